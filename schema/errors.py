@@ -1,0 +1,40 @@
+"""Every error that one part of Revolve reports to another.
+
+Whose fault an error is decides its class, and the class decides what is done.
+"""
+
+
+class RevolveError(Exception):
+    """Base of all errors that a user may see as one line."""
+
+
+class ExperimentError(RevolveError):
+    """The user's document is wrong: says where, what came, what is allowed."""
+
+
+class UnknownPlugin(ExperimentError):  # noqa: N818 - reads as what it says
+    """A ``module:attribute`` or a name that nothing answers to."""
+
+
+class InvalidRobot(RevolveError):  # noqa: N818 - reads as what it says
+    """A robot or genome that breaks the rules of its body space."""
+
+
+class RunFolderError(RevolveError):
+    """A run folder that is in use, damaged, missing or already taken."""
+
+
+class NetworkError(RevolveError):
+    """An address that cannot be listened on or reached."""
+
+
+class MalformedMessage(RevolveError):  # noqa: N818 - reads as what it says
+    """Bytes of a peer that do not decode: count them, drop them, go on."""
+
+
+class UnexpectedEvent(RevolveError):  # noqa: N818 - reads as what it says
+    """An event that the machine's state does not allow: our own fault, stop."""
+
+
+class SimulationDiverged(RevolveError):  # noqa: N818 - reads as what it says
+    """The physics left the realm of numbers: nobody's fault, a result."""

@@ -1,0 +1,175 @@
+"""The genome that evolution varies, and its development into a robot.
+
+A genome is a tree of nodes. Each node owns the neurons of its part and the
+connections that leave them. A connection names its target by a path: the slots
+to follow from the source node, towards parent or child alike. Subtrees can
+therefore move between genomes and keep their wiring; a path that leads nowhere
+in the new place is kept, and ignored in the robot.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from schema.brain import INPUT, Brain, Connection, Layer, Neuron
+from schema.parts import BodySpace
+from schema.robot import Part, Robot
+
+
+@dataclass(frozen=True, slots=True)
+class NeuronGene:
+    """An output or hidden neuron: its type and that type's parameters."""
+
+    kind: str
+    parameters: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectionGene:
+    """A connection that leaves a neuron of the node that owns it.
+
+    Attributes:
+        source: layer and offset within the owning node.
+        path: slots to follow from the owning node; empty is the node itself.
+        target: layer and offset within the node at the path's end.
+        weight: factor of the source's state.
+    """
+
+    source: tuple[Layer, int]
+    path: tuple[int, ...]
+    target: tuple[Layer, int]
+    weight: float
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One gene of a genome: a part with its share of the brain.
+
+    Attributes:
+        kind: name of the part type.
+        slot: own slot that joins it to its parent; -1 for the root.
+        orientation: turn about its own slot's normal [degrees].
+        parameters: values in the order of the part type's ``parameters``.
+        gene: identity that outlives variation; equal genes share an origin.
+        outputs: one neuron for each motor of the part.
+        hidden: hidden neurons that live on this part.
+        connections: those whose source is a neuron of this node.
+        children: (slot of this node, child), by ascending slot.
+    """
+
+    kind: str
+    slot: int
+    orientation: int
+    parameters: tuple[float, ...]
+    gene: int = 0
+    outputs: tuple[NeuronGene, ...] = ()
+    hidden: tuple[NeuronGene, ...] = ()
+    connections: tuple[ConnectionGene, ...] = ()
+    children: "tuple[tuple[int, Node], ...]" = ()
+
+
+Genome = Node
+"""A genome is its root node."""
+
+
+def walk(genome: Genome) -> Iterator[tuple[Node, int, int]]:
+    """Yield (node, index of its parent, slot of its parent), depth first.
+
+    The core comes first, with (-1, -1); children by ascending slot, as the parts
+    of a robot stand.
+    """
+    stack: list[tuple[Node, int, int]] = [(genome, -1, -1)]
+    index = 0
+    while stack:
+        entry = stack.pop()
+        yield entry
+        stack.extend(
+            (child, index, slot) for slot, child in reversed(entry[0].children)
+        )
+        index += 1
+
+
+def develop(genome: Genome, space: BodySpace) -> Robot:
+    """Return the robot that a genome describes.
+
+    Paths that cannot be followed or that end at a missing neuron are left out,
+    and so is every connection after the first between the same two neurons.
+
+    Args:
+        genome: a well-formed genome of this body space.
+        space: its part types.
+
+    Returns:
+        The robot: parts in depth-first order, neurons by layer and then by part.
+    """
+    entries = list(walk(genome))
+    parts = tuple(
+        Part(
+            node.kind,
+            parent,
+            parent_slot,
+            node.slot,
+            node.orientation,
+            node.parameters,
+            node.gene,
+        )
+        for node, parent, parent_slot in entries
+    )
+    inputs: list[Neuron] = []
+    outputs: list[Neuron] = []
+    hidden: list[Neuron] = []
+    first: list[dict[Layer, tuple[int, int]]] = []
+    for index, (node, _, _) in enumerate(entries):
+        input_count = space[node.kind].inputs
+        first.append(
+            {
+                "input": (len(inputs), input_count),
+                "output": (len(outputs), len(node.outputs)),
+                "hidden": (len(hidden), len(node.hidden)),
+            }
+        )
+        inputs.extend(Neuron("input", INPUT, index) for _ in range(input_count))
+        outputs.extend(
+            Neuron("output", gene.kind, index, gene.parameters)
+            for gene in node.outputs
+        )
+        hidden.extend(
+            Neuron("hidden", gene.kind, index, gene.parameters)
+            for gene in node.hidden
+        )
+    layer_start: dict[Layer, int] = {
+        "input": 0,
+        "output": len(inputs),
+        "hidden": len(inputs) + len(outputs),
+    }
+
+    def find(index: int, neuron: tuple[Layer, int]) -> int | None:
+        layer, offset = neuron
+        start, count = first[index][layer]
+        return layer_start[layer] + start + offset if offset < count else None
+
+    neighbours = _neighbours(entries)
+    edges: dict[tuple[int, int], Connection] = {}
+    for index, (node, _, _) in enumerate(entries):
+        for gene in node.connections:
+            end: int | None = index
+            for slot in gene.path:
+                end = None if end is None else neighbours[end].get(slot)
+            if end is None or gene.target[0] == "input":
+                continue
+            source, target = find(index, gene.source), find(end, gene.target)
+            if source is not None and target is not None:
+                edge = Connection(source, target, gene.weight)
+                edges.setdefault((source, target), edge)
+    return Robot(
+        parts, Brain((*inputs, *outputs, *hidden), tuple(edges.values()))
+    )
+
+
+def _neighbours(entries: list[tuple[Node, int, int]]) -> list[dict[int, int]]:
+    """Return, for each node, the node that each of its used slots leads to."""
+    neighbours: list[dict[int, int]] = [{} for _ in entries]
+    for index, (node, parent, parent_slot) in enumerate(entries):
+        if parent >= 0:
+            neighbours[index][node.slot] = parent
+            neighbours[parent][parent_slot] = index
+    return neighbours

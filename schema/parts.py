@@ -1,0 +1,316 @@
+"""Part types as data: the RoboGen body space as Revolve changed it.
+
+All lengths are metres, masses kilograms, angles radians. Each part has a frame
+of its own whose origin is the centre of its root box.
+
+Source: Hupkes, *Revolve*, 2016, table 5.1, and its published code; where the two
+differ the code is followed, because it produced the results.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+Vector = tuple[float, float, float]
+Matrix = tuple[Vector, Vector, Vector]
+
+IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+BAR_KG_PER_M = 0.02
+"""Mass of a bar per metre: 0.2 g/cm as coded; the author meant 2 g/cm."""
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """One box of a part, of uniform density; it collides and it weighs.
+
+    Attributes:
+        name: unique within the part.
+        size: full lengths along its own x, y, z [m].
+        position: centre in the part frame [m].
+        mass: [kg].
+        segment: 0 on slot 0's side of the joint, 1 beyond it.
+        rotation: box frame to part frame, rows first.
+    """
+
+    name: str
+    size: Vector
+    position: Vector
+    mass: float
+    segment: int = 0
+    rotation: Matrix = IDENTITY
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """A place where two parts meet: position [m], outward normal, tangent."""
+
+    position: Vector
+    normal: Vector
+    tangent: Vector
+    segment: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A revolute joint between a part's two segments.
+
+    Attributes:
+        anchor: a point of the axis in the part frame [m].
+        axis: a positive angle turns segment 1 about it relative to segment 0.
+        limit: the angle stays within +-limit [rad].
+    """
+
+    anchor: Vector
+    axis: Vector
+    limit: float
+
+
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """A position servo that commands a velocity and holds it between ticks.
+
+    Commanded velocity = gain * (target - angle) [rad/s], where target runs over
+    the joint's range as the network output runs over [0, 1].
+    """
+
+    gain: float
+    max_torque: float
+    max_velocity: float
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """A sensor: ``imu`` gives 6 inputs, ``touch`` and ``light`` one each.
+
+    Attributes:
+        kind: what it measures.
+        box: name of the box that it sits in (imu, light) or feels with (touch).
+    """
+
+    kind: Literal["imu", "touch", "light"]
+    box: str
+
+    @property
+    def inputs(self) -> int:
+        """Number of network inputs that it feeds."""
+        return 6 if self.kind == "imu" else 1
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A number that a part carries, drawn uniformly from [low, high].
+
+    ``is_mutable`` false keeps it as inherited (colours).
+    """
+
+    name: str
+    low: float
+    high: float
+    default: float
+    is_mutable: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """Geometry of a part for given parameters; ``joint`` is None if rigid."""
+
+    boxes: tuple[Box, ...]
+    slots: tuple[Slot, ...]
+    joint: Joint | None = None
+
+
+COLOURS = tuple(
+    Parameter(name, 0.0, 1.0, 0.5, is_mutable=False)
+    for name in ("red", "green", "blue")
+)
+
+
+@dataclass(frozen=True, slots=True)
+class PartType:
+    """A kind of part.
+
+    Attributes:
+        name: as it stands in genomes, files and tables.
+        arity: number of slots.
+        shape: parameter values, in the order of ``parameters``, to geometry.
+        own_parameters: those before the three colours.
+        sensors: in the order of the inputs that they feed.
+        motor: the drive of the joint; one network output; None if there is none.
+        is_root: it is a core: always and only the root of a tree.
+        is_levelled: planarity turns it back to the plane of the core.
+        not_on: names of part types that it is never put on at random.
+    """
+
+    name: str
+    arity: int
+    shape: Callable[[tuple[float, ...]], Shape]
+    own_parameters: tuple[Parameter, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    motor: Motor | None = None
+    is_root: bool = False
+    is_levelled: bool = False
+    not_on: tuple[str, ...] = ()
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters, in the order in which they are written."""
+        return self.own_parameters + COLOURS
+
+    @property
+    def inputs(self) -> int:
+        """Number of network inputs that its sensors feed."""
+        return sum(sensor.inputs for sensor in self.sensors)
+
+    @property
+    def outputs(self) -> int:
+        """Number of network outputs that drive it."""
+        return 0 if self.motor is None else 1
+
+
+BodySpace = Mapping[str, PartType]
+"""The part types that an experiment allows, by name, in a fixed order."""
+
+_PLATE: Vector = (0.0015, 0.034, 0.034)
+_X: Vector = (1.0, 0.0, 0.0)
+_Y: Vector = (0.0, 1.0, 0.0)
+_Z: Vector = (0.0, 0.0, 1.0)
+_MINUS_X: Vector = (-1.0, 0.0, 0.0)
+_MINUS_Y: Vector = (0.0, -1.0, 0.0)
+_BASE_SLOT_Y = Slot((-0.00075, 0.0, 0.0), _MINUS_X, _Y)
+
+SERVO = Motor(gain=0.9, max_torque=0.17658, max_velocity=5.236)
+"""1.8 kg cm, 50 rpm; the gain is the thesis's, about ten times slower than RoboGen's."""
+
+
+def _side_slots(reach: float) -> tuple[Slot, ...]:
+    """Return the four slots (front, back, right, left) of a box-shaped part."""
+    return (
+        Slot((0.0, -reach, 0.0), _MINUS_Y, _Z),
+        Slot((0.0, reach, 0.0), _Y, _Z),
+        Slot((reach, 0.0, 0.0), _X, _Z),
+        Slot((-reach, 0.0, 0.0), _MINUS_X, _Z),
+    )
+
+
+_CORE = Shape(
+    boxes=(Box("body", (0.09, 0.09, 0.045), (0.0, 0.0, 0.0), 0.09),),
+    slots=_side_slots(0.045),
+)
+_BRICK = Shape(
+    boxes=(Box("body", (0.041, 0.041, 0.0355), (0.0, 0.0, 0.0), 0.0102),),
+    slots=_side_slots(0.0205),
+)
+_ACTIVE_HINGE = Shape(
+    boxes=(
+        Box("root", _PLATE, (0.0, 0.0, 0.0), 0.007),
+        Box("frame", (0.018, 0.034, 0.01), (0.00985, 0.0, 0.0), 0.0012),
+        Box("servo", (0.0245, 0.034, 0.01), (0.0231, 0.0, 0.0), 0.009, 1),
+        Box("tail", _PLATE, (0.0362, 0.0, 0.0), 0.007, 1),
+    ),
+    slots=(
+        Slot((-0.00075, 0.0, 0.0), _MINUS_X, _Z),
+        Slot((0.03695, 0.0, 0.0), _X, _Z, 1),
+    ),
+    joint=Joint((0.01485, 0.0, 0.0), _MINUS_Y, math.radians(45)),
+)
+_HINGE = Shape(
+    boxes=(
+        Box("root", _PLATE, (0.0, 0.0, 0.0), 0.002),
+        Box("conn_a", (0.0205, 0.002, 0.02), (0.0111, 0.0, 0.0), 0.001),
+        Box("conn_b", (0.0205, 0.002, 0.02), (0.0276, 0.0, 0.0), 0.001, 1),
+        Box("tail", _PLATE, (0.0387, 0.0, 0.0), 0.002, 1),
+    ),
+    slots=(
+        Slot((-0.00075, 0.0, 0.0), _MINUS_X, _Z),
+        Slot((0.03945, 0.0, 0.0), _X, _Z, 1),
+    ),
+    joint=Joint((0.01935, 0.0, 0.0), _Z, math.radians(60)),
+)
+_TOUCH = Shape(
+    boxes=(
+        Box("base", _PLATE, (0.0, 0.0, 0.0), 0.003),
+        Box("left", (0.009, 0.0185, 0.016), (0.00525, -0.01025, 0.0), 0.003),
+        Box("right", (0.009, 0.0185, 0.016), (0.00525, 0.01025, 0.0), 0.003),
+    ),
+    slots=(_BASE_SLOT_Y,),
+)
+_LIGHT = Shape(
+    boxes=(Box("base", _PLATE, (0.0, 0.0, 0.0), 0.002),), slots=(_BASE_SLOT_Y,)
+)
+
+
+def _bar(values: tuple[float, ...]) -> Shape:
+    """Return a bar: a plate, a strip and a tail plate tilted by alpha, beta.
+
+    The length is carried in millimetres, as the genome of the original does.
+    """
+    length, alpha, beta = values[0] / 1000.0, values[1], values[2]
+    sa, ca, sb, cb = math.sin(alpha), math.cos(alpha), math.sin(beta), math.cos(beta)
+    # Rotation about x by beta first, then about y by alpha.
+    tilt: Matrix = ((ca, sa * sb, sa * cb), (0.0, cb, -sb), (-sa, ca * sb, ca * cb))
+    tail = length + 0.0015
+    normal, tangent = (ca, 0.0, -sa), (sa * sb, cb, ca * sb)
+    end = (tail + 0.00075 * ca, 0.0, -0.00075 * sa)
+    return Shape(
+        boxes=(
+            Box("root", _PLATE, (0.0, 0.0, 0.0), 0.001),
+            Box(
+                "bar",
+                (length, 0.02, 0.002),
+                (0.00075 + length / 2, 0.0, 0.0),
+                BAR_KG_PER_M * length,
+            ),
+            Box("tail", _PLATE, (tail, 0.0, 0.0), 0.001, 0, tilt),
+        ),
+        slots=(_BASE_SLOT_Y, Slot(end, normal, tangent)),
+    )
+
+
+def _constant(shape: Shape) -> Callable[[tuple[float, ...]], Shape]:
+    """Return a function that gives the same shape for any parameters."""
+    return lambda _values: shape
+
+
+CORE = PartType(
+    "Core", 4, _constant(_CORE), sensors=(Sensor("imu", "body"),), is_root=True
+)
+FIXED_BRICK = PartType("FixedBrick", 4, _constant(_BRICK), is_levelled=True)
+ACTIVE_HINGE = PartType("ActiveHinge", 2, _constant(_ACTIVE_HINGE), motor=SERVO)
+HINGE = PartType("Hinge", 2, _constant(_HINGE))
+PARAMETRIC_BAR_JOINT = PartType(
+    "ParametricBarJoint",
+    2,
+    _bar,
+    own_parameters=(
+        Parameter("connection_length", 20.0, 100.0, 50.0),
+        Parameter("alpha", -math.pi / 2, math.pi / 2, 0.0),
+        # The original forces beta to 0 while bodies are planar, as all are.
+        Parameter("beta", 0.0, 0.0, 0.0),
+    ),
+    is_levelled=True,
+    not_on=("ParametricBarJoint",),
+)
+TOUCH_SENSOR = PartType(
+    "TouchSensor",
+    1,
+    _constant(_TOUCH),
+    sensors=(Sensor("touch", "left"), Sensor("touch", "right")),
+)
+LIGHT_SENSOR = PartType(
+    "LightSensor", 1, _constant(_LIGHT), sensors=(Sensor("light", "base"),)
+)
+
+BUILT_IN: BodySpace = {
+    part_type.name: part_type
+    for part_type in (
+        CORE,
+        FIXED_BRICK,
+        ACTIVE_HINGE,
+        HINGE,
+        PARAMETRIC_BAR_JOINT,
+        TOUCH_SENSOR,
+        LIGHT_SENSOR,
+    )
+}
+"""The part set T of the thesis, table 5.1, and its light sensor."""

@@ -1,0 +1,37 @@
+"""Code named by data: ``"package.module:attribute"``.
+
+Nothing registers itself; the process that runs the code resolves its name.
+"""
+
+from functools import lru_cache
+from importlib import import_module
+from difflib import get_close_matches
+
+from schema.errors import UnknownPlugin
+
+
+@lru_cache(maxsize=256)
+def load(path: str, where: str) -> object:
+    """Return what a dotted path names.
+
+    Args:
+        path: ``package.module:attribute``.
+        where: the key that holds it, for messages.
+
+    Raises:
+        UnknownPlugin: not of that form, no such module, no such attribute (the
+            nearest is named).
+    """
+    module_name, colon, attribute = path.partition(":")
+    if not (colon and module_name and attribute):
+        raise UnknownPlugin(f"{where}: must be 'module:attribute', got {path!r}")
+    try:
+        module = import_module(module_name)
+    except ImportError as error:
+        raise UnknownPlugin(f"{where}: {path!r}: {error}") from None
+    if not hasattr(module, attribute):
+        names = [name for name in vars(module) if not name.startswith("_")]
+        near = get_close_matches(attribute, names, n=1)
+        hint = f"; did you mean '{module_name}:{near[0]}'?" if near else ""
+        raise UnknownPlugin(f"{where}: {module_name} has no {attribute!r}{hint}")
+    return getattr(module, attribute)

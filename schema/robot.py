@@ -1,0 +1,163 @@
+"""A robot: a tree of parts and a brain, the phenotype that is built and judged.
+
+Parts stand in a flat tuple in depth-first order (children by ascending slot of
+their parent), each naming its parent, so that index 0 is always the core.
+"""
+
+import math
+from dataclasses import dataclass
+
+from schema.brain import Brain, check_brain
+from schema.errors import InvalidRobot
+from schema.parts import BodySpace, PartType
+
+ORIENTATIONS = (0, 90, 180, 270)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One part of a body.
+
+    Attributes:
+        kind: name of its part type.
+        parent: index of its parent; -1 for the core.
+        parent_slot: slot of the parent that it sits on; -1 for the core.
+        slot: own slot that it sits with; -1 for the core.
+        orientation: turn about its own slot's normal [degrees].
+        parameters: values in the order of its type's ``parameters``.
+        gene: identity that the part inherits along its line of descent.
+    """
+
+    kind: str
+    parent: int
+    parent_slot: int
+    slot: int
+    orientation: int
+    parameters: tuple[float, ...]
+    gene: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A body and the brain that drives it."""
+
+    parts: tuple[Part, ...]
+    brain: Brain = Brain()
+
+
+def check_robot(robot: Robot, space: BodySpace) -> None:
+    """Raise unless a robot is well formed in a body space.
+
+    Whether its parts intersect is the analyzer's question, not this one's.
+
+    Args:
+        robot: the robot.
+        space: the part types that it may use.
+
+    Raises:
+        InvalidRobot: no core or more than one, an unknown part type, a slot that
+            does not exist or is taken, parts out of depth-first order, a wrong
+            number of parameters or not finite ones, a brain that breaks its
+            rules or does not fit the sensors and motors of the body.
+    """
+    if not robot.parts:
+        raise InvalidRobot("body: a robot needs at least its core")
+    taken: set[tuple[int, int]] = set()
+    for index, part in enumerate(robot.parts):
+        _check_part(part, index, space)
+        if part.parent < 0:
+            continue
+        for end in ((part.parent, part.parent_slot), (index, part.slot)):
+            owner = robot.parts[end[0]]
+            arity = space[owner.kind].arity
+            if not 0 <= end[1] < arity:
+                raise InvalidRobot(
+                    f"body.parts[{index}]: {owner.kind} has slots 0..{arity - 1}, "
+                    f"got {end[1]}"
+                )
+            if end in taken:
+                raise InvalidRobot(
+                    f"body.parts[{index}]: slot {end[1]} of part {end[0]} is taken"
+                )
+            taken.add(end)
+    _check_order(robot)
+    check_brain(robot.brain, len(robot.parts))
+    _check_wiring(robot, space)
+
+
+def _check_part(part: Part, index: int, space: BodySpace) -> None:
+    where = f"body.parts[{index}]"
+    kind = part_type(part.kind, space, where)
+    if kind.is_root != (index == 0) or (part.parent < 0) != (index == 0):
+        raise InvalidRobot(
+            f"{where}: exactly the first part must be a core, got {part.kind}"
+        )
+    if not -1 <= part.parent < index:
+        raise InvalidRobot(f"{where}.parent: must stand before it, got {part.parent}")
+    if part.orientation not in ORIENTATIONS:
+        raise InvalidRobot(
+            f"{where}.orientation: must be one of {ORIENTATIONS}, "
+            f"got {part.orientation}"
+        )
+    if len(part.parameters) != len(kind.parameters):
+        raise InvalidRobot(
+            f"{where}.parameters: {part.kind} takes {len(kind.parameters)}, "
+            f"got {len(part.parameters)}"
+        )
+    for parameter, value in zip(kind.parameters, part.parameters, strict=True):
+        if not (math.isfinite(value) and parameter.low <= value <= parameter.high):
+            raise InvalidRobot(
+                f"{where}.{parameter.name}: must be in "
+                f"[{parameter.low}, {parameter.high}], got {value}"
+            )
+
+
+def part_type(name: str, space: BodySpace, where: str) -> PartType:
+    """Return the part type of a name.
+
+    Raises:
+        InvalidRobot: the body space has none of that name.
+    """
+    if name not in space:
+        raise InvalidRobot(
+            f"{where}.kind: must be one of {', '.join(space)}, got {name!r}"
+        )
+    return space[name]
+
+
+def _check_order(robot: Robot) -> None:
+    """Raise unless parts stand depth first, children by ascending slot."""
+    path: list[int] = []
+    last_slot: dict[int, int] = {}
+    for index, part in enumerate(robot.parts):
+        while path and path[-1] != part.parent:
+            path.pop()
+        is_first = index == 0
+        if not is_first and (
+            not path or last_slot.get(part.parent, -1) >= part.parent_slot
+        ):
+            raise InvalidRobot(
+                f"body.parts[{index}]: parts must stand depth first, "
+                "children by ascending slot"
+            )
+        last_slot[part.parent] = part.parent_slot
+        path.append(index)
+
+
+def _check_wiring(robot: Robot, space: BodySpace) -> None:
+    """Raise unless inputs and outputs are those of the sensors and motors."""
+    for layer, count_of in (
+        ("input", lambda kind: kind.inputs),
+        ("output", lambda kind: kind.outputs),
+    ):
+        expected = [
+            index
+            for index, part in enumerate(robot.parts)
+            for _ in range(count_of(space[part.kind]))
+        ]
+        owners = [n.part for n in robot.brain.neurons if n.layer == layer]
+        if owners != expected:
+            raise InvalidRobot(
+                f"brain: {layer} neurons must belong to parts {expected}, "
+                f"got {owners}"
+            )
