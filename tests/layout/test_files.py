@@ -1,0 +1,87 @@
+"""What no committed file may hold: one machine's paths, one registry's address."""
+
+import re
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+# Put together here so that this file does not hold them either.
+HOSTS = tuple(
+    ".".join(labels)
+    for labels in (
+        ("pypi", "org"),
+        ("pythonhosted", "org"),
+        ("anaconda", "org"),
+        ("npmjs", "org"),
+        ("npmjs", "com"),
+        ("crates", "io"),
+    )
+)
+# An absolute path below a folder that only one machine has.
+MACHINE_PATH = re.compile(r"(?<![\w.}\])])/(?:work|root|home|Users)/\w")
+
+
+def tracked() -> list[Path]:
+    """Return the files that git tracks and that are there."""
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        pytest.skip("not a git checkout")
+    listing = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True
+    ).stdout
+    paths = [ROOT / name for name in listing.split("\0") if name]
+    return [path for path in paths if path.is_file()]
+
+
+def texts() -> dict[str, str]:
+    """Return the text of each tracked file by its name; bytes that are no text go."""
+    return {
+        path.relative_to(ROOT).as_posix(): path.read_text("utf-8", errors="ignore")
+        for path in tracked()
+    }
+
+
+def test_no_file_names_a_registry() -> None:
+    found = [
+        (name, host)
+        for name, text in texts().items()
+        for host in HOSTS
+        if host in text.lower()
+    ]
+    assert found == []
+
+
+def test_no_file_names_a_path_of_one_machine() -> None:
+    found = {name: MACHINE_PATH.findall(text) for name, text in texts().items()}
+    assert {name: hits for name, hits in found.items() if hits} == {}
+
+
+@pytest.mark.parametrize("before", ["", "see ", "(", '"', "file://"])
+def test_a_path_of_one_machine_is_seen(before: str) -> None:
+    assert MACHINE_PATH.search(before + "/" + "home/ada/runs")
+
+
+@pytest.mark.parametrize("text", ["runs/work/x", "../home/y", "tcp/host/root/z"])
+def test_a_relative_path_is_left_alone(text: str) -> None:
+    assert not MACHINE_PATH.search(text)
+
+
+def test_constraints_are_names_and_versions() -> None:
+    lines = (ROOT / "constraints.txt").read_text("utf-8").splitlines()
+    pins = [line for line in lines if not line.startswith("#")]
+    assert pins
+    assert [line for line in pins if not re.fullmatch(r"[\w.-]+==[\w.]+", line)] == []
+
+
+def test_every_dependency_is_pinned() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    wanted = [*project["dependencies"]]
+    for extra in project["optional-dependencies"].values():
+        wanted += extra
+    pins = (ROOT / "constraints.txt").read_text("utf-8").lower().replace("_", "-")
+    names = [re.split(r"[^\w.-]", line.lower())[0] for line in wanted]
+    assert [name for name in names if f"\n{name}==" not in pins] == []

@@ -1,0 +1,40 @@
+"""The wheel holds all that runs, and nothing else."""
+
+import zipfile
+from pathlib import Path
+
+import pytest
+from hatchling.builders.wheel import WheelBuilder
+
+ROOT = Path(__file__).parents[2]
+ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis")
+
+pytestmark = pytest.mark.system
+
+
+@pytest.fixture(scope="module")
+def names(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
+    """Return the names in a freshly built wheel."""
+    folder = tmp_path_factory.mktemp("wheel")
+    builder = WheelBuilder(str(ROOT))
+    (wheel,) = builder.build(directory=str(folder), versions=["standard"])
+    return set(zipfile.ZipFile(wheel).namelist())
+
+
+def test_wheel_holds_every_file_of_the_rooms(names: set[str]) -> None:
+    wanted = {
+        path.relative_to(ROOT).as_posix()
+        for room in ROOMS
+        for pattern in ("*.py", "*.pyi", "*.toml", "*.proto")
+        for path in (ROOT / room).rglob(pattern)
+    }
+    assert wanted <= names
+    assert {"revolve.py", "schema/revolve.proto"} <= names
+    assert any(name.startswith("coordinator/experiments/") for name in names)
+
+
+def test_wheel_holds_nothing_else(names: set[str]) -> None:
+    tops = {name.partition("/")[0] for name in names}
+    (metadata,) = (top for top in tops if top.endswith(".dist-info"))
+    assert tops == {"revolve.py", *ROOMS, metadata}
+    assert f"{metadata}/entry_points.txt" in names
