@@ -1,0 +1,250 @@
+"""A genome in the making: the tree that generation and variation cut and graft.
+
+A genome never changes; a `Branch` may. It is thawed from a genome, worked upon
+within one function call, and frozen into a new genome.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import count
+from typing import NamedTuple
+
+from schema.birth import BirthId
+from schema.brain import Layer
+from schema.experiment import Space
+from schema.genome import ConnectionGene, Genome, NeuronGene, Node
+from schema.parts import BodySpace, PartType
+
+
+@dataclass(slots=True, eq=False)
+class Branch:
+    """A node that may still change; its fields are those of `Node`.
+
+    ``parent`` and ``parent_slot`` are None and -1 at the root.
+    """
+
+    kind: PartType
+    slot: int
+    orientation: int
+    parameters: tuple[float, ...]
+    gene: int
+    outputs: tuple[NeuronGene, ...] = ()
+    hidden: tuple[NeuronGene, ...] = ()
+    connections: tuple[ConnectionGene, ...] = ()
+    parent: "Branch | None" = None
+    parent_slot: int = -1
+    children: "dict[int, Branch]" = field(default_factory=dict)
+
+    def free_slots(self) -> list[int]:
+        """Return the slots that nothing sits on, ascending."""
+        return [
+            slot
+            for slot in range(self.kind.arity)
+            if slot != self.slot and slot not in self.children
+        ]
+
+    def graft(self, child: "Branch", slot: int) -> None:
+        """Put a child on a slot, in the place of whatever sat there."""
+        child.parent, child.parent_slot = self, slot
+        self.children[slot] = child
+
+    def cut(self) -> None:
+        """Take this branch, which must not be a root, off its parent."""
+        assert self.parent is not None
+        del self.parent.children[self.parent_slot]
+        self.parent, self.parent_slot = None, -1
+
+    def neurons(self, *layers: Layer) -> list[tuple[Layer, int]]:
+        """Return (layer, offset) of its own neurons of some layers, in turn."""
+        counts = {
+            "input": self.kind.inputs,
+            "output": len(self.outputs),
+            "hidden": len(self.hidden),
+        }
+        return [(layer, k) for layer in layers for k in range(counts[layer])]
+
+
+class Tally(NamedTuple):
+    """What restrictions limit, of a tree or a part of one."""
+
+    parts: int
+    inputs: int
+    outputs: int
+    hidden: int
+
+    def plus(self, other: "Tally", sign: int = 1) -> "Tally":
+        """Return the sum with another tally, or the difference for sign -1."""
+        return Tally(
+            self.parts + sign * other.parts,
+            self.inputs + sign * other.inputs,
+            self.outputs + sign * other.outputs,
+            self.hidden + sign * other.hidden,
+        )
+
+    def fits(self, space: Space) -> bool:
+        """Return whether it exceeds none of the greatest numbers."""
+        return (
+            self.parts <= space.max_parts
+            and self.inputs <= space.max_inputs
+            and self.outputs <= space.max_outputs
+            and self.hidden <= space.max_hidden
+        )
+
+
+def gene_ids(birth: BirthId) -> Iterator[int]:
+    """Return the gene identities that an individual may give to its new parts.
+
+    They are unique over a run: 16 bits of island, 32 of birth number and 16 of a
+    running index from 1, so that no gene is 0.
+    """
+    return count((birth.island << 48 | birth.number << 16) + 1)
+
+
+def thaw(genome: Genome, space: BodySpace) -> Branch:
+    """Return a genome as a tree that may change."""
+    root = _thaw_node(genome, space)
+    stack = [(genome, root)]
+    while stack:
+        node, branch = stack.pop()
+        for slot, child in node.children:
+            twig = _thaw_node(child, space)
+            branch.graft(twig, slot)
+            stack.append((child, twig))
+    return root
+
+
+def _thaw_node(node: Node, space: BodySpace) -> Branch:
+    return Branch(
+        space[node.kind],
+        node.slot,
+        node.orientation,
+        node.parameters,
+        node.gene,
+        node.outputs,
+        node.hidden,
+        node.connections,
+    )
+
+
+def freeze(root: Branch) -> Genome:
+    """Return a tree as a genome."""
+    frozen: dict[Branch, Node] = {}
+    for branch in reversed(preorder(root)):
+        frozen[branch] = Node(
+            branch.kind.name,
+            branch.slot,
+            branch.orientation,
+            branch.parameters,
+            branch.gene,
+            branch.outputs,
+            branch.hidden,
+            branch.connections,
+            tuple(
+                (slot, frozen[child]) for slot, child in sorted(branch.children.items())
+            ),
+        )
+    return frozen[root]
+
+
+def preorder(root: Branch) -> list[Branch]:
+    """Return a tree's branches depth first, children by ascending slot."""
+    order: list[Branch] = []
+    stack = [root]
+    while stack:
+        branch = stack.pop()
+        order.append(branch)
+        if branch.children:
+            stack += [branch.children[s] for s in sorted(branch.children, reverse=True)]
+    return order
+
+
+def copied(root: Branch) -> Branch:
+    """Return a copy of a tree that hangs nowhere."""
+    twins: dict[Branch, Branch] = {}
+    for branch in preorder(root):
+        twin = twins[branch] = Branch(
+            branch.kind,
+            branch.slot,
+            branch.orientation,
+            branch.parameters,
+            branch.gene,
+            branch.outputs,
+            branch.hidden,
+            branch.connections,
+        )
+        if branch is not root:
+            assert branch.parent is not None
+            twins[branch.parent].graft(twin, branch.parent_slot)
+    return twins[root]
+
+
+def tallies(root: Branch) -> dict[Branch, Tally]:
+    """Return the tally of every subtree, in depth-first order of their tops."""
+    order = preorder(root)
+    sums = {
+        branch: [1, branch.kind.inputs, len(branch.outputs), len(branch.hidden)]
+        for branch in order
+    }
+    for branch in reversed(order[1:]):
+        assert branch.parent is not None
+        above, own = sums[branch.parent], sums[branch]
+        for index, number in enumerate(own):
+            above[index] += number
+    return {branch: Tally(*numbers) for branch, numbers in sums.items()}
+
+
+def free_places(root: Branch) -> list[tuple[Branch, int]]:
+    """Return every (branch, free slot) of a tree, depth first."""
+    return [(branch, slot) for branch in preorder(root) for slot in branch.free_slots()]
+
+
+def lineage(branch: Branch) -> list[Branch]:
+    """Return a branch and its ancestors, up to the root."""
+    line = [branch]
+    while (parent := line[-1].parent) is not None:
+        line.append(parent)
+    return line
+
+
+def path_between(source: Branch, target: Branch) -> tuple[int, ...]:
+    """Return the slots to follow from one branch to another of its tree."""
+    if source is target:
+        return ()
+    down = {branch: depth for depth, branch in enumerate(lineage(target))}
+    path: list[int] = []
+    here = source
+    while here not in down:
+        path.append(here.slot)
+        assert here.parent is not None
+        here = here.parent
+    descent = list(down)[: down[here]]
+    return (*path, *(branch.parent_slot for branch in reversed(descent)))
+
+
+def follow(branch: Branch, path: tuple[int, ...]) -> Branch | None:
+    """Return the branch that a path leads to, or None if it leads nowhere."""
+    here: Branch | None = branch
+    for slot in path:
+        if here is None:
+            return None
+        here = here.parent if slot == here.slot else here.children.get(slot)
+    return here
+
+
+def level(root: Branch) -> None:
+    """Turn a tree's levelled parts back into the plane of its core.
+
+    Walking outwards, the turns add up; every part that is levelled gets the turn
+    that brings the sum back to zero, all others keep theirs.
+
+    Source: facts of the original, section 2 (planarity).
+    """
+    turns: dict[Branch, int] = {}
+    for branch in preorder(root):
+        if branch.parent is None:
+            branch.orientation = turns[branch] = 0
+            continue
+        before = turns[branch.parent]
+        if branch.kind.is_levelled:
+            branch.orientation = (360 - before) % 360
+        turns[branch] = (before + branch.orientation) % 360
