@@ -54,6 +54,27 @@ class Draws:
         """Return one value for each parameter, uniform in its range."""
         return tuple(map(self.value, parameters))
 
+    def nearby(
+        self,
+        parameters: Sequence[Parameter],
+        values: Sequence[float],
+        epsilon: float,
+    ) -> tuple[float, ...]:
+        """Return values moved by a share of the way to random ones.
+
+        Args:
+            parameters: their ranges; what is not mutable stays as it is.
+            values: one for each parameter.
+            epsilon: 0 leaves them, 1 draws them anew.
+        """
+        return tuple(
+            # Rounding must not carry a value out of its range.
+            min(max((1.0 - epsilon) * v + epsilon * self.value(p), p.low), p.high)
+            if p.is_mutable
+            else v
+            for p, v in zip(parameters, values, strict=True)
+        )
+
     def normal(self, mean: float, sd: float) -> float:
         """Return a normally distributed number; the mean itself where sd is 0."""
         number = self.number()

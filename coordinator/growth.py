@@ -4,6 +4,7 @@ Source: facts of the original, sections 4.3 and 4.5.
 """
 
 from collections.abc import Iterable, Iterator
+from fractions import Fraction
 
 from coordinator.branch import Branch, Tally, path_between
 from coordinator.draws import Draws
@@ -18,6 +19,11 @@ Ending = tuple[Branch, tuple[Layer, int]]
 """One end of a connection: a branch and a neuron of it."""
 
 _NEURONS = tuple(NEURON_TYPES.items())
+
+
+def half_up(number: Fraction) -> int:
+    """Return the nearest integer, the upper one of two: the original's rounding."""
+    return int(number + Fraction(1, 2))
 
 
 def random_neuron(draws: Draws) -> NeuronGene:

@@ -1,0 +1,129 @@
+"""How two parents make a child: crossover, mutation, and what is refused.
+
+Source: Hupkes 2016, sections 4.4.3 to 4.4.6; facts of the original, sections 4.4 to
+4.6. The analyzer's verdict, which ends a mating attempt, is asked for elsewhere.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from coordinator.body_mutation import (
+    add_parts,
+    delete_subtree,
+    duplicate_subtree,
+    swap_subtrees,
+    vary_parts,
+)
+from coordinator.brain_mutation import (
+    add_connections,
+    add_hidden_neurons,
+    delete_connections,
+    delete_hidden_neurons,
+    vary_neurons,
+)
+from coordinator.branch import Branch, freeze, gene_ids, level, tallies, thaw
+from coordinator.draws import Draws
+from schema.birth import BirthId
+from schema.experiment import Experiment, body_space
+from schema.genome import Genome
+
+
+def mate(
+    first: Genome,
+    second: Genome,
+    rng: np.random.Generator,
+    experiment: Experiment,
+    birth: BirthId,
+) -> Genome | None:
+    """Return a child of two parents, or None where this attempt comes to none.
+
+    Args:
+        first: gives the child its root.
+        second: gives a subtree.
+        rng: the stream of this attempt.
+        experiment: body space, restrictions, probabilities.
+        birth: whose genome it is to be; its new parts' identities are made of it.
+
+    Returns:
+        A genome within all restrictions, planar where bodies are, with at least
+        one motor; None if crossover finds no fitting subtree or no motor is left.
+    """
+    draws = Draws(rng)
+    types = body_space(experiment.space)
+    root = thaw(first, types)
+    if not crossover(draws, root, thaw(second, types), experiment):
+        return None
+    mutate(draws, root, gene_ids(birth), experiment)
+    if not tallies(root)[root].outputs:
+        return None
+    if experiment.space.planar:
+        level(root)
+    return freeze(root)
+
+
+def crossover(
+    draws: Draws, root: Branch, donor: Branch, experiment: Experiment
+) -> bool:
+    """Put a subtree of a donor in the place of one of a tree, neither a root.
+
+    The subtree that goes is uniform; the one that comes is uniform among those with
+    which the tree stays within its limits. It keeps its own slot and turn.
+
+    Args:
+        draws: where the choices come from.
+        root: the tree that changes.
+        donor: the other; what is taken is cut off it.
+        experiment: restrictions.
+
+    Returns:
+        Whether it was done; if not, the trees are as they were.
+    """
+    space = experiment.space
+    sizes, gifts = tallies(root), tallies(donor)
+    if len(sizes) == 1:
+        return False
+    gone = draws.pick(list(sizes)[1:])
+    rest = sizes[root].plus(sizes[gone], -1)
+    candidates = [
+        branch
+        for branch, size in gifts.items()
+        if branch.parent and rest.plus(size).fits(space)
+    ]
+    if not candidates:
+        return False
+    gift = draws.pick(candidates)
+    parts = rest.parts + gifts[gift].parts
+    if experiment.variation.check_min_parts and parts < space.min_parts:
+        return False
+    assert gone.parent is not None
+    gift.cut()
+    gone.parent.graft(gift, gone.parent_slot)
+    return True
+
+
+def mutate(
+    draws: Draws, root: Branch, genes: Iterator[int], experiment: Experiment
+) -> None:
+    """Change a tree in place, step by step in the order of the thesis.
+
+    Args:
+        draws: where all choices come from.
+        root: the tree.
+        genes: identities for parts that are added.
+        experiment: restrictions and probabilities.
+    """
+    variation = experiment.variation
+    delete_subtree(draws, root, experiment)
+    duplicate_subtree(draws, root, experiment)
+    swap_subtrees(draws, root, experiment)
+    sizes = tallies(root)
+    hidden = sizes[root].hidden
+    connections = sum(len(branch.connections) for branch in sizes)
+    delete_hidden_neurons(draws, root, variation.p_delete_hidden_neuron)
+    delete_connections(draws, root, variation.p_remove_brain_connection)
+    vary_parts(draws, root, variation.body_epsilon)
+    vary_neurons(draws, root, variation.brain_epsilon)
+    add_hidden_neurons(draws, root, hidden, experiment)
+    add_connections(draws, root, connections, experiment)
+    add_parts(draws, root, genes, experiment)
