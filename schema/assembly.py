@@ -76,4 +76,4 @@ def attach(parent: Slot, child: Slot, orientation: int) -> tuple[Floats, Floats]
 
 def _exact(value: float) -> float:
     """Return sine or cosine of a quarter turn without its rounding error."""
-    return float(round(value)) if abs(value - round(value)) < 1e-12 else value
+    return float(round(value))

@@ -84,13 +84,16 @@ def check_brain(brain: Brain, part_count: int) -> None:
         part_count: number of parts of its robot.
 
     Raises:
-        InvalidRobot: neurons out of layer order, of unknown type, with a wrong
+        InvalidRobot: neurons out of layer or part order, of unknown type, with a wrong
             number of parameters or not finite ones, on a part that does not
             exist; a connection to an input, to or from nowhere, or twice.
     """
-    order = [LAYERS.index(neuron.layer) for neuron in brain.neurons]
+    order = [(LAYERS.index(neuron.layer), neuron.part) for neuron in brain.neurons]
     if order != sorted(order):
-        raise InvalidRobot("brain.neurons: must be inputs, outputs, hidden in turn")
+        raise InvalidRobot(
+            "brain.neurons: must be inputs, outputs, hidden in turn, "
+            "each by ascending part"
+        )
     for index, neuron in enumerate(brain.neurons):
         _check_neuron(neuron, f"brain.neurons[{index}]", part_count)
     seen: set[tuple[int, int]] = set()

@@ -88,6 +88,19 @@ def walk(genome: Genome) -> Iterator[tuple[Node, int, int]]:
         index += 1
 
 
+def node_part(node: Node, parent: int, parent_slot: int) -> Part:
+    """Return the part that a node becomes on a slot of the parent at an index."""
+    return Part(
+        node.kind,
+        parent,
+        parent_slot,
+        node.slot,
+        node.orientation,
+        node.parameters,
+        node.gene,
+    )
+
+
 def develop(genome: Genome, space: BodySpace) -> Robot:
     """Return the robot that a genome describes.
 
@@ -103,16 +116,7 @@ def develop(genome: Genome, space: BodySpace) -> Robot:
     """
     entries = list(walk(genome))
     parts = tuple(
-        Part(
-            node.kind,
-            parent,
-            parent_slot,
-            node.slot,
-            node.orientation,
-            node.parameters,
-            node.gene,
-        )
-        for node, parent, parent_slot in entries
+        node_part(node, parent, parent_slot) for node, parent, parent_slot in entries
     )
     inputs: list[Neuron] = []
     outputs: list[Neuron] = []
@@ -129,12 +133,10 @@ def develop(genome: Genome, space: BodySpace) -> Robot:
         )
         inputs.extend(Neuron("input", INPUT, index) for _ in range(input_count))
         outputs.extend(
-            Neuron("output", gene.kind, index, gene.parameters)
-            for gene in node.outputs
+            Neuron("output", gene.kind, index, gene.parameters) for gene in node.outputs
         )
         hidden.extend(
-            Neuron("hidden", gene.kind, index, gene.parameters)
-            for gene in node.hidden
+            Neuron("hidden", gene.kind, index, gene.parameters) for gene in node.hidden
         )
     layer_start: dict[Layer, int] = {
         "input": 0,
@@ -160,9 +162,7 @@ def develop(genome: Genome, space: BodySpace) -> Robot:
             if source is not None and target is not None:
                 edge = Connection(source, target, gene.weight)
                 edges.setdefault((source, target), edge)
-    return Robot(
-        parts, Brain((*inputs, *outputs, *hidden), tuple(edges.values()))
-    )
+    return Robot(parts, Brain((*inputs, *outputs, *hidden), tuple(edges.values())))
 
 
 def _neighbours(entries: list[tuple[Node, int, int]]) -> list[dict[int, int]]:

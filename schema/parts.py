@@ -180,7 +180,7 @@ _MINUS_Y: Vector = (0.0, -1.0, 0.0)
 _BASE_SLOT_Y = Slot((-0.00075, 0.0, 0.0), _MINUS_X, _Y)
 
 SERVO = Motor(gain=0.9, max_torque=0.17658, max_velocity=5.236)
-"""1.8 kg cm, 50 rpm; the gain is the thesis's, about ten times slower than RoboGen's."""
+"""1.8 kg cm, 50 rpm; the gain is the thesis's, far slower than RoboGen's."""
 
 
 def _side_slots(reach: float) -> tuple[Slot, ...]:

@@ -3,9 +3,9 @@
 Nothing registers itself; the process that runs the code resolves its name.
 """
 
+from difflib import get_close_matches
 from functools import lru_cache
 from importlib import import_module
-from difflib import get_close_matches
 
 from schema.errors import UnknownPlugin
 

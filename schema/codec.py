@@ -1,0 +1,389 @@
+"""Bytes of robots, genomes, requests and answers: what travels and what is stored.
+
+Encoding is deterministic: equal values give equal bytes. Decoding trusts nobody:
+bytes are such a message and keep its rules, or ``MalformedMessage`` is raised.
+What needs the part types is ``schema.robot.check_robot``'s business.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from google.protobuf.message import DecodeError, Message
+
+from schema import revolve_pb2 as pb
+from schema.brain import (
+    NEURON_TYPES,
+    Brain,
+    Connection,
+    Layer,
+    Neuron,
+    check_brain,
+)
+from schema.errors import InvalidRobot, MalformedMessage
+from schema.evaluation import Evaluation, Report
+from schema.genome import ConnectionGene, Genome, NeuronGene, Node, node_part, walk
+from schema.parts import Vector
+from schema.robot import Part, Robot, check_tree
+
+M = TypeVar("M", bound=Message)
+T = TypeVar("T")
+
+_LAYER_CODES: dict[Layer, pb.Layer] = {
+    "input": pb.LAYER_INPUT,
+    "output": pb.LAYER_OUTPUT,
+    "hidden": pb.LAYER_HIDDEN,
+}
+_LAYERS: dict[int, Layer] = {int(code): name for name, code in _LAYER_CODES.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A request to an analyzer or a worker; its answer depends on nothing else.
+
+    Attributes:
+        run: name of the run that it belongs to.
+        epoch: incarnation of the run's coordinator.
+        number: of the job, unique within the epoch.
+        settings: JSON of ``VettingSettings`` or ``EvaluationSettings``.
+        robot: the robot in question.
+    """
+
+    run: str
+    epoch: int
+    number: int
+    settings: bytes
+    robot: Robot
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The answer to a request.
+
+    Attributes:
+        epoch, number: of the request.
+        wall_s: how long it took [s]; never decides anything.
+        result: what came out; a text says why the simulation came to nothing.
+    """
+
+    epoch: int
+    number: int
+    wall_s: float
+    result: Report | Evaluation | str
+
+
+def encode_robot(robot: Robot) -> bytes:
+    """Return the bytes of a robot."""
+    message = pb.Robot()
+    add_part = message.parts.add
+    for part in robot.parts:
+        _write_part(part, add_part())
+    add_neuron = message.neurons.add
+    for neuron in robot.brain.neurons:
+        add_neuron(
+            layer=_LAYER_CODES[neuron.layer],
+            kind=neuron.kind,
+            part=neuron.part,
+            parameters=neuron.parameters,
+        )
+    add_connection = message.connections.add
+    for edge in robot.brain.connections:
+        add_connection(source=edge.source, target=edge.target, weight=edge.weight)
+    return message.SerializeToString(deterministic=True)
+
+
+def decode_robot(data: bytes) -> Robot:
+    """Return the robot of some bytes.
+
+    Raises:
+        MalformedMessage: not a robot's bytes, no tree of parts, or a brain that
+            breaks its rules.
+    """
+    return _decoded(data, pb.Robot(), _robot_from_message)
+
+
+def encode_genome(genome: Genome) -> bytes:
+    """Return the bytes of a genome."""
+    message = pb.Genome()
+    for node, parent, parent_slot in walk(genome):
+        entry = message.nodes.add()
+        _write_part(node_part(node, parent, parent_slot), entry.part)
+        for gene in node.outputs:
+            entry.outputs.add(kind=gene.kind, parameters=gene.parameters)
+        for gene in node.hidden:
+            entry.hidden.add(kind=gene.kind, parameters=gene.parameters)
+        for edge in node.connections:
+            entry.connections.add(
+                source_layer=_LAYER_CODES[edge.source[0]],
+                source_offset=edge.source[1],
+                path=edge.path,
+                target_layer=_LAYER_CODES[edge.target[0]],
+                target_offset=edge.target[1],
+                weight=edge.weight,
+            )
+    return message.SerializeToString(deterministic=True)
+
+
+def decode_genome(data: bytes) -> Genome:
+    """Return the genome of some bytes.
+
+    Raises:
+        MalformedMessage: not a genome's bytes, no tree of nodes, an unknown neuron
+            type or layer, a number that is not finite.
+    """
+    return _decoded(data, pb.Genome(), _genome_from_message)
+
+
+def encode_request(
+    *, run: str, epoch: int, number: int, settings: bytes, robot: bytes
+) -> bytes:
+    """Return the bytes of a request; ``robot`` is already encoded."""
+    message = pb.Request(
+        run=run, epoch=epoch, number=number, settings=settings, robot=robot
+    )
+    return message.SerializeToString(deterministic=True)
+
+
+def decode_request(data: bytes) -> Request:
+    """Return the request of some bytes.
+
+    Raises:
+        MalformedMessage: not a request's bytes, or its robot is malformed.
+    """
+    return _decoded(data, pb.Request(), _request_from_message)
+
+
+def encode_answer(answer: Answer) -> bytes:
+    """Return the bytes of an answer."""
+    message = pb.Answer(epoch=answer.epoch, number=answer.number, wall_s=answer.wall_s)
+    if isinstance(answer.result, Report):
+        message.report.CopyFrom(report_to_message(answer.result))
+    elif isinstance(answer.result, Evaluation):
+        message.evaluation.CopyFrom(evaluation_to_message(answer.result))
+    else:
+        message.failure = answer.result
+    return message.SerializeToString(deterministic=True)
+
+
+def decode_answer(data: bytes) -> Answer:
+    """Return the answer of some bytes.
+
+    Raises:
+        MalformedMessage: not an answer's bytes, no result in it, a number that is
+            not finite.
+    """
+    return _decoded(data, pb.Answer(), _answer_from_message)
+
+
+def report_to_message(report: Report) -> pb.Report:
+    """Return a report as a message."""
+    return pb.Report(
+        is_viable=report.is_viable,
+        reason=report.reason,
+        intersections=[
+            pb.Intersection(first=first, second=second)
+            for first, second in report.intersections
+        ],
+        lower=_vector_to_message(report.lower),
+        upper=_vector_to_message(report.upper),
+        mass=report.mass,
+        motors=report.motors,
+    )
+
+
+def report_from_message(message: pb.Report) -> Report:
+    """Return the report of a message.
+
+    Raises:
+        MalformedMessage: a viable body with a reason why not, a missing corner, a
+            number that is not finite.
+    """
+    if message.is_viable and message.reason:
+        raise MalformedMessage(f"report: viable, and yet {message.reason!r}")
+    if not (message.HasField("lower") and message.HasField("upper")):
+        raise MalformedMessage("report: must hold both corners of the body")
+    return Report(
+        is_viable=message.is_viable,
+        reason=message.reason,
+        intersections=tuple(
+            (pair.first, pair.second) for pair in message.intersections
+        ),
+        lower=_vector_from_message(message.lower),
+        upper=_vector_from_message(message.upper),
+        mass=_finite(message.mass, "report.mass"),
+        motors=message.motors,
+    )
+
+
+def evaluation_to_message(evaluation: Evaluation) -> pb.Evaluation:
+    """Return an evaluation as a message."""
+    return pb.Evaluation(
+        fitness=evaluation.fitness,
+        path_velocity=evaluation.path_velocity,
+        straight_velocity=evaluation.straight_velocity,
+        simulated_s=evaluation.simulated_s,
+    )
+
+
+def evaluation_from_message(message: pb.Evaluation) -> Evaluation:
+    """Return the evaluation of a message.
+
+    Raises:
+        MalformedMessage: a number that is not finite.
+    """
+    return Evaluation(
+        fitness=_finite(message.fitness, "evaluation.fitness"),
+        path_velocity=_finite(message.path_velocity, "evaluation.path_velocity"),
+        straight_velocity=_finite(
+            message.straight_velocity, "evaluation.straight_velocity"
+        ),
+        simulated_s=_finite(message.simulated_s, "evaluation.simulated_s"),
+    )
+
+
+def _decoded(data: bytes, message: M, read: Callable[[M], T]) -> T:
+    """Return what ``read`` makes of a parsed message; any fault is the sender's."""
+    name = message.DESCRIPTOR.name
+    try:
+        message.ParseFromString(data)
+    except DecodeError as error:
+        raise MalformedMessage(f"not the bytes of a {name}: {error}") from None
+    try:
+        return read(message)
+    except InvalidRobot as error:
+        raise MalformedMessage(f"{name}: {error}") from None
+
+
+def _write_part(part: Part, message: pb.Part) -> None:
+    # Assignments cost half of what keyword arguments do.
+    message.kind = part.kind
+    message.parent = part.parent
+    message.parent_slot = part.parent_slot
+    message.slot = part.slot
+    message.orientation = part.orientation
+    message.parameters.extend(part.parameters)
+    message.gene = part.gene
+
+
+def _part_from_message(message: pb.Part) -> Part:
+    return Part(
+        message.kind,
+        message.parent,
+        message.parent_slot,
+        message.slot,
+        message.orientation,
+        tuple(message.parameters),
+        message.gene,
+    )
+
+
+def _robot_from_message(message: pb.Robot) -> Robot:
+    parts = tuple(map(_part_from_message, message.parts))
+    check_tree(parts)
+    brain = Brain(
+        neurons=tuple(
+            Neuron(_layer(item.layer), item.kind, item.part, tuple(item.parameters))
+            for item in message.neurons
+        ),
+        connections=tuple(
+            Connection(item.source, item.target, item.weight)
+            for item in message.connections
+        ),
+    )
+    check_brain(brain, len(parts))
+    return Robot(parts, brain)
+
+
+def _genome_from_message(message: pb.Genome) -> Genome:
+    parts = [_part_from_message(item.part) for item in message.nodes]
+    check_tree(parts)
+    children: list[list[tuple[int, Node]]] = [[] for _ in parts]
+    # Backwards, so that a node's children are there before it is made.
+    for index in range(len(parts) - 1, -1, -1):
+        part, item = parts[index], message.nodes[index]
+        node = Node(
+            kind=part.kind,
+            slot=part.slot,
+            orientation=part.orientation,
+            parameters=part.parameters,
+            gene=part.gene,
+            outputs=tuple(map(_neuron_gene, item.outputs)),
+            hidden=tuple(map(_neuron_gene, item.hidden)),
+            connections=tuple(map(_connection_gene, item.connections)),
+            children=tuple(reversed(children[index])),
+        )
+        if index == 0:
+            return node
+        children[part.parent].append((part.parent_slot, node))
+    raise MalformedMessage("genome: needs at least one node")
+
+
+def _neuron_gene(message: pb.NeuronGene) -> NeuronGene:
+    if message.kind not in NEURON_TYPES:
+        raise MalformedMessage(
+            f"neuron: must be one of {', '.join(NEURON_TYPES)}, got {message.kind!r}"
+        )
+    parameters = tuple(message.parameters)
+    expected = len(NEURON_TYPES[message.kind])
+    if len(parameters) != expected or not all(map(math.isfinite, parameters)):
+        raise MalformedMessage(
+            f"neuron: {message.kind} takes {expected} finite numbers, got {parameters}"
+        )
+    return NeuronGene(message.kind, parameters)
+
+
+def _connection_gene(message: pb.ConnectionGene) -> ConnectionGene:
+    return ConnectionGene(
+        source=(_layer(message.source_layer), message.source_offset),
+        path=tuple(message.path),
+        target=(_layer(message.target_layer), message.target_offset),
+        weight=_finite(message.weight, "connection.weight"),
+    )
+
+
+def _request_from_message(message: pb.Request) -> Request:
+    return Request(
+        run=message.run,
+        epoch=message.epoch,
+        number=message.number,
+        settings=message.settings,
+        robot=decode_robot(message.robot),
+    )
+
+
+def _answer_from_message(message: pb.Answer) -> Answer:
+    result: Report | Evaluation | str
+    match message.WhichOneof("result"):
+        case "report":
+            result = report_from_message(message.report)
+        case "evaluation":
+            result = evaluation_from_message(message.evaluation)
+        case "failure":
+            result = message.failure
+        case _:
+            raise MalformedMessage("answer: holds no result")
+    wall_s = _finite(message.wall_s, "answer.wall_s")
+    return Answer(message.epoch, message.number, wall_s, result)
+
+
+def _layer(code: int) -> Layer:
+    if code not in _LAYERS:
+        raise MalformedMessage(f"layer: must be one of {sorted(_LAYERS)}, got {code}")
+    return _LAYERS[code]
+
+
+def _finite(value: float, where: str) -> float:
+    if not math.isfinite(value):
+        raise MalformedMessage(f"{where}: must be finite, got {value}")
+    return value
+
+
+def _vector_to_message(vector: Vector) -> pb.Vector:
+    return pb.Vector(x=vector[0], y=vector[1], z=vector[2])
+
+
+def _vector_from_message(message: pb.Vector) -> Vector:
+    values: Sequence[float] = (message.x, message.y, message.z)
+    x, y, z = (_finite(value, "report corner") for value in values)
+    return x, y, z
