@@ -1,0 +1,192 @@
+"""Arrow tables of a run: what each column holds, its unit, whether it repeats.
+
+Every field carries ``unit`` and ``repeatable`` in its metadata. Repeatable columns
+are equal, row by row, in two runs of the same experiment and seed; the others tell
+of machines and clocks. Every row starts with ``record``, its number in its table.
+"""
+
+from typing import Any
+
+import pyarrow as pa
+
+from schema.brain import Layer
+from schema.genome import Genome, walk
+from schema.parts import BodySpace
+from schema.robot import Robot
+
+VERSION = 1
+"""Of all tables; goes up when a column changes its name, type or meaning."""
+
+Row = dict[str, Any]
+
+
+def _column(
+    name: str,
+    kind: pa.DataType,
+    unit: str = "",
+    *,
+    is_repeatable: bool = True,
+    is_nullable: bool = False,
+) -> pa.Field:
+    metadata = {"unit": unit, "repeatable": "true" if is_repeatable else "false"}
+    return pa.field(name, kind, nullable=is_nullable, metadata=metadata)
+
+
+def _table(name: str, *columns: pa.Field) -> pa.Schema:
+    metadata = {"revolve.schema": name, "revolve.schema_version": str(VERSION)}
+    return pa.schema([_column("record", pa.int64()), *columns], metadata=metadata)
+
+
+def _inner(name: str, kind: pa.DataType) -> pa.Field:
+    return pa.field(name, kind, nullable=False)
+
+
+PARENT = pa.struct([_inner("island", pa.int32()), _inner("birth", pa.int64())])
+"""A parent's name; the first of two is the one that was copied."""
+
+PART = pa.struct(
+    [
+        _inner("idx", pa.int32()),
+        _inner("parent", pa.int32()),
+        _inner("parent_slot", pa.int32()),
+        _inner("child_slot", pa.int32()),
+        _inner("kind", pa.string()),
+        _inner("rot", pa.int32()),
+        _inner("params", pa.list_(_inner("item", pa.float64()))),
+        _inner("gene", pa.uint64()),
+    ]
+)
+"""A part of a body, in the order and with the meaning of ``schema.robot.Part``."""
+
+BIRTHS = _table(
+    "births",
+    _column("island", pa.int32()),
+    _column("birth", pa.int64()),
+    _column("parents", pa.list_(_inner("item", PARENT))),
+    _column("generation", pa.int32(), is_nullable=True),
+    _column("rank", pa.int32()),
+    _column("attempts", pa.int32()),
+    _column("genome", pa.binary()),
+    _column("body", pa.list_(_inner("item", PART)), "params: m, rad, 1 by type"),
+    _column("parts", pa.int32()),
+    _column("joints", pa.int32()),
+    _column("motors", pa.int32()),
+    _column("extremities", pa.int32()),
+    _column("inputs", pa.int32()),
+    _column("outputs", pa.int32()),
+    _column("hidden", pa.int32()),
+    _column("connections", pa.int32()),
+)
+"""One row per individual born; founders have no parents."""
+
+EVALUATIONS = _table(
+    "evaluations",
+    _column("island", pa.int32()),
+    _column("birth", pa.int64()),
+    _column("status", pa.string()),
+    _column("reason", pa.string()),
+    _column("fitness", pa.float64(), is_nullable=True),
+    _column("path_velocity", pa.float64(), "m/s", is_nullable=True),
+    _column("straight_velocity", pa.float64(), "m/s", is_nullable=True),
+    _column("simulated_s", pa.float64(), "s", is_nullable=True),
+    _column("wall_s", pa.float64(), "s", is_repeatable=False),
+    _column("worker", pa.string(), is_repeatable=False),
+    _column("platform", pa.string(), is_repeatable=False),
+)
+"""One row per evaluation finished; status is "ok", or "failed" with a reason."""
+
+POPULATION = _table(
+    "population",
+    _column("island", pa.int32()),
+    _column("births", pa.int64()),
+    _column("birth", pa.int64()),
+    _column("fitness", pa.float64(), is_nullable=True),
+)
+"""One row per individual alive when ``births`` individuals had been born."""
+
+_INSTANT = pa.timestamp("ms", tz="UTC")
+
+RUNS = _table(
+    "runs",
+    _column("name", pa.string()),
+    _column("run", pa.int32()),
+    _column("seed", pa.uint64()),
+    _column("document", pa.string()),
+    _column("state", pa.string()),
+    _column("versions", pa.string(), is_repeatable=False),
+    _column("platform", pa.string(), is_repeatable=False),
+    _column("cpu_flags", pa.string(), is_repeatable=False),
+    _column("start", _INSTANT, is_repeatable=False),
+    _column("end", _INSTANT, is_repeatable=False, is_nullable=True),
+)
+"""One row: what was run; ``document`` (the experiment) and ``versions`` are JSON.
+
+No column may be called ``experiment``: that is a folder name of a finished run,
+which readers of a campaign turn into a column.
+"""
+
+TABLES: dict[str, pa.Schema] = {
+    "births": BIRTHS,
+    "evaluations": EVALUATIONS,
+    "population": POPULATION,
+    "runs": RUNS,
+}
+"""Schemas by table name."""
+
+
+def repeatable(schema: pa.Schema) -> list[str]:
+    """Return the names of the columns that two equal runs have in common."""
+    return [field.name for field in schema if field.metadata[b"repeatable"] == b"true"]
+
+
+def body_rows(robot: Robot) -> list[Row]:
+    """Return the ``body`` of a births row: one dictionary per part, core first."""
+    return [
+        {
+            "idx": index,
+            "parent": part.parent,
+            "parent_slot": part.parent_slot,
+            "child_slot": part.slot,
+            "kind": part.kind,
+            "rot": part.orientation,
+            "params": part.parameters,
+            "gene": part.gene,
+        }
+        for index, part in enumerate(robot.parts)
+    ]
+
+
+def sizes(robot: Robot, genome: Genome, space: BodySpace) -> dict[str, int]:
+    """Return the counts of a births row.
+
+    Args:
+        robot: the phenotype.
+        genome: what it developed from.
+        space: its part types.
+
+    Returns:
+        ``parts``, ``joints`` (driven or not), ``motors`` (driven), ``extremities``
+        (parts without children; a lone core counts 1), ``inputs``, ``outputs``,
+        ``hidden``, and ``connections`` of the genome, unresolvable ones included.
+
+    Source: thesis section 6.3; facts of the original, section 8.
+    """
+    kinds = [space[part.kind] for part in robot.parts]
+    layers: tuple[tuple[str, Layer], ...] = (
+        ("inputs", "input"),
+        ("outputs", "output"),
+        ("hidden", "hidden"),
+    )
+    counts = {name: robot.brain.count(layer) for name, layer in layers}
+    parents = {part.parent for part in robot.parts}
+    return {
+        "parts": len(robot.parts),
+        "joints": sum(
+            kind.shape(part.parameters).joint is not None
+            for kind, part in zip(kinds, robot.parts, strict=True)
+        ),
+        "motors": sum(kind.outputs for kind in kinds),
+        "extremities": sum(index not in parents for index in range(len(robot.parts))),
+        **counts,
+        "connections": sum(len(node.connections) for node, _, _ in walk(genome)),
+    }
