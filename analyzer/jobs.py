@@ -1,0 +1,33 @@
+"""Requests in, answers out: the analyzer's work without its network."""
+
+import time
+
+from analyzer.report import analyze
+from schema.codec import Answer, decode_request, encode_answer
+from schema.experiment import body_space, read_vetting_settings
+from schema.robot import check_robot
+
+
+def answer(request: bytes) -> bytes:
+    """Return the encoded answer to an encoded request.
+
+    Args:
+        request: a ``Request`` with ``VettingSettings``.
+
+    Returns:
+        An ``Answer`` with a report; it depends on nothing but the request, except
+        for ``wall_s``.
+
+    Raises:
+        MalformedMessage: not a request's bytes.
+        ExperimentError: settings that are none, or name what is not there.
+        InvalidRobot: a robot that the body space does not allow.
+    """
+    start = time.perf_counter()
+    asked = decode_request(request)
+    settings = read_vetting_settings(asked.settings)
+    space = body_space(settings.space)
+    check_robot(asked.robot, space)
+    report = analyze(asked.robot, space, settings.vetting)
+    wall_s = time.perf_counter() - start
+    return encode_answer(Answer(asked.epoch, asked.number, wall_s, report))

@@ -1,0 +1,62 @@
+"""The analyzer's work on bytes."""
+
+import pytest
+
+from analyzer.jobs import answer
+from analyzer.report import analyze
+from schema.brain import Brain, Neuron
+from schema.codec import decode_answer, encode_request, encode_robot
+from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
+from schema.experiment import Experiment, body_space, vetting_settings
+from schema.robot import Part, Robot
+
+GREY = (0.5, 0.5, 0.5)
+EXPERIMENT = Experiment(name="test")
+SETTINGS = vetting_settings(EXPERIMENT)
+INPUTS = tuple(Neuron("input", "Input", 0) for _ in range(6))
+MOTOR = Neuron("output", "Simple", 1, (0.0, 0.5))
+ROBOT = Robot(
+    (Part("Core", -1, -1, -1, 0, GREY), Part("ActiveHinge", 0, 2, 0, 90, GREY)),
+    Brain((*INPUTS, MOTOR)),
+)
+
+
+def request_for(
+    robot: Robot, settings: bytes = SETTINGS, *, epoch: int = 1, number: int = 1
+) -> bytes:
+    """Return the bytes of a request."""
+    return encode_request(
+        run="run",
+        epoch=epoch,
+        number=number,
+        settings=settings,
+        robot=encode_robot(robot),
+    )
+
+
+def test_an_answer_carries_the_report_and_whose_it_is() -> None:
+    request = request_for(ROBOT, epoch=3, number=17)
+    found = decode_answer(answer(request))
+    space = body_space(EXPERIMENT.space)
+    assert (found.epoch, found.number) == (3, 17)
+    assert found.result == analyze(ROBOT, space, EXPERIMENT.vetting)
+    assert found.wall_s > 0
+
+
+def test_a_robot_that_the_space_does_not_allow_is_refused() -> None:
+    light = Part("LightSensor", 0, 2, 0, 0, GREY)
+    robot = Robot((ROBOT.parts[0], light), Brain(INPUTS))
+    request = request_for(robot)
+    with pytest.raises(InvalidRobot, match="LightSensor"):
+        answer(request)
+
+
+def test_settings_of_another_kind_are_refused() -> None:
+    request = request_for(ROBOT, b'{"space": 3}')
+    with pytest.raises(ExperimentError, match="settings of a request"):
+        answer(request)
+
+
+def test_bytes_that_are_no_request_are_malformed() -> None:
+    with pytest.raises(MalformedMessage):
+        answer(b"\xff\xff\xff")
