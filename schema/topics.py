@@ -1,0 +1,91 @@
+"""Where on the network whom can be reached.
+
+``revolve/{fleet}/w/{worker}/...``, ``.../an/{analyzer}/...``,
+``.../co/{coordinator}/...``: all of one process stands under one prefix, so that
+one access rule covers it. A name belongs to one process for ever: who starts
+again has a new one, so nothing meant for the dead reaches the living.
+"""
+
+import re
+from dataclasses import dataclass
+from typing import Literal
+
+from schema.errors import MalformedMessage, NetworkError
+
+Role = Literal["worker", "analyzer", "coordinator"]
+
+_CHUNKS: dict[Role, str] = {"worker": "w", "analyzer": "an", "coordinator": "co"}
+_ROLES: dict[str, Role] = {chunk: role for role, chunk in _CHUNKS.items()}
+# No key separator, no wildcard, no leading "@": that is the engine's own space.
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,95}")
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A process of a fleet; a fleet serves many runs.
+
+    Attributes:
+        fleet: name of the fleet.
+        role: what the process is.
+        name: its own, never used again.
+    """
+
+    fleet: str
+    role: Role
+    name: str
+
+    @property
+    def alive(self) -> str:
+        """Key of the token that stands while the process lives."""
+        return f"{self._prefix}/alive"
+
+    @property
+    def info(self) -> str:
+        """Key that tells what the process is (an ``AgentInfo``)."""
+        return f"{self._prefix}/info"
+
+    @property
+    def jobs(self) -> str:
+        """Key that takes one ``Request`` and gives one ``Answer``."""
+        return f"{self._prefix}/jobs"
+
+    @property
+    def _prefix(self) -> str:
+        return f"revolve/{self.fleet}/{_CHUNKS[self.role]}/{self.name}"
+
+
+def agents_alive(fleet: str, role: Role) -> str:
+    """Return the key expression of all tokens of one role."""
+    return f"revolve/{fleet}/{_CHUNKS[role]}/*/alive"
+
+
+def member_of(key: str) -> Member:
+    """Return whose token a key is.
+
+    Raises:
+        MalformedMessage: no such key.
+    """
+    chunks = key.split("/")
+    if len(chunks) == 5 and (chunks[0], chunks[4]) == ("revolve", "alive"):  # noqa: PLR2004 - five chunks
+        _, fleet, chunk, name, _ = chunks
+        if chunk in _ROLES and _NAME.fullmatch(fleet) and _NAME.fullmatch(name):
+            return Member(fleet, _ROLES[chunk], name)
+    raise MalformedMessage(f"must be revolve/FLEET/w|an|co/NAME/alive, got {key!r}")
+
+
+def check_name(name: str, what: str) -> str:
+    """Return a name that may stand in a key.
+
+    Args:
+        name: of a fleet or a process.
+        what: what it names, for the message.
+
+    Raises:
+        NetworkError: empty, too long, or with characters that mean something else.
+    """
+    if not _NAME.fullmatch(name):
+        raise NetworkError(
+            f"{what}: must be 1 to 96 letters, digits, '.', '_' or '-', "
+            f"beginning with a letter or digit, got {name!r}"
+        )
+    return name

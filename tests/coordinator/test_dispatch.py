@@ -1,0 +1,360 @@
+"""Who gets which job: every job once, whatever happens to whoever does it."""
+
+from itertools import count
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coordinator.dispatch import LONGEST_REST_S, MAX_ERRORS, REST_S, Dispatch
+from coordinator.events import (
+    AgentKind,
+    Assign,
+    Deliver,
+    DispatchCommand,
+    DispatchEvent,
+    Job,
+    JobKind,
+    Joined,
+    Left,
+    Requested,
+    Returned,
+    Ticked,
+)
+from schema.birth import BirthId
+from schema.errors import UnexpectedEvent
+
+
+def job(number: int, kind: JobKind = "evaluate") -> Job:
+    return Job(number, kind, BirthId(0, number), 0, b"%d" % number)
+
+
+def worker(name: str, slots: int = 1) -> Joined:
+    return Joined(name, "worker", slots, "p")
+
+
+def ok(number: int, agent: str) -> Returned:
+    return Returned(number, agent, "ok", b"a%d" % number)
+
+
+def error(number: int, agent: str) -> Returned:
+    return Returned(number, agent, "error", reason=f"{agent} cannot")
+
+
+def lost(number: int, agent: str) -> Returned:
+    return Returned(number, agent, "lost")
+
+
+def told(*events: DispatchEvent) -> Dispatch:
+    dispatch = Dispatch()
+    for event in events:
+        dispatch.handle(event)
+    return dispatch
+
+
+def given_out(commands: list[DispatchCommand]) -> list[tuple[int, str]]:
+    return [(c.job.number, c.agent) for c in commands if isinstance(c, Assign)]
+
+
+def requests(*numbers: int) -> list[Requested]:
+    return [Requested(job(number)) for number in numbers]
+
+
+def test_an_agent_holds_one_job_more_than_it_has_slots() -> None:
+    dispatch = told(*requests(0, 1, 2, 3, 4))
+    assert given_out(dispatch.handle(worker("w", slots=2))) == [
+        (0, "w"),
+        (1, "w"),
+        (2, "w"),
+    ]
+    assert dispatch.waiting("worker") == 2
+    assert given_out(dispatch.handle(ok(1, "w"))) == [(3, "w")]
+
+
+def test_the_agent_with_the_least_to_do_comes_first_then_the_name() -> None:
+    dispatch = told(worker("b"), worker("a"), worker("c", slots=4))
+    out = [given_out(dispatch.handle(event)) for event in requests(*range(8))]
+    # c has four slots: one job there weighs a quarter.
+    assert [agent for ((_, agent),) in out] == ["a", "b", "c", "c", "c", "c", "a", "b"]
+
+
+def test_kinds_do_not_mix() -> None:
+    dispatch = told(Joined("an", "analyzer", 1, "p"))
+    assert given_out(dispatch.handle(Requested(job(0)))) == []
+    assert given_out(dispatch.handle(Requested(job(1, "vet")))) == [(1, "an")]
+    assert (dispatch.agents("worker"), dispatch.waiting("worker")) == (0, 1)
+
+
+def test_what_an_agent_held_goes_first_to_others() -> None:
+    dispatch = told(worker("a"), *requests(0, 1, 2, 3))
+    dispatch.handle(worker("b"))  # takes 2 and 3
+    assert given_out(dispatch.handle(Left("a"))) == []
+    assert given_out(dispatch.handle(ok(3, "b"))) == [(0, "b")]
+    assert given_out(dispatch.handle(ok(2, "b"))) == [(1, "b")]
+
+
+def test_lost_after_left_is_no_news() -> None:
+    dispatch = told(worker("a"), *requests(0), worker("b"))
+    assert given_out(dispatch.handle(Left("a"))) == [(0, "b")]
+    assert dispatch.handle(lost(0, "a")) == []
+    assert dispatch.handle(Left("a")) == []
+    assert dispatch.handle(ok(0, "b")) == [Deliver(job(0), "b", b"a0")]
+
+
+def test_an_agent_that_lost_a_job_rests_before_it_gets_it_back() -> None:
+    dispatch = told(Ticked(10.0), worker("a"), *requests(0))
+    assert dispatch.wake_s is None
+    assert dispatch.handle(lost(0, "a")) == []
+    assert dispatch.wake_s == pytest.approx(10.0 + REST_S)
+    assert dispatch.handle(Ticked(10.0 + 0.9 * REST_S)) == []
+    assert given_out(dispatch.handle(Ticked(10.0 + 1.1 * REST_S))) == [(0, "a")]
+
+
+def test_rests_grow_until_an_answer_comes() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
+    rests = []
+    for _ in range(9):
+        begin = dispatch._now_s
+        dispatch.handle(lost(0, "a"))
+        assert begin is not None
+        assert dispatch.wake_s is not None
+        rests.append(dispatch.wake_s - begin)
+        dispatch.handle(Ticked(dispatch.wake_s))
+    doubled = [min(REST_S * 2**k, LONGEST_REST_S) for k in range(9)]
+    assert rests == pytest.approx(doubled)
+    dispatch.handle(ok(0, "a"))
+    dispatch.handle(Requested(job(1)))
+    now_s = dispatch._now_s or 0.0
+    dispatch.handle(lost(1, "a"))
+    assert dispatch.wake_s == pytest.approx(now_s + REST_S)
+
+
+def test_a_job_that_fails_goes_to_another_agent_though_that_one_waits() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), worker("b"), *requests(0, 1, 2, 3))
+    # a holds 0 and 2, b holds 1 and 3 and has no credit.
+    assert dispatch.handle(error(0, "a")) == []
+    assert dispatch.handle(Ticked(9.0)) == []  # a is free again, but 0 avoids it
+    assert given_out(dispatch.handle(Requested(job(4)))) == [(4, "a")]
+    assert given_out(dispatch.handle(ok(1, "b"))) == [(0, "b")]
+
+
+def test_three_errors_are_delivered_with_the_last_reason() -> None:
+    dispatch = told(worker("a"), worker("b"), worker("c"), *requests(0))
+    assert given_out(dispatch.handle(error(0, "a"))) == [(0, "b")]
+    assert given_out(dispatch.handle(error(0, "b"))) == [(0, "c")]
+    assert dispatch.handle(error(0, "c")) == [Deliver(job(0), "c", b"", "c cannot")]
+    assert dispatch.pending == 0
+
+
+def test_a_lonely_agent_is_asked_again() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
+    delivered: list[DispatchCommand] = []
+    for tries in range(1, MAX_ERRORS + 1):
+        delivered = dispatch.handle(error(0, "a"))
+        assert given_out(dispatch.handle(Ticked(10.0 * tries))) == (
+            [(0, "a")] if tries < MAX_ERRORS else []
+        )
+    assert delivered == [Deliver(job(0), "a", b"", "a cannot")]
+
+
+def test_losses_never_end_a_job() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
+    for tries in range(1, 20):
+        assert dispatch.handle(lost(0, "a")) == []
+        assert given_out(dispatch.handle(Ticked(10.0 * tries))) == [(0, "a")]
+
+
+def test_answers_that_nobody_waits_for_change_nothing() -> None:
+    dispatch = told(worker("a"), *requests(0))
+    assert dispatch.handle(ok(7, "a")) == []
+    assert dispatch.handle(ok(0, "b")) == []
+    assert len(dispatch.handle(ok(0, "a"))) == 1
+    assert dispatch.handle(ok(0, "a")) == []
+
+
+def test_twice_the_same_is_once() -> None:
+    dispatch = told(worker("a"), *requests(0))
+    assert dispatch.handle(worker("a")) == []
+    assert dispatch.handle(Requested(job(0))) == []
+    assert dispatch.handle(Left("nobody")) == []
+    assert (dispatch.pending, dispatch.agents("worker")) == (1, 1)
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        Requested(job(4)),
+        Requested(job(5, "vet")),
+        worker("b", slots=0),
+        worker("a", slots=3),
+        Joined("a", "analyzer", 1, "p"),
+        Ticked(0.5),
+    ],
+)
+def test_what_cannot_be_changes_nothing(event: DispatchEvent) -> None:
+    dispatch = told(Ticked(1.0), worker("a"), Requested(job(5)))
+    with pytest.raises(UnexpectedEvent):
+        dispatch.handle(event)
+    assert dispatch.handle(ok(5, "a")) == [Deliver(job(5), "a", b"a5")]
+    assert dispatch.pending == 0
+
+
+class World:
+    """All that can happen to jobs, and what must hold after each step."""
+
+    def __init__(self, seed: int) -> None:
+        self.dispatch = Dispatch()
+        self.random = Random(seed)  # noqa: S311 - a story, no secret
+        self.names = count()
+        self.numbers = count()
+        self.now_s = 0.0
+        self.jobs: dict[int, Job] = {}
+        self.delivered: dict[int, Deliver] = {}
+        self.errors: dict[int, int] = {}
+        self.agents: dict[str, Joined] = {}
+        self.held: dict[str, list[int]] = {}
+        self.past: list[DispatchEvent] = []
+
+    def tell(self, event: DispatchEvent) -> None:
+        for command in self.dispatch.handle(event):
+            number, agent = command.job.number, command.agent
+            if isinstance(command, Deliver):
+                assert number not in self.delivered
+                self.delivered[number] = command
+                continue
+            assert isinstance(command, Assign)
+            assert number not in self.delivered
+            assert all(number not in held for held in self.held.values())
+            kind: AgentKind = "analyzer" if command.job.kind == "vet" else "worker"
+            assert self.agents[agent].kind == kind
+            self.held[agent].append(number)
+            assert len(self.held[agent]) <= self.agents[agent].slots + 1
+        self.past.append(event)
+        self.check()
+
+    def check(self) -> None:
+        """Hold the machine's books against the world's."""
+        inside = self.dispatch
+        assert inside.pending == len(self.jobs) - len(self.delivered)
+        for kind, pool in inside._pools.items():
+            names = [n for n, joined in self.agents.items() if joined.kind == kind]
+            assert sorted(pool.agents) == sorted(names)
+            for name in names:
+                assert sorted(pool.agents[name].held) == sorted(self.held[name])
+            held = [number for name in names for number in self.held[name]]
+            assert len(set(pool.waiting)) == len(pool.waiting)
+            assert not set(pool.waiting) & set(held)
+            assert len(pool.free) <= 4 * len(pool.agents) + 65
+            if pool.waiting and (name := pool.best()):
+                # Credit and work: only a job that avoids all with credit waits.
+                assert all(inside._jobs[n].avoid for n in pool.waiting)
+
+    def request(self) -> None:
+        number = next(self.numbers)
+        self.jobs[number] = job(number, self.random.choice(("vet", "evaluate")))
+        self.tell(Requested(self.jobs[number]))
+
+    def join(self) -> None:
+        kind: AgentKind = self.random.choice(("worker", "analyzer"))
+        name = f"{kind}-{next(self.names)}"
+        self.enter(Joined(name, kind, self.random.randint(1, 3), "p"))
+
+    def enter(self, joined: Joined) -> None:
+        self.agents[joined.agent] = joined
+        self.held[joined.agent] = []
+        self.tell(joined)
+
+    def leave(self) -> None:
+        if self.agents:
+            name = self.random.choice(sorted(self.agents))
+            joined = self.agents.pop(name)
+            held = self.held.pop(name)
+            self.tell(Left(name))
+            for number in held:  # the news of each comes after that of the whole
+                self.tell(lost(number, name))
+            if self.random.random() < 0.3:  # a thawed one comes back
+                self.enter(joined)
+
+    def answer(self) -> None:
+        self.give_back("ok")
+
+    def give_back(self, outcome: str) -> None:
+        busy = sorted(name for name, held in self.held.items() if held)
+        if not busy:
+            return
+        name = self.random.choice(busy)
+        held = self.held[name]
+        number = held.pop(self.random.randrange(len(held)))
+        if outcome == "error":
+            self.errors[number] = self.errors.get(number, 0) + 1
+        made = {"ok": ok, "error": error, "lost": lost}[outcome]
+        self.tell(made(number, name))
+
+    def fail(self) -> None:
+        self.give_back("error")
+
+    def lose(self) -> None:
+        self.give_back("lost")
+
+    def tick(self) -> None:
+        self.now_s += self.random.uniform(0.0, 0.3)
+        self.tell(Ticked(self.now_s))
+
+    def repeat(self) -> None:
+        """A message of the past once more, if its sender is not asked just now."""
+        event = self.random.choice(self.past) if self.past else Left("nobody")
+        if isinstance(event, Returned) and event.number not in self.held.get(
+            event.agent, ()
+        ):
+            self.tell(event)
+
+    def finish(self) -> None:
+        """Let one good agent of each kind join, and time pass."""
+        self.enter(Joined("z1", "worker", 1, "p"))
+        self.enter(Joined("z2", "analyzer", 1, "p"))
+        while self.dispatch.pending:
+            self.now_s += LONGEST_REST_S
+            self.tell(Ticked(self.now_s))
+            self.answer()
+
+
+ACTIONS = ["request"] * 3 + [
+    "join",
+    "leave",
+    "answer",
+    "fail",
+    "lose",
+    "tick",
+    "repeat",
+]
+
+
+@settings(derandomize=True, max_examples=150, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    actions=st.lists(st.sampled_from(ACTIONS), max_size=120),
+)
+def test_each_job_is_delivered_once_whatever_happens(
+    seed: int, actions: list[str]
+) -> None:
+    world = World(seed)
+    for action in actions:
+        getattr(world, action)()
+    world.finish()
+    assert sorted(world.delivered) == sorted(world.jobs)
+    for number, delivered in world.delivered.items():
+        failed = world.errors.get(number, 0) == MAX_ERRORS
+        assert delivered.job == world.jobs[number]
+        assert bool(delivered.reason) == failed
+        assert delivered.answer == (b"" if failed else b"a%d" % number)
+
+
+def test_same_story_same_commands() -> None:
+    stories = []
+    for _ in range(2):
+        world = World(7)
+        for _ in range(300):
+            getattr(world, world.random.choice(ACTIONS))()
+        stories.append((world.past, world.held, list(world.delivered)))
+    assert stories[0] == stories[1]
