@@ -35,7 +35,7 @@ class _Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Base of the sections: immutable, nothing unknown, keys by name."""
 
 
-class Space(_Section):
+class Space(_Section, frozen=True):
     """What a robot may be: part types and limits (thesis tables 4.1, 5.1)."""
 
     part_types: tuple[str, ...] = (
@@ -54,7 +54,7 @@ class Space(_Section):
     planar: bool = True
 
 
-class Generation(_Section):
+class Generation(_Section, frozen=True):
     """How a random robot is made (thesis section 4.4.2)."""
 
     parts_mean: float = 12.0
@@ -64,7 +64,7 @@ class Generation(_Section):
     max_tries: AtLeastOne = 100
 
 
-class Variation(_Section):
+class Variation(_Section, frozen=True):
     """How offspring differ (thesis section 4.4.6)."""
 
     p_delete_subtree: Probability = 0.05
@@ -80,7 +80,7 @@ class Variation(_Section):
     check_min_parts: bool = True
 
 
-class Selection(_Section):
+class Selection(_Section, frozen=True):
     """Who mates and who lives on (thesis section 5.3)."""
 
     population: AtLeastOne = 15
@@ -93,14 +93,14 @@ class Selection(_Section):
     max_mating_attempts: AtLeastOne = 5
 
 
-class Vetting(_Section):
+class Vetting(_Section, frozen=True):
     """Which bodies can be built: ``overlap`` allows touching, ``contact`` not."""
 
     mode: Literal["overlap", "contact"] = "overlap"
     tolerance_m: NotNegative = 1e-6
 
 
-class Simulation(_Section):
+class Simulation(_Section, frozen=True):
     """The simulated world and its clocks, in physics steps.
 
     ``armature`` [kg m2] and ``damping`` [N m s/rad] are what MuJoCo needs beyond
@@ -116,11 +116,13 @@ class Simulation(_Section):
     friction: NotNegative = 1.0
     armature: NotNegative = 1e-4
     damping: NotNegative = 1e-4
+    servo_armature: NotNegative = 2e-3
     servo_stiffness: Positive = 1.0
+    contact_time_s: Positive = 0.01
     drop_m: NotNegative = 0.0
 
 
-class Fitness(_Section):
+class Fitness(_Section, frozen=True):
     """What is maximised: a function ``module:attribute`` and its weights."""
 
     function: str = "worker.fitness:thesis"
@@ -129,7 +131,7 @@ class Fitness(_Section):
     limit: Positive = 1.0
 
 
-class Experiment(_Section):
+class Experiment(_Section, frozen=True):
     """One experiment; ``births`` counts the initial population."""
 
     name: str
@@ -148,14 +150,14 @@ class Experiment(_Section):
         return self.selection.window or self.selection.children
 
 
-class VettingSettings(_Section):
+class VettingSettings(_Section, frozen=True):
     """What an analyzer's answer depends on, beside the robot."""
 
     space: Space
     vetting: Vetting
 
 
-class EvaluationSettings(_Section):
+class EvaluationSettings(_Section, frozen=True):
     """What a worker's answer depends on, beside the robot."""
 
     space: Space

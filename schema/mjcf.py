@@ -1,0 +1,225 @@
+"""The one translation of a robot into MuJoCo.
+
+One body per rigid segment, so a robot with k joints has k + 1 bodies. At neutral
+pose all body frames are parallel to the core's; the root body's origin is the
+centre of the core, every other origin is its joint's anchor. The free joint's
+position is therefore the position that the thesis tracks, and its velocity that of
+the core's centre.
+
+A robot's spec has no ground and can be attached to any number of worlds, each time
+with a prefix of its own. Its elements are found by name, p being the index of the
+part: bodies ``root`` and ``body{p}``, joints and actuators ``joint{p}``, the free
+joint ``free``, geoms ``{p}/{box}``, imu sites ``{p}/imu``. What MuJoCo needs beyond
+the original's numbers stands, with its measured effect, in docs/physics.md.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from schema.assembly import place_parts
+from schema.evaluation import Floats
+from schema.experiment import Simulation
+from schema.parts import BodySpace, Box, Joint, PartType, Shape
+from schema.robot import Robot
+
+MEMORY_BYTES = 1 << 20
+"""Arena of a single robot's data; a pile of 30 parts needs about 120 KB."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSpec:
+    """A robot as MuJoCo's own description.
+
+    Attributes:
+        spec: root body with a free joint, no ground; attachable.
+        height: of the core's centre when the lowest point touches z = 0 [m].
+    """
+
+    spec: Any
+    height: float
+
+
+def robot_spec(robot: Robot, space: BodySpace, simulation: Simulation) -> RobotSpec:
+    """Return a robot's description, its core's centre at the origin.
+
+    Args:
+        robot: a checked robot.
+        space: its part types.
+        simulation: numbers of contacts, joints and servos.
+    """
+    builder = _Builder(robot, space, simulation)
+    for index in range(len(robot.parts)):
+        builder.add_part(index)
+    return RobotSpec(builder.spec, -builder.lowest)
+
+
+def solo_model(robot: Robot, space: BodySpace, simulation: Simulation) -> Any:  # noqa: ANN401 - mujoco ships no types
+    """Return the model of one robot alone on the ground, lowest point touching it.
+
+    Args:
+        robot: a checked robot.
+        space: its part types.
+        simulation: the world's numbers; ``drop_m`` lifts the robot.
+    """
+    built = robot_spec(robot, space, simulation)
+    spec = built.spec
+    set_options(spec, simulation, is_single=True)
+    add_ground(spec, simulation)
+    spec.memory = MEMORY_BYTES
+    spec.body("root").pos = (0.0, 0.0, built.height + simulation.drop_m)
+    return spec.compile()
+
+
+def set_options(spec: Any, simulation: Simulation, *, is_single: bool) -> None:  # noqa: ANN401 - mujoco ships no types
+    """Set a world's integrator, solver and clock.
+
+    Args:
+        spec: the world's MjSpec.
+        simulation: time step and gravity.
+        is_single: one robot only: no contact islands to look for.
+    """
+    option = spec.option
+    option.timestep = simulation.timestep_s
+    option.gravity = (0.0, 0.0, -simulation.gravity)
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    option.tolerance = 1e-6
+    option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
+    # Without warm start a step is a pure function of (qpos, qvel, ctrl). Without
+    # automatic reset a diverged robot stays diverged, and can be told.
+    disabled = mujoco.mjtDisableBit.mjDSBL_WARMSTART
+    disabled |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    if is_single:
+        disabled |= mujoco.mjtDisableBit.mjDSBL_ISLAND
+    option.disableflags |= int(disabled)
+
+
+def add_ground(spec: Any, simulation: Simulation) -> None:  # noqa: ANN401 - mujoco ships no types
+    """Add the endless plane z = 0, named ``ground``."""
+    spec.worldbody.add_geom(
+        name="ground",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=(0.0, 0.0, 1.0),
+        condim=3,
+        friction=(simulation.friction, 0.0, 0.0),
+        solref=(simulation.contact_time_s, 1.0),
+    )
+
+
+class _Builder:
+    """Builds one robot, part by part in the robot's own order."""
+
+    def __init__(
+        self, robot: Robot, space: BodySpace, simulation: Simulation
+    ) -> None:
+        self.robot = robot
+        self.simulation = simulation
+        self.types: list[PartType] = [space[part.kind] for part in robot.parts]
+        self.shapes: list[Shape] = [
+            kind.shape(part.parameters)
+            for kind, part in zip(self.types, robot.parts, strict=True)
+        ]
+        self.rotations, self.positions = place_parts(robot, space)
+        self.lowest = np.inf
+        self.spec = mujoco.MjSpec()
+        self._set_defaults()
+        root = self.spec.worldbody.add_body(name="root")
+        # Never aligned: the joint's position must stay the core's centre.
+        root.add_freejoint(name="free", align=0)
+        # Of each part: (body, its origin in the core's frame) of both segments.
+        self.segments: list[list[tuple[Any, Floats]]] = []
+        self.root = (root, np.zeros(3))
+
+    def _set_defaults(self) -> None:
+        spec, simulation = self.spec, self.simulation
+        spec.compiler.degree = False
+        spec.copy_during_attach = True
+        geom = spec.default.geom
+        geom.type = mujoco.mjtGeom.mjGEOM_BOX
+        geom.condim = 3
+        geom.friction = (simulation.friction, 0.0, 0.0)
+        geom.solref = (simulation.contact_time_s, 1.0)
+        joint = spec.default.joint
+        joint.type = mujoco.mjtJoint.mjJNT_HINGE
+        joint.limited = 1
+        joint.armature = simulation.armature
+        joint.damping[0] = simulation.damping
+
+    def add_part(self, index: int) -> None:
+        """Add a part's boxes, and its joint if it has one."""
+        part, shape = self.robot.parts[index], self.shapes[index]
+        near = self.root
+        own = 0
+        if index:
+            slot = self.shapes[part.parent].slots[part.parent_slot]
+            near = self.segments[part.parent][slot.segment]
+            own = shape.slots[part.slot].segment
+        pair = [near, near]
+        if shape.joint is not None:
+            pair[1 - own] = self._add_joint(index, shape.joint, near, own)
+        self.segments.append(pair)
+        for box in shape.boxes:
+            self._add_box(index, box, *pair[box.segment])
+        body, origin = pair[0]
+        for sensor in self.types[index].sensors:
+            if sensor.kind == "imu":
+                box = next(box for box in shape.boxes if box.name == sensor.box)
+                position, quaternion = self._place(index, box, origin)
+                body.add_site(name=f"{index}/imu", pos=position, quat=quaternion)
+
+    def _add_joint(
+        self, index: int, joint: Joint, near: tuple[Any, Floats], own: int
+    ) -> tuple[Any, Floats]:
+        """Return the segment beyond a joint; ``own`` is the one on the near side."""
+        rotation = self.rotations[index]
+        anchor = self.positions[index] + rotation @ joint.anchor
+        body = near[0].add_body(name=f"body{index}", pos=anchor - near[1])
+        # The angle is that of segment 1 against segment 0, also where segment 1
+        # is the one that carries segment 0.
+        axis = rotation @ joint.axis
+        made = body.add_joint(
+            name=f"joint{index}",
+            axis=axis if own == 0 else -axis,
+            range=(-joint.limit, joint.limit),
+        )
+        motor = self.types[index].motor
+        if motor is not None:
+            made.armature = self.simulation.servo_armature
+            actuator = self.spec.add_actuator(
+                name=f"joint{index}",
+                target=f"joint{index}",
+                trntype=mujoco.mjtTrn.mjTRN_JOINT,
+                forcelimited=1,
+                forcerange=(-motor.max_torque, motor.max_torque),
+            )
+            actuator.set_to_velocity(kv=self.simulation.servo_stiffness)
+        return body, anchor
+
+    def _add_box(self, index: int, box: Box, body: Any, origin: Floats) -> None:  # noqa: ANN401 - mujoco ships no types
+        position, quaternion = self._place(index, box, origin)
+        half = np.multiply(box.size, 0.5)
+        body.add_geom(
+            name=f"{index}/{box.name}",
+            size=half,
+            pos=position,
+            quat=quaternion,
+            mass=box.mass,
+            rgba=(*self.robot.parts[index].parameters[-3:], 1.0),
+        )
+        reach = np.abs(self._rotation(index, box)[2]) @ half
+        self.lowest = min(self.lowest, float(position[2] + origin[2] - reach))
+
+    def _rotation(self, index: int, box: Box) -> Floats:
+        rotation: Floats = self.rotations[index] @ np.asarray(box.rotation)
+        return rotation
+
+    def _place(self, index: int, box: Box, origin: Floats) -> tuple[Floats, Floats]:
+        """Return a box's position and quaternion in a body's frame."""
+        position = self.positions[index] + self.rotations[index] @ box.position
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, self._rotation(index, box).ravel())
+        return position - origin, quaternion

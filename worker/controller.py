@@ -1,0 +1,184 @@
+"""Brains in motion: recurrent networks, one or many, each alone in its arithmetic.
+
+All networks of a bank have the widths of the experiment's limits, never those of
+the company, and each is one slice of every array. A robot's outputs are therefore
+equal to the last bit alone, in any batch and at any place in it
+(tests/worker/test_controller.py). Formulas: ``schema.brain``.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from schema.brain import Brain, Neuron
+from schema.errors import InvalidRobot
+from schema.evaluation import Floats
+from schema.experiment import Space
+
+STATE_LIMIT = 1e6
+"""Linear neurons may feed themselves for ever: their states stop here."""
+SHORTEST_PERIOD_S = 1e-6
+"""Of an oscillator; a period of 0 would divide by zero."""
+_NUMBER_LIMIT = 1e100
+"""Of weights and parameters, so that no sum of products overflows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Widths:
+    """Numbers of input, output and hidden neurons that every network is given."""
+
+    inputs: int
+    outputs: int
+    hidden: int
+
+    @property
+    def states(self) -> int:
+        """Number of neurons that have a state."""
+        return self.outputs + self.hidden
+
+
+def widths(space: Space) -> Widths:
+    """Return the widths that an experiment's limits ask for."""
+    return Widths(space.max_inputs, space.max_outputs, space.max_hidden)
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """A brain as arrays: S states (outputs, then hidden), I inputs.
+
+    Attributes:
+        weights: (S, I + S), from inputs and previous states to each neuron.
+        numbers: (5, S): bias and gain of a = gain * (sum - bias); angular
+            frequency [rad/s], phase [rad] and half amplitude of oscillators.
+        kinds: (2, S): is it a sigmoid, is it an oscillator.
+    """
+
+    weights: Floats
+    numbers: Floats
+    kinds: np.ndarray[tuple[int, int], np.dtype[np.bool_]]
+
+
+def pack(brain: Brain, width: Widths) -> Network:
+    """Return a brain as arrays of fixed width.
+
+    Args:
+        brain: a checked brain.
+        width: of the arrays.
+
+    Raises:
+        InvalidRobot: more inputs, outputs or hidden neurons than the widths.
+    """
+    places: list[int] = []
+    starts = {"input": 0, "output": width.inputs, "hidden": width.inputs + width.outputs}
+    limits = {"input": width.inputs, "output": width.outputs, "hidden": width.hidden}
+    used = {"input": 0, "output": 0, "hidden": 0}
+    for neuron in brain.neurons:
+        places.append(starts[neuron.layer] + used[neuron.layer])
+        used[neuron.layer] += 1
+    for layer, count in used.items():
+        if count > limits[layer]:
+            raise InvalidRobot(
+                f"brain: {layer} neurons must be <= {limits[layer]}, got {count}"
+            )
+    weights = np.zeros((width.states, width.inputs + width.states))
+    numbers = np.zeros((5, width.states))
+    kinds = np.zeros((2, width.states), dtype=np.bool_)
+    for edge in brain.connections:
+        weights[places[edge.target] - width.inputs, places[edge.source]] = edge.weight
+    for place, neuron in zip(places, brain.neurons, strict=True):
+        if neuron.layer != "input":
+            _set_neuron(neuron, place - width.inputs, numbers, kinds)
+    for array in (weights, numbers):
+        np.clip(array, -_NUMBER_LIMIT, _NUMBER_LIMIT, out=array)
+    return Network(weights, numbers, kinds)
+
+
+def _set_neuron(
+    neuron: Neuron,
+    place: int,
+    numbers: Floats,
+    kinds: np.ndarray[tuple[int, int], np.dtype[np.bool_]],
+) -> None:
+    if neuron.kind == "Oscillator":
+        period, phase, amplitude = neuron.parameters
+        numbers[2, place] = 2.0 * pi / max(period, SHORTEST_PERIOD_S)
+        numbers[3, place] = 2.0 * pi * phase
+        numbers[4, place] = 0.5 * amplitude
+        kinds[1, place] = True
+    else:
+        numbers[:2, place] = neuron.parameters
+        kinds[0, place] = neuron.kind == "Sigmoid"
+
+
+class Bank:
+    """R networks that tick together; row r belongs to robot r.
+
+    Attributes:
+        states: (R, S) outputs and hidden states after the last tick; may be
+            copied and written to save, move and restore robots.
+    """
+
+    def __init__(
+        self, networks: Sequence[Network], width: Widths, tick_s: float
+    ) -> None:
+        """Start all networks at state 0.
+
+        Args:
+            networks: packed with the same widths.
+            width: those widths.
+            tick_s: time between two ticks [s].
+        """
+        count, states = len(networks), width.states
+        self._tick_s = tick_s
+        self._weights = np.empty((count, states, width.inputs + states))
+        numbers = np.empty((5, count, states))
+        kinds = np.empty((2, count, states), dtype=np.bool_)
+        for row, network in enumerate(networks):
+            self._weights[row] = network.weights
+            numbers[:, row] = network.numbers
+            kinds[:, row] = network.kinds
+        bias, self._gain, self._frequency, self._phase, self._half = numbers
+        self._bias = bias
+        self._is_sigmoid, self._is_oscillator = kinds
+        # Inputs and previous states side by side, as the weights expect them.
+        self._sources = np.zeros((count, width.inputs + states, 1))
+        self._readings = self._sources[:, : width.inputs, 0]
+        self.states = self._sources[:, width.inputs :, 0]
+        self._sums = np.empty((count, states, 1))
+        self._next = self._sums[:, :, 0]
+        self._other = np.empty((count, states))
+        self._outputs = self.states[:, : width.outputs]
+
+    def step(self, readings: Floats, age_ticks: Floats | float) -> Floats:
+        """Let all networks tick once and return their outputs.
+
+        Args:
+            readings: (R, I) sensor readings, finite; unused inputs 0.
+            age_ticks: (R, 1) ticks since each robot's own birth, or one number.
+
+        Returns:
+            (R, O) output states, a view that the next tick overwrites; finite,
+            not yet clipped to [0, 1].
+        """
+        new, other = self._next, self._other
+        self._readings[...] = readings
+        np.matmul(self._weights, self._sources, out=self._sums)
+        np.subtract(new, self._bias, out=new)
+        np.multiply(new, self._gain, out=new)
+        # 1 / (1 + exp(-a)) = (1 + tanh(a / 2)) / 2, which cannot overflow.
+        np.multiply(new, 0.5, out=other)
+        np.tanh(other, out=other)
+        np.multiply(other, 0.5, out=other)
+        np.add(other, 0.5, out=other)
+        np.copyto(new, other, where=self._is_sigmoid)
+        np.multiply(self._frequency, age_ticks * self._tick_s, out=other)
+        np.subtract(other, self._phase, out=other)
+        np.sin(other, out=other)
+        np.multiply(other, self._half, out=other)
+        np.add(other, 0.5, out=other)
+        np.copyto(new, other, where=self._is_oscillator)
+        np.maximum(new, -STATE_LIMIT, out=new)
+        np.minimum(new, STATE_LIMIT, out=self.states)
+        return self._outputs
