@@ -13,6 +13,8 @@ from schema.errors import InvalidRobot
 from schema.parts import BodySpace, PartType
 
 ORIENTATIONS = (0, 90, 180, 270)
+GENES = 2**64
+"""How many identities there are."""
 NO_BRAIN = Brain()
 
 
@@ -56,7 +58,8 @@ def check_tree(parts: Sequence[Part]) -> None:
     Raises:
         InvalidRobot: no part at all; a parent that does not stand before its child;
             a slot below 0 or taken twice; parts out of depth-first order; an
-            orientation that is no quarter turn; a number that is not finite.
+            orientation that is no quarter turn; a number that is not finite; a gene
+            that is no 64-bit number.
     """
     if not parts:
         raise InvalidRobot("body: a robot needs at least its core")
@@ -71,6 +74,8 @@ def check_tree(parts: Sequence[Part]) -> None:
             )
         if not all(map(math.isfinite, part.parameters)):
             raise InvalidRobot(f"{where}.parameters: must be finite")
+        if not 0 <= part.gene < GENES:
+            raise InvalidRobot(f"{where}.gene: must be 0..2^64-1, got {part.gene}")
         if index == 0:
             continue
         for end in ((part.parent, part.parent_slot), (index, part.slot)):

@@ -1,0 +1,119 @@
+"""``revolve robot``: robot files on the command line."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from schema.errors import RevolveError
+from schema.experiment import body_space, read_experiment
+from schema.parts import BUILT_IN, BodySpace
+from schema.robot import Robot
+from schema.robot_file import read_robot, write_robot
+from schema.yaml_form import neuron_names
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run ``revolve robot ...`` and return its exit code.
+
+    Args:
+        argv: the words after ``revolve``; those of the process by default.
+
+    Returns:
+        0 if done.
+
+    Raises:
+        RevolveError: a file that holds no robot, or cannot be read or written.
+    """
+    words = ["robot", *sys.argv[1:]] if argv is None else argv
+    options = _parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
+    space = _space(options.experiment)
+    robot = read_robot(options.file, space)
+    if options.command == "check":
+        print(f"{options.file}: well formed; {_summary(robot)}")
+    elif options.command == "convert":
+        write_robot(robot, options.output, space)
+        print(f"{options.output}: written")
+    else:
+        _show(robot, space, options.file.name)
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="revolve robot",
+        description="Check, convert or show a robot file (.yaml, .yml, .pb).",
+        epilog="example: revolve robot convert spider.yaml spider.pb",
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    for name, what in (
+        ("check", "tell whether a file holds a well-formed robot"),
+        ("convert", "write a robot in another form"),
+        ("show", "show a robot's body and brain as a tree"),
+    ):
+        command = commands.add_parser(name, help=what, description=what)
+        command.add_argument("file", type=Path, metavar="FILE")
+        if name == "convert":
+            command.add_argument("output", type=Path, metavar="OUTPUT")
+        command.add_argument(
+            "--experiment",
+            metavar="NAME|FILE.toml",
+            help="take the part types of this experiment, not all built-in ones",
+        )
+    return parser
+
+
+def _space(experiment: str | None) -> BodySpace:
+    if experiment is None:
+        return BUILT_IN
+    return body_space(read_experiment(experiment).space)
+
+
+def _summary(robot: Robot) -> str:
+    brain = robot.brain
+    return (
+        f"{len(robot.parts)} parts, {brain.count('input')} inputs, "
+        f"{brain.count('output')} outputs, {brain.count('hidden')} hidden neurons, "
+        f"{len(brain.connections)} connections"
+    )
+
+
+def _show(robot: Robot, space: BodySpace, title: str) -> None:
+    """Print a robot: its parts as a tree, each with its neurons and their inputs."""
+    from rich.console import Console
+    from rich.text import Text
+    from rich.tree import Tree
+
+    names = neuron_names(robot.brain, [f"part-{i}" for i in range(len(robot.parts))])
+    trees: list[Tree] = []
+    for index, part in enumerate(robot.parts):
+        label = f"part-{index} {part.kind}"
+        if index:
+            label = (
+                f"slot {part.parent_slot}: {label}, by its slot {part.slot}, "
+                f"turned {part.orientation}°"
+            )
+        own = space[part.kind].own_parameters
+        for parameter, value in zip(own, part.parameters, strict=False):
+            label += f", {parameter.name} {value:g}"
+        trees.append(Tree(Text(label)))
+        if index:
+            trees[part.parent].children.append(trees[index])
+    for number, neuron in enumerate(robot.brain.neurons):
+        values = ", ".join(f"{value:g}" for value in neuron.parameters)
+        kind = f"{neuron.kind}({values})" if values else neuron.kind
+        branch = trees[neuron.part].add(Text(f"{names[number]} {kind}", style="cyan"))
+        for edge in robot.brain.connections:
+            if edge.target == number:
+                source = f"<- {edge.weight:g} × {names[edge.source]}"
+                branch.add(Text(source, style="dim"))
+    console = Console()
+    console.print(Text(f"{title}: {_summary(robot)}"))
+    console.print(trees[0])
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main())
+    except RevolveError as error:
+        print(f"revolve: {error}", file=sys.stderr)
+        sys.exit(2)

@@ -1,0 +1,250 @@
+"""Robots as YAML, the form for people.
+
+::
+
+    revolve_robot: 1
+    body:
+      id: part-0
+      type: Core
+      gene: 1
+      params: {red: 0.5, green: 0.5, blue: 0.5}
+      children:
+        2:                       # slot of the core
+          slot: 0                # own slot
+          id: leg
+          type: ActiveHinge
+          orientation: 90
+    brain:
+      neurons:
+      - {id: leg-out-0, part: leg, layer: output, type: Oscillator}
+      connections:
+      - {source: part-0-in-2, target: leg-out-0, weight: 0.25}
+
+A parameter that is not written has its default, an orientation or gene is 0, an id
+is ``part-<index>`` and for neurons ``<part>-in-k``, ``<part>-out-k`` or
+``<part>-hidden-k``. Input neurons are there because sensors are: they are only
+named, never written. Floats are written so that they are read back bit for bit.
+"""
+
+import re
+from typing import Any
+
+import yaml
+
+from schema.brain import INPUT, LAYERS, NEURON_TYPES, Brain, Connection, Layer, Neuron
+from schema.errors import InvalidRobot
+from schema.parts import BodySpace, Parameter
+from schema.robot import Part, Robot, check_robot
+from schema.yaml_node import Table, compose
+
+VERSION = 1
+SHORT: dict[Layer, str] = {"input": "in", "output": "out", "hidden": "hidden"}
+_WRITTEN: tuple[Layer, ...] = ("output", "hidden")
+_INDEXED = re.compile(r"(?:body\.parts|brain\.neurons|brain\.connections)\[\d+\]")
+
+
+def robot_to_yaml(robot: Robot, space: BodySpace) -> str:
+    """Return the text of a robot.
+
+    Raises:
+        InvalidRobot: the robot is not well formed in this body space.
+    """
+    check_robot(robot, space)
+    entries: list[dict[str, Any]] = []
+    for index, part in enumerate(robot.parts):
+        entries.append(_part_entry(part, index, space))
+        if index:
+            siblings = entries[part.parent].setdefault("children", {})
+            siblings[part.parent_slot] = entries[index]
+    names = neuron_names(robot.brain, [entry["id"] for entry in entries])
+    document = {
+        "revolve_robot": VERSION,
+        "body": entries[0],
+        "brain": {
+            "neurons": [
+                {
+                    "id": name,
+                    "part": entries[neuron.part]["id"],
+                    "layer": neuron.layer,
+                    "type": neuron.kind,
+                    "params": _named(NEURON_TYPES[neuron.kind], neuron.parameters),
+                }
+                for name, neuron in zip(names, robot.brain.neurons, strict=True)
+                if neuron.layer != "input"
+            ],
+            "connections": [
+                {
+                    "source": names[edge.source],
+                    "target": names[edge.target],
+                    "weight": float(edge.weight),
+                }
+                for edge in robot.brain.connections
+            ],
+        },
+    }
+    return yaml.safe_dump(document, sort_keys=False, default_flow_style=None)
+
+
+def robot_from_yaml(text: str, file: str, space: BodySpace) -> Robot:
+    """Return the robot of a text.
+
+    Args:
+        text: the document.
+        file: its name, for messages.
+        space: the part types that it may use.
+
+    Raises:
+        InvalidRobot: not YAML, an unknown or missing key, part type or name, a value
+            of a wrong type, a robot that is not well formed in this body space. The
+            message names file, line and field.
+    """
+    return _Reader(space, file).read(text)
+
+
+def neuron_names(brain: Brain, part_ids: list[str]) -> list[str]:
+    """Return a name for each neuron: ``<part>-in-k``, ``-out-k``, ``-hidden-k``."""
+    counts: dict[str, int] = {}
+    names = []
+    for neuron in brain.neurons:
+        stem = f"{part_ids[neuron.part]}-{SHORT[neuron.layer]}"
+        counts[stem] = counts.get(stem, -1) + 1
+        names.append(f"{stem}-{counts[stem]}")
+    return names
+
+
+def _part_entry(part: Part, index: int, space: BodySpace) -> dict[str, Any]:
+    entry = {} if index == 0 else {"slot": part.slot}
+    return entry | {
+        "id": f"part-{index}",
+        "type": part.kind,
+        "orientation": part.orientation,
+        "gene": part.gene,
+        "params": _named(space[part.kind].parameters, part.parameters),
+    }
+
+
+def _named(
+    parameters: tuple[Parameter, ...], values: tuple[float, ...]
+) -> dict[str, float]:
+    pairs = zip(parameters, values, strict=True)
+    return {parameter.name: float(value) for parameter, value in pairs}
+
+
+class _Reader:
+    """One reading of one document.
+
+    It remembers the line of all that it has read, so that a rule that is checked
+    on the finished robot can still say where it was broken.
+    """
+
+    def __init__(self, space: BodySpace, file: str) -> None:
+        self._space = space
+        self._file = file
+        self._parts: list[Part] = []
+        self._part_index: dict[str, int] = {}
+        self._lines: dict[str, int] = {}
+
+    def read(self, text: str) -> Robot:
+        document = compose(text, self._file)
+        document.refuse_others("revolve_robot", "body", "brain")
+        if document.has("revolve_robot"):
+            version = document.integer("revolve_robot")
+            if version != VERSION:
+                document.refuse("revolve_robot", f"must be {VERSION}, got {version}")
+        self._read_part(document.table("body"), -1, -1)
+        brain = document.table("brain") if document.has("brain") else None
+        robot = Robot(tuple(self._parts), self._read_brain(brain))
+        try:
+            check_robot(robot, self._space)
+        except InvalidRobot as error:
+            raise InvalidRobot(f"{self._place(str(error))}: {error}") from None
+        return robot
+
+    def _place(self, message: str) -> str:
+        """Return ``file:line`` of what a message of ``check_robot`` is about."""
+        found = _INDEXED.search(message)
+        line = self._lines.get(found.group()) if found else None
+        return self._file if line is None else f"{self._file}:{line}"
+
+    def _read_part(self, table: Table, parent: int, parent_slot: int) -> None:
+        index = len(self._parts)
+        own = () if parent < 0 else ("slot",)
+        table.refuse_others(
+            *own, "id", "type", "orientation", "gene", "params", "children"
+        )
+        kind = self._space[table.word("type", self._space)]
+        name = table.text("id", f"part-{index}")
+        if name in self._part_index:
+            table.refuse("id", f"second part named {name!r}")
+        self._part_index[name] = index
+        self._lines[f"body.parts[{index}]"] = table.line
+        part = Part(
+            kind=kind.name,
+            parent=parent,
+            parent_slot=parent_slot,
+            slot=table.integer("slot") if own else -1,
+            orientation=table.integer("orientation", 0),
+            parameters=_values(table, kind.parameters),
+            gene=table.integer("gene", 0),
+        )
+        self._parts.append(part)
+        if table.has("children"):
+            children = table.table("children")
+            for slot in sorted(map(children.key_as_slot, children.keys)):
+                self._read_part(children.table(str(slot)), index, slot)
+
+    def _read_brain(self, table: Table | None) -> Brain:
+        ids = list(self._part_index)
+        names = {
+            f"{ids[index]}-in-{offset}": Neuron("input", INPUT, index)
+            for index, part in enumerate(self._parts)
+            for offset in range(self._space[part.kind].inputs)
+        }
+        if table is None:
+            return Brain(tuple(names.values()))
+        table.refuse_others("neurons", "connections")
+        written = [self._read_neuron(item) for item in table.tables("neurons")]
+        written.sort(key=lambda entry: (LAYERS.index(entry[0].layer), entry[0].part))
+        neurons = (*names.values(), *(neuron for neuron, _ in written))
+        defaults = neuron_names(Brain(neurons), ids)[len(names) :]
+        for (neuron, item), default in zip(written, defaults, strict=True):
+            self._lines[f"brain.neurons[{len(names)}]"] = item.line
+            name = item.text("id", default)
+            if name in names:
+                item.refuse("id", f"second neuron named {name!r}")
+            names[name] = neuron
+        return Brain(
+            neurons, self._read_connections(table.tables("connections"), list(names))
+        )
+
+    def _read_neuron(self, table: Table) -> tuple[Neuron, Table]:
+        table.refuse_others("id", "part", "layer", "type", "params")
+        layer: Layer = (
+            "output" if table.word("layer", _WRITTEN) == "output" else "hidden"
+        )
+        kind = table.word("type", NEURON_TYPES)
+        part = self._part_index[table.word("part", self._part_index)]
+        values = _values(table, NEURON_TYPES[kind])
+        return Neuron(layer, kind, part, values), table
+
+    def _read_connections(
+        self, tables: list[Table], names: list[str]
+    ) -> tuple[Connection, ...]:
+        index = {name: number for number, name in enumerate(names)}
+        edges = []
+        for number, table in enumerate(tables):
+            table.refuse_others("source", "target", "weight")
+            self._lines[f"brain.connections[{number}]"] = table.line
+            source, target = (table.word(end, index) for end in ("source", "target"))
+            weight = table.number("weight")
+            edges.append(Connection(index[source], index[target], weight))
+        return tuple(edges)
+
+
+def _values(table: Table, parameters: tuple[Parameter, ...]) -> tuple[float, ...]:
+    """Return the values of ``params``, in the order of the parameters."""
+    if not table.has("params"):
+        return tuple(parameter.default for parameter in parameters)
+    params = table.table("params")
+    params.refuse_others(*(parameter.name for parameter in parameters))
+    return tuple(params.number(item.name, item.default) for item in parameters)

@@ -1,0 +1,224 @@
+"""YAML mappings that know where they stand, so that errors can say it.
+
+Scalars are taken as they are asked for: ``1e-5`` is a number where a number
+belongs, though YAML 1.1 calls it a text. Aliases are refused: what is written once
+is meant once, and a document cannot hold itself.
+"""
+
+import math
+import re
+from collections.abc import Iterable
+from typing import NoReturn
+
+import yaml
+
+from schema.errors import InvalidRobot
+from schema.experiment import nearest
+
+_SLOT = re.compile("0|[1-9][0-9]{0,3}")
+
+
+class _Loader(yaml.SafeLoader):
+    """A loader that refuses aliases."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.composer.ComposerError(None, None, "no aliases here", mark)
+        return super().compose_node(parent, index)
+
+
+class Table:
+    """A mapping of a document.
+
+    Attributes:
+        line: where it starts, from 1.
+        keys: its keys as they are written, in their order.
+    """
+
+    def __init__(self, node: yaml.Node | None, path: str, file: str) -> None:
+        """Read the keys of a node.
+
+        Raises:
+            InvalidRobot: not a mapping, a key that is no scalar, or one twice.
+        """
+        self._path = path
+        self._file = file
+        self.line = _line(node)
+        self._values: dict[str, yaml.Node] = {}
+        self._key_lines: dict[str, int] = {}
+        if not isinstance(node, yaml.MappingNode):
+            self._fail(path, f"must be a mapping, got {_shown(node)}", self.line)
+        for key, value in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                self._fail(path, "a key must be a word or a number", _line(key))
+            if key.value in self._values:
+                self._fail(self._at(key.value), "stands here twice", _line(key))
+            self._values[key.value] = value
+            self._key_lines[key.value] = _line(key)
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Return its keys as they are written, in their order."""
+        return tuple(self._values)
+
+    def has(self, key: str) -> bool:
+        """Return whether it has a key."""
+        return key in self._values
+
+    def refuse(self, key: str, message: str) -> NoReturn:
+        """Raise ``InvalidRobot`` about a key."""
+        self._fail(self._at(key), message, self._key_lines.get(key, self.line))
+
+    def refuse_others(self, *allowed: str) -> None:
+        """Raise for a key that is not allowed, naming the nearest that is.
+
+        Raises:
+            InvalidRobot: such a key.
+        """
+        for key in self._values:
+            if key not in allowed:
+                words = ", ".join(allowed)
+                self.refuse(
+                    key, f"no such key{nearest(key, allowed)}; allowed: {words}"
+                )
+
+    def table(self, key: str) -> "Table":
+        """Return the mapping of a key.
+
+        Raises:
+            InvalidRobot: no such key, or no mapping there.
+        """
+        return Table(self._node(key), self._at(key), self._file)
+
+    def tables(self, key: str) -> list["Table"]:
+        """Return the mappings of a key that holds a list; none without the key.
+
+        Raises:
+            InvalidRobot: not a list of mappings.
+        """
+        if key not in self._values:
+            return []
+        node = self._node(key)
+        if not isinstance(node, yaml.SequenceNode):
+            self.refuse(key, f"must be a list, got {_shown(node)}")
+        return [
+            Table(item, f"{self._at(key)}[{index}]", self._file)
+            for index, item in enumerate(node.value)
+        ]
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """Return the text of a key.
+
+        Raises:
+            InvalidRobot: no such key and no default, or no text there.
+        """
+        if default is not None and key not in self._values:
+            return default
+        node = self._node(key)
+        if not isinstance(node, yaml.ScalarNode) or not node.value:
+            self.refuse(key, f"must be a word, got {_shown(node)}")
+        return str(node.value)
+
+    def word(self, key: str, allowed: Iterable[str]) -> str:
+        """Return the text of a key that must be one of some words.
+
+        Raises:
+            InvalidRobot: no such key, or another word; the nearest is named.
+        """
+        words = list(allowed)
+        word = self.text(key)
+        if word not in words:
+            near = nearest(word, words)
+            self.refuse(key, f"must be one of {', '.join(words)}, got {word!r}{near}")
+        return word
+
+    def integer(self, key: str, default: int | None = None) -> int:
+        """Return the whole number of a key.
+
+        Raises:
+            InvalidRobot: no such key and no default, or no whole number there.
+        """
+        if default is not None and key not in self._values:
+            return default
+        try:
+            return int(self.text(key))
+        except ValueError:
+            shown = _shown(self._node(key))
+            self.refuse(key, f"must be a whole number, got {shown}")
+
+    def number(self, key: str, default: float | None = None) -> float:
+        """Return the finite number of a key.
+
+        Raises:
+            InvalidRobot: no such key and no default, or no finite number there.
+        """
+        if default is not None and key not in self._values:
+            return default
+        try:
+            value = float(self.text(key))
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            shown = _shown(self._node(key))
+            self.refuse(key, f"must be a finite number, got {shown}")
+        return value
+
+    def key_as_slot(self, key: str) -> int:
+        """Return a key as the number of a slot.
+
+        Raises:
+            InvalidRobot: not a plain number such as 0 or 12.
+        """
+        if not _SLOT.fullmatch(key):
+            self.refuse(key, "must be the number of a slot: 0, 1, ...")
+        return int(key)
+
+    def _at(self, key: str) -> str:
+        return f"{self._path}.{key}" if self._path else key
+
+    def _node(self, key: str) -> yaml.Node:
+        if key not in self._values:
+            self._fail(self._at(key), "is missing", self.line)
+        return self._values[key]
+
+    def _fail(self, path: str, message: str, line: int) -> NoReturn:
+        field = f"{path}: " if path else ""
+        raise InvalidRobot(f"{self._file}:{line}: {field}{message}")
+
+
+def compose(text: str, file: str) -> Table:
+    """Return the outermost mapping of a document.
+
+    Args:
+        text: the document.
+        file: its name, for messages.
+
+    Raises:
+        InvalidRobot: not YAML, not one mapping, or nested without end.
+    """
+    try:
+        node = yaml.compose(text, Loader=_Loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = "" if mark is None else f":{mark.line + 1}"
+        raise InvalidRobot(f"{file}{line}: not YAML: {error.problem}") from None
+    except yaml.YAMLError as error:
+        words = " ".join(str(error).split())
+        raise InvalidRobot(f"{file}: not YAML: {words}") from None
+    except RecursionError:
+        raise InvalidRobot(f"{file}: nested too deeply") from None
+    return Table(node, "", file)
+
+
+def _line(node: yaml.Node | None) -> int:
+    return 1 if node is None else int(node.start_mark.line) + 1
+
+
+def _shown(node: yaml.Node | None) -> str:
+    """Return what a node is, short enough for a message."""
+    if isinstance(node, yaml.ScalarNode):
+        return repr(str(node.value)[:40]) if node.value else "nothing"
+    if node is None:
+        return "nothing"
+    return "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"
