@@ -1,0 +1,157 @@
+"""Off-line evaluation: one robot, alone, from birth to a number.
+
+All clocks are integers of physics steps; nothing here looks at the wall's.
+"""
+
+import math
+from functools import lru_cache
+from typing import Any, cast
+
+import mujoco
+import numpy as np
+
+from schema.errors import ExperimentError, SimulationDiverged
+from schema.evaluation import Evaluation, Floats, Track
+from schema.experiment import (
+    EvaluationSettings,
+    Simulation,
+    Space,
+    body_space,
+    fitness_function,
+)
+from schema.mjcf import solo_model
+from schema.robot import Robot
+from worker.controller import Bank, pack, widths
+from worker.fitness import FitnessFunction, path_velocity, straight_velocity
+from worker.sensors import Senses, Servos
+
+
+def evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
+    """Return how a robot does: a pure function of the arguments.
+
+    Args:
+        robot: a robot that passes ``check_robot`` in the settings' body space.
+        settings: the world, its clocks and what is maximised.
+
+    Raises:
+        SimulationDiverged: the physics did; reason and simulated time.
+        ExperimentError: a sensor that the world has nothing for, a fitness
+            function that fails its contract.
+        InvalidRobot: more neurons than the limits.
+    """
+    track = simulate(robot, settings.space, settings.simulation)
+    function = cast("FitnessFunction", fitness_function(settings.fitness))
+    value = function(track, settings.fitness)
+    if not (isinstance(value, int | float) and math.isfinite(value)):
+        raise ExperimentError(
+            f"fitness.function: {settings.fitness.function!r} must return a finite "
+            f"number, got {value!r}"
+        )
+    clock = settings.simulation
+    return Evaluation(
+        float(value),
+        path_velocity(track),
+        straight_velocity(track),
+        (clock.warmup_steps + clock.window_steps) * clock.timestep_s,
+    )
+
+
+def simulate(robot: Robot, space: Space, simulation: Simulation) -> Track:
+    """Return where a robot goes, alone, from the origin, its lowest point at 0.
+
+    Brain, sensors and commands change every ``brain_steps`` from birth on; the
+    position of the core's centre is taken every ``pose_steps`` of the window,
+    its first and last moment included.
+
+    Args:
+        robot: a checked robot.
+        space: part types and limits.
+        simulation: the world and its clocks.
+
+    Raises:
+        SimulationDiverged: a number that is none, or a warning of the engine.
+        ExperimentError: a sensor that the world has nothing for.
+        InvalidRobot: more neurons than the limits.
+    """
+    _silence_engine()
+    model = solo_model(robot, body_space(space), simulation)
+    data = mujoco.MjData(model)
+    positions = _live(robot, space, simulation, (model, data))
+    interval_s = simulation.pose_steps * simulation.timestep_s
+    return Track(interval_s, positions)
+
+
+def _live(
+    robot: Robot, space: Space, simulation: Simulation, world: tuple[Any, Any]
+) -> Floats:
+    """Run the closed loop to the window's end; return the sampled positions."""
+    model, data = world
+    types, width = body_space(space), widths(space)
+    senses = Senses(robot, types, model, width=width.inputs)
+    servos = Servos(robot, types, model)
+    tick_s = simulation.brain_steps * simulation.timestep_s
+    bank = Bank([pack(robot.brain, width)], width, tick_s)
+    start, end = simulation.warmup_steps, _end(simulation)
+    positions = np.empty((simulation.window_steps // simulation.pose_steps + 1, 3))
+    step = tick = sample = 0
+    next_tick, next_sample = 0, start
+    while True:
+        if step == next_sample:
+            positions[sample] = data.qpos[:3]
+            sample += 1
+            next_sample += simulation.pose_steps
+        if step == end:
+            break
+        if step == next_tick:
+            if step:
+                readings = senses.read(model, data, tick_s)
+            else:
+                readings = senses.start(model, data)
+            _check(data, step * simulation.timestep_s)
+            servos.drive(data, bank.step(readings, float(tick))[0])
+            tick += 1
+            next_tick += simulation.brain_steps
+        until = min(next_tick, next_sample)
+        mujoco.mj_step(model, data, nstep=until - step)
+        step = until
+    _check_warnings(data, end * simulation.timestep_s)
+    return positions
+
+
+def _end(simulation: Simulation) -> int:
+    return simulation.warmup_steps + simulation.window_steps
+
+
+def _check(data: Any, time_s: float) -> None:  # noqa: ANN401 - mujoco ships no types
+    """Raise if the state is no longer made of numbers.
+
+    A sum is finite only if all its terms are; nothing plausible overflows it.
+    """
+    if not math.isfinite(data.qvel.sum() + data.qpos.sum()):
+        _raise_diverged(data, time_s)
+
+
+def _check_warnings(data: Any, time_s: float) -> None:  # noqa: ANN401 - mujoco ships no types
+    """Raise if the engine warned of anything, or the state is not of numbers."""
+    _check(data, time_s)
+    if any(warning.number for warning in data.warning):
+        _raise_diverged(data, time_s)
+
+
+def _raise_diverged(data: Any, time_s: float) -> None:  # noqa: ANN401 - mujoco ships no types
+    names = [
+        mujoco.mjtWarning(index).name.removeprefix("mjWARN_")
+        for index, warning in enumerate(data.warning)
+        if warning.number
+    ]
+    reason = ", ".join(names) or "state not finite"
+    raise SimulationDiverged(f"physics diverged by {time_s:.3f} s: {reason}")
+
+
+@lru_cache(maxsize=1)
+def _silence_engine() -> None:
+    """Keep the engine's warnings out of stderr and of a file where we stand.
+
+    They are counted all the same, and ``_check_warnings`` reads the counts.
+    """
+    mujoco.set_mju_user_warning(lambda _message: None)

@@ -1,0 +1,122 @@
+"""Fitness functions, and what every one of them must keep.
+
+A fitness function is any ``module:attribute`` that takes a track and the
+experiment's fitness section and returns a finite number, higher is better.
+"""
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from schema.errors import ExperimentError
+from schema.evaluation import Floats, Track
+from schema.experiment import Fitness
+
+
+class FitnessFunction(Protocol):
+    """What the experiment's ``fitness.function`` names."""
+
+    def __call__(self, track: Track, fitness: Fitness) -> float:
+        """Return how good a track is; always maximised, finite."""
+        ...
+
+
+def path_velocity(track: Track) -> float:
+    """Return the length of the path over its time, in the ground plane [m/s].
+
+    Args:
+        track: (T, 3) positions; T >= 2.
+    """
+    steps = np.diff(track.core_position[:, :2], axis=0)
+    # hypot of plain floats: the sum's order is the track's.
+    length = sum(math.hypot(x, y) for x, y in steps.tolist())
+    return length / _duration_s(track)
+
+
+def straight_velocity(track: Track) -> float:
+    """Return the net distance over the time, in the ground plane [m/s].
+
+    Args:
+        track: (T, 3) positions; T >= 2.
+    """
+    x, y = (track.core_position[-1, :2] - track.core_position[0, :2]).tolist()
+    return math.hypot(x, y) / _duration_s(track)
+
+
+def _duration_s(track: Track) -> float:
+    return (len(track.core_position) - 1) * track.interval_s
+
+
+def thesis(track: Track, fitness: Fitness) -> float:
+    """Return f = path_weight v + straight_weight s, or 0 above the limit.
+
+    v is the path velocity, s the straight one. The limit is one of fitness, not
+    of speed: what is faster has broken the physics.
+
+    Args:
+        track: (T, 3) positions; T >= 2.
+        fitness: the weights, 1 and 5 in the thesis, and the limit, 1.0.
+
+    Returns:
+        The fitness [m/s], finite, >= 0 for weights >= 0.
+
+    Source: Hupkes 2016, equation 5.1, and its published code for the limit.
+    """
+    value = fitness.path_weight * path_velocity(
+        track
+    ) + fitness.straight_weight * straight_velocity(track)
+    return 0.0 if value > fitness.limit else value
+
+
+def check_fitness(function: FitnessFunction, fitness: Fitness) -> None:
+    """Raise unless a fitness function keeps its contract on a few plain tracks.
+
+    Args:
+        function: what an experiment would name.
+        fitness: the section that it will be given.
+
+    Raises:
+        ExperimentError: it returns no number, one that is not finite, another one
+            the second time, or writes to the track.
+    """
+    for name, positions in _plain_tracks():
+        track = Track(0.2, positions.copy())
+        values = [function(track, fitness) for _ in range(2)]
+        for value in values:
+            if isinstance(value, bool) or not isinstance(value, int | float):
+                raise ExperimentError(
+                    f"fitness.function: must return a number, got {value!r} "
+                    f"for a {name} track"
+                )
+            if not math.isfinite(value):
+                raise ExperimentError(
+                    f"fitness.function: must return a finite number, got {value} "
+                    f"for a {name} track"
+                )
+        if values[0] != values[1]:
+            raise ExperimentError(
+                "fitness.function: must return the same for the same track, got "
+                f"{values[0]} and {values[1]} for a {name} track"
+            )
+        if not np.array_equal(track.core_position, positions):
+            raise ExperimentError(
+                f"fitness.function: must not write to the track, but changed a "
+                f"{name} one"
+            )
+
+
+def _plain_tracks() -> list[tuple[str, Floats]]:
+    along = np.linspace(0.0, 0.6, 61)
+    turn = np.linspace(0.0, 2.0 * np.pi, 61)
+    still = np.zeros((61, 3))
+    straight, circle, two = still.copy(), still.copy(), still[:2].copy()
+    straight[:, 0] = along
+    circle[:, 0], circle[:, 1] = np.cos(turn), np.sin(turn)
+    two[1] = (0.01, 0.02, 0.03)
+    return [
+        ("still", still),
+        ("straight", straight),
+        ("circular", circle),
+        ("two-sample", two),
+    ]

@@ -1,0 +1,249 @@
+"""What a robot feels and what its motors are told.
+
+Readings are functions of the engine's current (qpos, qvel) and of the contacts of
+the last step, never of its ``sensordata``, which is empty after a restore. A robot
+is found in a model by the prefix of its names, so that many can share one.
+"""
+
+from typing import Any, cast
+
+import mujoco
+import numpy as np
+
+from schema.errors import ExperimentError
+from schema.evaluation import Floats
+from schema.parts import BodySpace
+from schema.robot import Robot
+
+LOWEST_OUTPUT = 1e-5
+HIGHEST_OUTPUT = 0.99999
+"""Outputs are clipped to these before they become target angles."""
+
+_Velocity = tuple[float, float, float]
+_GEOM = mujoco.mjtObj.mjOBJ_GEOM
+_SITE = mujoco.mjtObj.mjOBJ_SITE
+_JOINT = mujoco.mjtObj.mjOBJ_JOINT
+_ACTUATOR = mujoco.mjtObj.mjOBJ_ACTUATOR
+
+
+class Senses:
+    """The sensors of one robot in a model, in the order of its network's inputs.
+
+    Acceleration is what an ideal sensor averages between two readings: change of
+    velocity over time in the present sensor frame, less gravity; at rest it reads
+    +9.81 upward. A pad reads 1 while it touches anything but its own segment and
+    those joined to it.
+
+    Attributes:
+        readings: (1, I) the last values; unused inputs stay 0.
+        velocities: of each imu at the last reading, world frame [m/s]; part of
+            what a snapshot must keep.
+    """
+
+    def __init__(
+        self, robot: Robot, space: BodySpace, model: Any, *, width: int, prefix: str = ""
+    ) -> None:
+        """Find the sensors.
+
+        Args:
+            robot: the robot.
+            space: its part types.
+            model: a compiled model that holds it.
+            width: number I of readings, at least the robot's inputs.
+            prefix: of the robot's names in the model.
+
+        Raises:
+            ExperimentError: a light sensor; this world has no light.
+        """
+        self.readings: Floats = np.zeros((1, width))
+        self.velocities: list[_Velocity] = []
+        self._row = self.readings[0]
+        self._pads: list[tuple[int, int]] = []
+        self._core_imu = -1
+        self._imus: list[tuple[int, int]] = []
+        start = free_joint(model, prefix)
+        self._qpos = int(model.jnt_qposadr[start])
+        self._qvel = int(model.jnt_dofadr[start])
+        root = int(model.jnt_bodyid[start])
+        self._gravity = -float(model.opt.gravity[2])
+        place = 0
+        for index, part in enumerate(robot.parts):
+            for sensor in space[part.kind].sensors:
+                if sensor.kind == "light":
+                    raise ExperimentError(
+                        f"body.parts[{index}]: {part.kind}: no light in this world"
+                    )
+                if sensor.kind == "touch":
+                    name = f"{prefix}{index}/{sensor.box}"
+                    self._pads.append((find(model, _GEOM, name), place))
+                else:
+                    site = find(model, _SITE, f"{prefix}{index}/imu")
+                    self._add_imu(model, site, root, place)
+                place += sensor.inputs
+
+    def _add_imu(self, model: Any, site: int, root: int, place: int) -> None:  # noqa: ANN401 - mujoco ships no types
+        at_origin = (
+            int(model.site_bodyid[site]) == root
+            and not model.site_pos[site].any()
+            and model.site_quat[site].tolist() == [1.0, 0.0, 0.0, 0.0]
+        )
+        if at_origin and self._core_imu < 0:
+            self._core_imu = place
+        else:
+            self._imus.append((site, place))
+
+    def start(self, model: Any, data: Any) -> Floats:  # noqa: ANN401 - mujoco ships no types
+        """Return the first readings: no motion before, so no acceleration."""
+        mujoco.mj_forward(model, data)
+        self.velocities = [
+            _velocity_of(data.qvel[self._qvel : self._qvel + 3])
+        ] + [_velocity_of(_site_motion(model, data, site)[3:]) for site, _ in self._imus]
+        return self.read(model, data, 1.0)
+
+    def read(self, model: Any, data: Any, interval_s: float) -> Floats:  # noqa: ANN401 - mujoco ships no types
+        """Read all sensors.
+
+        Args:
+            model: the model.
+            data: its state, just stepped.
+            interval_s: since the last reading [s].
+
+        Returns:
+            ``readings``, new values.
+        """
+        if self._core_imu >= 0:
+            self._read_core(data, interval_s)
+        if self._imus:
+            self._read_sites(model, data, interval_s)
+        if self._pads:
+            touching = set(data.contact.geom.ravel().tolist())
+            for geom, place in self._pads:
+                self._row[place] = geom in touching
+        return self.readings
+
+    def _read_core(self, data: Any, interval_s: float) -> None:  # noqa: ANN401 - mujoco ships no types
+        """Read the imu of the core straight from the free joint's state.
+
+        Plain floats: at one robot they are twice as fast as arrays of three.
+        """
+        w, x, y, z = data.qpos[self._qpos + 3 : self._qpos + 7].tolist()
+        vx, vy, vz, gx, gy, gz = data.qvel[self._qvel : self._qvel + 6].tolist()
+        ux, uy, uz = self.velocities[0]
+        self.velocities[0] = (vx, vy, vz)
+        ax = (vx - ux) / interval_s
+        ay = (vy - uy) / interval_s
+        az = (vz - uz) / interval_s + self._gravity
+        place = self._core_imu
+        # The rows are the columns of the core's rotation: world into core frame.
+        self._row[place : place + 6] = (
+            (1 - 2 * (y * y + z * z)) * ax + 2 * (x * y + w * z) * ay
+            + 2 * (x * z - w * y) * az,
+            2 * (x * y - w * z) * ax + (1 - 2 * (x * x + z * z)) * ay
+            + 2 * (y * z + w * x) * az,
+            2 * (x * z + w * y) * ax + 2 * (y * z - w * x) * ay
+            + (1 - 2 * (x * x + y * y)) * az,
+            gx,
+            gy,
+            gz,
+        )
+
+    def _read_sites(self, model: Any, data: Any, interval_s: float) -> None:  # noqa: ANN401 - mujoco ships no types
+        """Read imus elsewhere than at the core's centre."""
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        for number, (site, place) in enumerate(self._imus, start=1):
+            motion = _site_motion(model, data, site)
+            rotation = data.site_xmat[site].reshape(3, 3)
+            change = np.subtract(motion[3:], self.velocities[number]) / interval_s
+            change[2] += self._gravity
+            self.velocities[number] = _velocity_of(motion[3:])
+            self._row[place : place + 3] = change @ rotation
+            self._row[place + 3 : place + 6] = motion[:3] @ rotation
+
+
+class Servos:
+    """The motors of one robot: network outputs to commanded joint velocities.
+
+    Attributes:
+        slots: indices of its actuators in the model, contiguous, in part order.
+    """
+
+    def __init__(
+        self, robot: Robot, space: BodySpace, model: Any, *, prefix: str = ""
+    ) -> None:
+        """Find the motors.
+
+        Args:
+            robot: the robot.
+            space: its part types.
+            model: a compiled model that holds it.
+            prefix: of the robot's names in the model.
+        """
+        self._joints: list[tuple[int, float, float, float, float]] = []
+        actuators: list[int] = []
+        for index, part in enumerate(robot.parts):
+            motor = space[part.kind].motor
+            if motor is None:
+                continue
+            name = f"{prefix}joint{index}"
+            actuators.append(find(model, _ACTUATOR, name))
+            joint = find(model, _JOINT, name)
+            low, high = model.jnt_range[joint].tolist()
+            self._joints.append(
+                (
+                    int(model.jnt_qposadr[joint]),
+                    low,
+                    high - low,
+                    motor.gain,
+                    motor.max_velocity,
+                )
+            )
+        first = actuators[0] if actuators else 0
+        self.slots = slice(first, first + len(actuators))
+        assert actuators == list(range(first, first + len(actuators)))
+
+    def drive(self, data: Any, outputs: Floats) -> None:  # noqa: ANN401 - mujoco ships no types
+        """Command each joint towards its target, until the next tick.
+
+        Args:
+            data: the state; its ``ctrl`` is written [rad/s].
+            outputs: (O,) of the network, unclipped; O may exceed the motors.
+        """
+        position = data.qpos
+        commands = []
+        for (address, low, span, gain, fastest), output in zip(
+            self._joints, outputs.tolist(), strict=False
+        ):
+            share = min(max(output, LOWEST_OUTPUT), HIGHEST_OUTPUT)
+            command = gain * (low + share * span - position.item(address))
+            commands.append(min(max(command, -fastest), fastest))
+        data.ctrl[self.slots] = commands
+
+
+def free_joint(model: Any, prefix: str = "") -> int:  # noqa: ANN401 - mujoco ships no types
+    """Return the index of a robot's free joint."""
+    return find(model, _JOINT, f"{prefix}free")
+
+
+def find(model: Any, kind: Any, name: str) -> int:  # noqa: ANN401 - mujoco ships no types
+    """Return the index of a named element of a model.
+
+    Raises:
+        KeyError: the model has none of that name.
+    """
+    index = int(mujoco.mj_name2id(model, kind, name))
+    if index < 0:
+        raise KeyError(name)
+    return index
+
+
+def _site_motion(model: Any, data: Any, site: int) -> Floats:  # noqa: ANN401 - mujoco ships no types
+    """Return a site's angular and linear velocity, (6,), world frame."""
+    motion = np.empty(6)
+    mujoco.mj_objectVelocity(model, data, _SITE, site, motion, 0)
+    return motion
+
+
+def _velocity_of(vector: Floats) -> _Velocity:
+    return cast("_Velocity", tuple(vector.tolist()))
