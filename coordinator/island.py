@@ -1,0 +1,219 @@
+"""An off-line island: who is born, judged once, and lives on. A pure machine.
+
+Founders come first, then broods of children of the population that stands when
+the brood begins. Births of a brood are in flight together, up to the experiment's
+window; whatever order their answers arrive in, they are committed in birth order.
+Source: Hupkes 2016, section 5.3; facts of the original, section 5.1.
+"""
+
+from dataclasses import dataclass
+from math import isfinite
+
+from coordinator.breeding import Breeder
+from coordinator.events import (
+    Answered,
+    Evaluate,
+    Evaluated,
+    EvaluationFailed,
+    Finish,
+    IslandCommand,
+    IslandEvent,
+    Started,
+    Vet,
+    Vetted,
+    VettingFailed,
+)
+from coordinator.rows import birth_record, evaluation_record, population_records
+from coordinator.selection import Couple, Individual
+from schema.birth import BirthId
+from schema.errors import UnexpectedEvent
+from schema.experiment import Experiment, body_space
+from schema.genome import Genome, develop
+from schema.robot import Robot
+
+
+@dataclass(slots=True)
+class _Candidate:
+    """Who is to be born under a number; ``attempt`` is the one being judged."""
+
+    birth: BirthId
+    attempt: int
+    couple: Couple | None
+    genome: Genome
+    robot: Robot
+    is_viable: bool = False
+    outcome: Evaluated | EvaluationFailed | None = None
+
+
+class Island:
+    """One population and its births.
+
+    Attributes:
+        births: how many individuals have been born and recorded.
+        population: the living, in birth order.
+    """
+
+    def __init__(
+        self, experiment: Experiment, seed: int, run: int, number: int = 0
+    ) -> None:
+        """Make an island to which nothing has happened.
+
+        Args:
+            experiment: what is evolved, and how.
+            seed: of the experiment's execution.
+            run: number of the repeat, from 0.
+            number: of this island.
+        """
+        self.births = 0
+        self.population: tuple[Individual, ...] = ()
+        self._experiment = experiment
+        self._number = number
+        self._space = body_space(experiment.space)
+        self._breeder = Breeder(experiment, seed, run)
+        self._has_started = False
+        self._generation = 0
+        self._begun = 0
+        # Founders need nobody's fitness: all of them are in flight together.
+        self._window = self._brood_end = experiment.selection.population
+        self._candidates: dict[int, _Candidate] = {}
+        self._brood: list[Individual] = []
+
+    @property
+    def is_finished(self) -> bool:
+        """All births of the experiment have been recorded."""
+        return self.births == self._experiment.births
+
+    def handle(self, event: IslandEvent) -> list[IslandCommand]:
+        """Take an event and return what follows from it.
+
+        Duplicates of answers that were taken before are ignored.
+
+        Raises:
+            UnexpectedEvent: an event that cannot come now; nothing has changed.
+            ExperimentError: restrictions that no robot meets; the island cannot go
+                on.
+        """
+        if isinstance(event, Started):
+            if self._has_started:
+                raise self._unexpected(event, "it has started before")
+            self._has_started = True
+            return self._proceed()
+        candidate = self._asked(event)
+        if candidate is None:
+            return []
+        match event:
+            case Vetted(report=report) if report.is_viable:
+                candidate.is_viable = True
+                return [Evaluate(candidate.birth, candidate.robot)]
+            case Vetted(report=report):
+                return [self._retry(candidate, report.reason)]
+            case VettingFailed(reason=reason):
+                return [self._retry(candidate, reason)]
+            case Evaluated() | EvaluationFailed():
+                candidate.outcome = event
+                return self._proceed()
+
+    def _asked(self, event: Answered) -> _Candidate | None:
+        """Return the candidate that an answer is news of, None if it is none.
+
+        Raises:
+            UnexpectedEvent: an answer to what was never asked.
+        """
+        birth = event.birth
+        if birth.island != self._number or not 0 <= birth.number < self._begun:
+            raise self._unexpected(event, f"births 0..{self._begun - 1} have begun")
+        candidate = self._candidates.get(birth.number)
+        if candidate is None or candidate.outcome is not None:
+            return None
+        if isinstance(event, Vetted | VettingFailed):
+            if event.attempt > candidate.attempt:
+                raise self._unexpected(event, f"it is at attempt {candidate.attempt}")
+            is_old = event.attempt < candidate.attempt or candidate.is_viable
+            return None if is_old else candidate
+        if not candidate.is_viable:
+            raise self._unexpected(event, "it has not been vetted")
+        if isinstance(event, Evaluated) and not isfinite(event.evaluation.fitness):
+            raise self._unexpected(event, "fitness must be finite")
+        return candidate
+
+    def _unexpected(self, event: IslandEvent, why: str) -> UnexpectedEvent:
+        return UnexpectedEvent(
+            f"island {self._number}, {self.births} of {self._experiment.births} born, "
+            f"{self._begun} begun, brood {self._generation} ends at "
+            f"{self._brood_end}: {why}, got {event}"
+        )
+
+    def _proceed(self) -> list[IslandCommand]:
+        """Commit who is judged and next in turn, and begin what the window allows."""
+        commands: list[IslandCommand] = []
+        while (first := self._candidates.get(self.births)) and first.outcome:
+            commands += self._commit(first, first.outcome)
+        if self.births == self._brood_end:
+            commands += self._close_brood()
+        while self._begun < min(self._brood_end, self.births + self._window):
+            birth = BirthId(self._number, self._begun)
+            candidate = self._conceived(birth, 0, None, "")
+            self._candidates[self._begun] = candidate
+            self._begun += 1
+            commands.append(Vet(birth, candidate.attempt, candidate.robot))
+        return commands
+
+    def _retry(self, candidate: _Candidate, why: str) -> Vet:
+        """Replace a candidate that cannot live by the next of its birth."""
+        birth = candidate.birth
+        following = self._conceived(birth, candidate.attempt + 1, candidate.couple, why)
+        self._candidates[birth.number] = following
+        return Vet(birth, following.attempt, following.robot)
+
+    def _conceived(
+        self, birth: BirthId, attempt: int, couple: Couple | None, why: str
+    ) -> _Candidate:
+        """Return the candidate of the first attempt, from this one, that gives one."""
+        while True:
+            self._breeder.check_patience(birth, attempt, self.population, why)
+            couple, genome = self._breeder.conceive(
+                birth, attempt, self.population, couple
+            )
+            if genome is not None:
+                robot = develop(genome, self._space)
+                return _Candidate(birth, attempt, couple, genome, robot)
+            attempt += 1
+            why = "crossover found no fitting subtree, or the child had no motor"
+
+    def _commit(
+        self, candidate: _Candidate, outcome: Evaluated | EvaluationFailed
+    ) -> list[IslandCommand]:
+        """Make a judged candidate an individual."""
+        parents = candidate.couple or ()
+        is_judged = isinstance(outcome, Evaluated)
+        individual = Individual(
+            candidate.birth,
+            candidate.genome,
+            outcome.evaluation.fitness if isinstance(outcome, Evaluated) else 0.0,
+            1 + max((parent.rank for parent in parents), default=0),
+            self._generation,
+            has_failed=not is_judged,
+        )
+        del self._candidates[self.births]
+        self._brood.append(individual)
+        self.births += 1
+        attempts = candidate.attempt + 1
+        return [
+            birth_record(individual, parents, attempts, candidate.robot, self._space),
+            evaluation_record(outcome),
+        ]
+
+    def _close_brood(self) -> list[IslandCommand]:
+        """Let the survivors be the population, and set out the next brood."""
+        last = BirthId(self._number, self.births - 1)
+        self.population = self._breeder.survivors(self.population, self._brood, last)
+        self._brood = []
+        commands: list[IslandCommand] = []
+        commands += population_records(self._number, self.births, self.population)
+        if self.is_finished:
+            return [*commands, Finish(self._number)]
+        self._generation += 1
+        self._window = self._experiment.window
+        children = self._experiment.selection.children
+        self._brood_end = min(self.births + children, self._experiment.births)
+        return commands

@@ -1,0 +1,81 @@
+"""What an off-line island writes: rows of the tables in `schema.tables`."""
+
+from collections.abc import Sequence
+
+from coordinator.events import Evaluated, EvaluationFailed, Record
+from coordinator.selection import Individual
+from schema.codec import encode_genome
+from schema.parts import BodySpace
+from schema.robot import Robot
+from schema.tables import body_rows, sizes
+
+
+def birth_record(
+    individual: Individual,
+    parents: Sequence[Individual],
+    attempts: int,
+    robot: Robot,
+    space: BodySpace,
+) -> Record:
+    """Return the births row of an individual.
+
+    Args:
+        individual: who was born.
+        parents: in order; none for a random robot.
+        attempts: that it took, this one included.
+        robot: what its genome develops into.
+        space: the part types.
+    """
+    row = {
+        "island": individual.birth.island,
+        "birth": individual.birth.number,
+        "parents": [
+            {"island": parent.birth.island, "birth": parent.birth.number}
+            for parent in parents
+        ],
+        "generation": individual.generation,
+        "rank": individual.rank,
+        "attempts": attempts,
+        "genome": encode_genome(individual.genome),
+        "body": body_rows(robot),
+        **sizes(robot, individual.genome, space),
+    }
+    return Record("births", row)
+
+
+def evaluation_record(outcome: Evaluated | EvaluationFailed) -> Record:
+    """Return the evaluations row of an outcome; a failure has no numbers."""
+    provenance = outcome.provenance
+    judged = outcome.evaluation if isinstance(outcome, Evaluated) else None
+    row = {
+        "island": outcome.birth.island,
+        "birth": outcome.birth.number,
+        "status": "ok" if isinstance(outcome, Evaluated) else "failed",
+        "reason": "" if isinstance(outcome, Evaluated) else outcome.reason,
+        "fitness": judged and judged.fitness,
+        "path_velocity": judged and judged.path_velocity,
+        "straight_velocity": judged and judged.straight_velocity,
+        "simulated_s": judged and judged.simulated_s,
+        "wall_s": provenance.wall_s,
+        "worker": provenance.agent,
+        "platform": provenance.platform,
+    }
+    return Record("evaluations", row)
+
+
+def population_records(
+    island: int, births: int, population: Sequence[Individual]
+) -> list[Record]:
+    """Return the population rows: who is alive when so many had been born."""
+    return [
+        Record(
+            "population",
+            {
+                "island": island,
+                "births": births,
+                "birth": individual.birth.number,
+                "fitness": None if individual.has_failed else individual.fitness,
+            },
+        )
+        for individual in population
+    ]
