@@ -1,0 +1,310 @@
+"""The coordinator on the network: who is there, jobs out, answers in.
+
+The network's threads only enqueue; whoever owns ``Network`` calls ``send`` and
+``receive`` from one thread and sees events in the order in which they came.
+"""
+
+import json
+import logging
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import Self
+
+import zenoh
+from google.protobuf.message import DecodeError
+
+from coordinator.events import AgentKind, DispatchEvent, Joined, Left, Returned
+from schema import revolve_pb2 as pb
+from schema.codec import decode_answer
+from schema.errors import MalformedMessage, NetworkError
+from schema.network import (
+    ASK_TIMEOUT_S,
+    DEFAULT_FLEET,
+    FENCED,
+    JOB_TIMEOUT_S,
+    THIS_MACHINE,
+    Tls,
+    client_config,
+    hub_config,
+    parse_address,
+)
+from schema.platform_tag import our_version
+from schema.topics import Member, agents_alive, check_name, member_of
+
+_LOG = logging.getLogger(__name__)
+_KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
+_NOW = zenoh.ConsolidationMode.NONE
+_LONGEST_REASON = 1000
+_MOST_AT_ONCE = 1000
+# What the engine itself replies when nobody did in time.
+_TIMEOUT = b"Timeout"
+
+
+@dataclass(slots=True)
+class _Asked:
+    """One question to one agent; ``number`` is the job's, -1 for "what are you?"."""
+
+    agent: str
+    number: int
+    inbox: "SimpleQueue[_News]"
+    reply: zenoh.Reply | None = None
+
+    def take(self, reply: zenoh.Reply) -> None:
+        self.reply = reply
+
+    def end(self) -> None:
+        """Comes exactly once, with a reply or without."""
+        self.inbox.put(self)
+
+
+_News = _Asked | zenoh.Sample
+
+
+class Network:
+    """A coordinator's end of the network; use it in a ``with``.
+
+    Attributes:
+        address: where agents connect to.
+        malformed: messages of peers that did not decode; they were dropped.
+        refused: agents that may not take part, and why.
+    """
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        epoch: int,
+        fleet: str = DEFAULT_FLEET,
+        listen: tuple[str, ...] = (THIS_MACHINE,),
+        connect: str = "",
+        tls: Tls | None = None,
+    ) -> None:
+        """Prepare, open nothing.
+
+        Args:
+            name: of this process, never used again by another.
+            epoch: of its run; answers of other epochs are not for it.
+            fleet: whose agents to use.
+            listen: addresses of the hub within this process.
+            connect: a hub elsewhere; then nothing listens here.
+            tls: files for ``tls/`` addresses.
+
+        Raises:
+            NetworkError: names or addresses that are none, or that would let
+                strangers in.
+        """
+        self.address = connect or listen[0]
+        self.malformed = 0
+        self.refused: dict[str, str] = {}
+        self._me = Member(
+            check_name(fleet, "fleet"), "coordinator", check_name(name, "name")
+        )
+        self._epoch = epoch
+        self._config = (
+            client_config(connect, tls) if connect else hub_config(listen, tls)
+        )
+        self._is_hub = not connect
+        self._inbox: SimpleQueue[_News] = SimpleQueue()
+        self._members: dict[str, Member] = {}
+        self._joined: set[str] = set()
+        self._ask_again: list[tuple[float, str]] = []
+
+    def __enter__(self) -> Self:
+        """Open the session and begin to look for agents.
+
+        Raises:
+            NetworkError: an address in use, a hub that is not there.
+        """
+        zenoh.init_log_from_env_or("error")
+        with ExitStack() as opened:
+            try:
+                config = zenoh.Config.from_json5(self._config)
+                self._session = opened.enter_context(zenoh.open(config))
+            except zenoh.ZError as error:
+                raise NetworkError(self._why_not(str(error))) from None
+            self._declare()
+            self._opened = opened.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._opened.close()
+
+    def _why_not(self, error: str) -> str:
+        """Return the engine's complaint as one short line."""
+        if not self._is_hub:
+            return f"no hub at {self.address}"
+        if "in use" in error:
+            return f"cannot listen on {self.address}: it is in use"
+        return f"cannot listen on {self.address}: {error.partition(' at /')[0].strip()}"
+
+    def _declare(self) -> None:
+        if self._is_hub and parse_address(self.address)[2] == 0:
+            self.address = self._free_address()
+        put = zenoh.handlers.Callback(self._inbox.put, indirect=False)
+        self._watches = [
+            self._session.liveliness().declare_subscriber(
+                agents_alive(self._me.fleet, kind), put, history=True
+            )
+            for kind in _KINDS
+        ]
+        self._token = self._session.liveliness().declare_token(self._me.alive)
+
+    def _free_address(self) -> str:
+        """Return where the hub really listens."""
+        key = f"@/{self._session.zid()}/router"
+        for reply in self._session.get(key, consolidation=_NOW):
+            if reply.ok is not None:
+                return str(json.loads(reply.ok.payload.to_bytes())["locators"][0])
+        raise NetworkError(f"the hub does not tell which port of {self.address} it has")
+
+    def send(self, number: int, agent: str, payload: bytes) -> None:
+        """Give a job to an agent; exactly one ``Returned`` will tell of it.
+
+        Args:
+            number: of the job.
+            agent: that joined; one that left since loses the job.
+            payload: an encoded request.
+        """
+        asked = _Asked(agent, number, self._inbox)
+        if member := self._members.get(agent):
+            self._ask(asked, member.jobs, payload, JOB_TIMEOUT_S)
+        else:
+            asked.end()
+
+    def _ask(
+        self, asked: _Asked, key: str, payload: bytes | None, timeout_s: float
+    ) -> None:
+        self._session.get(
+            key,
+            zenoh.handlers.Callback(asked.take, asked.end, indirect=False),
+            payload=payload,
+            timeout=timeout_s,
+            consolidation=_NOW,
+        )
+
+    def receive(self, timeout_s: float) -> list[DispatchEvent]:
+        """Return what happened, in order; empty if nothing did in time.
+
+        Args:
+            timeout_s: how long to wait for the first event [s].
+
+        Raises:
+            NetworkError: another coordinator has taken this one's run over.
+        """
+        now_s = time.monotonic()
+        while self._ask_again and self._ask_again[0][0] <= now_s:
+            self._ask_info(self._ask_again.pop(0)[1])
+        events: list[DispatchEvent] = []
+        try:
+            news = self._inbox.get(timeout=timeout_s)
+            while True:
+                event = self._understand(news)
+                if event is not None:
+                    events.append(event)
+                if len(events) == _MOST_AT_ONCE:
+                    return events
+                news = self._inbox.get_nowait()
+        except Empty:
+            return events
+
+    def _understand(self, news: _News) -> DispatchEvent | None:
+        """Return what news means for who gives out jobs, if anything."""
+        try:
+            if isinstance(news, zenoh.Sample):
+                return self._token_changed(news)
+            if news.number < 0:
+                return self._introduced(news)
+            return self._returned(news)
+        except MalformedMessage as error:
+            self.malformed += 1
+            _LOG.warning("dropped a malformed message: %s", error)
+            return None
+
+    def _token_changed(self, sample: zenoh.Sample) -> DispatchEvent | None:
+        member = member_of(str(sample.key_expr))
+        if sample.kind == zenoh.SampleKind.PUT:
+            if member.name not in self._members:
+                self._members[member.name] = member
+                self._ask_info(member.name)
+            return None
+        self._members.pop(member.name, None)
+        self.refused.pop(member.name, None)
+        if member.name in self._joined:
+            self._joined.remove(member.name)
+            return Left(member.name)
+        return None
+
+    def _ask_info(self, agent: str) -> None:
+        if member := self._members.get(agent):
+            asked = _Asked(agent, -1, self._inbox)
+            self._ask(asked, member.info, None, ASK_TIMEOUT_S)
+
+    def _introduced(self, asked: _Asked) -> DispatchEvent | None:
+        """Let an agent take part that says what it is and is of our version."""
+        member = self._members.get(asked.agent)
+        if member is None or asked.agent in self._joined:
+            return None
+        if asked.reply is None or asked.reply.ok is None:
+            # It lives but does not answer (yet).
+            self._ask_again.append((time.monotonic() + 1.0, asked.agent))
+            return None
+        info = _info(asked.reply.ok.payload.to_bytes(), member)
+        if info.version != our_version():
+            reason = f"version {info.version!r}, the coordinator is {our_version()!r}"
+            self.refused[member.name] = reason
+            _LOG.warning("refused %s %s: %s", member.role, member.name, reason)
+            return None
+        self._joined.add(member.name)
+        kind: AgentKind = "analyzer" if member.role == "analyzer" else "worker"
+        return Joined(member.name, kind, info.slots, info.platform)
+
+    def _returned(self, asked: _Asked) -> DispatchEvent:
+        number, agent, reply = asked.number, asked.agent, asked.reply
+        if reply is None:
+            return Returned(number, agent, "lost")
+        if reply.ok is not None:
+            data = reply.ok.payload.to_bytes()
+            problem = self._problem(number, data)
+            if not problem:
+                return Returned(number, agent, "ok", data)
+            self.malformed += 1
+            _LOG.warning("malformed answer of %s: %s", agent, problem)
+            return Returned(number, agent, "error", reason=problem)
+        assert reply.err is not None
+        told = reply.err.payload.to_bytes()
+        if told == _TIMEOUT:
+            return Returned(number, agent, "lost")
+        reason = told.decode("utf-8", "replace")[:_LONGEST_REASON]
+        if reason.startswith(FENCED):
+            raise NetworkError(f"this coordinator stops: {reason[len(FENCED) :]}")
+        return Returned(number, agent, "error", reason=reason or "no reason given")
+
+    def _problem(self, number: int, data: bytes) -> str:
+        """Return what is wrong with an answer, empty if nothing is."""
+        try:
+            answer = decode_answer(data)
+        except MalformedMessage as error:
+            return str(error)
+        if (answer.epoch, answer.number) != (self._epoch, number):
+            return (
+                f"answer must be of epoch {self._epoch}, job {number}, "
+                f"got epoch {answer.epoch}, job {answer.number}"
+            )
+        return ""
+
+
+def _info(data: bytes, member: Member) -> pb.AgentInfo:
+    """Return what an agent says of itself.
+
+    Raises:
+        MalformedMessage: not such bytes, no slots, or it says it is another.
+    """
+    try:
+        info = pb.AgentInfo.FromString(data)
+    except DecodeError as error:
+        raise MalformedMessage(f"not the bytes of an AgentInfo: {error}") from None
+    if (info.agent, info.kind) != (member.name, member.role) or info.slots < 1:
+        raise MalformedMessage(f"{member.name} says that it is {info}")
+    return info
