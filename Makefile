@@ -46,8 +46,7 @@ format: $(STAMP)
 check: lint test
 
 proto: $(STAMP)
-	$(BIN)/python -m grpc_tools.protoc -I. --python_out=. \
-		--plugin=protoc-gen-mypy=$(BIN)/protoc-gen-mypy --mypy_out=quiet:. \
+	$(BIN)/python -m grpc_tools.protoc -I. --python_out=. --pyi_out=. \
 		schema/revolve.proto
 
 # Only names and versions: where they come from is each machine's own matter.
