@@ -5,7 +5,6 @@ bytes are such a message and keep its rules, or ``MalformedMessage`` is raised.
 What needs the part types is ``schema.robot.check_robot``'s business.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -13,29 +12,21 @@ from typing import TypeVar
 from google.protobuf.message import DecodeError, Message
 
 from schema import revolve_pb2 as pb
-from schema.brain import (
-    NEURON_TYPES,
-    Brain,
-    Connection,
-    Layer,
-    Neuron,
-    check_brain,
-)
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.evaluation import Evaluation, Report
-from schema.genome import ConnectionGene, Genome, NeuronGene, Node, node_part, walk
+from schema.genome import Genome
+from schema.messages import (
+    finite,
+    genome_from_message,
+    genome_to_message,
+    robot_from_message,
+    robot_to_message,
+)
 from schema.parts import Vector
-from schema.robot import Part, Robot, check_tree
+from schema.robot import Robot
 
 M = TypeVar("M", bound=Message)
 T = TypeVar("T")
-
-_LAYER_CODES: dict[Layer, pb.Layer] = {
-    "input": pb.LAYER_INPUT,
-    "output": pb.LAYER_OUTPUT,
-    "hidden": pb.LAYER_HIDDEN,
-}
-_LAYERS: dict[int, Layer] = {int(code): name for name, code in _LAYER_CODES.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,21 +66,7 @@ class Answer:
 
 def encode_robot(robot: Robot) -> bytes:
     """Return the bytes of a robot."""
-    message = pb.Robot()
-    add_part = message.parts.add
-    for part in robot.parts:
-        _write_part(part, add_part())
-    add_neuron = message.neurons.add
-    for neuron in robot.brain.neurons:
-        add_neuron(
-            layer=_LAYER_CODES[neuron.layer],
-            kind=neuron.kind,
-            part=neuron.part,
-            parameters=neuron.parameters,
-        )
-    add_connection = message.connections.add
-    for edge in robot.brain.connections:
-        add_connection(source=edge.source, target=edge.target, weight=edge.weight)
+    message = robot_to_message(robot)
     return message.SerializeToString(deterministic=True)
 
 
@@ -100,28 +77,12 @@ def decode_robot(data: bytes) -> Robot:
         MalformedMessage: not a robot's bytes, no tree of parts, or a brain that
             breaks its rules.
     """
-    return _decoded(data, pb.Robot(), _robot_from_message)
+    return _decoded(data, pb.Robot(), robot_from_message)
 
 
 def encode_genome(genome: Genome) -> bytes:
     """Return the bytes of a genome."""
-    message = pb.Genome()
-    for node, parent, parent_slot in walk(genome):
-        entry = message.nodes.add()
-        _write_part(node_part(node, parent, parent_slot), entry.part)
-        for gene in node.outputs:
-            entry.outputs.add(kind=gene.kind, parameters=gene.parameters)
-        for gene in node.hidden:
-            entry.hidden.add(kind=gene.kind, parameters=gene.parameters)
-        for edge in node.connections:
-            entry.connections.add(
-                source_layer=_LAYER_CODES[edge.source[0]],
-                source_offset=edge.source[1],
-                path=edge.path,
-                target_layer=_LAYER_CODES[edge.target[0]],
-                target_offset=edge.target[1],
-                weight=edge.weight,
-            )
+    message = genome_to_message(genome)
     return message.SerializeToString(deterministic=True)
 
 
@@ -132,7 +93,7 @@ def decode_genome(data: bytes) -> Genome:
         MalformedMessage: not a genome's bytes, no tree of nodes, an unknown neuron
             type or layer, a number that is not finite.
     """
-    return _decoded(data, pb.Genome(), _genome_from_message)
+    return _decoded(data, pb.Genome(), genome_from_message)
 
 
 def encode_request(
@@ -211,7 +172,7 @@ def report_from_message(message: pb.Report) -> Report:
         ),
         lower=_vector_from_message(message.lower),
         upper=_vector_from_message(message.upper),
-        mass=_finite(message.mass, "report.mass"),
+        mass=finite(message.mass, "report.mass"),
         motors=message.motors,
     )
 
@@ -233,12 +194,12 @@ def evaluation_from_message(message: pb.Evaluation) -> Evaluation:
         MalformedMessage: a number that is not finite.
     """
     return Evaluation(
-        fitness=_finite(message.fitness, "evaluation.fitness"),
-        path_velocity=_finite(message.path_velocity, "evaluation.path_velocity"),
-        straight_velocity=_finite(
+        fitness=finite(message.fitness, "evaluation.fitness"),
+        path_velocity=finite(message.path_velocity, "evaluation.path_velocity"),
+        straight_velocity=finite(
             message.straight_velocity, "evaluation.straight_velocity"
         ),
-        simulated_s=_finite(message.simulated_s, "evaluation.simulated_s"),
+        simulated_s=finite(message.simulated_s, "evaluation.simulated_s"),
     )
 
 
@@ -253,93 +214,6 @@ def _decoded(data: bytes, message: M, read: Callable[[M], T]) -> T:
         return read(message)
     except InvalidRobot as error:
         raise MalformedMessage(f"{name}: {error}") from None
-
-
-def _write_part(part: Part, message: pb.Part) -> None:
-    # Assignments cost half of what keyword arguments do.
-    message.kind = part.kind
-    message.parent = part.parent
-    message.parent_slot = part.parent_slot
-    message.slot = part.slot
-    message.orientation = part.orientation
-    message.parameters.extend(part.parameters)
-    message.gene = part.gene
-
-
-def _part_from_message(message: pb.Part) -> Part:
-    return Part(
-        message.kind,
-        message.parent,
-        message.parent_slot,
-        message.slot,
-        message.orientation,
-        tuple(message.parameters),
-        message.gene,
-    )
-
-
-def _robot_from_message(message: pb.Robot) -> Robot:
-    parts = tuple(map(_part_from_message, message.parts))
-    check_tree(parts)
-    brain = Brain(
-        neurons=tuple(
-            Neuron(_layer(item.layer), item.kind, item.part, tuple(item.parameters))
-            for item in message.neurons
-        ),
-        connections=tuple(
-            Connection(item.source, item.target, item.weight)
-            for item in message.connections
-        ),
-    )
-    check_brain(brain, len(parts))
-    return Robot(parts, brain)
-
-
-def _genome_from_message(message: pb.Genome) -> Genome:
-    parts = [_part_from_message(item.part) for item in message.nodes]
-    check_tree(parts)
-    children: list[list[tuple[int, Node]]] = [[] for _ in parts]
-    # Backwards, so that a node's children are there before it is made.
-    for index in range(len(parts) - 1, -1, -1):
-        part, item = parts[index], message.nodes[index]
-        node = Node(
-            kind=part.kind,
-            slot=part.slot,
-            orientation=part.orientation,
-            parameters=part.parameters,
-            gene=part.gene,
-            outputs=tuple(map(_neuron_gene, item.outputs)),
-            hidden=tuple(map(_neuron_gene, item.hidden)),
-            connections=tuple(map(_connection_gene, item.connections)),
-            children=tuple(reversed(children[index])),
-        )
-        if index == 0:
-            return node
-        children[part.parent].append((part.parent_slot, node))
-    raise MalformedMessage("genome: needs at least one node")
-
-
-def _neuron_gene(message: pb.NeuronGene) -> NeuronGene:
-    if message.kind not in NEURON_TYPES:
-        raise MalformedMessage(
-            f"neuron: must be one of {', '.join(NEURON_TYPES)}, got {message.kind!r}"
-        )
-    parameters = tuple(message.parameters)
-    expected = len(NEURON_TYPES[message.kind])
-    if len(parameters) != expected or not all(map(math.isfinite, parameters)):
-        raise MalformedMessage(
-            f"neuron: {message.kind} takes {expected} finite numbers, got {parameters}"
-        )
-    return NeuronGene(message.kind, parameters)
-
-
-def _connection_gene(message: pb.ConnectionGene) -> ConnectionGene:
-    return ConnectionGene(
-        source=(_layer(message.source_layer), message.source_offset),
-        path=tuple(message.path),
-        target=(_layer(message.target_layer), message.target_offset),
-        weight=_finite(message.weight, "connection.weight"),
-    )
 
 
 def _request_from_message(message: pb.Request) -> Request:
@@ -363,20 +237,8 @@ def _answer_from_message(message: pb.Answer) -> Answer:
             result = message.failure
         case _:
             raise MalformedMessage("answer: holds no result")
-    wall_s = _finite(message.wall_s, "answer.wall_s")
+    wall_s = finite(message.wall_s, "answer.wall_s")
     return Answer(message.epoch, message.number, wall_s, result)
-
-
-def _layer(code: int) -> Layer:
-    if code not in _LAYERS:
-        raise MalformedMessage(f"layer: must be one of {sorted(_LAYERS)}, got {code}")
-    return _LAYERS[code]
-
-
-def _finite(value: float, where: str) -> float:
-    if not math.isfinite(value):
-        raise MalformedMessage(f"{where}: must be finite, got {value}")
-    return value
 
 
 def _vector_to_message(vector: Vector) -> pb.Vector:
@@ -385,5 +247,5 @@ def _vector_to_message(vector: Vector) -> pb.Vector:
 
 def _vector_from_message(message: pb.Vector) -> Vector:
     values: Sequence[float] = (message.x, message.y, message.z)
-    x, y, z = (_finite(value, "report corner") for value in values)
+    x, y, z = (finite(value, "report corner") for value in values)
     return x, y, z

@@ -1,0 +1,178 @@
+"""Robots and genomes as Protobuf messages, and back.
+
+``schema.codec`` makes bytes of them.
+"""
+
+import math
+
+from schema import revolve_pb2 as pb
+from schema.brain import NEURON_TYPES, Brain, Connection, Layer, Neuron, check_brain
+from schema.errors import MalformedMessage
+from schema.genome import ConnectionGene, Genome, NeuronGene, Node, node_part, walk
+from schema.robot import Part, Robot, check_tree
+
+_LAYER_CODES: dict[Layer, pb.Layer] = {
+    "input": pb.LAYER_INPUT,
+    "output": pb.LAYER_OUTPUT,
+    "hidden": pb.LAYER_HIDDEN,
+}
+_LAYERS: dict[int, Layer] = {int(code): name for name, code in _LAYER_CODES.items()}
+
+
+def robot_to_message(robot: Robot) -> pb.Robot:
+    """Return a robot as a message."""
+    message = pb.Robot()
+    add_part = message.parts.add
+    for part in robot.parts:
+        _write_part(part, add_part())
+    add_neuron = message.neurons.add
+    for neuron in robot.brain.neurons:
+        add_neuron(
+            layer=_LAYER_CODES[neuron.layer],
+            kind=neuron.kind,
+            part=neuron.part,
+            parameters=neuron.parameters,
+        )
+    add_connection = message.connections.add
+    for edge in robot.brain.connections:
+        add_connection(source=edge.source, target=edge.target, weight=edge.weight)
+    return message
+
+
+def robot_from_message(message: pb.Robot) -> Robot:
+    """Return the robot of a message.
+
+    Raises:
+        InvalidRobot: no tree of parts, or a brain that breaks its rules.
+        MalformedMessage: an unknown layer.
+    """
+    parts = tuple(map(_part_from_message, message.parts))
+    check_tree(parts)
+    brain = Brain(
+        neurons=tuple(
+            Neuron(_layer(item.layer), item.kind, item.part, tuple(item.parameters))
+            for item in message.neurons
+        ),
+        connections=tuple(
+            Connection(item.source, item.target, item.weight)
+            for item in message.connections
+        ),
+    )
+    check_brain(brain, len(parts))
+    return Robot(parts, brain)
+
+
+def genome_to_message(genome: Genome) -> pb.Genome:
+    """Return a genome as a message."""
+    message = pb.Genome()
+    for node, parent, parent_slot in walk(genome):
+        entry = message.nodes.add()
+        _write_part(node_part(node, parent, parent_slot), entry.part)
+        for gene in node.outputs:
+            entry.outputs.add(kind=gene.kind, parameters=gene.parameters)
+        for gene in node.hidden:
+            entry.hidden.add(kind=gene.kind, parameters=gene.parameters)
+        for edge in node.connections:
+            entry.connections.add(
+                source_layer=_LAYER_CODES[edge.source[0]],
+                source_offset=edge.source[1],
+                path=edge.path,
+                target_layer=_LAYER_CODES[edge.target[0]],
+                target_offset=edge.target[1],
+                weight=edge.weight,
+            )
+    return message
+
+
+def genome_from_message(message: pb.Genome) -> Genome:
+    """Return the genome of a message.
+
+    Raises:
+        InvalidRobot: no tree of nodes.
+        MalformedMessage: an unknown neuron type or layer, a number that is not
+            finite.
+    """
+    parts = [_part_from_message(item.part) for item in message.nodes]
+    check_tree(parts)
+    children: list[list[tuple[int, Node]]] = [[] for _ in parts]
+    # Backwards, so that a node's children are there before it is made.
+    for index in range(len(parts) - 1, -1, -1):
+        part, item = parts[index], message.nodes[index]
+        node = Node(
+            kind=part.kind,
+            slot=part.slot,
+            orientation=part.orientation,
+            parameters=part.parameters,
+            gene=part.gene,
+            outputs=tuple(map(_neuron_gene, item.outputs)),
+            hidden=tuple(map(_neuron_gene, item.hidden)),
+            connections=tuple(map(_connection_gene, item.connections)),
+            children=tuple(reversed(children[index])),
+        )
+        if index == 0:
+            return node
+        children[part.parent].append((part.parent_slot, node))
+    raise MalformedMessage("genome: needs at least one node")
+
+
+def _write_part(part: Part, message: pb.Part) -> None:
+    # Assignments cost half of what keyword arguments do.
+    message.kind = part.kind
+    message.parent = part.parent
+    message.parent_slot = part.parent_slot
+    message.slot = part.slot
+    message.orientation = part.orientation
+    message.parameters.extend(part.parameters)
+    message.gene = part.gene
+
+
+def _part_from_message(message: pb.Part) -> Part:
+    return Part(
+        message.kind,
+        message.parent,
+        message.parent_slot,
+        message.slot,
+        message.orientation,
+        tuple(message.parameters),
+        message.gene,
+    )
+
+
+def _neuron_gene(message: pb.NeuronGene) -> NeuronGene:
+    if message.kind not in NEURON_TYPES:
+        raise MalformedMessage(
+            f"neuron: must be one of {', '.join(NEURON_TYPES)}, got {message.kind!r}"
+        )
+    parameters = tuple(message.parameters)
+    expected = len(NEURON_TYPES[message.kind])
+    if len(parameters) != expected or not all(map(math.isfinite, parameters)):
+        raise MalformedMessage(
+            f"neuron: {message.kind} takes {expected} finite numbers, got {parameters}"
+        )
+    return NeuronGene(message.kind, parameters)
+
+
+def _connection_gene(message: pb.ConnectionGene) -> ConnectionGene:
+    return ConnectionGene(
+        source=(_layer(message.source_layer), message.source_offset),
+        path=tuple(message.path),
+        target=(_layer(message.target_layer), message.target_offset),
+        weight=finite(message.weight, "connection.weight"),
+    )
+
+
+def _layer(code: int) -> Layer:
+    if code not in _LAYERS:
+        raise MalformedMessage(f"layer: must be one of {sorted(_LAYERS)}, got {code}")
+    return _LAYERS[code]
+
+
+def finite(value: float, where: str) -> float:
+    """Return a number of a message.
+
+    Raises:
+        MalformedMessage: it is not finite.
+    """
+    if not math.isfinite(value):
+        raise MalformedMessage(f"{where}: must be finite, got {value}")
+    return value
