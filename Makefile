@@ -63,7 +63,7 @@ clean:
 $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' \
 		|| { echo 'Python 3.11, 3.12 or 3.13 is needed, and "$(PYTHON)" is' \
-		"$$($(PYTHON) --version 2>&1 || echo missing)." \
+		"$$($(PYTHON) --version 2>/dev/null || echo missing)." \
 		'Name another: make PYTHON=python3.12 ...' >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null \
 		|| { echo '"$(PYTHON)" lacks venv: install it (Debian: python3-venv)' >&2; \
