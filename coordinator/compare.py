@@ -1,0 +1,92 @@
+"""Are two runs the same, in every column that must repeat?"""
+
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute
+
+from coordinator.folder import read_details
+from schema.run_tables import read_table
+from schema.tables import TABLES, repeatable
+
+LONGEST = 60
+"""Characters of a value that a message shows."""
+
+
+def compare(first: Path, second: Path) -> list[str]:
+    """Return how two runs differ in their repeatable columns.
+
+    Args:
+        first: a run folder, finished or not.
+        second: the other.
+
+    Returns:
+        One line for each table whose number of rows differs, and one for the first
+        row and column of each table that does; nothing if the runs are equal. If
+        they are not and ran on different platforms, a last line says so, for
+        equality is only promised on one.
+
+    Raises:
+        RunFolderError: a folder without a run, or a table that cannot be read.
+    """
+    for folder in (first, second):
+        read_details(folder)
+    lines: list[str] = []
+    platforms: list[list[str]] = []
+    for name, schema in TABLES.items():
+        tables = [read_table(folder, name) for folder in (first, second)]
+        lines += _differences(name, tables, repeatable(schema))
+        if name == "evaluations":
+            platforms = [_platforms(table) for table in tables]
+    if lines and platforms[0] != platforms[1]:
+        ours, theirs = (", ".join(each) or "none" for each in platforms)
+        lines.append(
+            f"platforms differ: {ours} against {theirs}; equality is only promised "
+            "on equal ones"
+        )
+    return lines
+
+
+def _platforms(evaluations: pa.Table) -> list[str]:
+    return sorted(pa.compute.unique(evaluations["platform"]).to_pylist())
+
+
+def _differences(name: str, tables: list[pa.Table], columns: list[str]) -> list[str]:
+    """Return what is different between two tables of one name."""
+    lines = []
+    rows = [table.num_rows for table in tables]
+    if rows[0] != rows[1]:
+        lines.append(f"{name}: {rows[0]} rows against {rows[1]}")
+    common = min(rows)
+    found: tuple[int, str, Any, Any] | None = None
+    for column in columns:
+        ours, theirs = (table[column][:common] for table in tables)
+        if ours.equals(theirs):
+            continue
+        row, one, other = _first_difference(ours.to_pylist(), theirs.to_pylist())
+        if row >= 0 and (found is None or row < found[0]):
+            found = (row, column, one, other)
+    if found is not None:
+        row, column, one, other = found
+        lines.append(
+            f"{name}: first at record {row}, column {column}: "
+            f"{_short(one)} against {_short(other)}"
+        )
+    return lines
+
+
+def _first_difference(ours: list[Any], theirs: list[Any]) -> tuple[int, Any, Any]:
+    """Return row and values of the first difference; row -1 if there is none.
+
+    Values are told apart by how they are written: a NaN equals itself.
+    """
+    for row, (one, other) in enumerate(zip(ours, theirs, strict=True)):
+        if repr(one) != repr(other):
+            return row, one, other
+    return -1, None, None
+
+
+def _short(value: Any) -> str:  # noqa: ANN401 - any value of any column
+    text = repr(value)
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."

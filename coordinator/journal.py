@@ -1,0 +1,232 @@
+"""The journal: every answer that a run was given, in the order it acted on them.
+
+All else is a function of experiment, seed and journal. A record is its sequence
+number, its length, a CRC32 of all three, and an ``Entry`` message. A record that a
+kill cut short can only be the last; it is dropped, for nobody has acted on it.
+"""
+
+import struct
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+from zlib import crc32
+
+from google.protobuf.message import DecodeError
+
+from coordinator.disk import AppendedFile
+from coordinator.events import (
+    Answered,
+    Evaluated,
+    EvaluationFailed,
+    Vetted,
+    VettingFailed,
+)
+from schema import revolve_pb2 as pb
+from schema.birth import BirthId
+from schema.codec import (
+    evaluation_from_message,
+    evaluation_to_message,
+    report_from_message,
+    report_to_message,
+)
+from schema.errors import MalformedMessage, RunFolderError
+from schema.evaluation import Provenance
+
+NAME = "journal.bin"
+MAGIC = b"revolve journal 1\n"
+
+_HEAD = struct.Struct("<QI")
+_CHECK = struct.Struct("<I")
+_FRAME = _HEAD.size + _CHECK.size
+
+
+class Journal:
+    """An open journal: what it held, and a place for what comes.
+
+    Attributes:
+        dropped: bytes of a cut tail that opening took away.
+    """
+
+    def __init__(self, path: Path, *, fsync: bool = False) -> None:
+        """Open a journal, or begin one.
+
+        Args:
+            path: the file.
+            fsync: survive power loss, too, and not only the death of the process.
+
+        Raises:
+            RunFolderError: not a journal, damage before intact records, or a disk
+                that fails.
+        """
+        try:
+            data = path.read_bytes() if path.exists() else b""
+        except OSError as error:
+            raise RunFolderError(f"{path}: cannot be read: {error}") from None
+        payloads, end = _intact(path, data)
+        self._history = [_event(path, payload) for payload in payloads]
+        self._sequence = len(payloads)
+        self._file = AppendedFile(path, fsync=fsync)
+        self.dropped = len(data) - end
+        if self.dropped:
+            self._file.cut(end)
+        if not end:
+            self._file.append(MAGIC)
+
+    @classmethod
+    def open(cls, folder: Path, *, fsync: bool = False) -> Self:
+        """Open the journal of a run folder."""
+        return cls(folder / NAME, fsync=fsync)
+
+    def replay(self) -> list[Answered]:
+        """Return what it held when it was opened, oldest first; only once."""
+        history, self._history = self._history, []
+        return history
+
+    def append(self, events: Iterable[Answered]) -> None:
+        """Keep events before anybody acts on them: all, or on failure none.
+
+        Raises:
+            RunFolderError: the disk is full or failed.
+        """
+        sequence = self._sequence
+        frames = []
+        for event in events:
+            frames.append(_frame(sequence, encode_entry(event)))
+            sequence += 1
+        self._file.append(b"".join(frames))
+        self._sequence = sequence
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def encode_entry(event: Answered) -> bytes:
+    """Return the bytes of one event."""
+    entry = pb.Entry(island=event.birth.island, birth=event.birth.number)
+    match event:
+        case Vetted():
+            entry.attempt = event.attempt
+            entry.vetted.CopyFrom(report_to_message(event.report))
+        case VettingFailed():
+            entry.attempt = event.attempt
+            entry.vetting_failed = event.reason
+        case Evaluated():
+            entry.evaluated.CopyFrom(evaluation_to_message(event.evaluation))
+            _sign(entry, event.provenance)
+        case EvaluationFailed():
+            entry.evaluation_failed = event.reason
+            _sign(entry, event.provenance)
+    return entry.SerializeToString(deterministic=True)
+
+
+def decode_entry(data: bytes) -> Answered:
+    """Return the event of some bytes.
+
+    Raises:
+        MalformedMessage: not an entry's bytes, or no event in it.
+    """
+    entry = pb.Entry()
+    try:
+        entry.ParseFromString(data)
+    except DecodeError as error:
+        raise MalformedMessage(f"not the bytes of an Entry: {error}") from None
+    birth = BirthId(entry.island, entry.birth)
+    signed = Provenance(
+        entry.provenance.agent, entry.provenance.platform, entry.provenance.wall_s
+    )
+    match entry.WhichOneof("event"):
+        case "vetted":
+            return Vetted(birth, entry.attempt, report_from_message(entry.vetted))
+        case "vetting_failed":
+            return VettingFailed(birth, entry.attempt, entry.vetting_failed)
+        case "evaluated":
+            return Evaluated(birth, evaluation_from_message(entry.evaluated), signed)
+        case "evaluation_failed":
+            return EvaluationFailed(birth, entry.evaluation_failed, signed)
+    raise MalformedMessage("entry: holds no event")
+
+
+def _sign(entry: pb.Entry, provenance: Provenance) -> None:
+    signed = entry.provenance
+    signed.agent = provenance.agent
+    signed.platform = provenance.platform
+    signed.wall_s = provenance.wall_s
+
+
+def _frame(sequence: int, payload: bytes) -> bytes:
+    head = _HEAD.pack(sequence, len(payload))
+    return head + _CHECK.pack(crc32(payload, crc32(head))) + payload
+
+
+def _record_at(data: bytes, start: int) -> tuple[int, int] | None:
+    """Return sequence number and end of the intact record at ``start``, if any."""
+    begin = start + _FRAME
+    if begin > len(data):
+        return None
+    sequence, length = _HEAD.unpack_from(data, start)
+    end: int = begin + length
+    if end > len(data):
+        return None
+    head = data[start : start + _HEAD.size]
+    (check,) = _CHECK.unpack_from(data, start + _HEAD.size)
+    if crc32(data[begin:end], crc32(head)) != check:
+        return None
+    return sequence, end
+
+
+def _intact(path: Path, data: bytes) -> tuple[list[bytes], int]:
+    """Return the payloads of all records, and where the last of them ends.
+
+    Raises:
+        RunFolderError: not a journal, or damage with intact records behind it.
+    """
+    if not data.startswith(MAGIC):
+        if MAGIC.startswith(data):
+            return [], 0
+        raise RunFolderError(f"{path}: not a journal of this version of Revolve")
+    payloads: list[bytes] = []
+    position = len(MAGIC)
+    while position < len(data):
+        found = _record_at(data, position)
+        if found is None or found[0] != len(payloads):
+            _refuse_gap(path, data, position, len(payloads))
+            break
+        payloads.append(data[position + _FRAME : found[1]])
+        position = found[1]
+    return payloads, position
+
+
+def _refuse_gap(path: Path, data: bytes, position: int, sequence: int) -> None:
+    """Raise if an intact record stands anywhere behind a damaged place."""
+    for start in range(position, len(data) - _FRAME + 1):
+        found = _record_at(data, start)
+        if found is not None:
+            raise RunFolderError(
+                f"{path}: damaged at byte {position} (record {sequence}), and record "
+                f"{found[0]} stands intact at byte {start}: put a sound copy of the "
+                "file in its place, or give up what follows the damage "
+                f"('truncate -s {position} {path}') and resume; what is lost is "
+                "computed anew"
+            )
+
+
+def _event(path: Path, payload: bytes) -> Answered:
+    try:
+        return decode_entry(payload)
+    except MalformedMessage as error:
+        raise RunFolderError(
+            f"{path}: an intact record that this version cannot read: {error}"
+        ) from None

@@ -1,0 +1,146 @@
+"""Where the tables of a run lie, and how they are read.
+
+While a run lives, a table is a row of Arrow stream segments, one per incarnation
+of its coordinator: ``segments/births-000.arrows``. A finished run has Parquet
+instead: ``tables/experiment=NAME/run=N/births.parquet``. The names of the folders
+carry columns (hive partitioning), so that one call reads a campaign; in DuckDB
+``read_parquet('runs/**/births.parquet', hive_partitioning = true)``, and so on.
+"""
+
+from pathlib import Path
+from urllib.parse import quote
+
+import pyarrow as pa
+import pyarrow.dataset
+from pyarrow.parquet import ParquetFile
+
+from schema.errors import RunFolderError
+from schema.tables import TABLES
+
+SEGMENTS = "segments"
+FINISHED = "tables"
+
+
+def parquet_path(folder: Path, experiment: str, run: int, table: str) -> Path:
+    """Return where a table of a finished run lies.
+
+    Args:
+        folder: the run folder.
+        experiment: its name; whatever no path may hold is percent-encoded.
+        run: number of the repeat.
+        table: its name.
+    """
+    place = folder / FINISHED / f"experiment={quote(experiment, safe='')}"
+    return place / f"run={run}" / f"{table}.parquet"
+
+
+def segment_path(folder: Path, table: str, number: int) -> Path:
+    """Return where a segment of a table lies."""
+    return folder / SEGMENTS / f"{table}-{number:03d}.arrows"
+
+
+def segments_of(folder: Path, table: str) -> list[tuple[int, Path]]:
+    """Return number and path of each segment of a table, in order."""
+    found = (folder / SEGMENTS).glob(f"{table}-*.arrows")
+    return sorted((int(path.stem.removeprefix(f"{table}-")), path) for path in found)
+
+
+def read_segment(path: Path, schema: pa.Schema) -> list[pa.RecordBatch]:
+    """Return the complete batches of a segment; what a kill cut off is left out.
+
+    Raises:
+        RunFolderError: the segment is of another version of its table, or the disk
+            fails.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise RunFolderError(f"{path}: cannot be read: {error.strerror}") from None
+    batches: list[pa.RecordBatch] = []
+    try:
+        reader = pa.ipc.open_stream(data)
+        if not reader.schema.equals(schema, check_metadata=True):
+            raise RunFolderError(
+                f"{path}: was written by another version of Revolve: finish the run "
+                "with that one"
+            )
+        batches.extend(iter(reader.read_next_batch, None))
+    except StopIteration:
+        pass
+    except (pa.ArrowInvalid, OSError, MemoryError):
+        # A cut or damaged tail: batches before it are whole.
+        pass
+    return batches
+
+
+def read_chain(
+    folder: Path, table: str
+) -> tuple[list[pa.RecordBatch], list[tuple[int, Path]]]:
+    """Return the rows that stand in a table's segments, without a gap.
+
+    Every row carries its number, so a row that is missing is noticed. Rows behind a
+    gap are left out: a replay of the journal writes them again.
+
+    Args:
+        folder: the run folder.
+        table: its name.
+
+    Returns:
+        The batches, rows 0, 1, 2 and so on; and the segments that they do not use.
+
+    Raises:
+        RunFolderError: a segment of another version.
+    """
+    chain: list[pa.RecordBatch] = []
+    rows = 0
+    segments = segments_of(folder, table)
+    for index, (_, path) in enumerate(segments):
+        for batch in read_segment(path, TABLES[table]):
+            if batch.num_rows and batch["record"][0].as_py() != rows:
+                return chain, segments[index:]
+            chain.append(batch)
+            rows += batch.num_rows
+    return chain, []
+
+
+def read_table(folder: Path, table: str) -> pa.Table:
+    """Return all rows of a table of a run, finished or not.
+
+    Args:
+        folder: the run folder.
+        table: its name, a key of ``TABLES``.
+
+    Raises:
+        RunFolderError: no such folder, a file that cannot be read, or one of another
+            version.
+    """
+    if not folder.is_dir():
+        raise RunFolderError(f"{folder}: no such folder")
+    finished = sorted((folder / FINISHED).glob(f"*/*/{table}.parquet"))
+    if not finished:
+        chain, _ = read_chain(folder, table)
+        return pa.Table.from_batches(chain, TABLES[table])
+    try:
+        # Parquet has its own name for the items of a list.
+        return ParquetFile(finished[0]).read().cast(TABLES[table])
+    except (ValueError, OSError) as error:
+        raise RunFolderError(f"{finished[0]}: cannot be read: {error}") from None
+
+
+def campaign(root: Path, table: str) -> pa.dataset.Dataset:
+    """Return one table of all finished runs below a folder.
+
+    Args:
+        root: a run folder, or any folder above some.
+        table: its name, a key of ``TABLES``.
+
+    Returns:
+        A dataset with the table's columns, ``experiment`` and ``run``.
+
+    Raises:
+        RunFolderError: no finished run is there.
+    """
+    files = sorted(root.glob(f"**/{FINISHED}/*/*/{table}.parquet"))
+    if not files:
+        raise RunFolderError(f"{root}: no finished run is there or below")
+    return pa.dataset.dataset([str(file) for file in files], partitioning="hive")
