@@ -1,0 +1,35 @@
+"""One evaluation request in, one answer out: what the service hands to a process."""
+
+import time
+
+from schema.codec import Answer, decode_request, encode_answer
+from schema.errors import SimulationDiverged
+from schema.evaluation import Evaluation
+from schema.experiment import body_space, read_evaluation_settings
+from schema.robot import check_robot
+from worker.evaluation import evaluate
+
+
+def answer(request: bytes) -> bytes:
+    """Return the encoded answer to an encoded evaluation request.
+
+    A function of its content but for ``wall_s``, which decides nothing. A robot
+    whose physics diverge is answered with the reason, not raised: it is a result.
+
+    Raises:
+        MalformedMessage: bytes that are no request.
+        ExperimentError: settings that are none, a plug-in that nothing answers
+            to, a sensor that the world has nothing for.
+        InvalidRobot: a robot that breaks the rules of its body space.
+    """
+    began = time.perf_counter()
+    job = decode_request(request)
+    settings = read_evaluation_settings(job.settings)
+    check_robot(job.robot, body_space(settings.space))
+    result: Evaluation | str
+    try:
+        result = evaluate(job.robot, settings)
+    except SimulationDiverged as error:
+        result = str(error)
+    wall_s = time.perf_counter() - began
+    return encode_answer(Answer(job.epoch, job.number, wall_s, result))
