@@ -55,7 +55,10 @@ class EvaluationFailed:
     provenance: Provenance
 
 
-IslandEvent = Started | Vetted | VettingFailed | Evaluated | EvaluationFailed
+Answered = Vetted | VettingFailed | Evaluated | EvaluationFailed
+"""Events that answer a question: what the journal keeps."""
+
+IslandEvent = Started | Answered
 
 # --- Island: commands -------------------------------------------------------
 

@@ -1,0 +1,114 @@
+"""What a run shows while it lives: one line per island on the terminal."""
+
+from collections import deque
+from time import monotonic
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeRemainingColumn,
+)
+
+from coordinator.loop import Loop
+
+_RATE_SPAN_S = 10.0
+
+
+class Display:
+    """Progress bars of a run; a line every so often where there is no terminal."""
+
+    def __init__(self, loop: Loop, births: int, *, quiet: bool) -> None:
+        """Show ``loop``, whose islands go to ``births`` each."""
+        self._loop = loop
+        self._births = births
+        self._console = Console(stderr=True)
+        self._quiet = quiet
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("births"),
+            TextColumn("{task.fields[rate]:5.1f}/s"),
+            TextColumn("{task.fields[workers]} workers"),
+            TextColumn("best {task.fields[best]}"),
+            TimeRemainingColumn(),
+            console=self._console,
+            disable=quiet or not self._console.is_terminal,
+        )
+        self._tasks: dict[int, TaskID] = {}
+        self._seen: deque[tuple[float, int]] = deque()
+        self._next_line_s = 0.0
+        self._waits_since: float | None = None
+
+    def __enter__(self) -> "Display":
+        """Start drawing."""
+        for number, island in sorted(self._loop.islands.items()):
+            self._tasks[number] = self._progress.add_task(
+                f"island {number}",
+                total=self._births,
+                completed=island.births,
+                rate=0.0,
+                workers=0,
+                best="-",
+            )
+        self._progress.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave the last state on the screen."""
+        self.update()
+        self._progress.stop()
+
+    def update(self) -> None:
+        """Show the present state."""
+        if self._quiet:
+            return
+        now_s = monotonic()
+        born = sum(island.births for island in self._loop.islands.values())
+        self._seen.append((now_s, born))
+        while now_s - self._seen[0][0] > _RATE_SPAN_S:
+            self._seen.popleft()
+        span_s = now_s - self._seen[0][0]
+        rate = (born - self._seen[0][1]) / span_s if span_s > 0 else 0.0
+        workers = self._loop.dispatch.count("worker")
+        for number, island in self._loop.islands.items():
+            best = max((one.fitness for one in island.population), default=None)
+            self._progress.update(
+                self._tasks[number],
+                completed=island.births,
+                rate=rate,
+                workers=workers,
+                best="-" if best is None else f"{best:.3f}",
+            )
+        self._say_who_is_missing(now_s)
+        if not self._console.is_terminal and now_s >= self._next_line_s:
+            self._next_line_s = now_s + _RATE_SPAN_S
+            self._console.print(
+                f"{born} of {self._births * len(self._tasks)} births, "
+                f"{rate:.1f}/s, {workers} workers"
+            )
+
+    def _say_who_is_missing(self, now_s: float) -> None:
+        """Say once, after a while, that nobody is there to do the work."""
+        missing = [
+            kind
+            for kind in ("worker", "analyzer")
+            if not self._loop.dispatch.count(kind)
+        ]
+        if not missing:
+            self._waits_since = None
+        elif self._waits_since is None:
+            self._waits_since = now_s
+        elif now_s - self._waits_since > _RATE_SPAN_S:
+            self._waits_since = now_s + 6 * _RATE_SPAN_S
+            self._console.print(f"waiting: no {' and no '.join(missing)} has joined")

@@ -1,0 +1,73 @@
+"""The command ``revolve``: names the rooms' commands, nothing else."""
+
+import os
+import sys
+from importlib import import_module
+
+# One BLAS thread, before NumPy is first imported: a robot's arithmetic must not
+# depend on the machine's cores, and the workers are already one to a core.
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+COMMANDS = {
+    "run": ("coordinator.__main__", "evolve an experiment on this machine"),
+    "resume": ("coordinator.__main__", "go on with a run after any crash"),
+    "coordinator": ("coordinator.__main__", "run an experiment for remote workers"),
+    "compare": ("coordinator.__main__", "tell whether two runs are equal"),
+    "worker": ("worker.__main__", "simulate robots for a coordinator"),
+    "analyzer": ("analyzer.__main__", "vet bodies for a coordinator"),
+    "robot": ("schema.__main__", "check, convert or show a robot file"),
+    "bench": ("worker.bench", "measure this machine"),
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run one command and return its exit code.
+
+    Args:
+        arguments: without the program's name; those of the process by default.
+
+    Returns:
+        0 if done, 2 for a user's error (one line on stderr), 130 after Ctrl-C.
+    """
+    words = sys.argv[1:] if arguments is None else arguments
+    if not words or words[0] in ("-h", "--help"):
+        print(_overview())
+        return 0
+    if words[0] not in COMMANDS:
+        near = import_module("schema.experiment").nearest(words[0], COMMANDS)
+        print(
+            f"revolve: no command {words[0]!r}{near}; "
+            f"allowed: {', '.join(COMMANDS)}",
+            file=sys.stderr,
+        )
+        return 2
+    error_type = import_module("schema.errors").RevolveError
+    try:
+        room = import_module(COMMANDS[words[0]][0])
+        return int(room.main(words))
+    except error_type as error:
+        print(f"revolve: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+def _overview() -> str:
+    width = max(map(len, COMMANDS))
+    lines = [f"  {name:{width}}  {what}" for name, (_, what) in COMMANDS.items()]
+    return "\n".join(
+        [
+            "Evolve robots, bodies and brains, on one machine or on many.",
+            "",
+            "usage: revolve COMMAND ...    (revolve COMMAND --help explains one)",
+            "",
+            *lines,
+            "",
+            "for example: revolve run scenario1 --seed 1 --births 600",
+        ]
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,103 @@
+"""Promise 1: the same births, however many workers and whatever dies."""
+
+import random
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coordinator.compare import compare
+
+pytestmark = pytest.mark.system
+
+Stage = Any
+Until = Callable[[Callable[[], bool], str], None]
+
+
+def _words(births: int, out: str) -> tuple[str, ...]:
+    return (
+        "scenario1", "--seed", "5", "--births", str(births), "--out", out, "--quiet",
+    )  # fmt: skip
+
+
+def _size(folder: Path) -> int:
+    journal = folder / "journal.bin"
+    return journal.stat().st_size if journal.exists() else 0
+
+
+def test_one_worker_gives_the_births_of_one_process(
+    stage: Stage, undisturbed: Path, births: int
+) -> None:
+    stage.run("run", *_words(births, "one"), "--workers", "1")
+    assert compare(undisturbed, stage.folder / "one") == []
+
+
+def test_three_workers_of_which_one_is_killed(
+    stage: Stage, undisturbed: Path, births: int, until: Until
+) -> None:
+    folder = stage.folder / "three"
+    words = _words(births, "three")
+    coordinator = stage.start("coordinator", *words, "--listen", "tcp/127.0.0.1:0")
+    until((folder / "address").exists, "the coordinator listens")
+    address = (folder / "address").read_text().strip()
+    stage.start("analyzer", "--connect", address)
+    workers = [
+        stage.start("worker", "--connect", address, "--processes", "1")
+        for _ in range(3)
+    ]
+    whole = _size(undisturbed)
+    share = random.Random(11).uniform(0.2, 0.7)
+    until(lambda: _size(folder) > share * whole, "the run is on its way")
+    workers[1].send_signal(signal.SIGKILL)
+    until(lambda: coordinator.poll() is not None, "the run ends")
+    assert coordinator.returncode == 0, coordinator.communicate()
+    assert compare(undisturbed, folder) == []
+
+
+@pytest.mark.parametrize("draw", range(4))
+def test_killed_coordinator_resumes_to_the_same_births(
+    stage: Stage, undisturbed: Path, births: int, until: Until, draw: int
+) -> None:
+    folder = stage.folder / "killed"
+    whole = _size(undisturbed)
+    # One kill in each quarter of the run, the instant within it drawn.
+    share = (draw + random.Random(draw).random()) / 4
+    first = stage.start("run", *_words(births, "killed"), "--workers", "2")
+    until(
+        lambda: _size(folder) > share * whole or first.poll() is not None,
+        "the run is on its way",
+    )
+    first.send_signal(signal.SIGKILL)
+    first.wait()
+    stage.run("resume", "killed", "--workers", "2", "--quiet")
+    assert compare(undisturbed, folder) == []
+
+
+def test_second_coordinator_is_refused_with_the_holder(
+    stage: Stage, births: int, until: Until
+) -> None:
+    folder = stage.folder / "held"
+    first = stage.start(
+        "coordinator", *_words(births, "held"), "--listen", "tcp/127.0.0.1:0"
+    )
+    until((folder / "address").exists, "the coordinator listens")
+    said = stage.run("resume", "held", "--quiet", code=2)
+    assert str(first.pid) in said
+    assert len(said.strip().splitlines()) == 1
+
+
+def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(
+    stage: Stage, undisturbed: Path, births: int, until: Until
+) -> None:
+    folder = stage.folder / "stopped"
+    first = stage.start("run", *_words(births, "stopped"), "--workers", "2")
+    until(lambda: _size(folder) > _size(undisturbed) // 3, "the run is on its way")
+    first.send_signal(signal.SIGINT)
+    out, err = first.communicate(timeout=60)
+    assert first.returncode == 130, out + err
+    assert "revolve resume stopped" in out + err
+    assert "Traceback" not in err
+    stage.run("resume", "stopped", "--workers", "1", "--quiet")
+    assert compare(undisturbed, folder) == []
