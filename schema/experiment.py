@@ -103,8 +103,10 @@ class Vetting(_Section, frozen=True):
 class Simulation(_Section, frozen=True):
     """The simulated world and its clocks, in physics steps.
 
-    ``armature`` [kg m2] and ``damping`` [N m s/rad] are what MuJoCo needs beyond
-    the original's numbers; their effect is measured in docs/physics.md.
+    ``armature`` and, at driven joints, ``servo_armature`` [kg m2], ``damping`` and
+    ``servo_stiffness`` [N m s/rad] and ``contact_time_s`` are what MuJoCo needs
+    beyond the original's numbers; their effect is measured in docs/physics.md. A
+    servo chatters above a stiffness of 2 servo_armature / timestep_s.
     """
 
     timestep_s: Positive = 0.005
@@ -116,7 +118,7 @@ class Simulation(_Section, frozen=True):
     friction: NotNegative = 1.0
     armature: NotNegative = 1e-4
     damping: NotNegative = 1e-4
-    servo_armature: NotNegative = 2e-3
+    servo_armature: NotNegative = 5e-3
     servo_stiffness: Positive = 1.0
     contact_time_s: Positive = 0.01
     drop_m: NotNegative = 0.0

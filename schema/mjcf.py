@@ -95,6 +95,9 @@ def set_options(spec: Any, simulation: Simulation, *, is_single: bool) -> None: 
     disabled |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if is_single:
         disabled |= mujoco.mjtDisableBit.mjDSBL_ISLAND
+    else:
+        # So that one robot's spec may be attached to many worlds.
+        spec.copy_during_attach = True
     option.disableflags |= int(disabled)
 
 
@@ -137,7 +140,6 @@ class _Builder:
     def _set_defaults(self) -> None:
         spec, simulation = self.spec, self.simulation
         spec.compiler.degree = False
-        spec.copy_during_attach = True
         geom = spec.default.geom
         geom.type = mujoco.mjtGeom.mjGEOM_BOX
         geom.condim = 3

@@ -1,0 +1,110 @@
+"""Fitness of hand-made tracks, exact, and the contract of every function."""
+
+from typing import cast
+
+import numpy as np
+import pytest
+
+from schema.errors import ExperimentError
+from schema.evaluation import Track
+from schema.experiment import Experiment, Fitness, fitness_function
+from worker.fitness import (
+    FitnessFunction,
+    check_fitness,
+    path_velocity,
+    straight_velocity,
+    thesis,
+)
+
+WEIGHTS = Fitness()
+
+
+def track(*points: tuple[float, float, float], interval_s: float = 0.25) -> Track:
+    """Return a track through some points."""
+    return Track(interval_s, np.array(points))
+
+
+def test_along_a_line_both_velocities_are_equal() -> None:
+    """0.5 m in two steps of 0.25 s: v = s = 1 m/s."""
+    found = track((0, 0, 0), (0.25, 0, 0), (0.5, 0, 0))
+    assert (path_velocity(found), straight_velocity(found)) == (1.0, 1.0)
+
+
+def test_a_detour_counts_for_the_path_only() -> None:
+    """Legs of 3 and 4 make a path of 7 and a distance of 5, in 0.5 s."""
+    found = track((1, 1, 0), (4, 1, 0), (4, 5, 0))
+    assert (path_velocity(found), straight_velocity(found)) == (14.0, 10.0)
+
+
+def test_height_earns_nothing() -> None:
+    found = track((0, 0, 5), (0, 0, 2), (0, 0, 0))
+    assert thesis(found, WEIGHTS) == 0.0
+
+
+def test_coming_home_earns_the_path_alone() -> None:
+    found = track((0, 0, 0), (0.125, 0, 0), (0, 0, 0))
+    assert thesis(found, WEIGHTS) == 0.5
+
+
+def test_the_straight_way_counts_five_times() -> None:
+    """v = s = 0.125 m/s: f = 0.125 + 5 * 0.125."""
+    assert thesis(track((0, 0, 0), (0.03125, 0, 0)), WEIGHTS) == 0.75
+
+
+def test_a_fitness_of_one_is_real_and_more_is_not() -> None:
+    weights = Fitness(path_weight=1.0, straight_weight=1.0)
+    assert thesis(track((0, 0, 0), (0.125, 0, 0)), weights) == 1.0
+    assert thesis(track((0, 0, 0), (0.126, 0, 0)), weights) == 0.0
+
+
+def test_only_differences_of_position_count() -> None:
+    here = track((0, 0, 0), (0.25, 0.125, 0), (0.5, 0, 0))
+    there = track((8, -4, 1), (8.25, -3.875, 1), (8.5, -4, 1))
+    weights = Fitness(limit=10.0)
+    assert thesis(here, weights) == thesis(there, weights) > 0
+
+
+def test_what_an_experiment_names_by_default_keeps_the_contract() -> None:
+    fitness = Experiment(name="test").fitness
+    function = fitness_function(fitness)
+    assert function is thesis
+    check_fitness(cast("FitnessFunction", function), fitness)
+
+
+def _writes(track: Track, fitness: Fitness) -> float:
+    track.core_position[0] += 1.0
+    return fitness.limit
+
+
+def _is_text(_track: Track, _fitness: Fitness) -> float:
+    return cast("float", "fast")
+
+
+def _is_endless(_track: Track, _fitness: Fitness) -> float:
+    return float("inf")
+
+
+def _counts_calls() -> FitnessFunction:
+    calls: list[int] = []
+
+    def count(_track: Track, _fitness: Fitness) -> float:
+        calls.append(1)
+        return float(len(calls))
+
+    return count
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (_writes, "must not write to the track"),
+        (_is_text, "must return a number, got 'fast'"),
+        (_is_endless, "must return a finite number, got inf"),
+        (_counts_calls(), "must return the same for the same track"),
+    ],
+)
+def test_a_function_that_breaks_the_contract_is_told(
+    function: FitnessFunction, message: str
+) -> None:
+    with pytest.raises(ExperimentError, match=message):
+        check_fitness(function, WEIGHTS)
