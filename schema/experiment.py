@@ -11,7 +11,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 from functools import lru_cache
 from importlib import resources
-from math import pi
+from math import isfinite, pi
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, cast
 
@@ -331,13 +331,17 @@ def nearest(word: str, words: Any) -> str:  # noqa: ANN401 - any iterable of str
 def _refuse_unknown(
     document: dict[str, Any], kind: type[Struct], where: str, prefix: str
 ) -> None:
-    """Raise for a key that a section does not have, naming the nearest."""
+    """Raise for a key that a section does not have, or a number that is none."""
     fields = {field.name: field for field in msgspec.structs.fields(kind)}
     for key, value in document.items():
         if key not in fields:
             raise ExperimentError(
                 f"{where}: {prefix}{key}: no such key{nearest(key, fields)}; "
                 f"allowed: {', '.join(fields)}"
+            )
+        if isinstance(value, float) and not isfinite(value):
+            raise ExperimentError(
+                f"{where}: {prefix}{key}: must be finite, got {value}"
             )
         inner = fields[key].type
         if isinstance(inner, type) and issubclass(inner, Struct):

@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from functools import lru_cache
 from importlib import import_module
 
-from schema.errors import UnknownPlugin
+from schema.errors import ExperimentError, UnknownPlugin
 
 
 @lru_cache(maxsize=256)
@@ -21,14 +21,19 @@ def load(path: str, where: str) -> object:
     Raises:
         UnknownPlugin: not of that form, no such module, no such attribute (the
             nearest is named).
+        ExperimentError: the module breaks while it is imported.
     """
     module_name, colon, attribute = path.partition(":")
-    if not (colon and module_name and attribute):
+    words = [*module_name.split("."), attribute]
+    if not (colon and all(word.isidentifier() for word in words)):
         raise UnknownPlugin(f"{where}: must be 'module:attribute', got {path!r}")
     try:
         module = import_module(module_name)
     except ImportError as error:
         raise UnknownPlugin(f"{where}: {path!r}: {error}") from None
+    except Exception as error:
+        story = f"{type(error).__name__}: {error}"
+        raise ExperimentError(f"{where}: {path!r}: {story}") from error
     if not hasattr(module, attribute):
         names = [name for name in vars(module) if not name.startswith("_")]
         near = get_close_matches(attribute, names, n=1)

@@ -62,9 +62,7 @@ def test_golden_position_of_a_hinge_on_the_front(node: NodeMaker) -> None:
     core = node("Core", children=((0, node("Hinge")),))
     rotations, positions = place_parts(body(core), BUILT_IN)
     boxes = BUILT_IN["Hinge"].shape(core.children[0][1].parameters).boxes
-    centres = {
-        box.name: rotations[1] @ box.position + positions[1] for box in boxes
-    }
+    centres = {box.name: rotations[1] @ box.position + positions[1] for box in boxes}
     assert centres["root"] == pytest.approx((0.0, -0.04575, 0.0), abs=1e-12)
     assert centres["conn_a"] == pytest.approx((0.0, -0.05685, 0.0), abs=1e-12)
 
@@ -113,9 +111,7 @@ def test_level_bodies_are_flat_and_stand_on_their_core(
     rotations, positions = place_parts(robot, BUILT_IN)
     lowest = math.inf
     corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    for part, rotation, position in zip(
-        robot.parts, rotations, positions, strict=True
-    ):
+    for part, rotation, position in zip(robot.parts, rotations, positions, strict=True):
         shape = BUILT_IN[part.kind].shape(part.parameters)
         for slot in shape.slots:
             assert abs((rotation @ slot.normal)[2]) < 1e-9

@@ -12,10 +12,11 @@ DEFAULTS = {
     for name, kind in BUILT_IN.items()
 }
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-PLATE = (1.5, 34.0, 34.0)
+PLATE: Vector = (1.5, 34.0, 34.0)
 
-# name: (box, size [mm], centre [mm], mass [g], segment)
-BOXES = {
+# By name: box, size [mm], centre [mm], mass [g], segment.
+Row = tuple[str, Vector, Vector, float, int]
+BOXES: dict[str, list[Row]] = {
     "Core": [("body", (90, 90, 45), (0, 0, 0), 90, 0)],
     "FixedBrick": [("body", (41, 41, 35.5), (0, 0, 0), 10.2, 0)],
     "ActiveHinge": [
@@ -42,7 +43,7 @@ BOXES = {
     ],
     "LightSensor": [("base", PLATE, (0, 0, 0), 2, 0)],
 }
-# name: arity, inputs, outputs, own parameters
+# By name: arity, inputs, outputs, own parameters.
 COUNTS = {
     "Core": (4, 6, 0, 0),
     "FixedBrick": (4, 0, 0, 0),
@@ -140,9 +141,7 @@ def test_slot_zero_of_a_plate(name: str, tangent: Vector) -> None:
     assert (slot.normal, slot.tangent) == ((-1.0, 0.0, 0.0), tangent)
 
 
-@pytest.mark.parametrize(
-    ("name", "x_mm"), [("ActiveHinge", 36.95), ("Hinge", 39.45)]
-)
+@pytest.mark.parametrize(("name", "x_mm"), [("ActiveHinge", 36.95), ("Hinge", 39.45)])
 def test_slot_one_of_a_hinge(name: str, x_mm: float) -> None:
     slot = shape(name).slots[1]
     assert slot.position == pytest.approx((x_mm / 1000, 0.0, 0.0))

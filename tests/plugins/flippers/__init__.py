@@ -1,0 +1,17 @@
+"""A user's package: one part type of their own, and one that is none."""
+
+from schema.parts import Box, PartType, Sensor, Shape, Slot
+
+_PADDLE = Shape(
+    boxes=(Box("paddle", (0.06, 0.03, 0.002), (0.0, 0.0, 0.0), 0.004),),
+    slots=(Slot((-0.03, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),),
+)
+
+
+def _shape(_values: tuple[float, ...]) -> Shape:
+    return _PADDLE
+
+
+FLIPPER = PartType("Flipper", 1, _shape, sensors=(Sensor("touch", "paddle"),))
+SECOND_FLIPPER = PartType("Flipper", 1, _shape)
+NOT_A_PART = 3.0
