@@ -135,6 +135,11 @@ class Dispatch:
         """Return how many jobs no agent of their kind has taken yet."""
         return len(self._pools[kind].waiting)
 
+    def platform(self, agent: str) -> str:
+        """Return what an agent's machine is; empty once it has left."""
+        kind = self._kind_of.get(agent)
+        return self._pools[kind].agents[agent].joined.platform if kind else ""
+
     @property
     def wake_s(self) -> float | None:
         """When the next ``Ticked`` can change something [s]; None: no need."""

@@ -17,7 +17,6 @@ from google.protobuf.message import DecodeError
 
 from coordinator.events import AgentKind, DispatchEvent, Joined, Left, Returned
 from schema import revolve_pb2 as pb
-from schema.codec import decode_answer
 from schema.errors import MalformedMessage, NetworkError
 from schema.network import (
     ASK_TIMEOUT_S,
@@ -67,7 +66,8 @@ class Network:
 
     Attributes:
         address: where agents connect to.
-        malformed: messages of peers that did not decode; they were dropped.
+        malformed: messages about peers that did not decode; they were dropped. Answers
+            are for whoever asked to decode.
         refused: agents that may not take part, and why.
     """
 
@@ -75,7 +75,6 @@ class Network:
         self,
         *,
         name: str,
-        epoch: int,
         fleet: str = DEFAULT_FLEET,
         listen: tuple[str, ...] = (THIS_MACHINE,),
         connect: str = "",
@@ -85,7 +84,6 @@ class Network:
 
         Args:
             name: of this process, never used again by another.
-            epoch: of its run; answers of other epochs are not for it.
             fleet: whose agents to use.
             listen: addresses of the hub within this process.
             connect: a hub elsewhere; then nothing listens here.
@@ -101,7 +99,6 @@ class Network:
         self._me = Member(
             check_name(fleet, "fleet"), "coordinator", check_name(name, "name")
         )
-        self._epoch = epoch
         self._config = (
             client_config(connect, tls) if connect else hub_config(listen, tls)
         )
@@ -265,13 +262,7 @@ class Network:
         if reply is None:
             return Returned(number, agent, "lost")
         if reply.ok is not None:
-            data = reply.ok.payload.to_bytes()
-            problem = self._problem(number, data)
-            if not problem:
-                return Returned(number, agent, "ok", data)
-            self.malformed += 1
-            _LOG.warning("malformed answer of %s: %s", agent, problem)
-            return Returned(number, agent, "error", reason=problem)
+            return Returned(number, agent, "ok", reply.ok.payload.to_bytes())
         assert reply.err is not None
         told = reply.err.payload.to_bytes()
         if told == _TIMEOUT:
@@ -280,19 +271,6 @@ class Network:
         if reason.startswith(FENCED):
             raise NetworkError(f"this coordinator stops: {reason[len(FENCED) :]}")
         return Returned(number, agent, "error", reason=reason or "no reason given")
-
-    def _problem(self, number: int, data: bytes) -> str:
-        """Return what is wrong with an answer, empty if nothing is."""
-        try:
-            answer = decode_answer(data)
-        except MalformedMessage as error:
-            return str(error)
-        if (answer.epoch, answer.number) != (self._epoch, number):
-            return (
-                f"answer must be of epoch {self._epoch}, job {number}, "
-                f"got epoch {answer.epoch}, job {answer.number}"
-            )
-        return ""
 
 
 def _info(data: bytes, member: Member) -> pb.AgentInfo:

@@ -15,7 +15,7 @@ from schema.topics import Role
 
 # Port 0: whichever is free.
 THIS_MACHINE = "tcp/127.0.0.1:0"
-DEFAULT_FLEET = "local"
+DEFAULT_FLEET = "default"
 
 # How an agent's refusal begins if a newer coordinator has taken the run over.
 FENCED = "fenced: "
@@ -94,7 +94,7 @@ def _is_loopback(host: str) -> bool:
 
 def _check_tls(address: str, protocol: str, tls: Tls | None) -> None:
     if protocol == "tls" and tls is None:
-        raise NetworkError(f"{address} needs --ca, --certificate and --key")
+        raise NetworkError(f"{address} needs --tls-ca, --tls-certificate and --tls-key")
 
 
 def hub_config(listen: tuple[str, ...], tls: Tls | None = None) -> str:
@@ -117,7 +117,7 @@ def hub_config(listen: tuple[str, ...], tls: Tls | None = None) -> str:
         if protocol == "tcp" and not _is_loopback(host):
             raise NetworkError(
                 f"{address} would listen beyond this machine without protection: "
-                "use tls/HOST:PORT with --ca, --certificate and --key"
+                "use tls/HOST:PORT with --tls-ca, --tls-certificate and --tls-key"
             )
         protocols.add(protocol)
     if "tls" in protocols and any(parse_address(a)[2] == 0 for a in listen):

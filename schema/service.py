@@ -9,16 +9,18 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from queue import Empty, SimpleQueue
 
 import zenoh
 from google.protobuf.message import DecodeError
 
 from schema import revolve_pb2 as pb
+from schema.crew import stop_on_signals, stop_with_parent
 from schema.errors import MalformedMessage, RevolveError
 from schema.network import FENCED, Agent, client_config
-from schema.topics import Member, check_name
+from schema.platform_tag import our_version, platform_tag
+from schema.topics import Member, check_name, unique_name
 
 _POLL_S = 0.2
 _RETRY_S = 0.3
@@ -78,6 +80,36 @@ def serve(
         with session:
             _serve_session(session, server, hub, stop)
     return server.tally
+
+
+def serve_as_process(
+    answer: Callable[[bytes], bytes], agent: Agent, index: int
+) -> None:
+    """Be one process of a crew: serve until asked to end, or left alone.
+
+    Args:
+        answer: as for ``serve``.
+        agent: of the whole crew; this process gets a name of its own.
+        index: of the process; the first one speaks for all.
+    """
+    stop = stop_on_signals()
+    stop_with_parent(stop)
+    own = replace(
+        agent,
+        name=unique_name(f"{agent.name}-{index}"),
+        platform=platform_tag(),
+        version=our_version(),
+    )
+    tally = serve(answer, own, stop, tell_user if index == 0 else _keep_quiet)
+    if tally.refused:
+        tell_user(
+            f"{own.name} refused {tally.refused} requests, "
+            f"{tally.malformed} of them malformed"
+        )
+
+
+def _keep_quiet(_line: str) -> None:
+    """Let the first of the crew speak."""
 
 
 def _open(config: str, hub: "_Hub", stop: threading.Event) -> zenoh.Session | None:

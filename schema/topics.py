@@ -7,6 +7,7 @@ again has a new one, so nothing meant for the dead reaches the living.
 """
 
 import re
+import secrets
 from dataclasses import dataclass
 from typing import Literal
 
@@ -89,3 +90,8 @@ def check_name(name: str, what: str) -> str:
             f"beginning with a letter or digit, got {name!r}"
         )
     return name
+
+
+def unique_name(name: str) -> str:
+    """Return a name that no other process will ever have."""
+    return f"{name}.{secrets.token_hex(4)}"

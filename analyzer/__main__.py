@@ -1,0 +1,25 @@
+"""``revolve analyzer``: vet bodies for a coordinator, here or far away."""
+
+import sys
+
+from schema.crew import one_thread_each
+
+
+def main(arguments: list[str]) -> int:
+    """Serve until told to end.
+
+    Args:
+        arguments: the command's name first.
+
+    Returns:
+        0 after Ctrl-C or SIGTERM; 130 after a second Ctrl-C.
+    """
+    one_thread_each()  # before anything imports numpy
+    from analyzer.service import process
+    from schema.agent_command import run_crew
+
+    return run_crew("analyzer", process, arguments[1:], processes=1)
+
+
+if __name__ == "__main__":
+    sys.exit(main(["analyzer", *sys.argv[1:]]))

@@ -1,0 +1,145 @@
+"""``revolve worker`` and ``revolve analyzer``: the same flags, the same life.
+
+One process does one job at a time; the command starts as many as it is told,
+starts those again that are killed, and ends all on Ctrl-C.
+"""
+
+import argparse
+import re
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import NoReturn
+
+from schema.crew import Crew, stop_on_signals, stop_with_input
+from schema.errors import NetworkError, RevolveError
+from schema.network import DEFAULT_FLEET, Agent, Tls, client_config
+from schema.topics import Role, check_name
+
+_POLL_S = 0.5
+
+
+class Flags(argparse.ArgumentParser):
+    """A parser whose complaints are one line (argparse is made for this override)."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong and where help is; end with status 2."""
+        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def add_network_flags(flags: argparse.ArgumentParser) -> None:
+    """Add what everybody on a network needs: its fleet and its certificates."""
+    flags.add_argument(
+        "--fleet", default=DEFAULT_FLEET, help=f"its name (default: {DEFAULT_FLEET})"
+    )
+    flags.add_argument(
+        "--tls-ca", metavar="FILE", help="certificate authority of the fleet (PEM)"
+    )
+    flags.add_argument("--tls-certificate", metavar="FILE", help="own one (PEM)")
+    flags.add_argument("--tls-key", metavar="FILE", help="own key (PEM, PKCS#8)")
+
+
+def tls_of(options: argparse.Namespace) -> Tls | None:
+    """Return the files that flags name; None if they name none.
+
+    Raises:
+        NetworkError: one is not named, or not there.
+    """
+    files = {
+        "--tls-ca": options.tls_ca,
+        "--tls-certificate": options.tls_certificate,
+        "--tls-key": options.tls_key,
+    }
+    if not any(files.values()):
+        return None
+    for flag, file in files.items():
+        if not file:
+            raise NetworkError(f"{flag} is missing: {', '.join(files)} go together")
+        if not Path(file).is_file():
+            raise NetworkError(f"{flag}: no such file: {file}")
+    return Tls(options.tls_ca, options.tls_certificate, options.tls_key)
+
+
+def host_name() -> str:
+    """Return this machine's name as it may stand in a key."""
+    return re.sub(r"[^A-Za-z0-9-]", "-", socket.gethostname()).strip("-")[:40] or "host"
+
+
+def run_crew(
+    role: Role,
+    body: Callable[[Agent, int], None],
+    arguments: list[str],
+    processes: int,
+) -> int:
+    """Run a command that serves jobs until Ctrl-C, and return its exit status.
+
+    Args:
+        role: "worker" or "analyzer".
+        body: what each process does with its agent and its number.
+        arguments: of the user, after the command's name.
+        processes: how many unless the user says so.
+    """
+    flags = _flags(role, processes)
+    options = flags.parse_args(arguments)
+    try:
+        agent = Agent(
+            role,
+            check_name(options.name, "--name"),
+            options.connect,
+            check_name(options.fleet, "--fleet"),
+            tls=tls_of(options),
+        )
+        client_config(agent.connect, agent.tls)
+    except RevolveError as error:
+        flags.error(str(error))
+    stop = stop_on_signals()
+    if options.until_closed:
+        stop_with_input(stop)
+    try:
+        with Crew(body, (agent,), size=options.processes) as crew:
+            while not stop.is_set():
+                crew.look_after()
+                crew.wait(_POLL_S)
+                if len(crew.exit_codes) == options.processes:
+                    return max(crew.exit_codes)
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
+    flags = Flags(
+        prog=f"revolve {role}",
+        description=f"Serve a coordinator as {role} until Ctrl-C, or wait for one.",
+        epilog=f"example: revolve {role} --connect tcp/127.0.0.1:7447 --processes 2",
+        allow_abbrev=False,
+    )
+    flags.add_argument(
+        "--connect",
+        required=True,
+        metavar="ADDRESS",
+        help="the coordinator's address, tcp/HOST:PORT or tls/HOST:PORT",
+    )
+    flags.add_argument(
+        "--processes",
+        type=_at_least_one,
+        default=processes,
+        metavar="N",
+        help=f"how many at a time (default: {processes})",
+    )
+    flags.add_argument(
+        "--name", default=host_name(), help="of this machine (default: its host name)"
+    )
+    flags.add_argument(
+        "--until-closed",
+        action="store_true",
+        help="end when standard input is closed, too",
+    )
+    add_network_flags(flags)
+    return flags
+
+
+def _at_least_one(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and int(text) >= 1):
+        raise argparse.ArgumentTypeError(f"must be a whole number >= 1, got {text!r}")
+    return int(text)

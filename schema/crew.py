@@ -1,0 +1,163 @@
+"""A crew of processes that one process starts, watches and ends.
+
+Processes are spawned, never forked: the network does not survive a fork. One
+that is killed is started again; one that ends by itself meant to. None outlives
+the one that started it.
+"""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from multiprocessing import connection, get_context, parent_process
+from multiprocessing.context import SpawnProcess
+from typing import Any, Self
+
+# So that results depend on no library's number of threads. These count only if
+# set before numpy is imported: in whoever starts the crew.
+_ONE_THREAD = (
+    "OPENBLAS_NUM_THREADS",
+    "OMP_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+)
+GRACE_S = 10.0
+_BETWEEN_STARTS_S = 1.0
+
+
+def one_thread_each() -> None:
+    """Have numerical libraries of this process and its children use one thread."""
+    os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
+
+
+class Crew:
+    """Processes that all run ``body(*arguments, index)``; use it in a ``with``."""
+
+    def __init__(
+        self, body: Callable[..., None], arguments: tuple[Any, ...], *, size: int
+    ) -> None:
+        self._body = body
+        self._arguments = arguments
+        self._context = get_context("spawn")
+        self._processes: list[SpawnProcess | None] = [None] * size
+        self._started_s = [-_BETWEEN_STARTS_S] * size
+        self.restarts = 0
+
+    def __enter__(self) -> Self:
+        try:
+            self.look_after()
+        except BaseException:
+            self.end()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
+    @property
+    def pids(self) -> list[int]:
+        """Process ids of those who run."""
+        return [p.pid for p in self._processes if p and p.is_alive() and p.pid]
+
+    @property
+    def exit_codes(self) -> list[int]:
+        """How those ended that ended by themselves."""
+        codes = [process.exitcode for process in self._processes if process]
+        return [code for code in codes if code is not None and code >= 0]
+
+    def look_after(self) -> None:
+        """Start who is not there yet, and again who was killed; not twice a second."""
+        now_s = time.monotonic()
+        for index, process in enumerate(self._processes):
+            was_killed = process is not None and (process.exitcode or 0) < 0
+            is_due = now_s - self._started_s[index] >= _BETWEEN_STARTS_S
+            if is_due and (process is None or was_killed):
+                self.restarts += was_killed
+                self._started_s[index] = now_s
+                self._processes[index] = self._start(index)
+
+    def _start(self, index: int) -> SpawnProcess:
+        process = self._context.Process(
+            target=self._body, args=(*self._arguments, index)
+        )
+        # A Ctrl-C of the terminal reaches all; only this process shall act on it.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        return process
+
+    def wait(self, timeout_s: float) -> None:
+        """Wait until one of them ends or time is up [s]."""
+        alive = [p.sentinel for p in self._processes if p and p.is_alive()]
+        if alive:
+            connection.wait(alive, timeout_s)
+        else:
+            time.sleep(min(timeout_s, _BETWEEN_STARTS_S / 10))
+
+    def end(self) -> None:
+        """Ask all to end, and end those who do not [after 10 s]."""
+        there = [process for process in self._processes if process]
+        for process in there:
+            process.terminate()
+        until_s = time.monotonic() + GRACE_S
+        try:
+            for process in there:
+                process.join(max(0.0, until_s - time.monotonic()))
+        finally:
+            for process in there:
+                process.kill()
+                process.join()
+
+
+def stop_on_signals() -> threading.Event:
+    """Return an event that Ctrl-C or SIGTERM sets; a second Ctrl-C interrupts."""
+    stop = threading.Event()
+
+    def ask(number: int, _frame: object) -> None:
+        if number == signal.SIGINT and stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+
+    signal.signal(signal.SIGINT, ask)
+    signal.signal(signal.SIGTERM, ask)
+    return stop
+
+
+def stop_with_input(stop: threading.Event) -> None:
+    """Set an event when standard input ends: whoever held its other end is gone."""
+
+    def watch() -> None:
+        # Not by sys.stdin: its lock would be held when this process ends.
+        while os.read(0, 1024):
+            pass
+        stop.set()
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def stop_with_parent(stop: threading.Event) -> None:
+    """Set an event when the process that started this one is gone.
+
+    Whoever is still there some seconds later, because its job never ends, is ended.
+    """
+    parent = parent_process()
+    if parent is None:
+        return
+
+    def watch() -> None:
+        connection.wait([parent.sentinel])
+        stop.set()
+        time.sleep(GRACE_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

@@ -1,0 +1,25 @@
+"""``revolve worker``: evaluate robots for a coordinator, here or far away."""
+
+import sys
+
+from schema.crew import cores, one_thread_each
+
+
+def main(arguments: list[str]) -> int:
+    """Serve until told to end.
+
+    Args:
+        arguments: the command's name first.
+
+    Returns:
+        0 after Ctrl-C or SIGTERM; 130 after a second Ctrl-C.
+    """
+    one_thread_each()  # before anything imports numpy
+    from schema.agent_command import run_crew
+    from worker.service import process
+
+    return run_crew("worker", process, arguments[1:], processes=cores())
+
+
+if __name__ == "__main__":
+    sys.exit(main(["worker", *sys.argv[1:]]))
