@@ -116,9 +116,7 @@ def add_ground(spec: Any, simulation: Simulation) -> None:  # noqa: ANN401 - muj
 class _Builder:
     """Builds one robot, part by part in the robot's own order."""
 
-    def __init__(
-        self, robot: Robot, space: BodySpace, simulation: Simulation
-    ) -> None:
+    def __init__(self, robot: Robot, space: BodySpace, simulation: Simulation) -> None:
         self.robot = robot
         self.simulation = simulation
         self.types: list[PartType] = [space[part.kind] for part in robot.parts]

@@ -71,7 +71,11 @@ def pack(brain: Brain, width: Widths) -> Network:
         InvalidRobot: more inputs, outputs or hidden neurons than the widths.
     """
     places: list[int] = []
-    starts = {"input": 0, "output": width.inputs, "hidden": width.inputs + width.outputs}
+    starts = {
+        "input": 0,
+        "output": width.inputs,
+        "hidden": width.inputs + width.outputs,
+    }
     limits = {"input": width.inputs, "output": width.outputs, "hidden": width.hidden}
     used = {"input": 0, "output": 0, "hidden": 0}
     for neuron in brain.neurons:

@@ -41,7 +41,13 @@ class Senses:
     """
 
     def __init__(
-        self, robot: Robot, space: BodySpace, model: Any, *, width: int, prefix: str = ""
+        self,
+        robot: Robot,
+        space: BodySpace,
+        model: Any,
+        *,
+        width: int,
+        prefix: str = "",
     ) -> None:
         """Find the sensors.
 
@@ -95,9 +101,9 @@ class Senses:
     def start(self, model: Any, data: Any) -> Floats:  # noqa: ANN401 - mujoco ships no types
         """Return the first readings: no motion before, so no acceleration."""
         mujoco.mj_forward(model, data)
-        self.velocities = [
-            _velocity_of(data.qvel[self._qvel : self._qvel + 3])
-        ] + [_velocity_of(_site_motion(model, data, site)[3:]) for site, _ in self._imus]
+        self.velocities = [_velocity_of(data.qvel[self._qvel : self._qvel + 3])] + [
+            _velocity_of(_site_motion(model, data, site)[3:]) for site, _ in self._imus
+        ]
         return self.read(model, data, 1.0)
 
     def read(self, model: Any, data: Any, interval_s: float) -> Floats:  # noqa: ANN401 - mujoco ships no types
@@ -136,11 +142,14 @@ class Senses:
         place = self._core_imu
         # The rows are the columns of the core's rotation: world into core frame.
         self._row[place : place + 6] = (
-            (1 - 2 * (y * y + z * z)) * ax + 2 * (x * y + w * z) * ay
+            (1 - 2 * (y * y + z * z)) * ax
+            + 2 * (x * y + w * z) * ay
             + 2 * (x * z - w * y) * az,
-            2 * (x * y - w * z) * ax + (1 - 2 * (x * x + z * z)) * ay
+            2 * (x * y - w * z) * ax
+            + (1 - 2 * (x * x + z * z)) * ay
             + 2 * (y * z + w * x) * az,
-            2 * (x * z + w * y) * ax + 2 * (y * z - w * x) * ay
+            2 * (x * z + w * y) * ax
+            + 2 * (y * z - w * x) * ay
             + (1 - 2 * (x * x + y * y)) * az,
             gx,
             gy,

@@ -111,7 +111,9 @@ def test_the_angle_is_that_of_segment_1_against_segment_0(
     data = mujoco.MjData(model)
     data.joint("joint1").qpos = 0.3
     mujoco.mj_forward(model, data)
-    names = ("1/servo", "1/frame") if kind == "ActiveHinge" else ("1/conn_b", "1/conn_a")
+    names = (
+        ("1/servo", "1/frame") if kind == "ActiveHinge" else ("1/conn_b", "1/conn_a")
+    )
     beyond, base = (data.geom(name).xmat.reshape(3, 3) for name in names)
     turn = base.T @ beyond
     expected = np.empty(4)
@@ -179,4 +181,6 @@ def test_one_spec_can_be_attached_to_a_world_twice() -> None:
         assert joint.armature == alone.armature
     assert model.joint("8:free").qposadr == solo.nq
     assert model.qpos0[solo.nq : solo.nq + 3] == pytest.approx([1, 0, 0.0225])
-    assert model.geom("8:1/servo").solref.tolist() == solo.geom("1/servo").solref.tolist()
+    assert (
+        model.geom("8:1/servo").solref.tolist() == solo.geom("1/servo").solref.tolist()
+    )

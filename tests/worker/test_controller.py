@@ -142,4 +142,3 @@ def test_states_can_be_carried_to_another_batch(networks: list[Network]) -> None
     for t in range(10, 20):
         found = second.step(readings[t, ::-1], float(t))
         assert found[::-1].tobytes() == expected[t].tobytes()
-

@@ -47,7 +47,7 @@ def test_coming_home_earns_the_path_alone() -> None:
 
 
 def test_the_straight_way_counts_five_times() -> None:
-    """v = s = 0.125 m/s: f = 0.125 + 5 * 0.125."""
+    """V = s = 0.125 m/s: f = 0.125 + 5 * 0.125."""
     assert thesis(track((0, 0, 0), (0.03125, 0, 0)), WEIGHTS) == 0.75
 
 
