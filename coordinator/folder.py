@@ -110,6 +110,8 @@ class RunFolder:
         """Let go of the folder."""
         lock, self._lock = self._lock, -1
         if lock >= 0:
+            # Closing alone would wait for a child that is just being started.
+            fcntl.flock(lock, fcntl.LOCK_UN)
             os.close(lock)
 
     def __enter__(self) -> Self:

@@ -1,0 +1,208 @@
+"""The journal through kills, damage and full disks."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coordinator.events import (
+    Answered,
+    Evaluated,
+    EvaluationFailed,
+    Vetted,
+    VettingFailed,
+)
+from coordinator.journal import MAGIC, NAME, Journal, decode_entry, encode_entry
+from schema.birth import BirthId
+from schema.errors import MalformedMessage, RunFolderError
+from schema.evaluation import Evaluation, Provenance, Report
+
+REFUSED = Report(
+    is_viable=False,
+    reason="parts 1 (Hinge) and 3 (FixedBrick) intersect",
+    intersections=((1, 3), (2, 5)),
+    lower=(-0.1, -0.2, -0.0225),
+    upper=(0.1, 1 / 3, 0.0225),
+    mass=0.1234,
+    motors=2,
+)
+EVENTS: list[Answered] = [
+    Vetted(BirthId(0, 0), 2, REFUSED),
+    VettingFailed(BirthId(1, 7), 4, "three analyzers raised KeyError: 'Wheel'"),
+    Evaluated(
+        BirthId(0, 0), Evaluation(0.1 + 0.2, 1e-300, 0.3, 12.0), Provenance("w", "x", 2)
+    ),
+    EvaluationFailed(BirthId(0, 1), "diverged at 3.2 s", Provenance("w 2", "y", 0.5)),
+    Vetted(BirthId(2**31, 2**40), 0, REFUSED),
+]
+
+
+def written(folder: Path) -> list[int]:
+    """Write all events one by one; return the file's size after each."""
+    sizes = [len(MAGIC)]
+    with Journal.open(folder) as journal:
+        for event in EVENTS:
+            journal.append([event])
+            sizes.append((folder / NAME).stat().st_size)
+    return sizes
+
+
+@contextmanager
+def no_file_beyond(size: int) -> Iterator[None]:
+    """Let no file of this process grow beyond a size, as a full disk would not."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_events_come_back_as_they_went_in(tmp_path: Path) -> None:
+    written(tmp_path)
+    with Journal.open(tmp_path) as journal:
+        assert journal.replay() == EVENTS
+        assert journal.dropped == 0
+
+
+def test_a_batch_reads_as_its_events_one_by_one(tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    (tmp_path / "all").mkdir()
+    written(tmp_path / "one")
+    with Journal.open(tmp_path / "all") as journal:
+        journal.append(EVENTS)
+    one, all_ = (tmp_path / name / NAME for name in ("one", "all"))
+    assert one.read_bytes() == all_.read_bytes()
+
+
+def test_a_journal_cut_anywhere_keeps_exactly_its_whole_records(
+    tmp_path: Path,
+) -> None:
+    sizes = written(tmp_path)
+    path = tmp_path / NAME
+    data = path.read_bytes()
+    for cut in range(len(data)):
+        path.write_bytes(data[:cut])
+        whole = sum(size <= cut for size in sizes[1:])
+        kept = max([size for size in sizes if size <= cut], default=0)
+        with Journal.open(tmp_path) as journal:
+            assert journal.replay() == EVENTS[:whole]
+            assert journal.dropped == cut - kept
+            journal.append(EVENTS[whole:])
+        assert path.read_bytes() == data
+
+
+def test_a_changed_byte_is_dropped_at_the_tail_and_refused_before_it(
+    tmp_path: Path,
+) -> None:
+    sizes = written(tmp_path)
+    path = tmp_path / NAME
+    data = path.read_bytes()
+    for position in range(len(data)):
+        changed = bytearray(data)
+        changed[position] ^= 0x41
+        path.write_bytes(changed)
+        record = sum(size <= position for size in sizes) - 1
+        if record == len(EVENTS) - 1:
+            with Journal.open(tmp_path) as journal:
+                assert journal.replay() == EVENTS[:-1]
+                assert journal.dropped == len(data) - sizes[-2]
+            continue
+        story = "not a journal" if record < 0 else f"damaged at byte {sizes[record]} "
+        with pytest.raises(RunFolderError, match=story):
+            Journal.open(tmp_path)
+        assert path.read_bytes() == changed
+
+
+def test_the_remedy_for_damage_works(tmp_path: Path) -> None:
+    sizes = written(tmp_path)
+    path = tmp_path / NAME
+    data = bytearray(path.read_bytes())
+    data[sizes[2] + 20] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(RunFolderError, match=f"truncate -s {sizes[2]} "):
+        Journal.open(tmp_path)
+    os.truncate(path, sizes[2])
+    with Journal.open(tmp_path) as journal:
+        assert journal.replay() == EVENTS[:2]
+
+
+def test_a_record_that_stands_twice_is_damage(tmp_path: Path) -> None:
+    sizes = written(tmp_path)
+    path = tmp_path / NAME
+    data = path.read_bytes()
+    path.write_bytes(data[: sizes[2]] + data[sizes[1] :])
+    with pytest.raises(RunFolderError, match=f"damaged at byte {sizes[2]}"):
+        Journal.open(tmp_path)
+
+
+def test_a_full_disk_takes_a_whole_batch_or_nothing(tmp_path: Path) -> None:
+    with Journal.open(tmp_path) as journal:
+        journal.append(EVENTS[:2])
+        before = (tmp_path / NAME).read_bytes()
+        # Room for one event of the batch and a part of the next.
+        with (
+            no_file_beyond(len(before) + 150),
+            pytest.raises(RunFolderError, match="disk full"),
+        ):
+            journal.append(EVENTS[2:])
+        assert (tmp_path / NAME).read_bytes() == before
+        journal.append(EVENTS[2:])
+    with Journal.open(tmp_path) as journal:
+        assert journal.replay() == EVENTS
+
+
+def test_a_killed_process_loses_nothing_that_it_was_sure_of(tmp_path: Path) -> None:
+    program = """
+import sys
+from pathlib import Path
+from coordinator.events import VettingFailed
+from coordinator.journal import Journal
+from schema.birth import BirthId
+journal = Journal.open(Path(sys.argv[1]))
+for number in range(10**9):
+    journal.append([VettingFailed(BirthId(0, number), 0, "x" * (number % 50))])
+    print(number, flush=True)
+"""
+    with subprocess.Popen(
+        [sys.executable, "-c", program, str(tmp_path)], stdout=subprocess.PIPE
+    ) as child:
+        assert child.stdout is not None
+        for _ in range(200):
+            last = int(child.stdout.readline())
+        child.send_signal(signal.SIGKILL)
+        said = child.stdout.read().split(b"\n")[:-1]
+    sure = int(said[-1]) if said else last
+    with Journal.open(tmp_path) as journal:
+        births = [event.birth.number for event in journal.replay()]
+    assert births == list(range(len(births)))
+    assert len(births) > sure
+
+
+def test_a_file_that_is_no_journal_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / NAME).write_bytes(b"something else")
+    with pytest.raises(RunFolderError, match="not a journal"):
+        Journal.open(tmp_path)
+    assert (tmp_path / NAME).read_bytes() == b"something else"
+
+
+@pytest.mark.parametrize("event", EVENTS)
+def test_an_entry_round_trips(event: Answered) -> None:
+    assert decode_entry(encode_entry(event)) == event
+
+
+@given(st.binary(max_size=80))
+def test_any_bytes_are_an_entry_or_malformed(data: bytes) -> None:
+    try:
+        event = decode_entry(data)
+    except MalformedMessage:
+        return
+    assert decode_entry(encode_entry(event)) == event
