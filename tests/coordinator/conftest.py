@@ -1,11 +1,21 @@
-"""Hand-made table rows for the tests of what is written and read back."""
+"""Hand-made rows, and a disk that is full, for tests of what is written."""
 
-from collections.abc import Callable
+import resource
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
 import pytest
 
 from coordinator.events import Record
+from coordinator.folder import RunDetails
+from coordinator.record import Recorder
+from schema.run_tables import read_table
+from schema.tables import TABLES
+
+DETAILS = RunDetails("a/b c", 2, 1, "{}")
 
 PART = {
     "idx": 0,
@@ -80,3 +90,56 @@ def records(
 def make_records() -> Callable[..., list[Record]]:
     """Return a function (births, worker, platform) -> all rows of a run."""
     return records
+
+
+def feed(folder: Path, rows: list[Record], every: int = 10) -> Recorder:
+    """Return a recorder that took rows and flushed after every few."""
+    recorder = Recorder(folder, DETAILS)
+    for index, record in enumerate(rows, start=1):
+        recorder.write(record)
+        if index % every == 0:
+            recorder.flush()
+    return recorder
+
+
+def expected(rows: list[Record], table: str) -> pa.Table:
+    """Return what a table must hold."""
+    own = [record.row for record in rows if record.table == table]
+    numbered = [{"record": index, **row} for index, row in enumerate(own)]
+    return pa.Table.from_pylist(numbered, TABLES[table])
+
+
+def assert_complete(folder: Path, rows: list[Record]) -> None:
+    """Fail unless every table holds exactly these rows."""
+    for name in TABLES:
+        found = read_table(folder, name)
+        assert found.equals(expected(rows, name), check_metadata=True), name
+
+
+@contextmanager
+def no_file_beyond(size: int) -> Iterator[None]:
+    """Let no file of this process grow beyond a size, as a full disk would not."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+@pytest.fixture
+def feed_rows() -> Callable[..., Recorder]:
+    """Return a function (folder, rows, every=10) -> recorder that took them."""
+    return feed
+
+
+@pytest.fixture
+def check_complete() -> Callable[[Path, list[Record]], None]:
+    """Return a function that fails unless a folder's tables hold these rows."""
+    return assert_complete
+
+
+@pytest.fixture
+def full_beyond() -> Callable[[int], AbstractContextManager[None]]:
+    """Return a context in which no file grows beyond a size."""
+    return no_file_beyond

@@ -1,12 +1,11 @@
 """The journal through kills, damage and full disks."""
 
 import os
-import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -25,6 +24,7 @@ from schema.birth import BirthId
 from schema.errors import MalformedMessage, RunFolderError
 from schema.evaluation import Evaluation, Provenance, Report
 
+FullBeyond = Callable[[int], AbstractContextManager[None]]
 REFUSED = Report(
     is_viable=False,
     reason="parts 1 (Hinge) and 3 (FixedBrick) intersect",
@@ -53,17 +53,6 @@ def written(folder: Path) -> list[int]:
             journal.append([event])
             sizes.append((folder / NAME).stat().st_size)
     return sizes
-
-
-@contextmanager
-def no_file_beyond(size: int) -> Iterator[None]:
-    """Let no file of this process grow beyond a size, as a full disk would not."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_events_come_back_as_they_went_in(tmp_path: Path) -> None:
@@ -144,13 +133,15 @@ def test_a_record_that_stands_twice_is_damage(tmp_path: Path) -> None:
         Journal.open(tmp_path)
 
 
-def test_a_full_disk_takes_a_whole_batch_or_nothing(tmp_path: Path) -> None:
+def test_a_full_disk_takes_a_whole_batch_or_nothing(
+    tmp_path: Path, full_beyond: FullBeyond
+) -> None:
     with Journal.open(tmp_path) as journal:
         journal.append(EVENTS[:2])
         before = (tmp_path / NAME).read_bytes()
         # Room for one event of the batch and a part of the next.
         with (
-            no_file_beyond(len(before) + 150),
+            full_beyond(len(before) + 150),
             pytest.raises(RunFolderError, match="disk full"),
         ):
             journal.append(EVENTS[2:])
