@@ -14,7 +14,6 @@ the original's numbers stands, with its measured effect, in docs/physics.md.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -38,7 +37,7 @@ class RobotSpec:
         height: of the core's centre when the lowest point touches z = 0 [m].
     """
 
-    spec: Any
+    spec: mujoco.MjSpec
     height: float
 
 
@@ -56,7 +55,9 @@ def robot_spec(robot: Robot, space: BodySpace, simulation: Simulation) -> RobotS
     return RobotSpec(builder.spec, -builder.lowest)
 
 
-def solo_model(robot: Robot, space: BodySpace, simulation: Simulation) -> Any:  # noqa: ANN401 - mujoco ships no types
+def solo_model(
+    robot: Robot, space: BodySpace, simulation: Simulation
+) -> mujoco.MjModel:
     """Return the model of one robot alone on the ground, lowest point touching it.
 
     Args:
@@ -73,7 +74,9 @@ def solo_model(robot: Robot, space: BodySpace, simulation: Simulation) -> Any:  
     return spec.compile()
 
 
-def set_options(spec: Any, simulation: Simulation, *, is_single: bool) -> None:  # noqa: ANN401 - mujoco ships no types
+def set_options(
+    spec: mujoco.MjSpec, simulation: Simulation, *, is_single: bool
+) -> None:
     """Set a world's integrator, solver and clock.
 
     Args:
@@ -101,7 +104,7 @@ def set_options(spec: Any, simulation: Simulation, *, is_single: bool) -> None: 
     option.disableflags |= int(disabled)
 
 
-def add_ground(spec: Any, simulation: Simulation) -> None:  # noqa: ANN401 - mujoco ships no types
+def add_ground(spec: mujoco.MjSpec, simulation: Simulation) -> None:
     """Add the endless plane z = 0, named ``ground``."""
     spec.worldbody.add_geom(
         name="ground",
@@ -132,7 +135,7 @@ class _Builder:
         # Never aligned: the joint's position must stay the core's centre.
         root.add_freejoint(name="free", align=0)
         # Of each part: (body, its origin in the core's frame) of both segments.
-        self.segments: list[list[tuple[Any, Floats]]] = []
+        self.segments: list[list[tuple[mujoco.MjsBody, Floats]]] = []
         self.root = (root, np.zeros(3))
 
     def _set_defaults(self) -> None:
@@ -172,8 +175,8 @@ class _Builder:
                 body.add_site(name=f"{index}/imu", pos=position, quat=quaternion)
 
     def _add_joint(
-        self, index: int, joint: Joint, near: tuple[Any, Floats], own: int
-    ) -> tuple[Any, Floats]:
+        self, index: int, joint: Joint, near: tuple[mujoco.MjsBody, Floats], own: int
+    ) -> tuple[mujoco.MjsBody, Floats]:
         """Return the segment beyond a joint; ``own`` is the one on the near side."""
         rotation = self.rotations[index]
         anchor = self.positions[index] + rotation @ joint.anchor
@@ -199,7 +202,9 @@ class _Builder:
             actuator.set_to_velocity(kv=self.simulation.servo_stiffness)
         return body, anchor
 
-    def _add_box(self, index: int, box: Box, body: Any, origin: Floats) -> None:  # noqa: ANN401 - mujoco ships no types
+    def _add_box(
+        self, index: int, box: Box, body: mujoco.MjsBody, origin: Floats
+    ) -> None:
         position, quaternion = self._place(index, box, origin)
         half = np.multiply(box.size, 0.5)
         body.add_geom(

@@ -5,7 +5,7 @@ All clocks are integers of physics steps; nothing here looks at the wall's.
 
 import math
 from functools import lru_cache
-from typing import Any, cast
+from typing import cast
 
 import mujoco
 import numpy as np
@@ -35,14 +35,14 @@ def evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
 
     Raises:
         SimulationDiverged: the physics did; reason and simulated time.
-        ExperimentError: a sensor that the world has nothing for, a fitness
-            function that fails its contract.
+        ExperimentError: a sensor that the world has nothing for, a fitness that
+            is no finite number.
         InvalidRobot: more neurons than the limits.
     """
     track = simulate(robot, settings.space, settings.simulation)
     function = cast("FitnessFunction", fitness_function(settings.fitness))
     value = function(track, settings.fitness)
-    if not (isinstance(value, int | float) and math.isfinite(value)):
+    if not math.isfinite(value):
         raise ExperimentError(
             f"fitness.function: {settings.fitness.function!r} must return a finite "
             f"number, got {value!r}"
@@ -82,7 +82,10 @@ def simulate(robot: Robot, space: Space, simulation: Simulation) -> Track:
 
 
 def _live(
-    robot: Robot, space: Space, simulation: Simulation, world: tuple[Any, Any]
+    robot: Robot,
+    space: Space,
+    simulation: Simulation,
+    world: tuple[mujoco.MjModel, mujoco.MjData],
 ) -> Floats:
     """Run the closed loop to the window's end; return the sampled positions."""
     model, data = world
@@ -122,7 +125,7 @@ def _end(simulation: Simulation) -> int:
     return simulation.warmup_steps + simulation.window_steps
 
 
-def _check(data: Any, time_s: float) -> None:  # noqa: ANN401 - mujoco ships no types
+def _check(data: mujoco.MjData, time_s: float) -> None:
     """Raise if the state is no longer made of numbers.
 
     A sum is finite only if all its terms are; nothing plausible overflows it.
@@ -131,14 +134,14 @@ def _check(data: Any, time_s: float) -> None:  # noqa: ANN401 - mujoco ships no 
         _raise_diverged(data, time_s)
 
 
-def _check_warnings(data: Any, time_s: float) -> None:  # noqa: ANN401 - mujoco ships no types
+def _check_warnings(data: mujoco.MjData, time_s: float) -> None:
     """Raise if the engine warned of anything, or the state is not of numbers."""
     _check(data, time_s)
     if any(warning.number for warning in data.warning):
         _raise_diverged(data, time_s)
 
 
-def _raise_diverged(data: Any, time_s: float) -> None:  # noqa: ANN401 - mujoco ships no types
+def _raise_diverged(data: mujoco.MjData, time_s: float) -> None:
     names = [
         mujoco.mjtWarning(index).name.removeprefix("mjWARN_")
         for index, warning in enumerate(data.warning)

@@ -5,7 +5,7 @@ the last step, never of its ``sensordata``, which is empty after a restore. A ro
 is found in a model by the prefix of its names, so that many can share one.
 """
 
-from typing import Any, cast
+from typing import cast
 
 import mujoco
 import numpy as np
@@ -44,7 +44,7 @@ class Senses:
         self,
         robot: Robot,
         space: BodySpace,
-        model: Any,
+        model: mujoco.MjModel,
         *,
         width: int,
         prefix: str = "",
@@ -87,7 +87,7 @@ class Senses:
                     self._add_imu(model, site, root, place)
                 place += sensor.inputs
 
-    def _add_imu(self, model: Any, site: int, root: int, place: int) -> None:  # noqa: ANN401 - mujoco ships no types
+    def _add_imu(self, model: mujoco.MjModel, site: int, root: int, place: int) -> None:
         at_origin = (
             int(model.site_bodyid[site]) == root
             and not model.site_pos[site].any()
@@ -98,7 +98,7 @@ class Senses:
         else:
             self._imus.append((site, place))
 
-    def start(self, model: Any, data: Any) -> Floats:  # noqa: ANN401 - mujoco ships no types
+    def start(self, model: mujoco.MjModel, data: mujoco.MjData) -> Floats:
         """Return the first readings: no motion before, so no acceleration."""
         mujoco.mj_forward(model, data)
         self.velocities = [_velocity_of(data.qvel[self._qvel : self._qvel + 3])] + [
@@ -106,7 +106,9 @@ class Senses:
         ]
         return self.read(model, data, 1.0)
 
-    def read(self, model: Any, data: Any, interval_s: float) -> Floats:  # noqa: ANN401 - mujoco ships no types
+    def read(
+        self, model: mujoco.MjModel, data: mujoco.MjData, interval_s: float
+    ) -> Floats:
         """Read all sensors.
 
         Args:
@@ -127,7 +129,7 @@ class Senses:
                 self._row[place] = geom in touching
         return self.readings
 
-    def _read_core(self, data: Any, interval_s: float) -> None:  # noqa: ANN401 - mujoco ships no types
+    def _read_core(self, data: mujoco.MjData, interval_s: float) -> None:
         """Read the imu of the core straight from the free joint's state.
 
         Plain floats: at one robot they are twice as fast as arrays of three.
@@ -156,7 +158,9 @@ class Senses:
             gz,
         )
 
-    def _read_sites(self, model: Any, data: Any, interval_s: float) -> None:  # noqa: ANN401 - mujoco ships no types
+    def _read_sites(
+        self, model: mujoco.MjModel, data: mujoco.MjData, interval_s: float
+    ) -> None:
         """Read imus elsewhere than at the core's centre."""
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
@@ -179,7 +183,7 @@ class Servos:
     """
 
     def __init__(
-        self, robot: Robot, space: BodySpace, model: Any, *, prefix: str = ""
+        self, robot: Robot, space: BodySpace, model: mujoco.MjModel, *, prefix: str = ""
     ) -> None:
         """Find the motors.
 
@@ -212,7 +216,7 @@ class Servos:
         self.slots = slice(first, first + len(actuators))
         assert actuators == list(range(first, first + len(actuators)))
 
-    def drive(self, data: Any, outputs: Floats) -> None:  # noqa: ANN401 - mujoco ships no types
+    def drive(self, data: mujoco.MjData, outputs: Floats) -> None:
         """Command each joint towards its target, until the next tick.
 
         Args:
@@ -230,12 +234,12 @@ class Servos:
         data.ctrl[self.slots] = commands
 
 
-def free_joint(model: Any, prefix: str = "") -> int:  # noqa: ANN401 - mujoco ships no types
+def free_joint(model: mujoco.MjModel, prefix: str = "") -> int:
     """Return the index of a robot's free joint."""
     return find(model, _JOINT, f"{prefix}free")
 
 
-def find(model: Any, kind: Any, name: str) -> int:  # noqa: ANN401 - mujoco ships no types
+def find(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
     """Return the index of a named element of a model.
 
     Raises:
@@ -247,7 +251,7 @@ def find(model: Any, kind: Any, name: str) -> int:  # noqa: ANN401 - mujoco ship
     return index
 
 
-def _site_motion(model: Any, data: Any, site: int) -> Floats:  # noqa: ANN401 - mujoco ships no types
+def _site_motion(model: mujoco.MjModel, data: mujoco.MjData, site: int) -> Floats:
     """Return a site's angular and linear velocity, (6,), world frame."""
     motion = np.empty(6)
     mujoco.mj_objectVelocity(model, data, _SITE, site, motion, 0)

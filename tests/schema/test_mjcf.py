@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -30,11 +29,11 @@ def on_core(kind: str, slot: int = 0, turn: int = 0, parent_slot: int = 2) -> Ro
     return Robot((CORE, Part(kind, 0, parent_slot, slot, turn, KINDS[kind])))
 
 
-def model_of(robot: Robot, simulation: Simulation = WORLD) -> Any:  # noqa: ANN401 - mujoco ships no types
+def model_of(robot: Robot, simulation: Simulation = WORLD) -> mujoco.MjModel:
     return solo_model(robot, BUILT_IN, simulation)
 
 
-def body_mass(model: Any, name: str) -> float:  # noqa: ANN401 - mujoco ships no types
+def body_mass(model: mujoco.MjModel, name: str) -> float:
     """Return the mass of a body in grams."""
     return float(model.body(name).mass[0]) * 1000
 
@@ -75,8 +74,11 @@ def test_inertia_is_that_of_uniform_boxes() -> None:
 
 
 def test_rigid_parts_become_one_body() -> None:
-    parts = (CORE, Part("FixedBrick", 0, 0, 2, 0, GREY))
-    parts += (Part("FixedBrick", 1, 0, 0, 0, GREY),)
+    parts = (
+        CORE,
+        Part("FixedBrick", 0, 0, 2, 0, GREY),
+        Part("FixedBrick", 1, 0, 0, 0, GREY),
+    )
     model = model_of(Robot(parts))
     assert (model.nbody, model.nv, model.ngeom) == (2, 6, 4)
 
@@ -90,8 +92,11 @@ def test_joints_bend_as_far_as_the_original_ones(kind: str, degrees: float) -> N
 
 
 def test_only_driven_joints_have_a_servo_of_its_torque() -> None:
-    parts = (CORE, Part("Hinge", 0, 0, 0, 0, GREY))
-    parts += (Part("ActiveHinge", 0, 2, 0, 0, GREY),)
+    parts = (
+        CORE,
+        Part("Hinge", 0, 0, 0, 0, GREY),
+        Part("ActiveHinge", 0, 2, 0, 0, GREY),
+    )
     model = model_of(Robot(parts))
     assert model.nu == 1
     assert model.actuator_forcerange.tolist() == [[-0.17658, 0.17658]]

@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -65,11 +64,11 @@ def test_the_physics_are_stepped_as_often_as_the_window_says(
     steps: list[int] = []
     step = mujoco.mj_step
 
-    def counted(model: Any, data: Any, nstep: int) -> None:  # noqa: ANN401 - mujoco ships no types
+    def counted(model: mujoco.MjModel, data: mujoco.MjData, nstep: int) -> None:
         steps.append(nstep)
         step(model, data, nstep=nstep)
 
-    monkeypatch.setattr(evaluation.mujoco, "mj_step", counted)
+    monkeypatch.setattr(mujoco, "mj_step", counted)
     simulate(turtle, Space(), replace(WORLD, warmup_steps=7))
     assert sum(steps) == 2407
 

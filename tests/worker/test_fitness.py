@@ -87,9 +87,9 @@ def _is_endless(_track: Track, _fitness: Fitness) -> float:
 def _counts_calls() -> FitnessFunction:
     calls: list[int] = []
 
-    def count(_track: Track, _fitness: Fitness) -> float:
-        calls.append(1)
-        return float(len(calls))
+    def count(track: Track, fitness: Fitness) -> float:
+        calls.append(len(track.core_position))
+        return float(len(calls)) + fitness.limit
 
     return count
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -29,13 +28,13 @@ HINGED = Robot(
 
 def alone(
     robot: Robot, simulation: Simulation = WORLD, space: BodySpace = BUILT_IN
-) -> tuple[Any, Any]:
+) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Return model and data of one robot on the ground."""
     model = solo_model(robot, space, simulation)
     return model, mujoco.MjData(model)
 
 
-def two(robots: tuple[Robot, Robot]) -> tuple[Any, Any]:
+def two(robots: tuple[Robot, Robot]) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Return model and data of two robots, ``1:`` and ``2:``, half a metre apart."""
     world = mujoco.MjSpec()
     set_options(world, WORLD, is_single=False)
@@ -51,7 +50,9 @@ def two(robots: tuple[Robot, Robot]) -> tuple[Any, Any]:
     return model, mujoco.MjData(model)
 
 
-def ticks(model: Any, data: Any, senses: list[Senses], count: int) -> Iterator[int]:
+def ticks(
+    model: mujoco.MjModel, data: mujoco.MjData, senses: list[Senses], count: int
+) -> Iterator[int]:
     """Step and read for some ticks, yielding after each."""
     for sense in senses:
         sense.start(model, data)
