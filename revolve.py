@@ -1,24 +1,20 @@
 """The command ``revolve``: names the rooms' commands, nothing else."""
 
-import os
 import sys
 from importlib import import_module
 
-# One BLAS thread, before NumPy is first imported: a robot's arithmetic must not
-# depend on the machine's cores, and the workers are already one to a core.
-for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ.setdefault(_name, "1")
-
+_COORDINATOR = "coordinator.__main__"
 COMMANDS = {
-    "run": ("coordinator.__main__", "evolve an experiment on this machine"),
-    "resume": ("coordinator.__main__", "go on with a run after any crash"),
-    "coordinator": ("coordinator.__main__", "run an experiment for remote workers"),
-    "compare": ("coordinator.__main__", "tell whether two runs are equal"),
+    "run": (_COORDINATOR, "evolve an experiment on this machine"),
+    "resume": (_COORDINATOR, "go on with a run after any crash"),
+    "coordinator": (_COORDINATOR, "run an experiment for remote workers"),
+    "compare": (_COORDINATOR, "tell whether two runs are equal"),
     "worker": ("worker.__main__", "simulate robots for a coordinator"),
     "analyzer": ("analyzer.__main__", "vet bodies for a coordinator"),
     "robot": ("schema.__main__", "check, convert or show a robot file"),
     "bench": ("worker.bench", "measure this machine"),
 }
+"""Module with a ``main``, and what it does; a module of several gets the name."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -42,10 +38,13 @@ def main(arguments: list[str] | None = None) -> int:
             file=sys.stderr,
         )
         return 2
+    # Before NumPy is first imported: a robot's arithmetic must not depend on cores.
+    import_module("schema.crew").one_thread_each()
     error_type = import_module("schema.errors").RevolveError
+    module = COMMANDS[words[0]][0]
     try:
-        room = import_module(COMMANDS[words[0]][0])
-        return int(room.main(words))
+        room = import_module(module)
+        return int(room.main(words if module == _COORDINATOR else words[1:]))
     except error_type as error:
         print(f"revolve: {error}", file=sys.stderr)
         return 2

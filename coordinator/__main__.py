@@ -1,13 +1,18 @@
 """Commands of the coordinator: ``run``, ``coordinator``, ``resume``, ``compare``."""
 
 import argparse
-import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from msgspec.structs import replace
 
-from schema.errors import ExperimentError
+from coordinator.compare import compare
+from coordinator.events import AgentKind
+from coordinator.running import Deployment, resume, start
+from schema.agent_command import Flags, add_network_flags, tls_of
+from schema.crew import cores
+from schema.errors import RunFolderError
 from schema.experiment import check_experiment, read_experiment, shipped_experiments
 
 _EXAMPLES = {
@@ -31,17 +36,7 @@ def main(arguments: list[str]) -> int:
     options = _parser(command).parse_args(words)
     if command == "compare":
         return _compare(options)
-    from coordinator.running import Deployment, resume, start
-
-    deployment = Deployment(
-        workers=options.workers,
-        in_process=getattr(options, "in_process", False),
-        listen=options.listen,
-        fleet=options.fleet,
-        tls=(options.tls_ca, options.tls_certificate, options.tls_key),
-        quiet=options.quiet,
-        fsync=options.fsync,
-    )
+    deployment = _deployment(options)
     if command == "resume":
         return resume(Path(options.folder), deployment)
     experiment = read_experiment(options.experiment)
@@ -53,8 +48,34 @@ def main(arguments: list[str]) -> int:
     return start(folder, experiment, options.seed, deployment)
 
 
+def _deployment(options: argparse.Namespace) -> Deployment:
+    """Return who does the work; the one place that names the other rooms."""
+    import analyzer.jobs
+    import analyzer.service
+    import worker.jobs
+    import worker.service
+
+    answers: dict[AgentKind, Callable[[bytes], bytes]] = {
+        "analyzer": analyzer.jobs.answer,
+        "worker": worker.jobs.answer,
+    }
+    return Deployment(
+        workers=options.workers,
+        bodies={
+            "analyzer": analyzer.service.process,
+            "worker": worker.service.process,
+        },
+        answers=answers if options.in_process else None,
+        listen=options.listen,
+        fleet=options.fleet,
+        tls=tls_of(options),
+        quiet=options.quiet,
+        fsync=options.fsync,
+    )
+
+
 def _parser(command: str) -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Flags(
         prog=f"revolve {command}",
         description=_DESCRIPTIONS[command],
         epilog=f"for example: {_EXAMPLES[command]}",
@@ -77,12 +98,12 @@ def _parser(command: str) -> argparse.ArgumentParser:
             "--out", help="run folder; default: runs/EXPERIMENT-seedSEED"
         )
     if command == "coordinator":
-        parser.set_defaults(workers=0)
+        parser.set_defaults(workers=0, in_process=False)
     else:
         parser.add_argument(
             "--workers",
             type=_whole,
-            default=os.cpu_count() or 1,
+            default=cores(),
             help="worker processes to start here; default: one per core",
         )
         parser.add_argument(
@@ -96,10 +117,7 @@ def _parser(command: str) -> argparse.ArgumentParser:
         metavar="ADDRESS",
         help="where others may connect, as tcp/127.0.0.1:7447",
     )
-    parser.add_argument("--fleet", default="default", help="name of the fleet")
-    parser.add_argument("--tls-ca", metavar="FILE")
-    parser.add_argument("--tls-certificate", metavar="FILE")
-    parser.add_argument("--tls-key", metavar="FILE")
+    add_network_flags(parser)
     parser.add_argument("--quiet", action="store_true", help="show no progress")
     parser.add_argument(
         "--fsync", action="store_true", help="survive power loss too; slower"
@@ -130,11 +148,9 @@ def _count(text: str) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    from coordinator.compare import compare
-
     for folder in (options.first, options.second):
         if not Path(folder).is_dir():
-            raise ExperimentError(f"{folder}: no such run folder")
+            raise RunFolderError(f"{folder}: no such run folder")
     differences = compare(Path(options.first), Path(options.second))
     for line in differences:
         print(line)

@@ -25,6 +25,7 @@ from coordinator.events import (
     Requested,
     Returned,
     Started,
+    Ticked,
     Vet,
     Vetted,
     VettingFailed,
@@ -124,17 +125,21 @@ class Loop:
         for command in unanswered.values():
             self._request(command)
 
-    def step(self, timeout_s: float) -> int:
+    def step(self, timeout_s: float, now_s: float) -> int:
         """Take what came and act on it.
 
         Args:
             timeout_s: how long to wait when nothing is there [s].
+            now_s: the time, of any clock that only goes forward [s].
 
         Returns:
             The number of island events that were taken.
         """
         events: list[Answered] = []
-        for event in self._agents.receive(timeout_s):
+        wake_s = self.dispatch.wake_s
+        if wake_s is not None:
+            timeout_s = min(timeout_s, max(0.0, wake_s - now_s))
+        for event in (Ticked(now_s), *self._agents.receive(timeout_s)):
             for command in self.dispatch.handle(self._checked(event)):
                 if isinstance(command, Assign):
                     self._assign(command)
@@ -179,7 +184,13 @@ class Loop:
         else:
             self._encoded.pop(birth, None)
             kind, attempt, settings = "evaluate", 0, asks.evaluation
-        payload = encode_request(asks.run, asks.epoch, number, settings, robot)
+        payload = encode_request(
+            run=asks.run,
+            epoch=asks.epoch,
+            number=number,
+            settings=settings,
+            robot=robot,
+        )
         job = Job(number, kind, birth, attempt, payload)  # type: ignore[arg-type]
         for reaction in self.dispatch.handle(Requested(job)):
             if isinstance(reaction, Assign):
@@ -195,7 +206,10 @@ class Loop:
         try:
             answer = decode_answer(event.answer)
             if (answer.epoch, answer.number) != (self._question.epoch, event.number):
-                raise MalformedMessage("an answer to another question")
+                raise MalformedMessage(
+                    f"answer must be to epoch {self._question.epoch}, job "
+                    f"{event.number}, got epoch {answer.epoch}, job {answer.number}"
+                )
         except MalformedMessage as error:
             self.malformed += 1
             return replace(event, outcome="error", answer=b"", reason=str(error))

@@ -80,7 +80,7 @@ class Display:
             self._seen.popleft()
         span_s = now_s - self._seen[0][0]
         rate = (born - self._seen[0][1]) / span_s if span_s > 0 else 0.0
-        workers = self._loop.dispatch.count("worker")
+        workers = self._loop.dispatch.agents("worker")
         for number, island in self._loop.islands.items():
             best = max((one.fitness for one in island.population), default=None)
             self._progress.update(
@@ -103,7 +103,7 @@ class Display:
         missing = [
             kind
             for kind in ("worker", "analyzer")
-            if not self._loop.dispatch.count(kind)
+            if not self._loop.dispatch.agents(kind)
         ]
         if not missing:
             self._waits_since = None

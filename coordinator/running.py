@@ -1,0 +1,206 @@
+"""One run from its first birth to its last, or to the next resume."""
+
+import json
+import socket
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from threading import Event
+
+from coordinator.events import AgentKind, Record
+from coordinator.folder import DETAILS, RunDetails, RunFolder, read_state
+from coordinator.island import Island
+from coordinator.journal import Journal
+from coordinator.local import LocalAgents
+from coordinator.loop import Agents, Loop, Question
+from coordinator.progress import Display
+from coordinator.record import Recorder
+from coordinator.service import Network
+from coordinator.summary import tell_result
+from schema.crew import Crew, stop_on_signals
+from schema.experiment import (
+    Experiment,
+    evaluation_settings,
+    experiment_from_text,
+    experiment_text,
+    vetting_settings,
+)
+from schema.network import THIS_MACHINE, Agent, Tls
+from schema.platform_tag import cpu_flags, our_version, platform_tag
+from schema.topics import unique_name
+
+ADDRESS = "address"
+"""File of a run folder that says where its coordinator listens, while it does."""
+
+_LOOK_S = 0.2
+_LIBRARIES = ("mujoco-core", "eclipse-zenoh", "numpy", "pyarrow", "protobuf")
+
+
+@dataclass(frozen=True, slots=True)
+class Deployment:
+    """Where and by whom a run is done; none of it changes a birth.
+
+    Attributes:
+        workers: worker processes to start here; an analyzer comes with them.
+        bodies: what a process of each kind runs (agent, index).
+        answers: functions in place of processes and network, or None.
+        listen: address of the hub; any free port of this machine if None.
+        fleet: whose agents to use.
+        tls: files for a ``tls/`` address.
+        quiet: show nothing but the end.
+        fsync: survive power loss, too.
+    """
+
+    workers: int
+    bodies: Mapping[AgentKind, Callable[[Agent, int], None]]
+    answers: Mapping[AgentKind, Callable[[bytes], bytes]] | None
+    listen: str | None
+    fleet: str
+    tls: Tls | None
+    quiet: bool
+    fsync: bool
+
+
+def start(
+    folder: Path, experiment: Experiment, seed: int, deployment: Deployment
+) -> int:
+    """Run an experiment in a new folder; return the exit code.
+
+    Raises:
+        RunFolderError: the folder is used or held, or the disk fails.
+        NetworkError: the address cannot be listened on.
+        ExperimentError: no robot meets its restrictions.
+    """
+    details = RunDetails(experiment.name, 0, seed, experiment_text(experiment))
+    return _run(folder, details, deployment)
+
+
+def resume(folder: Path, deployment: Deployment) -> int:
+    """Go on with the run of a folder; return the exit code.
+
+    Raises:
+        RunFolderError: no run is there, it is held by another coordinator, its
+            journal is damaged, or the disk fails.
+        NetworkError: the address cannot be listened on.
+    """
+    if read_state(folder) == "finished":
+        print(f"{folder}: is finished; nothing is left to do")
+        return 0
+    return _run(folder, None, deployment)
+
+
+def _run(folder: Path, details: RunDetails | None, deployment: Deployment) -> int:
+    stop = stop_on_signals()
+    with ExitStack() as stack:
+        held = stack.enter_context(RunFolder(folder, details))
+        journal = stack.enter_context(Journal.open(folder, fsync=deployment.fsync))
+        if journal.dropped:
+            _say(f"journal: dropped a cut record of {journal.dropped} bytes at its end")
+        recorder = Recorder(folder, held.details, fsync=deployment.fsync)
+        stack.callback(recorder.close)
+        experiment = experiment_from_text(held.details.document)
+        agents, crews = stack.enter_context(_agents(held, deployment))
+        loop = Loop(
+            {0: Island(experiment, held.details.seed, held.details.run)},
+            question=Question(
+                run=f"{socket.gethostname()}:{folder.resolve()}",
+                epoch=held.epoch,
+                vetting=vetting_settings(experiment),
+                evaluation=evaluation_settings(experiment),
+            ),
+            agents=agents,
+            log=journal,
+            rows=recorder,
+        )
+        loop.start(journal.replay())
+        held.set_state("running")
+        with Display(loop, experiment.births, quiet=deployment.quiet) as display:
+            _turn(loop, display, crews, stop)
+        if not loop.is_finished:
+            recorder.flush()
+            held.set_state("stopped")
+            _say(f"stopped; to go on: revolve resume {folder}")
+            return 130
+        recorder.write(_runs_row(held))
+        recorder.finish()
+        held.confirm()
+        held.set_state("finished")
+    tell_result(folder, experiment, loop.islands[0])
+    return 0
+
+
+def _turn(loop: Loop, display: Display, crews: list[Crew], stop: Event) -> None:
+    """Step until all is done or somebody says stop."""
+    shown_s = 0.0
+    while not (loop.is_finished or stop.is_set()):
+        loop.step(_LOOK_S, time.monotonic())
+        now_s = time.monotonic()
+        if now_s - shown_s >= _LOOK_S:
+            shown_s = now_s
+            display.update()
+            for crew in crews:
+                crew.look_after()
+
+
+@contextmanager
+def _agents(
+    held: RunFolder, deployment: Deployment
+) -> Iterator[tuple[Agents, list[Crew]]]:
+    """Give whoever does the work: functions, or a network with its processes."""
+    if deployment.answers is not None:
+        yield LocalAgents(deployment.answers, platform_tag()), []
+        return
+    with ExitStack() as stack:
+        network = stack.enter_context(
+            Network(
+                name=unique_name("coordinator"),
+                fleet=deployment.fleet,
+                listen=(deployment.listen or THIS_MACHINE,),
+                tls=deployment.tls,
+            )
+        )
+        note = held.path / ADDRESS
+        note.write_text(f"{network.address}\n", encoding="utf-8")
+        stack.callback(note.unlink, missing_ok=True)
+        crews = []
+        sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
+        for kind, size in sizes.items() if deployment.workers else ():
+            agent = Agent(
+                kind, f"own-{kind}", network.address, deployment.fleet,
+                tls=deployment.tls,
+            )  # fmt: skip
+            crew = Crew(deployment.bodies[kind], (agent,), size=size)
+            crews.append(stack.enter_context(crew))
+        if deployment.listen is not None:
+            _say(f"listening on {network.address}")
+        yield network, crews
+
+
+def _runs_row(held: RunFolder) -> Record:
+    """Return the one row of the runs table."""
+    details = held.details
+    began = (held.path / DETAILS).stat().st_mtime
+    versions = {name: metadata.version(name) for name in _LIBRARIES}
+    versions["revolve-islands"] = our_version()
+    row = {
+        "name": details.name,
+        "run": details.run,
+        "seed": details.seed,
+        "document": details.document,
+        "state": "finished",
+        "versions": json.dumps(versions),
+        "platform": platform_tag(),
+        "cpu_flags": " ".join(sorted(cpu_flags(Path("/proc/cpuinfo")))),
+        "start": datetime.fromtimestamp(began, UTC),
+        "end": datetime.now(UTC),
+    }
+    return Record("runs", row)
+
+
+def _say(line: str) -> None:
+    print(line, file=sys.stderr)

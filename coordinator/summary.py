@@ -1,0 +1,36 @@
+"""What a finished run tells on the terminal: the best robot, and where all is."""
+
+from pathlib import Path
+
+from coordinator.island import Island
+from schema.experiment import Experiment, body_space
+from schema.genome import develop
+from schema.robot_file import write_robot
+
+BEST = "best.yaml"
+
+
+def tell_result(folder: Path, experiment: Experiment, island: Island) -> None:
+    """Write the best robot of an island to a file; say what there is to see.
+
+    Args:
+        folder: of the run.
+        experiment: what was run.
+        island: finished.
+    """
+    best = max(island.population, key=lambda one: (one.fitness, -one.birth.number))
+    mean = sum(one.fitness for one in island.population) / len(island.population)
+    space = body_space(experiment.space)
+    robot = develop(best.genome, space)
+    write_robot(robot, folder / BEST, space)
+    motors = sum(space[part.kind].outputs for part in robot.parts)
+    print(f"{island.births} births; mean fitness of the last population {mean:.4f}")
+    print(
+        f"best robot: birth {best.birth.number}, fitness {best.fitness:.4f}, "
+        f"rank {best.rank}, {len(robot.parts)} parts, {motors} motors"
+    )
+    print(f"its file:   {folder / BEST}")
+    print(f"tables:     {folder / 'tables'}")
+    print("try next:")
+    print(f"  revolve robot show {folder / BEST}")
+    print("  revolve run no-selection --seed 1 --births 600")
