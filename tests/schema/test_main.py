@@ -1,0 +1,81 @@
+"""``revolve robot``: check, convert, show."""
+
+from pathlib import Path
+
+import pytest
+
+from schema.__main__ import main
+from schema.errors import InvalidRobot
+from schema.robot_file import read_robot
+
+TEXT = """\
+body:
+  type: Core
+  children:
+    1: {slot: 1, id: leg, type: ActiveHinge, orientation: 270}
+    3: {slot: 0, type: ParametricBarJoint, params: {connection_length: 33}}
+brain:
+  neurons: [{part: leg, layer: output, type: Sigmoid, params: {bias: 0.125}}]
+  connections: [{source: part-0-in-2, target: leg-out-0, weight: 0.25}]
+"""
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    file = tmp_path / "robot.yaml"
+    file.write_text(TEXT)
+    return file
+
+
+def test_check(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["robot", "check", str(path)]) == 0
+    assert "well formed; 3 parts, 6 inputs, 1 outputs" in capsys.readouterr().out
+
+
+def test_check_of_what_is_wrong(path: Path) -> None:
+    path.write_text(TEXT.replace("leg,", "leg, leg: 1,"))
+    with pytest.raises(InvalidRobot, match=r"robot\.yaml:4: body\.children\.1\.leg"):
+        main(["robot", "check", str(path)])
+
+
+def test_convert_there_and_back(path: Path) -> None:
+    there, back = path.with_suffix(".pb"), path.with_suffix(".yml")
+    assert main(["robot", "convert", str(path), str(there)]) == 0
+    assert main(["robot", "convert", str(there), str(back)]) == 0
+    assert read_robot(path) == read_robot(there) == read_robot(back)
+
+
+def test_show(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["robot", "show", str(path)]) == 0
+    shown = capsys.readouterr().out
+    for words in (
+        "slot 1: part-1 ActiveHinge, by its slot 1, turned 270",
+        "slot 3: part-2 ParametricBarJoint, by its slot 0, turned 0",
+        "connection_length 33",
+        "part-1-out-0 Sigmoid(0.125, 0.5)",
+        "0.25 × part-0-in-2",
+    ):
+        assert words in shown
+
+
+def test_part_types_of_an_experiment(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "plugins")
+    experiment = path.with_name("mine.toml")
+    experiment.write_text(
+        'name = "mine"\n[space]\npart_types = ["schema.parts:CORE", '
+        '"schema.parts:ACTIVE_HINGE", "flippers:FLIPPER"]'
+    )
+    words = ["robot", "check", str(path), "--experiment", str(experiment)]
+    with pytest.raises(InvalidRobot, match="must be one of Core, ActiveHinge, Flipper"):
+        main(words)
+    bar = "type: ParametricBarJoint, params: {connection_length: 33}"
+    path.write_text(TEXT.replace(bar, "type: Flipper"))
+    assert main(words) == 0
+
+
+def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["robot", "--help"])
+    assert "example: revolve robot convert" in capsys.readouterr().out
