@@ -1,0 +1,204 @@
+"""``revolve worker`` and ``revolve analyzer`` as a user runs them."""
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from coordinator.events import DispatchEvent, Joined, Left, Returned
+from coordinator.service import Network
+from schema.network import Tls
+
+pytestmark = pytest.mark.system
+
+ROOT = Path(__file__).parents[2]
+PATIENCE_S = 60.0
+ROLES = ["worker", "analyzer"]
+
+
+@contextmanager
+def command(*words: str) -> Iterator[subprocess.Popen[str]]:
+    with subprocess.Popen(
+        [sys.executable, "-m", *words],
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def free_address() -> str:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return f"tcp/127.0.0.1:{server.getsockname()[1]}"
+
+
+def until(network: Network, count: int) -> list[DispatchEvent]:
+    events: list[DispatchEvent] = []
+    end_s = time.monotonic() + PATIENCE_S
+    while len(events) < count:
+        assert time.monotonic() < end_s, events
+        events += network.receive(0.2)
+    return events
+
+
+def agents(events: list[DispatchEvent]) -> list[str]:
+    return [event.agent for event in events if isinstance(event, Joined)]
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_an_agent_waits_for_a_coordinator_and_says_so(role: str) -> None:
+    address = free_address()
+    with command(role, "--connect", address, "--processes", "1") as process:
+        assert process.stderr is not None
+        line = process.stderr.readline()
+        assert line == f"no coordinator at {address}; trying on, Ctrl-C ends\n"
+        with Network(name="c", listen=(address,)) as network:
+            (joined,) = until(network, 1)
+            assert isinstance(joined, Joined)
+            assert joined.kind == role
+            network.send(1, joined.agent, b"\xff")
+            (refused,) = until(network, 1)
+            assert isinstance(refused, Returned)
+            assert refused.outcome == "error"
+            process.send_signal(signal.SIGINT)
+            assert until(network, 1) == [Left(joined.agent)]
+        assert process.wait(PATIENCE_S) == 0
+        rest = process.stderr.read()
+    assert f"connected to {address}\n" in rest
+    assert "refused 1 requests, 1 of them malformed" in rest
+    assert "Traceback" not in rest
+
+
+def children(pid: int) -> list[int]:
+    """Return the agents among a process's children."""
+    listing = Path(f"/proc/{pid}/task/{pid}/children").read_text("utf-8").split()
+    lines = {
+        int(child): Path(f"/proc/{child}/cmdline").read_bytes() for child in listing
+    }
+    return [child for child, line in lines.items() if b"spawn_main" in line]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_a_killed_process_is_replaced_under_another_name() -> None:
+    with Network(name="c") as network:
+        flags = ("--connect", network.address, "--processes", "2", "--name", "box")
+        with command("worker", *flags) as process:
+            names = agents(until(network, 2))
+            assert [name[:6] for name in sorted(names)] == ["box-0.", "box-1."]
+            os.kill(children(process.pid)[0], signal.SIGKILL)
+            gone, back = until(network, 2)
+            assert isinstance(gone, Left)
+            assert gone.agent in names
+            (name,) = agents([back])
+            assert name not in names
+            assert name[:6] == gone.agent[:6]
+
+
+def test_agents_end_with_whoever_holds_their_input() -> None:
+    with Network(name="c") as network:
+        flags = ("--connect", network.address, "--processes", "2", "--until-closed")
+        with command("worker", *flags) as process:
+            until(network, 2)
+            assert process.stdin is not None
+            process.stdin.close()
+            assert process.wait(PATIENCE_S) == 0
+            assert all(isinstance(event, Left) for event in until(network, 2))
+
+
+def test_agents_do_not_outlive_their_command() -> None:
+    with Network(name="c") as network:
+        flags = ("--connect", network.address, "--processes", "2")
+        with command("worker", *flags) as process:
+            until(network, 2)
+            process.kill()
+            assert all(isinstance(event, Left) for event in until(network, 2))
+
+
+@pytest.mark.parametrize("role", ROLES)
+@pytest.mark.parametrize(
+    ("flags", "complaint"),
+    [
+        ("", "--connect"),
+        ("--connect here", "must be tcp/HOST:PORT or tls/HOST:PORT, got 'here'"),
+        ("--connect tls/h:1", "needs --tls-ca, --tls-certificate and --tls-key"),
+        ("--connect tls/h:1 --tls-ca x", "--tls-ca: no such file: x"),
+        ("--connect tcp/h:1 --processes 0", "must be a whole number >= 1, got '0'"),
+        ("--connect tcp/h:1 --name a/b", "--name: must be 1 to 96 letters"),
+        ("--connect tcp/h:1 --fleet *", "--fleet: must be 1 to 96 letters"),
+        ("--connect tcp/h:1 --slots 2", "unrecognized arguments: --slots 2"),
+    ],
+)
+def test_a_wrong_flag_is_one_line(role: str, flags: str, complaint: str) -> None:
+    result = subprocess.run(
+        [sys.executable, "-m", role, *flags.split()],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 2
+    assert complaint in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_help_shows_an_example() -> None:
+    result = subprocess.run(
+        [sys.executable, "-m", "worker", "--help"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "example: revolve worker --connect tcp/127.0.0.1:7447" in result.stdout
+
+
+def certify(folder: Path, name: str, authority: str) -> Tls:
+    """Make a certificate with openssl, signed by an authority made for it."""
+    script = f"""
+    set -e; cd "{folder}"; exec 2>&1
+    [ -f {authority}.pem ] || openssl req -x509 -newkey rsa:2048 -nodes -days 1 \
+        -keyout {authority}.key -out {authority}.pem -subj /CN={authority}
+    openssl req -newkey rsa:2048 -nodes -subj /CN={name} \
+        -keyout {name}.key -out {name}.csr
+    printf 'subjectAltName=IP:127.0.0.1,DNS:localhost\nbasicConstraints=CA:FALSE\n' \
+        > {name}.ext
+    openssl x509 -req -in {name}.csr -CA {authority}.pem -CAkey {authority}.key \
+        -CAcreateserial -days 1 -out {name}.pem -extfile {name}.ext
+    """
+    subprocess.run(["sh", "-c", script], check=True, capture_output=True)
+    files = (f"{authority}.pem", f"{name}.pem", f"{name}.key")
+    return Tls(*(str(folder / file) for file in files))
+
+
+@pytest.mark.skipif(not shutil.which("openssl"), reason="makes certificates")
+def test_only_who_is_certified_gets_in(tmp_path: Path) -> None:
+    hub = certify(tmp_path, "hub", "ca")
+    friend = certify(tmp_path, "friend", "ca")
+    stranger = certify(tmp_path, "stranger", "another")
+    address = free_address().replace("tcp/", "tls/")
+
+    def flags(tls: Tls) -> list[str]:
+        files = ["--tls-certificate", tls.certificate, "--tls-key", tls.key]
+        return ["--connect", address, "--processes", "1", "--tls-ca", hub.ca, *files]
+
+    with (
+        Network(name="c", listen=(address,), tls=hub) as network,
+        command("worker", *flags(stranger), "--name", "stranger") as outside,
+    ):
+        assert outside.stderr is not None
+        assert outside.stderr.readline().startswith("no coordinator at")
+        with command("worker", *flags(friend), "--name", "friend"):
+            (name,) = agents(until(network, 1))
+            assert name.startswith("friend-0.")
