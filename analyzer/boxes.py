@@ -49,7 +49,7 @@ def place_boxes(robot: Robot, space: BodySpace) -> Boxes:
     rotations, positions = place_parts(robot, space)
     shapes = [space[part.kind].shape(part.parameters).boxes for part in robot.parts]
     boxes = list(chain.from_iterable(shapes))
-    part = np.repeat(np.arange(len(shapes)), [len(each) for each in shapes])
+    part = np.array([index for index, each in enumerate(shapes) for _ in each])
     half = np.array([box.size for box in boxes]) / 2
     local = np.array([box.position for box in boxes])
     rotation = rotations[part]

@@ -47,6 +47,8 @@ def intersecting_parts(
         Index pairs of parts, each ascending, in ascending order.
     """
     first, second = _candidates(boxes, robot, vetting)
+    if not first.size:
+        return ()
     # Among axis-aligned boxes the hulls have decided already.
     tilted = np.flatnonzero(_is_tilted(boxes, first) | _is_tilted(boxes, second))
     if tilted.size:

@@ -131,8 +131,11 @@ class _Table:
             return
         chain, unused = read_chain(folder, name)
         self._stored = sum(batch.num_rows for batch in chain)
-        for _, path in unused:
-            path.unlink()
+        try:
+            for _, path in unused:
+                path.unlink()
+        except OSError as error:
+            raise storage_error(folder, error) from None
 
     def take(self, row: Mapping[str, Any]) -> None:
         """Take the next row, unless it stands on disk already."""
