@@ -4,6 +4,7 @@ All clocks are integers of physics steps; nothing here looks at the wall's.
 """
 
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import cast
 
@@ -11,7 +12,7 @@ import mujoco
 import numpy as np
 
 from schema.errors import ExperimentError, SimulationDiverged
-from schema.evaluation import Evaluation, Floats, Track
+from schema.evaluation import Evaluation, Track
 from schema.experiment import (
     EvaluationSettings,
     Simulation,
@@ -56,7 +57,13 @@ def evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
     )
 
 
-def simulate(robot: Robot, space: Space, simulation: Simulation) -> Track:
+def simulate(
+    robot: Robot,
+    space: Space,
+    simulation: Simulation,
+    *,
+    watch: Callable[[mujoco.MjData], None] | None = None,
+) -> Track:
     """Return where a robot goes, alone, from the origin, its lowest point at 0.
 
     Brain, sensors and commands change every ``brain_steps`` from birth on; the
@@ -67,6 +74,7 @@ def simulate(robot: Robot, space: Space, simulation: Simulation) -> Track:
         robot: a checked robot.
         space: part types and limits.
         simulation: the world and its clocks.
+        watch: is shown the state after each tick, before the steps that follow.
 
     Raises:
         SimulationDiverged: a number that is none, or a warning of the engine.
@@ -75,69 +83,74 @@ def simulate(robot: Robot, space: Space, simulation: Simulation) -> Track:
     """
     _silence_engine()
     model = solo_model(robot, body_space(space), simulation)
-    data = mujoco.MjData(model)
-    positions = _live(robot, space, simulation, (model, data))
-    interval_s = simulation.pose_steps * simulation.timestep_s
-    return Track(interval_s, positions)
-
-
-def _live(
-    robot: Robot,
-    space: Space,
-    simulation: Simulation,
-    world: tuple[mujoco.MjModel, mujoco.MjData],
-) -> Floats:
-    """Run the closed loop to the window's end; return the sampled positions."""
-    model, data = world
-    types, width = body_space(space), widths(space)
-    senses = Senses(robot, types, model, width=width.inputs)
-    servos = Servos(robot, types, model)
-    tick_s = simulation.brain_steps * simulation.timestep_s
-    bank = Bank([pack(robot.brain, width)], width, tick_s)
-    start, end = simulation.warmup_steps, _end(simulation)
+    life = _Life(robot, space, simulation, model)
+    start = simulation.warmup_steps
+    end = start + simulation.window_steps
     positions = np.empty((simulation.window_steps // simulation.pose_steps + 1, 3))
-    step = tick = sample = 0
-    next_tick, next_sample = 0, start
+    step, next_tick, next_sample = 0, 0, start
     while True:
         if step == next_sample:
-            positions[sample] = data.qpos[:3]
-            sample += 1
+            positions[(step - start) // simulation.pose_steps] = life.data.qpos[:3]
             next_sample += simulation.pose_steps
         if step == end:
             break
         if step == next_tick:
-            if step:
-                readings = senses.read(model, data, tick_s)
-            else:
-                readings = senses.start(model, data)
-            _check(data, step * simulation.timestep_s)
-            servos.drive(data, bank.step(readings, float(tick))[0])
-            tick += 1
+            life.tick(step)
             next_tick += simulation.brain_steps
+            if watch is not None:
+                watch(life.data)
         until = min(next_tick, next_sample)
-        mujoco.mj_step(model, data, nstep=until - step)
+        mujoco.mj_step(model, life.data, nstep=until - step)
         step = until
-    _check_warnings(data, end * simulation.timestep_s)
-    return positions
+    _check_warnings(life.data, end * simulation.timestep_s)
+    return Track(simulation.pose_steps * simulation.timestep_s, positions)
 
 
-def _end(simulation: Simulation) -> int:
-    return simulation.warmup_steps + simulation.window_steps
+class _Life:
+    """One robot's closed loop: what it feels, thinks and does at a tick."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        space: Space,
+        simulation: Simulation,
+        model: mujoco.MjModel,
+    ) -> None:
+        types, width = body_space(space), widths(space)
+        self.data = mujoco.MjData(model)
+        self._model = model
+        self._timestep_s = simulation.timestep_s
+        self._brain_steps = simulation.brain_steps
+        self._tick_s = simulation.brain_steps * simulation.timestep_s
+        self._senses = Senses(robot, types, model, width=width.inputs)
+        self._servos = Servos(robot, types, model)
+        self._bank = Bank([pack(robot.brain, width)], width, self._tick_s)
+
+    def tick(self, step: int) -> None:
+        """Read, think and command; ``step`` counts from birth."""
+        if step:
+            _check(self.data, step * self._timestep_s)
+            readings = self._senses.read(self._model, self.data, self._tick_s)
+        else:
+            readings = self._senses.start(self._model, self.data)
+        outputs = self._bank.step(readings, float(step // self._brain_steps))
+        self._servos.drive(self.data, outputs[0])
 
 
 def _check(data: mujoco.MjData, time_s: float) -> None:
-    """Raise if the state is no longer made of numbers.
+    """Raise if the velocities are no longer numbers: one breaks all of a robot's.
 
     A sum is finite only if all its terms are; nothing plausible overflows it.
     """
-    if not math.isfinite(data.qvel.sum() + data.qpos.sum()):
+    if not math.isfinite(data.qvel.sum()):
         _raise_diverged(data, time_s)
 
 
 def _check_warnings(data: mujoco.MjData, time_s: float) -> None:
     """Raise if the engine warned of anything, or the state is not of numbers."""
-    _check(data, time_s)
-    if any(warning.number for warning in data.warning):
+    if not math.isfinite(data.qvel.sum() + data.qpos.sum()) or any(
+        warning.number for warning in data.warning
+    ):
         _raise_diverged(data, time_s)
 
 

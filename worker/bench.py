@@ -1,0 +1,239 @@
+"""Measures this machine, and how far the physics can be trusted on it.
+
+``revolve bench evaluate`` compares whole evaluations with the bare engine doing
+the same steps; ``revolve bench fidelity RUN`` simulates a run's robots anew with a
+time step five times finer (``worker.fidelity``).
+"""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+import mujoco
+import numpy as np
+from msgspec.structs import replace
+
+from schema.birth import BirthId
+from schema.errors import SimulationDiverged
+from schema.evaluation import Floats
+from schema.experiment import (
+    EvaluationSettings,
+    Experiment,
+    Simulation,
+    body_space,
+    parse_experiment,
+    read_experiment,
+)
+from schema.genome import Genome, develop
+from schema.mjcf import solo_model
+from schema.plugin import load
+from schema.robot import Robot
+from worker import evaluation, fidelity
+
+LEAST_RATIO = 0.85
+"""Of bare engine time to evaluation time: the promise of the design, section 9."""
+LEAST_SPEARMAN = 0.95
+"""Of fitness against a time step five times finer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """CPU time of whole evaluations and of their engine steps alone.
+
+    Attributes:
+        robots: how many were timed.
+        evaluation_s: build, control, sensors, fitness and steps [s].
+        engine_s: the same steps with the same controls, nothing else [s].
+    """
+
+    robots: int
+    evaluation_s: float
+    engine_s: float
+
+    @property
+    def ratio(self) -> float:
+        """Share of an evaluation that the engine needs; 1 would be perfect."""
+        return self.engine_s / self.evaluation_s
+
+
+def time_evaluations(
+    robots: Sequence[Robot], settings: EvaluationSettings, repeats: int = 3
+) -> Timing:
+    """Return how long evaluations take beside the bare engine.
+
+    Both are timed in turn, robot by robot, and the fastest of the repeats counts,
+    so that a busy machine slows both alike. Diverging robots are left out.
+
+    Args:
+        robots: checked robots.
+        settings: of their evaluation.
+        repeats: of each measurement.
+    """
+    count, whole, bare = 0, 0.0, 0.0
+    for robot in robots:
+        try:
+            commands = _commands(robot, settings)
+        except SimulationDiverged:
+            continue
+        pairs = []
+        for _ in range(repeats):
+            start = time.thread_time()
+            evaluation.evaluate(robot, settings)
+            between = time.thread_time()
+            pairs.append((between - start, _replay(robot, settings, commands)))
+        count += 1
+        whole += min(pair[0] for pair in pairs)
+        bare += min(pair[1] for pair in pairs)
+    return Timing(count, whole, bare)
+
+
+def _commands(robot: Robot, settings: EvaluationSettings) -> list[Floats]:
+    """Return the controls of each tick of a robot's life."""
+    found: list[Floats] = []
+    evaluation.simulate(
+        robot,
+        settings.space,
+        settings.simulation,
+        watch=lambda data: found.append(data.ctrl.copy()),
+    )
+    return found
+
+
+def _replay(
+    robot: Robot, settings: EvaluationSettings, commands: list[Floats]
+) -> float:
+    """Return the time of the engine's steps under recorded controls [s]."""
+    clock = settings.simulation
+    model = solo_model(robot, body_space(settings.space), clock)
+    data = mujoco.MjData(model)
+    left = clock.warmup_steps + clock.window_steps
+    start = time.thread_time()
+    for command in commands:
+        data.ctrl[:] = command
+        mujoco.mj_step(model, data, nstep=min(left, clock.brain_steps))
+        left -= clock.brain_steps
+    return time.thread_time() - start
+
+
+def random_robots(experiment: Experiment, count: int, seed: int) -> list[Robot]:
+    """Return robots of the experiment's own generator, unvetted.
+
+    The generator belongs to another room, so it is named, as any plug-in is.
+    """
+    generate = cast(
+        "Callable[[np.random.Generator, Experiment, BirthId], Genome]",
+        load("coordinator.generation:generate", "generator"),
+    )
+    rng = np.random.default_rng(seed)
+    space = body_space(experiment.space)
+    return [
+        develop(generate(rng, experiment, BirthId(0, number)), space)
+        for number in range(count)
+    ]
+
+
+def main(arguments: list[str]) -> int:
+    """Run ``revolve bench evaluate`` or ``revolve bench fidelity``.
+
+    Args:
+        arguments: those after ``bench``.
+
+    Returns:
+        0 if the measurement keeps the promise, 1 if not.
+    """
+    options = _parser().parse_args(arguments)
+    if options.what == "evaluate":
+        return _evaluate(options)
+    return _fidelity(options)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="revolve bench", description=__doc__)
+    kinds = parser.add_subparsers(dest="what", required=True)
+    timing = kinds.add_parser(
+        "evaluate", help="time evaluations against the bare engine"
+    )
+    timing.add_argument("experiment", nargs="?", default="scenario1")
+    timing.add_argument("--robots", type=int, default=30)
+    timing.add_argument("--seed", type=int, default=1)
+    study = kinds.add_parser(
+        "fidelity", help="simulate a run's robots anew with another world"
+    )
+    study.add_argument("run", type=Path, help="folder of a run")
+    study.add_argument("--per-third", type=int, default=20)
+    study.add_argument("--seed", type=int, default=1)
+    study.add_argument(
+        "--against",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="compare with this simulation setting instead of a finer time step",
+    )
+    return parser
+
+
+def _evaluate(options: argparse.Namespace) -> int:
+    experiment = read_experiment(options.experiment)
+    robots = random_robots(experiment, options.robots, options.seed)
+    settings = EvaluationSettings(
+        space=experiment.space,
+        simulation=experiment.simulation,
+        fitness=experiment.fitness,
+    )
+    timing = time_evaluations(robots, settings)
+    each_s = timing.evaluation_s / timing.robots
+    _say(
+        f"{timing.robots} random robots: {1000 * each_s:.1f} ms CPU each, "
+        f"{1 / each_s:.0f} per second and core",
+        f"bare engine / evaluation: {timing.ratio:.3f} (promised: {LEAST_RATIO})",
+    )
+    return 0 if timing.ratio >= LEAST_RATIO else 1
+
+
+def _fidelity(options: argparse.Namespace) -> int:
+    population = fidelity.read_population(options.run)
+    experiment = population.experiment
+    other = fidelity.finer(experiment.simulation)
+    if options.against:
+        other = _changed(experiment, options.against)
+    chosen = fidelity.sample_thirds(population.fitness, options.per_third, options.seed)
+    best = fidelity.winners(population.fitness)
+    found = fidelity.compare(
+        [population.robots[index] for index in chosen], experiment, other
+    )
+    top = fidelity.compare(
+        [population.robots[index] for index in best], experiment, other
+    )
+    size = options.per_third
+    thirds = [found.of(slice(k * size, (k + 1) * size)) for k in range(fidelity.THIRDS)]
+    _say(
+        f"{len(chosen)} robots of {options.run}: Spearman {found.spearman:.4f} "
+        f"(promised: {LEAST_SPEARMAN}); mean {found.first.mean():.4f} here, "
+        f"{found.second.mean():.4f} there",
+        "  by thirds, least fit first: "
+        + ", ".join(f"{third.spearman:.3f}" for third in thirds),
+        *(
+            f"  winner {rank}: {here:.4f} here, {there:.4f} there"
+            for rank, (here, there) in enumerate(
+                zip(top.first, top.second, strict=True), start=1
+            )
+        ),
+    )
+    return 0 if found.spearman >= LEAST_SPEARMAN else 1
+
+
+def _changed(experiment: Experiment, settings: Sequence[str]) -> Simulation:
+    """Return the experiment's world with some keys set, checked as a document."""
+    changes = "\n".join(settings)
+    text = f'name = "against"\n[simulation]\n{changes}'
+    wanted = parse_experiment(text, "--against").simulation
+    keys = [setting.partition("=")[0].strip() for setting in settings]
+    return replace(experiment.simulation, **{key: getattr(wanted, key) for key in keys})
+
+
+def _say(*lines: str) -> None:
+    sys.stdout.write("\n".join(lines) + "\n")
