@@ -35,7 +35,9 @@ def robot_to_message(robot: Robot) -> pb.Robot:
         )
     add_connection = message.connections.add
     for edge in robot.brain.connections:
-        add_connection(source=edge.source, target=edge.target, weight=edge.weight)
+        entry = add_connection()
+        entry.source, entry.target = edge.source, edge.target
+        entry.weight = edge.weight
     return message
 
 
@@ -116,7 +118,7 @@ def genome_from_message(message: pb.Genome) -> Genome:
 
 
 def _write_part(part: Part, message: pb.Part) -> None:
-    # Assignments cost half of what keyword arguments do.
+    # Assignments take a quarter less time than keyword arguments.
     message.kind = part.kind
     message.parent = part.parent
     message.parent_slot = part.parent_slot

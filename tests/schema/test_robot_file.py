@@ -156,7 +156,7 @@ def test_what_is_wrong_is_said_with_file_line_and_field(
         "body: {type: Core}\nbrain: {neurons: [1]}",
         "body: {type: Core}\n---\nbody: {type: Core}",
         "body: &a {type: Core, children: {0: *a}}",
-        "body: !!python/object:os.system {type: Core",
+        "body: !!python/object:os.system {type: Core}\nx: 1",
         "body: \x00",
         "body: {type: Core",
         "\tbody: x",
