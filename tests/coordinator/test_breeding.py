@@ -63,10 +63,11 @@ def test_a_couple_stays_for_its_attempts_and_then_makes_room_for_another() -> No
 
 def test_every_attempt_of_a_couple_draws_anew() -> None:
     population = founders()
-    couple, first = breeder().conceive(CHILD, 0, population, None)
-    children = [first]
-    for attempt in range(1, 5):
-        children.append(breeder().conceive(CHILD, attempt, population, couple)[1])
+    couple = None
+    children = []
+    for attempt in range(5):
+        couple, child = breeder().conceive(CHILD, attempt, population, couple)
+        children.append(child)
     assert len(set(children)) == 5
 
 
