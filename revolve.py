@@ -14,7 +14,7 @@ COMMANDS = {
     "robot": ("schema.__main__", "check, convert or show a robot file"),
     "bench": ("worker.bench", "measure this machine"),
 }
-"""Module with a ``main``, and what it does; a module of several gets the name."""
+"""Module whose ``main`` takes the words, the command first; and what it does."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -41,10 +41,9 @@ def main(arguments: list[str] | None = None) -> int:
     # Before NumPy is first imported: a robot's arithmetic must not depend on cores.
     import_module("schema.crew").one_thread_each()
     error_type = import_module("schema.errors").RevolveError
-    module = COMMANDS[words[0]][0]
     try:
-        room = import_module(module)
-        return int(room.main(words if module == _COORDINATOR else words[1:]))
+        room = import_module(COMMANDS[words[0]][0])
+        return int(room.main(words))
     except error_type as error:
         print(f"revolve: {error}", file=sys.stderr)
         return 2
