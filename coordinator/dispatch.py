@@ -10,8 +10,8 @@ longer each time in a row, so that a broken one cannot eat the queue.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from heapq import heapify, heappop, heappush
+from dataclasses import dataclass
+from heapq import heappop, heappush
 from itertools import count
 
 from coordinator.events import (
@@ -28,27 +28,13 @@ from coordinator.events import (
     Returned,
     Ticked,
 )
+from coordinator.pool import AgentState, Pool
 from schema.errors import UnexpectedEvent
 
 AGENT_OF: dict[JobKind, AgentKind] = {"vet": "analyzer", "evaluate": "worker"}
 MAX_ERRORS = 3
 REST_S = 0.05
 LONGEST_REST_S = 3.2
-
-
-@dataclass(slots=True)
-class _Agent:
-    """One that does jobs.
-
-    ``stamp`` names its only valid entry in its pool's heap; ``failures`` counts
-    errors and losses since its last answer.
-    """
-
-    joined: Joined
-    held: dict[int, None] = field(default_factory=dict)
-    failures: int = 0
-    rests: bool = False
-    stamp: int = 0
 
 
 @dataclass(slots=True)
@@ -61,54 +47,12 @@ class _Pending:
     avoid: tuple[str, ...] = ()
 
 
-@dataclass(slots=True)
-class _Pool:
-    """All agents of one kind and the jobs that wait for them.
-
-    ``free`` holds (load, name, stamp) of each agent with credit; entries with an
-    old stamp are dead and dropped when met.
-    """
-
-    agents: dict[str, _Agent] = field(default_factory=dict)
-    free: list[tuple[float, str, int]] = field(default_factory=list)
-    waiting: list[int] = field(default_factory=list)
-
-    def offer(self, name: str, stamp: int) -> None:
-        """Note what an agent can take now; its earlier entry dies."""
-        agent = self.agents[name]
-        agent.stamp = stamp
-        if agent.rests or len(agent.held) > agent.joined.slots:
-            return
-        if len(self.free) > 4 * len(self.agents) + 64:
-            self.free = [entry for entry in self.free if self._is_live(entry)]
-            heapify(self.free)
-        heappush(self.free, (len(agent.held) / agent.joined.slots, name, stamp))
-
-    def best(self) -> str:
-        """Return who has the least to do and credit left, empty if nobody has."""
-        while self.free:
-            if self._is_live(self.free[0]):
-                return self.free[0][1]
-            heappop(self.free)
-        return ""
-
-    def _is_live(self, entry: tuple[float, str, int]) -> bool:
-        agent = self.agents.get(entry[1])
-        return agent is not None and agent.stamp == entry[2]
-
-    def may_take(self, name: str, avoid: tuple[str, ...]) -> bool:
-        """Return whether a job may go to an agent: others first, if there are any."""
-        if name not in avoid:
-            return True
-        return sum(other in self.agents for other in avoid) == len(self.agents)
-
-
 class Dispatch:
     """The machine; ``handle`` is its only door."""
 
     def __init__(self) -> None:
         self._jobs: dict[int, _Pending] = {}
-        self._pools: dict[AgentKind, _Pool] = {"worker": _Pool(), "analyzer": _Pool()}
+        self._pools: dict[AgentKind, Pool] = {"worker": Pool(), "analyzer": Pool()}
         self._kind_of: dict[str, AgentKind] = {}
         self._resting: list[tuple[float, str, int]] = []
         self._stamps = count(1)
@@ -168,7 +112,7 @@ class Dispatch:
             return
         pool = self._pools[event.kind]
         self._kind_of[event.agent] = event.kind
-        pool.agents[event.agent] = _Agent(event)
+        pool.agents[event.agent] = AgentState(event)
         pool.offer(event.agent, next(self._stamps))
         yield from self._assign(pool)
 
@@ -219,7 +163,7 @@ class Dispatch:
         pool.offer(event.agent, next(self._stamps))
         yield from self._assign(pool)
 
-    def _rest(self, agent: _Agent) -> None:
+    def _rest(self, agent: AgentState) -> None:
         """Give an agent nothing for a while; one rest at a time."""
         if agent.rests:
             return
@@ -241,7 +185,7 @@ class Dispatch:
                 pool.offer(name, next(self._stamps))
                 yield from self._assign(pool)
 
-    def _assign(self, pool: _Pool) -> Iterator[DispatchCommand]:
+    def _assign(self, pool: Pool) -> Iterator[DispatchCommand]:
         """Give out what can be given out."""
         passed: list[str] = []
         while pool.waiting and (name := pool.best()):
@@ -257,7 +201,7 @@ class Dispatch:
         for name in passed:
             pool.offer(name, next(self._stamps))
 
-    def _take(self, pool: _Pool, name: str) -> _Pending | None:
+    def _take(self, pool: Pool, name: str) -> _Pending | None:
         """Take the first waiting job that may go to an agent, if there is one."""
         passed: list[int] = []
         taken: _Pending | None = None

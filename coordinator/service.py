@@ -7,16 +7,16 @@ The network's threads only enqueue; whoever owns ``Network`` calls ``send`` and
 import json
 import logging
 import time
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Self
 
 import zenoh
-from google.protobuf.message import DecodeError
 
-from coordinator.events import AgentKind, DispatchEvent, Joined, Left, Returned
-from schema import revolve_pb2 as pb
+from coordinator.events import AgentKind, DispatchEvent, Returned
+from coordinator.roster import Roster
 from schema.errors import MalformedMessage, NetworkError
 from schema.network import (
     ASK_TIMEOUT_S,
@@ -30,13 +30,14 @@ from schema.network import (
     parse_address,
 )
 from schema.platform_tag import our_version
-from schema.topics import Member, agents_alive, check_name, member_of
+from schema.topics import Member, agents_alive, check_name
 
 _LOG = logging.getLogger(__name__)
 _KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 _NOW = zenoh.ConsolidationMode.NONE
 _LONGEST_REASON = 1000
 _MOST_AT_ONCE = 1000
+_ASK_AGAIN_S = 1.0
 # What the engine itself replies when nobody did in time.
 _TIMEOUT = b"Timeout"
 
@@ -68,7 +69,6 @@ class Network:
         address: where agents connect to.
         malformed: messages about peers that did not decode; they were dropped. Answers
             are for whoever asked to decode.
-        refused: agents that may not take part, and why.
     """
 
     def __init__(
@@ -95,7 +95,6 @@ class Network:
         """
         self.address = connect or listen[0]
         self.malformed = 0
-        self.refused: dict[str, str] = {}
         self._me = Member(
             check_name(fleet, "fleet"), "coordinator", check_name(name, "name")
         )
@@ -104,9 +103,13 @@ class Network:
         )
         self._is_hub = not connect
         self._inbox: SimpleQueue[_News] = SimpleQueue()
-        self._members: dict[str, Member] = {}
-        self._joined: set[str] = set()
+        self._roster = Roster(our_version())
         self._ask_again: list[tuple[float, str]] = []
+
+    @property
+    def refused(self) -> Mapping[str, str]:
+        """Agents that may not take part, and why."""
+        return self._roster.refused
 
     def __enter__(self) -> Self:
         """Open the session and begin to look for agents.
@@ -165,7 +168,7 @@ class Network:
             payload: an encoded request.
         """
         asked = _Asked(agent, number, self._inbox)
-        if member := self._members.get(agent):
+        if member := self._roster.find(agent):
             self._ask(asked, member.jobs, payload, JOB_TIMEOUT_S)
         else:
             asked.end()
@@ -220,42 +223,31 @@ class Network:
             return None
 
     def _token_changed(self, sample: zenoh.Sample) -> DispatchEvent | None:
-        member = member_of(str(sample.key_expr))
-        if sample.kind == zenoh.SampleKind.PUT:
-            if member.name not in self._members:
-                self._members[member.name] = member
-                self._ask_info(member.name)
-            return None
-        self._members.pop(member.name, None)
-        self.refused.pop(member.name, None)
-        if member.name in self._joined:
-            self._joined.remove(member.name)
-            return Left(member.name)
+        key = str(sample.key_expr)
+        if sample.kind != zenoh.SampleKind.PUT:
+            return self._roster.vanish(key)
+        if member := self._roster.appear(key):
+            self._ask_info(member.name)
         return None
 
     def _ask_info(self, agent: str) -> None:
-        if member := self._members.get(agent):
+        if member := self._roster.find(agent):
             asked = _Asked(agent, -1, self._inbox)
             self._ask(asked, member.info, None, ASK_TIMEOUT_S)
 
     def _introduced(self, asked: _Asked) -> DispatchEvent | None:
         """Let an agent take part that says what it is and is of our version."""
-        member = self._members.get(asked.agent)
-        if member is None or asked.agent in self._joined:
+        agent, reply = asked.agent, asked.reply
+        if not self._roster.is_stranger(agent):
             return None
-        if asked.reply is None or asked.reply.ok is None:
+        if reply is None or reply.ok is None:
             # It lives but does not answer (yet).
-            self._ask_again.append((time.monotonic() + 1.0, asked.agent))
+            self._ask_again.append((time.monotonic() + _ASK_AGAIN_S, agent))
             return None
-        info = _info(asked.reply.ok.payload.to_bytes(), member)
-        if info.version != our_version():
-            reason = f"version {info.version!r}, the coordinator is {our_version()!r}"
-            self.refused[member.name] = reason
-            _LOG.warning("refused %s %s: %s", member.role, member.name, reason)
-            return None
-        self._joined.add(member.name)
-        kind: AgentKind = "analyzer" if member.role == "analyzer" else "worker"
-        return Joined(member.name, kind, info.slots, info.platform)
+        joined = self._roster.introduce(agent, reply.ok.payload.to_bytes())
+        if joined is None:
+            _LOG.warning("refused: %s %s", agent, self.refused[agent])
+        return joined
 
     def _returned(self, asked: _Asked) -> DispatchEvent:
         number, agent, reply = asked.number, asked.agent, asked.reply
@@ -271,18 +263,3 @@ class Network:
         if reason.startswith(FENCED):
             raise NetworkError(f"this coordinator stops: {reason[len(FENCED) :]}")
         return Returned(number, agent, "error", reason=reason or "no reason given")
-
-
-def _info(data: bytes, member: Member) -> pb.AgentInfo:
-    """Return what an agent says of itself.
-
-    Raises:
-        MalformedMessage: not such bytes, no slots, or it says it is another.
-    """
-    try:
-        info = pb.AgentInfo.FromString(data)
-    except DecodeError as error:
-        raise MalformedMessage(f"not the bytes of an AgentInfo: {error}") from None
-    if (info.agent, info.kind) != (member.name, member.role) or info.slots < 1:
-        raise MalformedMessage(f"{member.name} says that it is {info}")
-    return info

@@ -7,6 +7,7 @@ starts those again that are killed, and ends all on Ctrl-C.
 import argparse
 import re
 import socket
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
@@ -95,11 +96,15 @@ def run_crew(
     stop = stop_on_signals()
     if options.until_closed:
         stop_with_input(stop)
+    restarts = 0
     try:
         with Crew(body, (agent,), size=options.processes) as crew:
             while not stop.is_set():
                 crew.look_after()
                 crew.wait(_POLL_S)
+                if crew.restarts > restarts:
+                    restarts = crew.restarts
+                    sys.stderr.write(f"a {role} was killed; another takes its place\n")
                 if len(crew.exit_codes) == options.processes:
                     return max(crew.exit_codes)
     except KeyboardInterrupt:
