@@ -133,6 +133,37 @@ class Fitness(_Section, frozen=True):
     limit: Positive = 1.0
 
 
+class Arena(_Section, frozen=True):
+    """An on-line world: robots are born, judged all the time and die in it.
+
+    Times are simulated seconds. Source: Hupkes 2016, section 5.3.3, and the code's
+    intervals (facts of the original, section 5.2).
+    """
+
+    founder_interval_s: Positive = 1.0
+    birth_interval_s: Positive = 15.0
+    cull_interval_s: Positive = 30.0
+    sample_interval_s: Positive = 5.0
+    snapshot_interval_s: Positive = 100.0
+    population_limit: AtLeastOne = 30
+    population_floor: AtLeastOne = 8
+    survive_share_of_mean: NotNegative = 0.7
+    full_cull_share: Probability = 0.7
+    birth_radius_m: NotNegative = 2.0
+    birth_distance_m: NotNegative = 0.25
+    birth_place_tries: AtLeastOne = 5
+    drop_m: NotNegative = 0.25
+    wall_diameter_m: NotNegative = 0.0
+    wall_segments: Annotated[int, Meta(ge=3)] = 12
+    wall_height_m: Positive = 1.0
+    wall_thickness_m: Positive = 0.05
+    light: tuple[float, float, float] | None = None
+    record_touches: bool = False
+    proximity_steps: AtLeastOne = 8
+    merge_distance_m: NotNegative = 0.02
+    split_distance_m: NotNegative = 0.06
+
+
 class Experiment(_Section, frozen=True):
     """One experiment; ``births`` counts the initial population."""
 
@@ -145,6 +176,7 @@ class Experiment(_Section, frozen=True):
     vetting: Vetting = Vetting()
     simulation: Simulation = Simulation()
     fitness: Fitness = Fitness()
+    arena: Arena | None = None
 
     @property
     def window(self) -> int:
@@ -165,6 +197,15 @@ class EvaluationSettings(_Section, frozen=True):
     space: Space
     simulation: Simulation
     fitness: Fitness
+
+
+class ArenaSettings(_Section, frozen=True):
+    """What an arena's advances depend on, beside its state and its changes."""
+
+    space: Space
+    simulation: Simulation
+    fitness: Fitness
+    arena: Arena
 
 
 def vetting_settings(experiment: Experiment) -> bytes:
