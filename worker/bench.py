@@ -140,12 +140,12 @@ def main(arguments: list[str]) -> int:
     """Run ``revolve bench evaluate`` or ``revolve bench fidelity``.
 
     Args:
-        arguments: those after ``bench``.
+        arguments: the command's name first.
 
     Returns:
         0 if the measurement keeps the promise, 1 if not.
     """
-    options = _parser().parse_args(arguments)
+    options = _parser().parse_args(arguments[1:])
     if options.what == "evaluate":
         return _evaluate(options)
     return _fidelity(options)

@@ -148,8 +148,8 @@ def _check(data: mujoco.MjData, time_s: float) -> None:
 
 def _check_warnings(data: mujoco.MjData, time_s: float) -> None:
     """Raise if the engine warned of anything, or the state is not of numbers."""
-    if not math.isfinite(data.qvel.sum() + data.qpos.sum()) or any(
-        warning.number for warning in data.warning
+    if data.warning.number.any() or not math.isfinite(
+        data.qvel.sum() + data.qpos.sum()
     ):
         _raise_diverged(data, time_s)
 
@@ -157,8 +157,7 @@ def _check_warnings(data: mujoco.MjData, time_s: float) -> None:
 def _raise_diverged(data: mujoco.MjData, time_s: float) -> None:
     names = [
         mujoco.mjtWarning(index).name.removeprefix("mjWARN_")
-        for index, warning in enumerate(data.warning)
-        if warning.number
+        for index in data.warning.number.nonzero()[0].tolist()
     ]
     reason = ", ".join(names) or "state not finite"
     raise SimulationDiverged(f"physics diverged by {time_s:.3f} s: {reason}")
