@@ -33,8 +33,7 @@ def main(arguments: list[str] | None = None) -> int:
     if words[0] not in COMMANDS:
         near = import_module("schema.experiment").nearest(words[0], COMMANDS)
         print(
-            f"revolve: no command {words[0]!r}{near}; "
-            f"allowed: {', '.join(COMMANDS)}",
+            f"revolve: no command {words[0]!r}{near}; allowed: {', '.join(COMMANDS)}",
             file=sys.stderr,
         )
         return 2

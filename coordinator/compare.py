@@ -22,10 +22,10 @@ def compare(first: Path, second: Path) -> list[str]:
         second: the other.
 
     Returns:
-        One line for each table whose number of rows differs, and one for the first
-        row and column of each table that does; nothing if the runs are equal. If
-        they are not and ran on different platforms, a last line says so, for
-        equality is only promised on one.
+        One line for each run without births, for each table whose number of rows
+        differs, and for the first row and column of each table that does; nothing
+        if the runs are equal. If they are not and ran on different platforms, a
+        last line says so, for equality is only promised on one.
 
     Raises:
         RunFolderError: a folder without a run, or a table that cannot be read.
@@ -37,6 +37,12 @@ def compare(first: Path, second: Path) -> list[str]:
     for name, schema in TABLES.items():
         tables = [read_table(folder, name) for folder in (first, second)]
         lines += _differences(name, tables, repeatable(schema))
+        if name == "births":
+            lines += [
+                f"{folder}: nobody has been born yet, so there is nothing to compare"
+                for folder, table in zip((first, second), tables, strict=True)
+                if not table.num_rows
+            ]
         if name == "evaluations":
             platforms = [_platforms(table) for table in tables]
     if lines and platforms[0] != platforms[1]:

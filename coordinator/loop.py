@@ -148,8 +148,8 @@ class Loop:
         if events:
             self._log.append(events)
         for answered in events:
-            for command in self._tell(answered):
-                self._request(command)
+            for question in self._tell(answered):
+                self._request(question)
         return len(events)
 
     def _tell(self, event: Answered) -> list[Vet | Evaluate]:
@@ -205,16 +205,22 @@ class Loop:
             return event
         try:
             answer = decode_answer(event.answer)
-            if (answer.epoch, answer.number) != (self._question.epoch, event.number):
-                raise MalformedMessage(
-                    f"answer must be to epoch {self._question.epoch}, job "
-                    f"{event.number}, got epoch {answer.epoch}, job {answer.number}"
-                )
         except MalformedMessage as error:
-            self.malformed += 1
-            return replace(event, outcome="error", answer=b"", reason=str(error))
+            return self._dropped(event, str(error))
+        expected = (self._question.epoch, event.number)
+        if (answer.epoch, answer.number) != expected:
+            return self._dropped(
+                event,
+                f"answer must be to (epoch, job) {expected}, "
+                f"got {(answer.epoch, answer.number)}",
+            )
         self._answers[event.number] = answer
         return event
+
+    def _dropped(self, event: Returned, reason: str) -> Returned:
+        """Count an answer of no use and return it as the agent's error."""
+        self.malformed += 1
+        return replace(event, outcome="error", answer=b"", reason=reason)
 
     def _delivered(self, command: Deliver) -> Answered:
         """Return the island's event that a finished job comes to."""

@@ -3,6 +3,7 @@
 from collections import deque
 from time import monotonic
 from types import TracebackType
+from typing import Self
 
 from rich.console import Console
 from rich.progress import (
@@ -45,7 +46,7 @@ class Display:
         self._next_line_s = 0.0
         self._waits_since: float | None = None
 
-    def __enter__(self) -> "Display":
+    def __enter__(self) -> Self:
         """Start drawing."""
         for number, island in sorted(self._loop.islands.items()):
             self._tasks[number] = self._progress.add_task(

@@ -1,8 +1,8 @@
 """One run from its first birth to its last, or to the next resume."""
 
 import json
+import math
 import socket
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -32,12 +32,14 @@ from schema.experiment import (
 )
 from schema.network import THIS_MACHINE, Agent, Tls
 from schema.platform_tag import cpu_flags, our_version, platform_tag
+from schema.service import tell_user
 from schema.topics import unique_name
 
 ADDRESS = "address"
 """File of a run folder that says where its coordinator listens, while it does."""
 
 _LOOK_S = 0.2
+_CHORES_S = 1.0
 _LIBRARIES = ("mujoco-core", "eclipse-zenoh", "numpy", "pyarrow", "protobuf")
 
 
@@ -89,7 +91,7 @@ def resume(folder: Path, deployment: Deployment) -> int:
         NetworkError: the address cannot be listened on.
     """
     if read_state(folder) == "finished":
-        print(f"{folder}: is finished; nothing is left to do")
+        tell_user(f"{folder}: is finished; nothing is left to do")
         return 0
     return _run(folder, None, deployment)
 
@@ -100,7 +102,9 @@ def _run(folder: Path, details: RunDetails | None, deployment: Deployment) -> in
         held = stack.enter_context(RunFolder(folder, details))
         journal = stack.enter_context(Journal.open(folder, fsync=deployment.fsync))
         if journal.dropped:
-            _say(f"journal: dropped a cut record of {journal.dropped} bytes at its end")
+            tell_user(
+                f"journal: dropped a cut record of {journal.dropped} bytes at its end"
+            )
         recorder = Recorder(folder, held.details, fsync=deployment.fsync)
         stack.callback(recorder.close)
         experiment = experiment_from_text(held.details.document)
@@ -120,38 +124,42 @@ def _run(folder: Path, details: RunDetails | None, deployment: Deployment) -> in
         loop.start(journal.replay())
         held.set_state("running")
         with Display(loop, experiment.births, quiet=deployment.quiet) as display:
-            _turn(loop, display, crews, stop)
+            _turn(loop, display, stop, [recorder.flush, held.confirm, *crews])
         if not loop.is_finished:
             recorder.flush()
             held.set_state("stopped")
-            _say(f"stopped; to go on: revolve resume {folder}")
+            tell_user(f"stopped; to go on: revolve resume {folder}")
             return 130
+        held.confirm()
         recorder.write(_runs_row(held))
         recorder.finish()
-        held.confirm()
         held.set_state("finished")
     tell_result(folder, experiment, loop.islands[0])
     return 0
 
 
-def _turn(loop: Loop, display: Display, crews: list[Crew], stop: Event) -> None:
-    """Step until all is done or somebody says stop."""
-    shown_s = 0.0
+def _turn(
+    loop: Loop, display: Display, stop: Event, chores: list[Callable[[], None]]
+) -> None:
+    """Step until all is done or somebody says stop; do the chores once a second."""
+    shown_s = done_s = -math.inf
     while not (loop.is_finished or stop.is_set()):
         loop.step(_LOOK_S, time.monotonic())
         now_s = time.monotonic()
         if now_s - shown_s >= _LOOK_S:
             shown_s = now_s
             display.update()
-            for crew in crews:
-                crew.look_after()
+        if now_s - done_s >= _CHORES_S:
+            done_s = now_s
+            for chore in chores:
+                chore()
 
 
 @contextmanager
 def _agents(
     held: RunFolder, deployment: Deployment
-) -> Iterator[tuple[Agents, list[Crew]]]:
-    """Give whoever does the work: functions, or a network with its processes."""
+) -> Iterator[tuple[Agents, list[Callable[[], None]]]]:
+    """Give whoever does the work, and what looks after them from time to time."""
     if deployment.answers is not None:
         yield LocalAgents(deployment.answers, platform_tag()), []
         return
@@ -167,7 +175,7 @@ def _agents(
         note = held.path / ADDRESS
         note.write_text(f"{network.address}\n", encoding="utf-8")
         stack.callback(note.unlink, missing_ok=True)
-        crews = []
+        crews: list[Callable[[], None]] = []
         sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
         for kind, size in sizes.items() if deployment.workers else ():
             agent = Agent(
@@ -175,9 +183,9 @@ def _agents(
                 tls=deployment.tls,
             )  # fmt: skip
             crew = Crew(deployment.bodies[kind], (agent,), size=size)
-            crews.append(stack.enter_context(crew))
+            crews.append(stack.enter_context(crew).look_after)
         if deployment.listen is not None:
-            _say(f"listening on {network.address}")
+            tell_user(f"listening on {network.address}")
         yield network, crews
 
 
@@ -200,7 +208,3 @@ def _runs_row(held: RunFolder) -> Record:
         "end": datetime.now(UTC),
     }
     return Record("runs", row)
-
-
-def _say(line: str) -> None:
-    print(line, file=sys.stderr)

@@ -1,5 +1,6 @@
 """What a finished run tells on the terminal: the best robot, and where all is."""
 
+import sys
 from pathlib import Path
 
 from coordinator.island import Island
@@ -24,13 +25,16 @@ def tell_result(folder: Path, experiment: Experiment, island: Island) -> None:
     robot = develop(best.genome, space)
     write_robot(robot, folder / BEST, space)
     motors = sum(space[part.kind].outputs for part in robot.parts)
-    print(f"{island.births} births; mean fitness of the last population {mean:.4f}")
-    print(
-        f"best robot: birth {best.birth.number}, fitness {best.fitness:.4f}, "
-        f"rank {best.rank}, {len(robot.parts)} parts, {motors} motors"
-    )
-    print(f"its file:   {folder / BEST}")
-    print(f"tables:     {folder / 'tables'}")
-    print("try next:")
-    print(f"  revolve robot show {folder / BEST}")
-    print("  revolve run no-selection --seed 1 --births 600")
+    lines = [
+        f"{island.births} births; mean fitness of the last population {mean:.4f}",
+        (
+            f"best robot: birth {best.birth.number}, fitness {best.fitness:.4f}, "
+            f"rank {best.rank}, {len(robot.parts)} parts, {motors} motors"
+        ),
+        f"its file:   {folder / BEST}",
+        f"tables:     {folder / 'tables'}",
+        "try next:",
+        f"  revolve robot show {folder / BEST}",
+        "  revolve run no-selection --seed 1 --births 600",
+    ]
+    sys.stdout.write("\n".join(lines) + "\n")

@@ -1,11 +1,11 @@
 """Promise 1: the same births, however many workers and whatever dies."""
 
-import random
 import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from coordinator.compare import compare
@@ -48,7 +48,7 @@ def test_three_workers_of_which_one_is_killed(
         for _ in range(3)
     ]
     whole = _size(undisturbed)
-    share = random.Random(11).uniform(0.2, 0.7)
+    share = np.random.default_rng(11).uniform(0.2, 0.7)
     until(lambda: _size(folder) > share * whole, "the run is on its way")
     workers[1].send_signal(signal.SIGKILL)
     until(lambda: coordinator.poll() is not None, "the run ends")
@@ -63,7 +63,7 @@ def test_killed_coordinator_resumes_to_the_same_births(
     folder = stage.folder / "killed"
     whole = _size(undisturbed)
     # One kill in each quarter of the run, the instant within it drawn.
-    share = (draw + random.Random(draw).random()) / 4
+    share = (draw + np.random.default_rng(draw).random()) / 4
     first = stage.start("run", *_words(births, "killed"), "--workers", "2")
     until(
         lambda: _size(folder) > share * whole or first.poll() is not None,
