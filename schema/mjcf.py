@@ -204,19 +204,28 @@ class _Builder:
         imus = {s.box for s in self.types[index].sensors if s.kind == "imu"}
         colour = (*self.robot.parts[index].parameters[-3:], 1.0)
         upright = _quaternion(rotation)
-        offsets = np.array([box.position for box in boxes]) @ rotation.T
-        centres = (self.positions[index] + offsets).tolist()
-        halves = 0.5 * np.array([box.size for box in boxes])
-        reaches = (halves @ np.abs(rotation[2])).tolist()
-        for box, half, centre, reach in zip(
-            boxes, halves, centres, reaches, strict=True
-        ):
+        ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = rotation.tolist()
+        px, py, pz = self.positions[index].tolist()
+        # Plain floats: at a few boxes a part they are faster than arrays.
+        for box in boxes:
+            x, y, z = box.position
+            centre = (
+                px + ax * x + ay * y + az * z,
+                py + bx * x + by * y + bz * z,
+                pz + cx * x + cy * y + cz * z,
+            )
+            half = (0.5 * box.size[0], 0.5 * box.size[1], 0.5 * box.size[2])
+            reach = abs(cx) * half[0] + abs(cy) * half[1] + abs(cz) * half[2]
             quaternion, below = upright, reach
             if box.rotation is not IDENTITY:
                 turned = rotation @ np.asarray(box.rotation)
                 quaternion, below = _quaternion(turned), float(abs(turned[2]) @ half)
             body, origin = pair[box.segment]
-            place = [here - there for here, there in zip(centre, origin, strict=True)]
+            place = (
+                centre[0] - origin[0],
+                centre[1] - origin[1],
+                centre[2] - origin[2],
+            )
             # Set one by one: a third of the time that keywords take.
             geom = body.add_geom()
             geom.name = f"{index}/{box.name}"

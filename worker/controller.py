@@ -11,11 +11,14 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
+import numpy.typing as npt
 
 from schema.brain import Brain, Neuron
 from schema.errors import InvalidRobot
 from schema.evaluation import Floats
 from schema.experiment import Space
+
+Mask = npt.NDArray[np.bool_]
 
 STATE_LIMIT = 1e6
 """Linear neurons may feed themselves for ever: their states stop here."""
@@ -48,16 +51,19 @@ def widths(space: Space) -> Widths:
 class Network:
     """A brain as arrays: S states (outputs, then hidden), I inputs.
 
+    A neuron's next state is scale * f(weights . sources + frequency * age - shift)
+    + offset, where f is tanh for a sigmoid, sine for an oscillator and nothing for
+    a linear neuron; gains are multiplied into the weights.
+
     Attributes:
         weights: (S, I + S), from inputs and previous states to each neuron.
-        numbers: (5, S): bias and gain of a = gain * (sum - bias); angular
-            frequency [rad/s], phase [rad] and half amplitude of oscillators.
+        numbers: (4, S): frequency [rad/s], shift, scale, offset.
         kinds: (2, S): is it a sigmoid, is it an oscillator.
     """
 
     weights: Floats
     numbers: Floats
-    kinds: np.ndarray[tuple[int, int], np.dtype[np.bool_]]
+    kinds: Mask
 
 
 def pack(brain: Brain, width: Widths) -> Network:
@@ -87,33 +93,41 @@ def pack(brain: Brain, width: Widths) -> Network:
                 f"brain: {layer} neurons must be <= {limits[layer]}, got {count}"
             )
     weights = np.zeros((width.states, width.inputs + width.states))
-    numbers = np.zeros((5, width.states))
+    numbers = np.zeros((4, width.states))
     kinds = np.zeros((2, width.states), dtype=np.bool_)
     for edge in brain.connections:
-        weights[places[edge.target] - width.inputs, places[edge.source]] = edge.weight
+        row = places[edge.target] - width.inputs
+        weights[row, places[edge.source]] = _bounded(edge.weight)
     for place, neuron in zip(places, brain.neurons, strict=True):
         if neuron.layer != "input":
-            _set_neuron(neuron, place - width.inputs, numbers, kinds)
-    for array in (weights, numbers):
-        np.clip(array, -_NUMBER_LIMIT, _NUMBER_LIMIT, out=array)
+            _set_neuron(neuron, place - width.inputs, (weights, numbers, kinds))
     return Network(weights, numbers, kinds)
 
 
-def _set_neuron(
-    neuron: Neuron,
-    place: int,
-    numbers: Floats,
-    kinds: np.ndarray[tuple[int, int], np.dtype[np.bool_]],
-) -> None:
+def _set_neuron(neuron: Neuron, row: int, arrays: tuple[Floats, Floats, Mask]) -> None:
+    """Write a neuron's row into the arrays of a network."""
+    weights, numbers, kinds = arrays
+    values = [_bounded(value) for value in neuron.parameters]
     if neuron.kind == "Oscillator":
-        period, phase, amplitude = neuron.parameters
-        numbers[2, place] = 2.0 * pi / max(period, SHORTEST_PERIOD_S)
-        numbers[3, place] = 2.0 * pi * phase
-        numbers[4, place] = 0.5 * amplitude
-        kinds[1, place] = True
-    else:
-        numbers[:2, place] = neuron.parameters
-        kinds[0, place] = neuron.kind == "Sigmoid"
+        period, phase, amplitude = values
+        frequency = 2.0 * pi / max(period, SHORTEST_PERIOD_S)
+        weights[row] = 0.0
+        numbers[:, row] = frequency, 2.0 * pi * phase, 0.5 * amplitude, 0.5
+        kinds[1, row] = True
+        return
+    bias, gain = values
+    scale = 1.0
+    if neuron.kind == "Sigmoid":
+        # 1 / (1 + exp(-a)) = (1 + tanh(a / 2)) / 2, which cannot overflow.
+        gain, scale = 0.5 * gain, 0.5
+        numbers[3, row] = 0.5
+        kinds[0, row] = True
+    weights[row] *= gain
+    numbers[1:3, row] = gain * bias, scale
+
+
+def _bounded(value: float) -> float:
+    return min(max(value, -_NUMBER_LIMIT), _NUMBER_LIMIT)
 
 
 class Bank:
@@ -137,14 +151,13 @@ class Bank:
         count, states = len(networks), width.states
         self._tick_s = tick_s
         self._weights = np.empty((count, states, width.inputs + states))
-        numbers = np.empty((5, count, states))
+        numbers = np.empty((4, count, states))
         kinds = np.empty((2, count, states), dtype=np.bool_)
         for row, network in enumerate(networks):
             self._weights[row] = network.weights
             numbers[:, row] = network.numbers
             kinds[:, row] = network.kinds
-        bias, self._gain, self._frequency, self._phase, self._half = numbers
-        self._bias = bias
+        self._frequency, self._shift, self._scale, self._offset = numbers
         self._is_sigmoid, self._is_oscillator = kinds
         # Inputs and previous states side by side, as the weights expect them.
         self._sources = np.zeros((count, width.inputs + states, 1))
@@ -169,20 +182,15 @@ class Bank:
         new, other = self._next, self._other
         self._readings[...] = readings
         np.matmul(self._weights, self._sources, out=self._sums)
-        np.subtract(new, self._bias, out=new)
-        np.multiply(new, self._gain, out=new)
-        # 1 / (1 + exp(-a)) = (1 + tanh(a / 2)) / 2, which cannot overflow.
-        np.multiply(new, 0.5, out=other)
-        np.tanh(other, out=other)
-        np.multiply(other, 0.5, out=other)
-        np.add(other, 0.5, out=other)
-        np.copyto(new, other, where=self._is_sigmoid)
         np.multiply(self._frequency, age_ticks * self._tick_s, out=other)
-        np.subtract(other, self._phase, out=other)
-        np.sin(other, out=other)
-        np.multiply(other, self._half, out=other)
-        np.add(other, 0.5, out=other)
+        np.add(new, other, out=new)
+        np.subtract(new, self._shift, out=new)
+        np.tanh(new, out=other)
+        np.copyto(new, other, where=self._is_sigmoid)
+        np.sin(new, out=other)
         np.copyto(new, other, where=self._is_oscillator)
+        np.multiply(new, self._scale, out=new)
+        np.add(new, self._offset, out=new)
         np.maximum(new, -STATE_LIMIT, out=new)
         np.minimum(new, STATE_LIMIT, out=self.states)
         return self._outputs

@@ -1,0 +1,30 @@
+"""An evaluation is little more than its physics: a promise of the design."""
+
+import pytest
+
+from schema.experiment import EvaluationSettings, Experiment
+from worker.bench import LEAST_RATIO, Timing, random_robots, time_evaluations
+
+EXPERIMENT = Experiment(name="test")
+SETTINGS = EvaluationSettings(
+    space=EXPERIMENT.space,
+    simulation=EXPERIMENT.simulation,
+    fitness=EXPERIMENT.fitness,
+)
+
+
+@pytest.mark.benchmark
+@pytest.mark.slow
+def test_build_brain_and_sensors_vanish_beside_the_engine() -> None:
+    """Best of three rounds: a neighbour on the machine costs the small parts more."""
+    robots = random_robots(EXPERIMENT, 30, seed=1)
+    ratios = []
+    for _ in range(3):
+        ratios.append(time_evaluations(robots, SETTINGS).ratio)
+        if ratios[-1] >= LEAST_RATIO:
+            break
+    assert max(ratios) >= LEAST_RATIO, ratios
+
+
+def test_a_timing_s_ratio_is_the_engine_s_share() -> None:
+    assert Timing(robots=2, evaluation_s=4.0, engine_s=3.0).ratio == 0.75
