@@ -13,14 +13,16 @@ joint ``free``, geoms ``{p}/{box}``, imu sites ``{p}/imu``. What MuJoCo needs be
 the original's numbers stands, with its measured effect, in docs/physics.md.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import pi, tan
 
 import mujoco
 import numpy as np
 
 from schema.assembly import place_parts
 from schema.evaluation import Floats
-from schema.experiment import Simulation
+from schema.experiment import Arena, Simulation
 from schema.parts import IDENTITY, BodySpace, Joint, PartType, Shape
 from schema.robot import Robot
 
@@ -58,8 +60,16 @@ def robot_spec(robot: Robot, space: BodySpace, simulation: Simulation) -> RobotS
     return RobotSpec(builder.spec, -builder.lowest)
 
 
+Scenery = Callable[[mujoco.MjSpec], None]
+"""Adds what stands in a world, beside the ground."""
+
+
 def solo_model(
-    robot: Robot, space: BodySpace, simulation: Simulation
+    robot: Robot,
+    space: BodySpace,
+    simulation: Simulation,
+    *,
+    scenery: Scenery | None = None,
 ) -> mujoco.MjModel:
     """Return the model of one robot alone on the ground, lowest point touching it.
 
@@ -67,13 +77,42 @@ def solo_model(
         robot: a checked robot.
         space: its part types.
         simulation: the world's numbers; ``drop_m`` lifts the robot.
+        scenery: adds what else stands there.
     """
     built = robot_spec(robot, space, simulation)
     spec = built.spec
     set_options(spec, simulation, is_single=True)
     add_ground(spec, simulation)
+    if scenery is not None:
+        scenery(spec)
     spec.memory = MEMORY_BYTES
     spec.body("root").pos = (0.0, 0.0, built.height + simulation.drop_m)
+    return spec.compile()
+
+
+def shared_model(
+    robots: Sequence[tuple[str, mujoco.MjSpec]],
+    simulation: Simulation,
+    *,
+    scenery: Scenery | None = None,
+) -> mujoco.MjModel:
+    """Return the model of several robots on one ground.
+
+    Args:
+        robots: prefix of the names, and ``robot_spec``'s spec, of each; the specs
+            stay as they are and may be used again.
+        simulation: the world's numbers.
+        scenery: adds what else stands there.
+    """
+    spec = mujoco.MjSpec()
+    set_options(spec, simulation, is_single=False)
+    add_ground(spec, simulation)
+    if scenery is not None:
+        scenery(spec)
+    # Contacts grow with neighbours: a pile needs more than its robots alone.
+    spec.memory = 2 * MEMORY_BYTES * len(robots)
+    for prefix, child in robots:
+        spec.attach(child, frame=spec.worldbody.add_frame(), prefix=prefix)
     return spec.compile()
 
 
@@ -117,6 +156,35 @@ def add_ground(spec: mujoco.MjSpec, simulation: Simulation) -> None:
         friction=(simulation.friction, 0.0, 0.0),
         solref=(simulation.contact_time_s, 1.0),
     )
+
+
+def add_ring_wall(spec: mujoco.MjSpec, arena: Arena, simulation: Simulation) -> None:
+    """Add a ring of straight walls about the origin, if the arena has one.
+
+    The inner faces touch the circle of ``wall_diameter_m`` from outside; geoms are
+    ``wall{k}``. Source: the original's ring of 12 segments, 0.05 m thick, 1 m high.
+    """
+    if not arena.wall_diameter_m:
+        return
+    count, half = arena.wall_segments, 0.5 * arena.wall_thickness_m
+    centre = 0.5 * arena.wall_diameter_m + half
+    length = (centre + half) * tan(pi / count)
+    for index in range(count):
+        angle = 2.0 * pi * index / count
+        spec.worldbody.add_geom(
+            name=f"wall{index}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=(half, length, 0.5 * arena.wall_height_m),
+            pos=(
+                centre * np.cos(angle),
+                centre * np.sin(angle),
+                0.5 * arena.wall_height_m,
+            ),
+            quat=(np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)),
+            condim=3,
+            friction=(simulation.friction, 0.0, 0.0),
+            solref=(simulation.contact_time_s, 1.0),
+        )
 
 
 class _Builder:
