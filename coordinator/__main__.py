@@ -13,7 +13,12 @@ from coordinator.running import Deployment, resume, start
 from schema.agent_command import Flags, add_network_flags, tls_of
 from schema.crew import cores
 from schema.errors import RunFolderError
-from schema.experiment import check_experiment, read_experiment, shipped_experiments
+from schema.experiment import (
+    check_experiment,
+    fitness_function,
+    read_experiment,
+    shipped_experiments,
+)
 
 _EXAMPLES = {
     "run": "revolve run scenario1 --seed 1 --births 600",
@@ -43,6 +48,7 @@ def main(arguments: list[str]) -> int:
     if options.births is not None:
         experiment = replace(experiment, births=options.births)
         check_experiment(experiment, "--births")
+    fitness_function(experiment.fitness)
     default = Path("runs") / f"{experiment.name}-seed{options.seed}"
     folder = Path(options.out) if options.out else default
     return start(folder, experiment, options.seed, deployment)

@@ -11,8 +11,10 @@ from typing import Protocol
 
 from coordinator.dispatch import Dispatch
 from coordinator.events import (
+    Advanced,
     Answered,
     Assign,
+    Commanded,
     Deliver,
     DispatchEvent,
     Evaluate,
@@ -21,6 +23,7 @@ from coordinator.events import (
     Finish,
     IslandCommand,
     Job,
+    Journalled,
     Record,
     Requested,
     Returned,
@@ -33,7 +36,7 @@ from coordinator.events import (
 from coordinator.island import Island
 from schema.birth import BirthId
 from schema.codec import Answer, decode_answer, encode_request, encode_robot
-from schema.errors import MalformedMessage
+from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
 from schema.evaluation import Evaluation, Provenance, Report
 from schema.robot import Robot
 
@@ -109,17 +112,22 @@ class Loop:
         """Every island is done."""
         return all(island.is_finished for island in self.islands.values())
 
-    def start(self, history: Iterable[Answered]) -> None:
+    def start(self, history: Iterable[Journalled]) -> None:
         """Begin, or come back: replay a journal, then ask what is still open.
 
         Args:
             history: the journalled events, oldest first; empty for a new run.
+
+        Raises:
+            UnexpectedEvent: the history of another kind of run.
         """
         unanswered: dict[Key, Vet | Evaluate] = {}
         for number in sorted(self.islands):
             asked = self._obey(self.islands[number].handle(Started()))
             unanswered.update((_key(command), command) for command in asked)
         for event in history:
+            if isinstance(event, Advanced | Commanded):
+                raise UnexpectedEvent(f"no island here is an arena, got {event}")
             unanswered.pop(_key(event), None)
             unanswered.update((_key(command), command) for command in self._tell(event))
         for command in unanswered.values():
@@ -223,17 +231,25 @@ class Loop:
         return replace(event, outcome="error", answer=b"", reason=reason)
 
     def _delivered(self, command: Deliver) -> Answered:
-        """Return the island's event that a finished job comes to."""
+        """Return the island's event that a finished job comes to.
+
+        Raises:
+            JobRefused: no agent that was asked can do it; the run stops as it is.
+        """
         job = command.job
-        answer = self._answers.pop(job.number, None)
-        result = command.reason if answer is None else answer.result
-        wall_s = 0.0 if answer is None else answer.wall_s
+        if command.reason:
+            raise JobRefused(
+                f"birth {job.birth.number}: several agents cannot {job.kind} it, the "
+                f"last of them {command.agent}: {command.reason}; mend that and resume"
+            )
+        answer = self._answers.pop(job.number)
+        result = answer.result
         if job.kind == "vet":
             if isinstance(result, Report):
                 return Vetted(job.birth, job.attempt, result)
             return VettingFailed(job.birth, job.attempt, str(result))
         platform = self.dispatch.platform(command.agent)
-        provenance = Provenance(command.agent, platform, wall_s)
+        provenance = Provenance(command.agent, platform, answer.wall_s)
         if isinstance(result, Evaluation):
             return Evaluated(job.birth, result, provenance)
         return EvaluationFailed(job.birth, str(result), provenance)

@@ -36,5 +36,13 @@ class UnexpectedEvent(RevolveError):  # noqa: N818 - reads as what it says
     """An event that the machine's state does not allow: our own fault, stop."""
 
 
+class FitnessUndefined(RevolveError):  # noqa: N818 - reads as what it says
+    """The fitness function raised, or gave no finite number: a result, too."""
+
+
+class JobRefused(RevolveError):  # noqa: N818 - reads as what it says
+    """Several agents cannot do a job: the machines' fault, never a result."""
+
+
 class SimulationDiverged(RevolveError):  # noqa: N818 - reads as what it says
     """The physics left the realm of numbers: nobody's fault, a result."""

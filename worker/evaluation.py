@@ -11,10 +11,11 @@ from typing import cast
 import mujoco
 import numpy as np
 
-from schema.errors import ExperimentError, SimulationDiverged
+from schema.errors import FitnessUndefined, SimulationDiverged
 from schema.evaluation import Evaluation, Track
 from schema.experiment import (
     EvaluationSettings,
+    Fitness,
     Simulation,
     Space,
     body_space,
@@ -36,25 +37,36 @@ def evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
 
     Raises:
         SimulationDiverged: the physics did; reason and simulated time.
-        ExperimentError: a sensor that the world has nothing for, a fitness that
-            is no finite number.
+        FitnessUndefined: the fitness function raised or gave no finite number.
+        ExperimentError: a sensor that the world has nothing for, a fitness
+            function that does not exist.
         InvalidRobot: more neurons than the limits.
     """
     track = simulate(robot, settings.space, settings.simulation)
-    function = cast("FitnessFunction", fitness_function(settings.fitness))
-    value = function(track, settings.fitness)
-    if not math.isfinite(value):
-        raise ExperimentError(
-            f"fitness.function: {settings.fitness.function!r} must return a finite "
-            f"number, got {value!r}"
-        )
+    value = _judge(track, settings.fitness)
     clock = settings.simulation
     return Evaluation(
-        float(value),
+        value,
         path_velocity(track),
         straight_velocity(track),
         (clock.warmup_steps + clock.window_steps) * clock.timestep_s,
     )
+
+
+def _judge(track: Track, fitness: Fitness) -> float:
+    """Return the fitness of a track; whatever a user's function does is told."""
+    function = cast("FitnessFunction", fitness_function(fitness))
+    try:
+        value = float(function(track, fitness))
+    except Exception as error:
+        raise FitnessUndefined(
+            f"{fitness.function} raised {type(error).__name__}: {error}"
+        ) from error
+    if not math.isfinite(value):
+        raise FitnessUndefined(
+            f"{fitness.function} must return a finite number, got {value}"
+        )
+    return value
 
 
 def simulate(

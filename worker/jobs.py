@@ -3,7 +3,7 @@
 import time
 
 from schema.codec import Answer, decode_request, encode_answer
-from schema.errors import SimulationDiverged
+from schema.errors import FitnessUndefined, SimulationDiverged
 from schema.evaluation import Evaluation
 from schema.experiment import body_space, read_evaluation_settings
 from schema.robot import check_robot
@@ -29,7 +29,7 @@ def answer(request: bytes) -> bytes:
     result: Evaluation | str
     try:
         result = evaluate(job.robot, settings)
-    except SimulationDiverged as error:
+    except (SimulationDiverged, FitnessUndefined) as error:
         result = str(error)
     wall_s = time.perf_counter() - began
     return encode_answer(Answer(job.epoch, job.number, wall_s, result))

@@ -7,20 +7,27 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import msgspec
 import mujoco
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
 from schema.brain import INPUT, Brain, Neuron
-from schema.codec import encode_robot
-from schema.errors import ExperimentError, InvalidRobot, SimulationDiverged
+from schema.codec import decode_answer, encode_request, encode_robot
+from schema.errors import (
+    ExperimentError,
+    FitnessUndefined,
+    InvalidRobot,
+    SimulationDiverged,
+)
 from schema.evaluation import Track
 from schema.experiment import EvaluationSettings, Fitness, Simulation, Space
 from schema.robot import Part, Robot
 from worker import evaluation
 from worker.evaluation import evaluate, simulate
-from worker.fitness import path_velocity, straight_velocity
+from worker.fitness import FitnessFunction, path_velocity, straight_velocity
+from worker.jobs import answer
 
 RobotOf = Callable[[int], Robot]
 WORLD = Simulation()
@@ -174,12 +181,34 @@ def not_a_number(_track: Track, _fitness: Fitness) -> float:
     return float("nan")
 
 
-def test_a_fitness_that_is_no_number_is_the_document_s_fault(
-    turtle: Robot, monkeypatch: pytest.MonkeyPatch
+def undecided(_track: Track, _fitness: Fitness) -> float:
+    raise ZeroDivisionError("by nothing")
+
+
+@pytest.mark.parametrize(
+    ("function", "told"),
+    [
+        (not_a_number, "must return a finite number, got nan"),
+        (undecided, "raised ZeroDivisionError: by nothing"),
+    ],
+)
+def test_a_fitness_function_that_cannot_judge_is_a_result(
+    turtle: Robot,
+    monkeypatch: pytest.MonkeyPatch,
+    function: FitnessFunction,
+    told: str,
 ) -> None:
-    monkeypatch.setattr(evaluation, "fitness_function", lambda _fitness: not_a_number)
-    with pytest.raises(ExperimentError, match="must return a finite number, got nan"):
+    monkeypatch.setattr(evaluation, "fitness_function", lambda _fitness: function)
+    with pytest.raises(FitnessUndefined, match=told):
         evaluate(turtle, SETTINGS)
+    request = encode_request(
+        run="run",
+        epoch=1,
+        number=2,
+        settings=msgspec.json.encode(SETTINGS),
+        robot=encode_robot(turtle),
+    )
+    assert told in str(decode_answer(answer(request)).result)
 
 
 def test_positions_are_those_of_the_core_not_of_the_mass(turtle: Robot) -> None:

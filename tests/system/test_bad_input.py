@@ -1,0 +1,135 @@
+"""Whatever a user gets wrong is told in one line, with a status that is not 0."""
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytestmark = pytest.mark.system
+
+Stage = Any
+
+
+def _refused(stage: Stage, *words: str) -> str:
+    said: str = stage.run(*words, code=2)
+    assert len(said.strip().splitlines()) == 1, said
+    return said
+
+
+def _document(stage: Stage, text: str) -> str:
+    (stage.folder / "mine.toml").write_text(text)
+    return "mine.toml"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('name = "a"\nbirth = 3', "'births'"),
+        ('name = "a"\n[selection]\npopulaton = 3', "selection.populaton"),
+        ('name = "a"\nbirths = "many"', "births"),
+        ('name = "a"\n[space]\nmin_parts = 9\nmax_parts = 8', "space.min_parts"),
+        (
+            'name = "a"\n[space]\npart_types = ["schema.parts:CROE"]',
+            "schema.parts:CORE",
+        ),
+        ('name = "a"\n[fitness]\nfunction = "worker.fitness:thesiss"', "thesis"),
+        ("name = ", "not TOML"),
+    ],
+)
+def test_broken_experiment(stage: Stage, text: str, told: str) -> None:
+    said = _refused(stage, "run", _document(stage, text), "--out", "x", "--quiet")
+    assert "mine.toml" in said or told in said
+    assert told in said
+    assert not (stage.folder / "x").exists()
+
+
+def test_restriction_that_no_robot_meets_ends_the_run_with_its_reason(
+    stage: Stage,
+) -> None:
+    text = 'name = "a"\n[space]\npart_types = ["schema.parts:CORE", '
+    text += '"schema.parts:ACTIVE_HINGE"]\nmin_parts = 29\nmax_parts = 30'
+    words = ("--out", "x", "--quiet", "--in-process", "--births", "15")
+    assert "space" in _refused(stage, "run", _document(stage, text), *words)
+
+
+def test_misspelt_command_and_experiment_get_the_nearest_name(stage: Stage) -> None:
+    assert "'resume'" in _refused(stage, "resum", "x")
+    assert "'scenario1'" in _refused(stage, "run", "senario1")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "told"),
+    [
+        ("robot.yaml", "body: {type: Cor, id: c}\n", "Core"),
+        ("robot.yaml", "body: [\n", "robot.yaml"),
+        ("robot.pb", "\x01\x02\x03", "robot.pb"),
+    ],
+)
+def test_broken_robot_file(stage: Stage, name: str, content: str, told: str) -> None:
+    (stage.folder / name).write_text(content)
+    assert told in _refused(stage, "robot", "check", name)
+
+
+def test_used_folder(stage: Stage) -> None:
+    (stage.folder / "used").mkdir()
+    (stage.folder / "used" / "thesis.pdf").write_text("mine")
+    assert "thesis.pdf" in _refused(stage, "run", "scenario1", "--out", "used")
+    assert (stage.folder / "used" / "thesis.pdf").read_text() == "mine"
+
+
+def test_folder_without_a_run(stage: Stage) -> None:
+    assert "nowhere" in _refused(stage, "resume", "nowhere")
+    assert "nowhere" in _refused(stage, "compare", "nowhere", "nowhere")
+
+
+def test_port_in_use(stage: Stage) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        address = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        words = ("coordinator", "scenario1", "--out", "x", "--listen", address)
+        assert "in use" in _refused(stage, *words)
+
+
+def test_nothing_listens_beyond_this_machine_without_certificates(
+    stage: Stage,
+) -> None:
+    words = ("coordinator", "scenario1", "--out", "x", "--listen", "tcp/0.0.0.0:0")
+    assert "tls/" in _refused(stage, *words)
+
+
+def test_worker_without_a_coordinator_says_so_and_keeps_trying(
+    stage: Stage,
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+    worker = stage.start("worker", "--connect", f"tcp/127.0.0.1:{port}")
+    line = worker.stderr.readline()
+    assert f"127.0.0.1:{port}" in line
+    assert worker.poll() is None
+    worker.send_signal(signal.SIGINT)
+    assert worker.wait(30) == 0
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
+def test_full_disk_loses_nothing(stage: Stage, undisturbed: Path, births: int) -> None:
+    disk = stage.folder / "disk"
+    disk.mkdir()
+    if subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)], check=False
+    ).returncode:
+        pytest.skip("a small disk cannot be mounted here")
+    try:
+        words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
+        said = stage.run("run", *words, "--in-process", "--out", "disk/run", code=2)
+        assert "full" in said
+        assert "Traceback" not in said
+        shutil.copytree(disk / "run", stage.folder / "moved")
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
+    stage.run("resume", "moved", "--in-process", "--quiet")
+    said = stage.run("compare", "moved", str(undisturbed))
+    assert "equal" in said
