@@ -7,11 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from schema.arena import Advance, Changes
 from schema.birth import BirthId
+from schema.brain import Brain
 from schema.evaluation import Evaluation, Provenance, Report
+from schema.genome import Genome
 from schema.robot import Robot
 
-# --- Island: events ---------------------------------------------------------
+# --- Islands: events --------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,12 +58,96 @@ class EvaluationFailed:
     provenance: Provenance
 
 
+@dataclass(frozen=True, slots=True)
+class Advanced:
+    """An arena shard reached the step that it was to reach.
+
+    Attributes:
+        island: whose shard.
+        number: of the advance that was asked for.
+        advance: what it came to; a journal gives it back without its poses, which
+            stand in their table before the journal has this.
+        pose_rows: how many rows its poses are.
+        provenance: who advanced it.
+    """
+
+    island: int
+    number: int
+    advance: Advance
+    pose_rows: int
+    provenance: Provenance
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """The arena stands still until it is to resume."""
+
+
+@dataclass(frozen=True, slots=True)
+class Resume:
+    """A paused arena goes on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Insert:
+    """A robot joins: a birth without parents, who may mate like any other.
+
+    Attributes:
+        genome: what it hands down, and develops from.
+        place: where in the ground plane [m]; drawn as for any birth if None.
+    """
+
+    genome: Genome
+    place: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Remove:
+    """A robot is taken out; nothing happens if it is not there any more."""
+
+    birth: BirthId
+
+
+@dataclass(frozen=True, slots=True)
+class ReplaceBrain:
+    """A robot gets another brain, which it does not hand down."""
+
+    birth: BirthId
+    brain: Brain
+
+
+Order = Pause | Resume | Insert | Remove | ReplaceBrain
+"""What an operator may want of an arena."""
+
+
+@dataclass(frozen=True, slots=True)
+class Commanded:
+    """An operator gave an order.
+
+    Attributes:
+        island: to which arena.
+        command_id: unique; an order that comes twice is carried out once.
+        step: at which it takes effect: the next decision (``Arena.next_step``).
+        order: what is to be done.
+    """
+
+    island: int
+    command_id: str
+    step: int
+    order: Order
+
+
 Answered = Vetted | VettingFailed | Evaluated | EvaluationFailed
-"""Events that answer a question: what the journal keeps."""
+"""Events that answer a question of an off-line island."""
+
+Journalled = Answered | Advanced | Commanded
+"""Events that are no function of others: what the journal keeps."""
 
 IslandEvent = Started | Answered
 
-# --- Island: commands -------------------------------------------------------
+ArenaEvent = Started | Vetted | VettingFailed | Advanced | Commanded
+
+# --- Islands: commands ------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +176,41 @@ class Record:
 
 
 @dataclass(frozen=True, slots=True)
+class Append:
+    """Add rows of a bulk table that come as columns.
+
+    Attributes:
+        table: its name.
+        rows: how many they are.
+        columns: Arrow IPC stream of all columns but ``record``; empty in a replay,
+            where the rows stand on disk already.
+    """
+
+    table: str
+    rows: int
+    columns: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class AdvanceShard:
+    """Have an arena changed and then advanced.
+
+    Attributes:
+        island: whose shard.
+        number: of the shard's advances, from 0.
+        until: step to reach.
+        changes: what is done before.
+        wants_snapshot: its state is due to be kept when it is there.
+    """
+
+    island: int
+    number: int
+    until: int
+    changes: Changes
+    wants_snapshot: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Finish:
     """The island is done."""
 
@@ -96,6 +218,8 @@ class Finish:
 
 
 IslandCommand = Vet | Evaluate | Record | Finish
+
+ArenaCommand = Vet | AdvanceShard | Record | Append | Finish
 
 # --- Dispatch ---------------------------------------------------------------
 

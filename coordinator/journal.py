@@ -12,26 +12,10 @@ from types import TracebackType
 from typing import Self
 from zlib import crc32
 
-from google.protobuf.message import DecodeError
-
 from coordinator.disk import AppendedFile
-from coordinator.events import (
-    Answered,
-    Evaluated,
-    EvaluationFailed,
-    Vetted,
-    VettingFailed,
-)
-from schema import revolve_pb2 as pb
-from schema.birth import BirthId
-from schema.codec import (
-    evaluation_from_message,
-    evaluation_to_message,
-    report_from_message,
-    report_to_message,
-)
+from coordinator.entries import decode_entry, encode_entry
+from coordinator.events import Journalled
 from schema.errors import MalformedMessage, RunFolderError
-from schema.evaluation import Provenance
 
 NAME = "journal.bin"
 MAGIC = b"revolve journal 1\n"
@@ -78,12 +62,12 @@ class Journal:
         """Open the journal of a run folder."""
         return cls(folder / NAME, fsync=fsync)
 
-    def replay(self) -> list[Answered]:
+    def replay(self) -> list[Journalled]:
         """Return what it held when it was opened, oldest first; only once."""
         history, self._history = self._history, []
         return history
 
-    def append(self, events: Iterable[Answered]) -> None:
+    def append(self, events: Iterable[Journalled]) -> None:
         """Keep events before anybody acts on them: all, or on failure none.
 
         Raises:
@@ -111,59 +95,6 @@ class Journal:
         trace: TracebackType | None,
     ) -> None:
         self.close()
-
-
-def encode_entry(event: Answered) -> bytes:
-    """Return the bytes of one event."""
-    entry = pb.Entry(island=event.birth.island, birth=event.birth.number)
-    match event:
-        case Vetted():
-            entry.attempt = event.attempt
-            entry.vetted.CopyFrom(report_to_message(event.report))
-        case VettingFailed():
-            entry.attempt = event.attempt
-            entry.vetting_failed = event.reason
-        case Evaluated():
-            entry.evaluated.CopyFrom(evaluation_to_message(event.evaluation))
-            _sign(entry, event.provenance)
-        case EvaluationFailed():
-            entry.evaluation_failed = event.reason
-            _sign(entry, event.provenance)
-    return entry.SerializeToString(deterministic=True)
-
-
-def decode_entry(data: bytes) -> Answered:
-    """Return the event of some bytes.
-
-    Raises:
-        MalformedMessage: not an entry's bytes, or no event in it.
-    """
-    entry = pb.Entry()
-    try:
-        entry.ParseFromString(data)
-    except DecodeError as error:
-        raise MalformedMessage(f"not the bytes of an Entry: {error}") from None
-    birth = BirthId(entry.island, entry.birth)
-    signed = Provenance(
-        entry.provenance.agent, entry.provenance.platform, entry.provenance.wall_s
-    )
-    match entry.WhichOneof("event"):
-        case "vetted":
-            return Vetted(birth, entry.attempt, report_from_message(entry.vetted))
-        case "vetting_failed":
-            return VettingFailed(birth, entry.attempt, entry.vetting_failed)
-        case "evaluated":
-            return Evaluated(birth, evaluation_from_message(entry.evaluated), signed)
-        case "evaluation_failed":
-            return EvaluationFailed(birth, entry.evaluation_failed, signed)
-    raise MalformedMessage("entry: holds no event")
-
-
-def _sign(entry: pb.Entry, provenance: Provenance) -> None:
-    signed = entry.provenance
-    signed.agent = provenance.agent
-    signed.platform = provenance.platform
-    signed.wall_s = provenance.wall_s
 
 
 def _frame(sequence: int, payload: bytes) -> bytes:
@@ -223,7 +154,7 @@ def _refuse_gap(path: Path, data: bytes, position: int, sequence: int) -> None:
             )
 
 
-def _event(path: Path, payload: bytes) -> Answered:
+def _event(path: Path, payload: bytes) -> Journalled:
     try:
         return decode_entry(payload)
     except MalformedMessage as error:

@@ -77,7 +77,7 @@ def decode_robot(data: bytes) -> Robot:
         MalformedMessage: not a robot's bytes, no tree of parts, or a brain that
             breaks its rules.
     """
-    return _decoded(data, pb.Robot(), robot_from_message)
+    return decoded(data, pb.Robot(), robot_from_message)
 
 
 def encode_genome(genome: Genome) -> bytes:
@@ -93,7 +93,7 @@ def decode_genome(data: bytes) -> Genome:
         MalformedMessage: not a genome's bytes, no tree of nodes, an unknown neuron
             type or layer, a number that is not finite.
     """
-    return _decoded(data, pb.Genome(), genome_from_message)
+    return decoded(data, pb.Genome(), genome_from_message)
 
 
 def encode_request(
@@ -112,7 +112,7 @@ def decode_request(data: bytes) -> Request:
     Raises:
         MalformedMessage: not a request's bytes, or its robot is malformed.
     """
-    return _decoded(data, pb.Request(), _request_from_message)
+    return decoded(data, pb.Request(), _request_from_message)
 
 
 def encode_answer(answer: Answer) -> bytes:
@@ -134,7 +134,7 @@ def decode_answer(data: bytes) -> Answer:
         MalformedMessage: not an answer's bytes, no result in it, a number that is
             not finite.
     """
-    return _decoded(data, pb.Answer(), _answer_from_message)
+    return decoded(data, pb.Answer(), _answer_from_message)
 
 
 def report_to_message(report: Report) -> pb.Report:
@@ -146,8 +146,8 @@ def report_to_message(report: Report) -> pb.Report:
             pb.Intersection(first=first, second=second)
             for first, second in report.intersections
         ],
-        lower=_vector_to_message(report.lower),
-        upper=_vector_to_message(report.upper),
+        lower=vector_to_message(report.lower),
+        upper=vector_to_message(report.upper),
         mass=report.mass,
         motors=report.motors,
     )
@@ -170,8 +170,8 @@ def report_from_message(message: pb.Report) -> Report:
         intersections=tuple(
             (pair.first, pair.second) for pair in message.intersections
         ),
-        lower=_vector_from_message(message.lower),
-        upper=_vector_from_message(message.upper),
+        lower=vector_from_message(message.lower, "report.lower"),
+        upper=vector_from_message(message.upper, "report.upper"),
         mass=finite(message.mass, "report.mass"),
         motors=message.motors,
     )
@@ -203,8 +203,12 @@ def evaluation_from_message(message: pb.Evaluation) -> Evaluation:
     )
 
 
-def _decoded(data: bytes, message: M, read: Callable[[M], T]) -> T:
-    """Return what ``read`` makes of a parsed message; any fault is the sender's."""
+def decoded(data: bytes, message: M, read: Callable[[M], T]) -> T:
+    """Return what ``read`` makes of a parsed message; any fault is the sender's.
+
+    Raises:
+        MalformedMessage: not the bytes of such a message, or ``read`` refuses it.
+    """
     name = message.DESCRIPTOR.name
     try:
         message.ParseFromString(data)
@@ -241,11 +245,17 @@ def _answer_from_message(message: pb.Answer) -> Answer:
     return Answer(message.epoch, message.number, wall_s, result)
 
 
-def _vector_to_message(vector: Vector) -> pb.Vector:
+def vector_to_message(vector: Vector) -> pb.Vector:
+    """Return a vector as a message."""
     return pb.Vector(x=vector[0], y=vector[1], z=vector[2])
 
 
-def _vector_from_message(message: pb.Vector) -> Vector:
+def vector_from_message(message: pb.Vector, where: str) -> Vector:
+    """Return the vector of a message.
+
+    Raises:
+        MalformedMessage: a number that is not finite.
+    """
     values: Sequence[float] = (message.x, message.y, message.z)
-    x, y, z = (finite(value, "report corner") for value in values)
+    x, y, z = (finite(value, where) for value in values)
     return x, y, z

@@ -25,19 +25,7 @@ def robot_to_message(robot: Robot) -> pb.Robot:
     add_part = message.parts.add
     for part in robot.parts:
         _write_part(part, add_part())
-    add_neuron = message.neurons.add
-    for neuron in robot.brain.neurons:
-        add_neuron(
-            layer=_LAYER_CODES[neuron.layer],
-            kind=neuron.kind,
-            part=neuron.part,
-            parameters=neuron.parameters,
-        )
-    add_connection = message.connections.add
-    for edge in robot.brain.connections:
-        entry = add_connection()
-        entry.source, entry.target = edge.source, edge.target
-        entry.weight = edge.weight
+    write_brain(robot.brain, message)
     return message
 
 
@@ -50,6 +38,33 @@ def robot_from_message(message: pb.Robot) -> Robot:
     """
     parts = tuple(map(_part_from_message, message.parts))
     check_tree(parts)
+    return Robot(parts, read_brain(message, len(parts)))
+
+
+def write_brain(brain: Brain, message: pb.Robot | pb.BrainChange) -> None:
+    """Put a brain into a message that has neurons and connections."""
+    add_neuron = message.neurons.add
+    for neuron in brain.neurons:
+        add_neuron(
+            layer=_LAYER_CODES[neuron.layer],
+            kind=neuron.kind,
+            part=neuron.part,
+            parameters=neuron.parameters,
+        )
+    add_connection = message.connections.add
+    for edge in brain.connections:
+        entry = add_connection()
+        entry.source, entry.target = edge.source, edge.target
+        entry.weight = edge.weight
+
+
+def read_brain(message: pb.Robot | pb.BrainChange, part_count: int) -> Brain:
+    """Return the brain of a message that has neurons and connections.
+
+    Raises:
+        InvalidRobot: a brain that breaks its rules.
+        MalformedMessage: an unknown layer.
+    """
     brain = Brain(
         neurons=tuple(
             Neuron(_layer(item.layer), item.kind, item.part, tuple(item.parameters))
@@ -60,8 +75,8 @@ def robot_from_message(message: pb.Robot) -> Robot:
             for item in message.connections
         ),
     )
-    check_brain(brain, len(parts))
-    return Robot(parts, brain)
+    check_brain(brain, part_count)
+    return brain
 
 
 def genome_to_message(genome: Genome) -> pb.Genome:

@@ -212,8 +212,206 @@ class Provenance(_message.Message):
     wall_s: float
     def __init__(self, agent: _Optional[str] = ..., platform: _Optional[str] = ..., wall_s: _Optional[float] = ...) -> None: ...
 
+class BirthName(_message.Message):
+    __slots__ = ("island", "number")
+    ISLAND_FIELD_NUMBER: _ClassVar[int]
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    island: int
+    number: int
+    def __init__(self, island: _Optional[int] = ..., number: _Optional[int] = ...) -> None: ...
+
+class Insertion(_message.Message):
+    __slots__ = ("birth", "robot", "x", "y", "heading")
+    BIRTH_FIELD_NUMBER: _ClassVar[int]
+    ROBOT_FIELD_NUMBER: _ClassVar[int]
+    X_FIELD_NUMBER: _ClassVar[int]
+    Y_FIELD_NUMBER: _ClassVar[int]
+    HEADING_FIELD_NUMBER: _ClassVar[int]
+    birth: BirthName
+    robot: Robot
+    x: float
+    y: float
+    heading: float
+    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., robot: _Optional[_Union[Robot, _Mapping]] = ..., x: _Optional[float] = ..., y: _Optional[float] = ..., heading: _Optional[float] = ...) -> None: ...
+
+class BrainChange(_message.Message):
+    __slots__ = ("birth", "neurons", "connections")
+    BIRTH_FIELD_NUMBER: _ClassVar[int]
+    NEURONS_FIELD_NUMBER: _ClassVar[int]
+    CONNECTIONS_FIELD_NUMBER: _ClassVar[int]
+    birth: BirthName
+    neurons: _containers.RepeatedCompositeFieldContainer[Neuron]
+    connections: _containers.RepeatedCompositeFieldContainer[Connection]
+    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., neurons: _Optional[_Iterable[_Union[Neuron, _Mapping]]] = ..., connections: _Optional[_Iterable[_Union[Connection, _Mapping]]] = ...) -> None: ...
+
+class Changes(_message.Message):
+    __slots__ = ("removals", "insertions", "brains")
+    REMOVALS_FIELD_NUMBER: _ClassVar[int]
+    INSERTIONS_FIELD_NUMBER: _ClassVar[int]
+    BRAINS_FIELD_NUMBER: _ClassVar[int]
+    removals: _containers.RepeatedCompositeFieldContainer[BirthName]
+    insertions: _containers.RepeatedCompositeFieldContainer[Insertion]
+    brains: _containers.RepeatedCompositeFieldContainer[BrainChange]
+    def __init__(self, removals: _Optional[_Iterable[_Union[BirthName, _Mapping]]] = ..., insertions: _Optional[_Iterable[_Union[Insertion, _Mapping]]] = ..., brains: _Optional[_Iterable[_Union[BrainChange, _Mapping]]] = ...) -> None: ...
+
+class Judgement(_message.Message):
+    __slots__ = ("birth", "age_s", "path_velocity", "straight_velocity", "fitness", "is_mature", "place")
+    BIRTH_FIELD_NUMBER: _ClassVar[int]
+    AGE_S_FIELD_NUMBER: _ClassVar[int]
+    PATH_VELOCITY_FIELD_NUMBER: _ClassVar[int]
+    STRAIGHT_VELOCITY_FIELD_NUMBER: _ClassVar[int]
+    FITNESS_FIELD_NUMBER: _ClassVar[int]
+    IS_MATURE_FIELD_NUMBER: _ClassVar[int]
+    PLACE_FIELD_NUMBER: _ClassVar[int]
+    birth: BirthName
+    age_s: float
+    path_velocity: float
+    straight_velocity: float
+    fitness: float
+    is_mature: bool
+    place: Vector
+    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., age_s: _Optional[float] = ..., path_velocity: _Optional[float] = ..., straight_velocity: _Optional[float] = ..., fitness: _Optional[float] = ..., is_mature: _Optional[bool] = ..., place: _Optional[_Union[Vector, _Mapping]] = ...) -> None: ...
+
+class Casualty(_message.Message):
+    __slots__ = ("birth", "step", "reason", "place")
+    BIRTH_FIELD_NUMBER: _ClassVar[int]
+    STEP_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    PLACE_FIELD_NUMBER: _ClassVar[int]
+    birth: BirthName
+    step: int
+    reason: str
+    place: Vector
+    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., step: _Optional[int] = ..., reason: _Optional[str] = ..., place: _Optional[_Union[Vector, _Mapping]] = ...) -> None: ...
+
+class Touch(_message.Message):
+    __slots__ = ("first", "second", "duration_s")
+    FIRST_FIELD_NUMBER: _ClassVar[int]
+    SECOND_FIELD_NUMBER: _ClassVar[int]
+    DURATION_S_FIELD_NUMBER: _ClassVar[int]
+    first: BirthName
+    second: BirthName
+    duration_s: float
+    def __init__(self, first: _Optional[_Union[BirthName, _Mapping]] = ..., second: _Optional[_Union[BirthName, _Mapping]] = ..., duration_s: _Optional[float] = ...) -> None: ...
+
+class Advance(_message.Message):
+    __slots__ = ("step", "digest", "judgements", "casualties", "touches", "poses")
+    STEP_FIELD_NUMBER: _ClassVar[int]
+    DIGEST_FIELD_NUMBER: _ClassVar[int]
+    JUDGEMENTS_FIELD_NUMBER: _ClassVar[int]
+    CASUALTIES_FIELD_NUMBER: _ClassVar[int]
+    TOUCHES_FIELD_NUMBER: _ClassVar[int]
+    POSES_FIELD_NUMBER: _ClassVar[int]
+    step: int
+    digest: bytes
+    judgements: _containers.RepeatedCompositeFieldContainer[Judgement]
+    casualties: _containers.RepeatedCompositeFieldContainer[Casualty]
+    touches: _containers.RepeatedCompositeFieldContainer[Touch]
+    poses: bytes
+    def __init__(self, step: _Optional[int] = ..., digest: _Optional[bytes] = ..., judgements: _Optional[_Iterable[_Union[Judgement, _Mapping]]] = ..., casualties: _Optional[_Iterable[_Union[Casualty, _Mapping]]] = ..., touches: _Optional[_Iterable[_Union[Touch, _Mapping]]] = ..., poses: _Optional[bytes] = ...) -> None: ...
+
+class PastAdvance(_message.Message):
+    __slots__ = ("changes", "until", "digest")
+    CHANGES_FIELD_NUMBER: _ClassVar[int]
+    UNTIL_FIELD_NUMBER: _ClassVar[int]
+    DIGEST_FIELD_NUMBER: _ClassVar[int]
+    changes: Changes
+    until: int
+    digest: bytes
+    def __init__(self, changes: _Optional[_Union[Changes, _Mapping]] = ..., until: _Optional[int] = ..., digest: _Optional[bytes] = ...) -> None: ...
+
+class AdvanceRequest(_message.Message):
+    __slots__ = ("run", "epoch", "number", "settings", "shard", "from_step", "from_digest", "changes", "until", "wants_snapshot", "snapshot", "history", "is_rebuild")
+    RUN_FIELD_NUMBER: _ClassVar[int]
+    EPOCH_FIELD_NUMBER: _ClassVar[int]
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    SETTINGS_FIELD_NUMBER: _ClassVar[int]
+    SHARD_FIELD_NUMBER: _ClassVar[int]
+    FROM_STEP_FIELD_NUMBER: _ClassVar[int]
+    FROM_DIGEST_FIELD_NUMBER: _ClassVar[int]
+    CHANGES_FIELD_NUMBER: _ClassVar[int]
+    UNTIL_FIELD_NUMBER: _ClassVar[int]
+    WANTS_SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
+    SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
+    HISTORY_FIELD_NUMBER: _ClassVar[int]
+    IS_REBUILD_FIELD_NUMBER: _ClassVar[int]
+    run: str
+    epoch: int
+    number: int
+    settings: bytes
+    shard: int
+    from_step: int
+    from_digest: bytes
+    changes: Changes
+    until: int
+    wants_snapshot: bool
+    snapshot: bytes
+    history: _containers.RepeatedCompositeFieldContainer[PastAdvance]
+    is_rebuild: bool
+    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., settings: _Optional[bytes] = ..., shard: _Optional[int] = ..., from_step: _Optional[int] = ..., from_digest: _Optional[bytes] = ..., changes: _Optional[_Union[Changes, _Mapping]] = ..., until: _Optional[int] = ..., wants_snapshot: _Optional[bool] = ..., snapshot: _Optional[bytes] = ..., history: _Optional[_Iterable[_Union[PastAdvance, _Mapping]]] = ..., is_rebuild: _Optional[bool] = ...) -> None: ...
+
+class AdvanceAnswer(_message.Message):
+    __slots__ = ("epoch", "number", "wall_s", "advance", "needs_state", "snapshot")
+    EPOCH_FIELD_NUMBER: _ClassVar[int]
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    WALL_S_FIELD_NUMBER: _ClassVar[int]
+    ADVANCE_FIELD_NUMBER: _ClassVar[int]
+    NEEDS_STATE_FIELD_NUMBER: _ClassVar[int]
+    SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
+    epoch: int
+    number: int
+    wall_s: float
+    advance: Advance
+    needs_state: bool
+    snapshot: bytes
+    def __init__(self, epoch: _Optional[int] = ..., number: _Optional[int] = ..., wall_s: _Optional[float] = ..., advance: _Optional[_Union[Advance, _Mapping]] = ..., needs_state: _Optional[bool] = ..., snapshot: _Optional[bytes] = ...) -> None: ...
+
+class Nothing(_message.Message):
+    __slots__ = ()
+    def __init__(self) -> None: ...
+
+class InsertOrder(_message.Message):
+    __slots__ = ("genome", "has_place", "x", "y")
+    GENOME_FIELD_NUMBER: _ClassVar[int]
+    HAS_PLACE_FIELD_NUMBER: _ClassVar[int]
+    X_FIELD_NUMBER: _ClassVar[int]
+    Y_FIELD_NUMBER: _ClassVar[int]
+    genome: Genome
+    has_place: bool
+    x: float
+    y: float
+    def __init__(self, genome: _Optional[_Union[Genome, _Mapping]] = ..., has_place: _Optional[bool] = ..., x: _Optional[float] = ..., y: _Optional[float] = ...) -> None: ...
+
+class Command(_message.Message):
+    __slots__ = ("command_id", "step", "pause", "resume", "insert", "remove", "replace_brain")
+    COMMAND_ID_FIELD_NUMBER: _ClassVar[int]
+    STEP_FIELD_NUMBER: _ClassVar[int]
+    PAUSE_FIELD_NUMBER: _ClassVar[int]
+    RESUME_FIELD_NUMBER: _ClassVar[int]
+    INSERT_FIELD_NUMBER: _ClassVar[int]
+    REMOVE_FIELD_NUMBER: _ClassVar[int]
+    REPLACE_BRAIN_FIELD_NUMBER: _ClassVar[int]
+    command_id: str
+    step: int
+    pause: Nothing
+    resume: Nothing
+    insert: InsertOrder
+    remove: BirthName
+    replace_brain: BrainChange
+    def __init__(self, command_id: _Optional[str] = ..., step: _Optional[int] = ..., pause: _Optional[_Union[Nothing, _Mapping]] = ..., resume: _Optional[_Union[Nothing, _Mapping]] = ..., insert: _Optional[_Union[InsertOrder, _Mapping]] = ..., remove: _Optional[_Union[BirthName, _Mapping]] = ..., replace_brain: _Optional[_Union[BrainChange, _Mapping]] = ...) -> None: ...
+
+class AdvanceEntry(_message.Message):
+    __slots__ = ("number", "advance", "pose_rows")
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    ADVANCE_FIELD_NUMBER: _ClassVar[int]
+    POSE_ROWS_FIELD_NUMBER: _ClassVar[int]
+    number: int
+    advance: Advance
+    pose_rows: int
+    def __init__(self, number: _Optional[int] = ..., advance: _Optional[_Union[Advance, _Mapping]] = ..., pose_rows: _Optional[int] = ...) -> None: ...
+
 class Entry(_message.Message):
-    __slots__ = ("island", "birth", "attempt", "provenance", "vetted", "vetting_failed", "evaluated", "evaluation_failed")
+    __slots__ = ("island", "birth", "attempt", "provenance", "vetted", "vetting_failed", "evaluated", "evaluation_failed", "advanced", "commanded")
     ISLAND_FIELD_NUMBER: _ClassVar[int]
     BIRTH_FIELD_NUMBER: _ClassVar[int]
     ATTEMPT_FIELD_NUMBER: _ClassVar[int]
@@ -222,6 +420,8 @@ class Entry(_message.Message):
     VETTING_FAILED_FIELD_NUMBER: _ClassVar[int]
     EVALUATED_FIELD_NUMBER: _ClassVar[int]
     EVALUATION_FAILED_FIELD_NUMBER: _ClassVar[int]
+    ADVANCED_FIELD_NUMBER: _ClassVar[int]
+    COMMANDED_FIELD_NUMBER: _ClassVar[int]
     island: int
     birth: int
     attempt: int
@@ -230,4 +430,6 @@ class Entry(_message.Message):
     vetting_failed: str
     evaluated: Evaluation
     evaluation_failed: str
-    def __init__(self, island: _Optional[int] = ..., birth: _Optional[int] = ..., attempt: _Optional[int] = ..., provenance: _Optional[_Union[Provenance, _Mapping]] = ..., vetted: _Optional[_Union[Report, _Mapping]] = ..., vetting_failed: _Optional[str] = ..., evaluated: _Optional[_Union[Evaluation, _Mapping]] = ..., evaluation_failed: _Optional[str] = ...) -> None: ...
+    advanced: AdvanceEntry
+    commanded: Command
+    def __init__(self, island: _Optional[int] = ..., birth: _Optional[int] = ..., attempt: _Optional[int] = ..., provenance: _Optional[_Union[Provenance, _Mapping]] = ..., vetted: _Optional[_Union[Report, _Mapping]] = ..., vetting_failed: _Optional[str] = ..., evaluated: _Optional[_Union[Evaluation, _Mapping]] = ..., evaluation_failed: _Optional[str] = ..., advanced: _Optional[_Union[AdvanceEntry, _Mapping]] = ..., commanded: _Optional[_Union[Command, _Mapping]] = ...) -> None: ...
