@@ -43,7 +43,7 @@ def evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
         InvalidRobot: more neurons than the limits.
     """
     track = simulate(robot, settings.space, settings.simulation)
-    value = _judge(track, settings.fitness)
+    value = judge(track, settings.fitness)
     clock = settings.simulation
     return Evaluation(
         value,
@@ -53,8 +53,16 @@ def evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
     )
 
 
-def _judge(track: Track, fitness: Fitness) -> float:
-    """Return the fitness of a track; whatever a user's function does is told."""
+def judge(track: Track, fitness: Fitness) -> float:
+    """Return the fitness of a track.
+
+    Args:
+        track: (T, 3) positions; T >= 2.
+        fitness: names the function and its weights.
+
+    Raises:
+        FitnessUndefined: it raised, or gave no finite number.
+    """
     function = cast("FitnessFunction", fitness_function(fitness))
     try:
         value = float(function(track, fitness))
@@ -93,7 +101,7 @@ def simulate(
         ExperimentError: a sensor that the world has nothing for.
         InvalidRobot: more neurons than the limits.
     """
-    _silence_engine()
+    silence_engine()
     model = solo_model(robot, body_space(space), simulation)
     life = _Life(robot, space, simulation, model)
     start = simulation.warmup_steps
@@ -176,9 +184,9 @@ def _raise_diverged(data: mujoco.MjData, time_s: float) -> None:
 
 
 @lru_cache(maxsize=1)
-def _silence_engine() -> None:
+def silence_engine() -> None:
     """Keep the engine's warnings out of stderr and of a file where we stand.
 
-    They are counted all the same, and ``_check_warnings`` reads the counts.
+    They are counted all the same, and whoever steps a model reads the counts.
     """
     mujoco.set_mju_user_warning(lambda _message: None)

@@ -38,6 +38,7 @@ class Senses:
         readings: (1, I) the last values; unused inputs stay 0.
         velocities: of each imu at the last reading, world frame [m/s]; part of
             what a snapshot must keep.
+        lights: (geom, place in the readings) of each light sensor.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class Senses:
         *,
         width: int,
         prefix: str = "",
+        has_light: bool = False,
     ) -> None:
         """Find the sensors.
 
@@ -57,9 +59,10 @@ class Senses:
             model: a compiled model that holds it.
             width: number I of readings, at least the robot's inputs.
             prefix: of the robot's names in the model.
+            has_light: somebody else fills in what light sensors read.
 
         Raises:
-            ExperimentError: a light sensor; this world has no light.
+            ExperimentError: a light sensor, and this world has no light.
         """
         self.readings: Floats = np.zeros((1, width))
         self.velocities: list[_Velocity] = []
@@ -67,6 +70,7 @@ class Senses:
         self._pads: list[tuple[int, int]] = []
         self._core_imu = -1
         self._imus: list[tuple[int, int]] = []
+        self.lights: list[tuple[int, int]] = []
         start = free_joint(model, prefix)
         self._qpos = int(model.jnt_qposadr[start])
         self._qvel = int(model.jnt_dofadr[start])
@@ -75,11 +79,14 @@ class Senses:
         place = 0
         for index, part in enumerate(robot.parts):
             for sensor in space[part.kind].sensors:
-                if sensor.kind == "light":
+                if sensor.kind == "light" and not has_light:
                     raise ExperimentError(
                         f"body.parts[{index}]: {part.kind}: no light in this world"
                     )
-                if sensor.kind == "touch":
+                if sensor.kind == "light":
+                    name = f"{prefix}{index}/{sensor.box}"
+                    self.lights.append((find(model, _GEOM, name), place))
+                elif sensor.kind == "touch":
                     name = f"{prefix}{index}/{sensor.box}"
                     self._pads.append((find(model, _GEOM, name), place))
                 else:
