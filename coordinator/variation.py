@@ -22,7 +22,7 @@ from coordinator.brain_mutation import (
     delete_hidden_neurons,
     vary_neurons,
 )
-from coordinator.branch import Branch, freeze, gene_ids, level, tallies, thaw
+from coordinator.branch import Branch, freeze, gene_ids, level, preorder, tallies, thaw
 from coordinator.draws import Draws
 from schema.birth import BirthId
 from schema.experiment import Experiment, body_space
@@ -55,7 +55,7 @@ def mate(
     if not crossover(draws, root, thaw(second, types), experiment):
         return None
     mutate(draws, root, gene_ids(birth), experiment)
-    if not tallies(root)[root].outputs:
+    if not any(branch.outputs for branch in preorder(root)):
         return None
     if experiment.space.planar:
         level(root)

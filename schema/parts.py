@@ -9,7 +9,7 @@ differ the code is followed, because it produced the results.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 Vector = tuple[float, float, float]
@@ -140,6 +140,9 @@ class PartType:
         is_root: it is a core: always and only the root of a tree.
         is_levelled: planarity turns it back to the plane of the core.
         not_on: names of part types that it is never put on at random.
+        parameters: all of them, in the order in which they are written.
+        inputs: number of network inputs that its sensors feed.
+        outputs: number of network outputs that drive it.
     """
 
     name: str
@@ -152,20 +155,19 @@ class PartType:
     is_levelled: bool = False
     not_on: tuple[str, ...] = ()
 
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """All parameters, in the order in which they are written."""
-        return self.own_parameters + COLOURS
+    parameters: tuple[Parameter, ...] = field(init=False)
+    inputs: int = field(init=False)
+    outputs: int = field(init=False)
 
-    @property
-    def inputs(self) -> int:
-        """Number of network inputs that its sensors feed."""
-        return sum(sensor.inputs for sensor in self.sensors)
-
-    @property
-    def outputs(self) -> int:
-        """Number of network outputs that drive it."""
-        return 0 if self.motor is None else 1
+    def __post_init__(self) -> None:
+        """Derive, once, what is asked for at every birth."""
+        derived = {
+            "parameters": self.own_parameters + COLOURS,
+            "inputs": sum(sensor.inputs for sensor in self.sensors),
+            "outputs": 0 if self.motor is None else 1,
+        }
+        for name, value in derived.items():
+            object.__setattr__(self, name, value)
 
 
 BodySpace = Mapping[str, PartType]
