@@ -12,6 +12,7 @@ COMMANDS = {
     "worker": ("worker.__main__", "simulate robots for a coordinator"),
     "analyzer": ("analyzer.__main__", "vet bodies for a coordinator"),
     "robot": ("schema.__main__", "check, convert or show a robot file"),
+    "analyze": ("analysis.__main__", "draw what the tables say"),
     "bench": ("worker.bench", "measure this machine"),
 }
 """Module whose ``main`` takes the words, the command first; and what it does."""

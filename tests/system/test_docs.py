@@ -1,0 +1,83 @@
+"""The code in README and docs runs as it stands."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from revolve import COMMANDS
+from schema.experiment import parse_experiment
+
+pytestmark = pytest.mark.system
+
+TOP = Path(__file__).parents[2]
+PAGES = [TOP / "README.md", *sorted((TOP / "docs").glob("*.md"))]
+
+
+def _blocks(page: Path, language: str) -> list[str]:
+    return re.findall(
+        rf"^```{language}\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL
+    )
+
+
+def _environment(*paths: Path) -> dict[str, str]:
+    found = os.pathsep.join(map(str, (*paths, TOP)))
+    return {**os.environ, "PYTHONPATH": found}
+
+
+def test_python_of_the_tables_page(undisturbed: Path, tmp_path: Path) -> None:
+    shutil.copytree(undisturbed, tmp_path / "runs" / "a")
+    blocks = _blocks(TOP / "docs" / "tables.md", "python")
+    assert len(blocks) >= 4
+    for block in blocks:
+        done = subprocess.run(
+            [sys.executable, "-W", "error", "-c", block],
+            cwd=tmp_path,
+            env=_environment(),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, f"{block}\n{done.stderr}"
+
+
+def test_experiments_of_the_experiments_page(tmp_path: Path) -> None:
+    page = TOP / "docs" / "experiments.md"
+    (module,) = _blocks(page, "python")
+    (tmp_path / "my_parts.py").write_text(module)
+    documents = _blocks(page, "toml")
+    assert len(documents) >= 2
+    for document in documents:
+        (tmp_path / "mine.toml").write_text(document)
+        done = subprocess.run(
+            [sys.executable, "-m", "revolve", "run", "mine.toml", "--births", "20",
+             "--in-process", "--quiet", "--out", f"out-{len(document)}"],
+            cwd=tmp_path,
+            env=_environment(tmp_path),
+            capture_output=True,
+            text=True,
+            check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, f"{document}\n{done.stderr}"
+        if "my_parts" not in document:
+            parse_experiment(document, page.name)
+
+
+def test_every_command_that_a_page_names_exists() -> None:
+    named = {
+        word
+        for page in PAGES
+        for word in re.findall(r"\brevolve ([a-z]+)\b", page.read_text())
+    }
+    assert len(named) >= 6
+    assert named <= set(COMMANDS)
+
+
+def test_every_link_leads_somewhere() -> None:
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
