@@ -5,31 +5,17 @@ same order, and those that already stand on disk are passed over by their number
 """
 
 import contextlib
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet
-
-from coordinator.disk import AppendedFile, replace_durably, storage_error
-from coordinator.events import Record
+from coordinator.disk import storage_error
+from coordinator.events import Append, Record
 from coordinator.folder import RunDetails
-from schema.errors import RunFolderError
-from schema.run_tables import (
-    SEGMENTS,
-    parquet_path,
-    read_chain,
-    read_table,
-    segment_path,
-    segments_of,
-)
+from coordinator.table_file import TableFile
+from schema.run_tables import SEGMENTS, parquet_path, segments_of
 from schema.tables import TABLES
 
 WAITING = 64
 """Rows of one table that wait for each other before they are written."""
-
-ROW_GROUP = 50_000
 
 
 class Recorder:
@@ -58,7 +44,7 @@ class Recorder:
         except OSError as error:
             raise storage_error(folder, error) from None
         self._tables = {
-            name: _Table(folder, name, paths[name], fsync=fsync) for name in TABLES
+            name: TableFile(folder, name, paths[name], fsync=fsync) for name in TABLES
         }
 
     def write(self, record: Record) -> None:
@@ -74,6 +60,28 @@ class Recorder:
         table.take(record.row)
         if len(table.waiting) >= WAITING:
             table.flush()
+
+    def store(self, rows: Append) -> None:
+        """Bring bulk rows to disk before the journal has what they belong to.
+
+        Rows that a process before this one stored, and died before its journal
+        told of them, are cut off.
+
+        Raises:
+            MalformedMessage: the columns are none of this table.
+            RunFolderError: the disk is full or failed.
+        """
+        self._tables[rows.table].store(rows.rows, rows.columns)
+
+    def append(self, rows: Append) -> None:
+        """Take bulk rows that the journal has; those stored before just count.
+
+        Raises:
+            MalformedMessage: the columns are none of this table.
+            RunFolderError: they are not on disk and do not come again, or the disk
+                is full or failed.
+        """
+        self._tables[rows.table].take_columns(rows.rows, rows.columns)
 
     def flush(self) -> None:
         """Bring all rows to disk.
@@ -111,89 +119,3 @@ class Recorder:
         """Close all files; rows that wait are dropped, a replay brings them again."""
         for table in self._tables.values():
             table.close()
-
-
-class _Table:
-    """One table: rows that wait, rows on disk, and the segment that grows."""
-
-    def __init__(self, folder: Path, name: str, parquet: Path, *, fsync: bool) -> None:
-        self._folder = folder
-        self._name = name
-        self._parquet = parquet
-        self._fsync = fsync
-        self._schema = TABLES[name]
-        self._columns = self._schema.names[1:]
-        self._segment: AppendedFile | None = None
-        self._seen = 0
-        self.waiting: list[Mapping[str, Any]] = []
-        if parquet.exists():
-            self._stored: int = read_table(folder, name).num_rows
-            return
-        chain, unused = read_chain(folder, name)
-        self._stored = sum(batch.num_rows for batch in chain)
-        try:
-            for _, path in unused:
-                path.unlink()
-        except OSError as error:
-            raise storage_error(folder, error) from None
-
-    def take(self, row: Mapping[str, Any]) -> None:
-        """Take the next row, unless it stands on disk already."""
-        if self._seen >= self._stored:
-            self.waiting.append(row)
-        self._seen += 1
-
-    def flush(self) -> None:
-        """Write the waiting rows as one batch, whole or not at all."""
-        if not self.waiting:
-            return
-        if self._parquet.exists():
-            raise RunFolderError(
-                f"{self._parquet}: finished with {self._stored} rows, and more came"
-            )
-        if self._segment is None:
-            self._segment = self._opened()
-        self._segment.append(self._batch().serialize().to_pybytes())
-        self._stored += len(self.waiting)
-        self.waiting = []
-
-    def finish(self) -> None:
-        """Write all rows as Parquet, unless that is done."""
-        if self._parquet.exists():
-            return
-        table = read_table(self._folder, self._name)
-        if table.num_rows != self._stored:
-            raise RunFolderError(
-                f"{self._folder / SEGMENTS}: {self._name}: must hold {self._stored} "
-                f"rows, got {table.num_rows}: resume the run to write them again"
-            )
-        replace_durably(
-            self._parquet,
-            lambda path: pa.parquet.write_table(
-                table, path, compression="zstd", row_group_size=ROW_GROUP
-            ),
-        )
-
-    def close(self) -> None:
-        """Close the segment."""
-        if self._segment is not None:
-            self._segment.close()
-
-    def _opened(self) -> AppendedFile:
-        """Return a new segment that holds the schema."""
-        numbers = [number for number, _ in segments_of(self._folder, self._name)]
-        number = max(numbers, default=-1) + 1
-        path = segment_path(self._folder, self._name, number)
-        segment = AppendedFile(path, fsync=self._fsync)
-        segment.append(self._schema.serialize().to_pybytes())
-        return segment
-
-    def _batch(self) -> pa.RecordBatch:
-        """Return the waiting rows as columns."""
-        rows = self.waiting
-        numbers = range(self._stored, self._stored + len(rows))
-        arrays = [pa.array(numbers, self._schema.field(0).type)]
-        for index, column in enumerate(self._columns, start=1):
-            kind = self._schema.field(index).type
-            arrays.append(pa.array([row[column] for row in rows], kind))
-        return pa.RecordBatch.from_arrays(arrays, schema=self._schema)

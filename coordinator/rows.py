@@ -1,4 +1,4 @@
-"""What an off-line island writes: rows of the tables in `schema.tables`."""
+"""What islands write: rows of the tables in `schema.tables`."""
 
 from collections.abc import Sequence
 
@@ -16,6 +16,9 @@ def birth_record(
     attempts: int,
     robot: Robot,
     space: BodySpace,
+    *,
+    sim_time_s: float | None = None,
+    place: tuple[float, float] | None = None,
 ) -> Record:
     """Return the births row of an individual.
 
@@ -25,6 +28,8 @@ def birth_record(
         attempts: that it took, this one included.
         robot: what its genome develops into.
         space: the part types.
+        sim_time_s: when it was born on-line [s].
+        place: and where, in the ground plane [m].
     """
     row = {
         "island": individual.birth.island,
@@ -39,6 +44,9 @@ def birth_record(
         "genome": encode_genome(individual.genome),
         "body": body_rows(robot),
         **sizes(robot, individual.genome, space),
+        "sim_time_s": sim_time_s,
+        "x": place and place[0],
+        "y": place and place[1],
     }
     return Record("births", row)
 

@@ -18,6 +18,7 @@ class Purpose(IntEnum):
     PARENTS = 2
     MATE = 3
     SURVIVORS = 4
+    PLACE = 5
 
 
 def stream(

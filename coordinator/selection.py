@@ -23,7 +23,7 @@ class Individual:
         genome: what it hands down.
         fitness: always maximised; 0 where its evaluation failed.
         rank: 1 without parents, else 1 + the greatest of theirs (thesis eq. 6.1).
-        generation: number of its brood; founders are 0.
+        generation: number of its brood; founders are 0; None on-line.
         has_failed: its evaluation ended without a judgement.
     """
 
@@ -31,7 +31,7 @@ class Individual:
     genome: Genome
     fitness: float
     rank: int
-    generation: int
+    generation: int | None
     has_failed: bool = False
 
 

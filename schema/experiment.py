@@ -11,9 +11,9 @@ from dataclasses import replace
 from difflib import get_close_matches
 from functools import lru_cache
 from importlib import resources
-from math import isfinite, pi
+from math import isclose, isfinite, lcm, pi
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, cast
+from typing import Annotated, Any, Literal, TypeVar, cast, get_args
 
 import msgspec
 from msgspec import Meta, Struct
@@ -91,6 +91,12 @@ class Selection(_Section, frozen=True):
     survivors: Literal["best", "random"] = "best"
     keep_parents: bool = True
     max_mating_attempts: AtLeastOne = 5
+
+    @property
+    def parents_needed(self) -> int:
+        """How many must be there to choose two parents from; 0 if none is chosen."""
+        needs = {"tournament": self.tournament_size + 1, "random": 2, "none": 0}
+        return needs[self.parents]
 
 
 class Vetting(_Section, frozen=True):
@@ -224,6 +230,34 @@ def evaluation_settings(experiment: Experiment) -> bytes:
             fitness=experiment.fitness,
         )
     )
+
+
+def arena_settings(experiment: Experiment) -> bytes:
+    """Return the JSON that goes with every request about the experiment's arena.
+
+    Raises:
+        ExperimentError: an off-line experiment.
+    """
+    if experiment.arena is None:
+        raise ExperimentError(f"{experiment.name}: has no arena")
+    return msgspec.json.encode(
+        ArenaSettings(
+            space=experiment.space,
+            simulation=experiment.simulation,
+            fitness=experiment.fitness,
+            arena=experiment.arena,
+        )
+    )
+
+
+@lru_cache(maxsize=64)
+def read_arena_settings(settings: bytes) -> ArenaSettings:
+    """Return the settings of a request to advance an arena.
+
+    Raises:
+        ExperimentError: not such settings.
+    """
+    return _from_json(settings, ArenaSettings)
 
 
 @lru_cache(maxsize=64)
@@ -380,15 +414,24 @@ def _refuse_unknown(
                 f"{where}: {prefix}{key}: no such key{nearest(key, fields)}; "
                 f"allowed: {', '.join(fields)}"
             )
-        if isinstance(value, float) and not isfinite(value):
-            raise ExperimentError(
-                f"{where}: {prefix}{key}: must be finite, got {value}"
-            )
-        inner = fields[key].type
-        if isinstance(inner, type) and issubclass(inner, Struct):
+        for number in value if isinstance(value, list) else (value,):
+            if isinstance(number, float) and not isfinite(number):
+                raise ExperimentError(
+                    f"{where}: {prefix}{key}: must be finite, got {number}"
+                )
+        inner = _section(fields[key].type)
+        if inner is not None:
             if not isinstance(value, dict):
                 raise ExperimentError(f"{where}: {prefix}{key}: must be a table")
             _refuse_unknown(value, inner, where, f"{prefix}{key}.")
+
+
+def _section(kind: Any) -> type[Struct] | None:  # noqa: ANN401 - any annotation
+    """Return the section that a key holds, be it optional; None if a plain value."""
+    for each in (kind, *get_args(kind)):
+        if isinstance(each, type) and issubclass(each, Struct):
+            return each
+    return None
 
 
 def _explain(error: msgspec.ValidationError, document: dict[str, Any]) -> str:
@@ -409,13 +452,16 @@ def check_experiment(experiment: Experiment, where: str) -> None:
 
     Raises:
         ExperimentError: a restriction that no robot can meet, a selection that
-            cannot draw its parents, a window that ends between two samples, a
-            plug-in that does not exist.
+            cannot draw its parents, a window that ends between two samples, an
+            arena too small or with clocks that do not meet, a plug-in that does
+            not exist.
     """
     checks: list[Callable[[Experiment], str]] = [
         _limits_problem,
         _selection_problem,
         _clock_problem,
+        _arena_problem,
+        _arena_clock_problem,
     ]
     for check in checks:
         if problem := check(experiment):
@@ -476,6 +522,64 @@ def _clock_problem(experiment: Experiment) -> str:
         return (
             "simulation.window_steps: must be a multiple of simulation.pose_steps = "
             f"{clock.pose_steps}, got {clock.window_steps}"
+        )
+    return ""
+
+
+def steps_of(seconds: float, simulation: Simulation) -> int:
+    """Return a time in physics steps, rounded."""
+    return round(seconds / simulation.timestep_s)
+
+
+def _arena_problem(experiment: Experiment) -> str:
+    arena, selection = experiment.arena, experiment.selection
+    if arena is None:
+        return ""
+    if selection.survivors != "best" or not selection.keep_parents:
+        return (
+            "selection: the survivors of an arena are those that are fit enough; "
+            'survivors must be "best" and keep_parents true'
+        )
+    needed = selection.parents_needed
+    if arena.population_floor < needed:
+        return (
+            f"arena.population_floor: must be >= {needed}, so that there are always "
+            f"two parents to choose, got {arena.population_floor}"
+        )
+    lowest = max(arena.population_floor, selection.population)
+    if arena.population_limit < lowest:
+        return (
+            "arena.population_limit: must be >= arena.population_floor and "
+            f"selection.population, {lowest}, got {arena.population_limit}"
+        )
+    if arena.split_distance_m < arena.merge_distance_m:
+        return (
+            "arena.split_distance_m: must be >= arena.merge_distance_m = "
+            f"{arena.merge_distance_m}, got {arena.split_distance_m}"
+        )
+    return ""
+
+
+def _arena_clock_problem(experiment: Experiment) -> str:
+    """Decisions fall on brain ticks and on poses; all else would be half a state."""
+    arena, clock = experiment.arena, experiment.simulation
+    if arena is None:
+        return ""
+    for name in ("founder", "birth", "cull", "sample", "snapshot"):
+        seconds: float = getattr(arena, f"{name}_interval_s")
+        steps = steps_of(seconds, clock)
+        tick = lcm(clock.brain_steps, clock.pose_steps)
+        is_whole = isclose(steps * clock.timestep_s, seconds, rel_tol=1e-9)
+        if not (steps and is_whole) or steps % tick:
+            return (
+                f"arena.{name}_interval_s: must be a whole multiple of "
+                f"{tick * clock.timestep_s:g} s, where simulation.brain_steps and "
+                f"pose_steps meet, got {seconds:g}"
+            )
+    if clock.warmup_steps % clock.pose_steps:
+        return (
+            "simulation.warmup_steps: must be a multiple of simulation.pose_steps = "
+            f"{clock.pose_steps}, got {clock.warmup_steps}"
         )
     return ""
 

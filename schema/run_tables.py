@@ -52,19 +52,35 @@ def read_segment(path: Path, schema: pa.Schema) -> list[pa.RecordBatch]:
         RunFolderError: the segment is of another version of its table, or the disk
             fails.
     """
+    return [batch for _, batch in _read_batches(path, schema)]
+
+
+def batch_ends(path: Path, schema: pa.Schema) -> list[tuple[int, int]]:
+    """Return where each complete batch of a segment ends, and its number of rows.
+
+    Raises:
+        RunFolderError: the segment is of another version of its table, or the disk
+            fails.
+    """
+    return [(end, batch.num_rows) for end, batch in _read_batches(path, schema)]
+
+
+def _read_batches(path: Path, schema: pa.Schema) -> list[tuple[int, pa.RecordBatch]]:
     try:
         data = path.read_bytes()
     except OSError as error:
         raise RunFolderError(f"{path}: cannot be read: {error.strerror}") from None
-    batches: list[pa.RecordBatch] = []
+    batches: list[tuple[int, pa.RecordBatch]] = []
     try:
-        reader = pa.ipc.open_stream(data)
+        source = pa.BufferReader(data)
+        reader = pa.ipc.open_stream(source)
         if not reader.schema.equals(schema, check_metadata=True):
             raise RunFolderError(
                 f"{path}: was written by another version of Revolve: finish the run "
                 "with that one"
             )
-        batches.extend(iter(reader.read_next_batch, None))
+        for batch in iter(reader.read_next_batch, None):
+            batches.append((source.tell(), batch))  # noqa: PERF401 - keeps what came
     except StopIteration:
         pass
     except (pa.ArrowInvalid, OSError, MemoryError):

@@ -10,11 +10,12 @@ from typing import Any
 import pyarrow as pa
 
 from schema.brain import Layer
+from schema.errors import MalformedMessage
 from schema.genome import Genome, walk
 from schema.parts import BodySpace
 from schema.robot import Robot
 
-VERSION = 1
+VERSION = 2
 """Of all tables; goes up when a column changes its name, type or meaning."""
 
 Row = dict[str, Any]
@@ -76,8 +77,14 @@ BIRTHS = _table(
     _column("outputs", pa.int32()),
     _column("hidden", pa.int32()),
     _column("connections", pa.int32()),
+    _column("sim_time_s", pa.float64(), "s", is_nullable=True),
+    _column("x", pa.float64(), "m", is_nullable=True),
+    _column("y", pa.float64(), "m", is_nullable=True),
 )
-"""One row per individual born; founders have no parents."""
+"""One row per individual born; founders have no parents.
+
+When and where it was born is null off-line, its generation on-line.
+"""
 
 EVALUATIONS = _table(
     "evaluations",
@@ -102,7 +109,73 @@ POPULATION = _table(
     _column("birth", pa.int64()),
     _column("fitness", pa.float64(), is_nullable=True),
 )
-"""One row per individual alive when ``births`` individuals had been born."""
+"""One row per individual alive when ``births`` individuals had been born.
+
+On-line there is a set of rows at each birth, the newborn's included; fitness is
+null of those who are not mature.
+"""
+
+FITNESS = _table(
+    "fitness",
+    _column("island", pa.int32()),
+    _column("birth", pa.int64()),
+    _column("sim_time_s", pa.float64(), "s"),
+    _column("births", pa.int64()),
+    _column("age_s", pa.float64(), "s"),
+    _column("path_velocity", pa.float64(), "m/s"),
+    _column("straight_velocity", pa.float64(), "m/s"),
+    _column("fitness", pa.float64()),
+    _column("is_mature", pa.bool_()),
+)
+"""One row per living robot and sample of an arena, mature or not."""
+
+_COORDINATE = pa.float32()
+
+POSES = _table(
+    "poses",
+    _column("island", pa.int32()),
+    _column("birth", pa.int64()),
+    _column("sim_time_s", pa.float64(), "s"),
+    *(_column(axis, _COORDINATE, "m") for axis in "xyz"),
+    *(_column(f"q{axis}", _COORDINATE) for axis in "wxyz"),
+    _column("angles", pa.list_(_inner("item", _COORDINATE)), "rad"),
+)
+"""One row per living robot and pose of an arena: enough to draw it.
+
+Position and attitude (unit quaternion) of the core, world frame, and the angle of
+every joint, driven or not, by ascending part.
+"""
+
+DEATHS = _table(
+    "deaths",
+    _column("island", pa.int32()),
+    _column("birth", pa.int64()),
+    _column("sim_time_s", pa.float64(), "s"),
+    _column("births", pa.int64()),
+    _column("reason", pa.string()),
+    _column("detail", pa.string()),
+    _column("x", pa.float64(), "m"),
+    _column("y", pa.float64(), "m"),
+    _column("z", pa.float64(), "m", is_nullable=True),
+)
+"""One row per robot that left an arena, and where its core was.
+
+Reason is "selection" (less fit than the survivors' rule asks), "cull" (an arena
+full of the mature made room), "diverged" (its physics did; ``detail`` says how) or
+"removed" (by an operator; z is null if it had not lived yet).
+"""
+
+TOUCHES = _table(
+    "touches",
+    _column("island", pa.int32()),
+    _column("birth", pa.int64()),
+    _column("other_island", pa.int32()),
+    _column("other_birth", pa.int64()),
+    _column("sim_time_s", pa.float64(), "s"),
+    _column("over_s", pa.float64(), "s"),
+    _column("duration_s", pa.float64(), "s"),
+)
+"""One row per pair that touched: for how long of the time ``over_s`` that ended."""
 
 _INSTANT = pa.timestamp("ms", tz="UTC")
 
@@ -129,9 +202,44 @@ TABLES: dict[str, pa.Schema] = {
     "births": BIRTHS,
     "evaluations": EVALUATIONS,
     "population": POPULATION,
+    "fitness": FITNESS,
+    "poses": POSES,
+    "deaths": DEATHS,
+    "touches": TOUCHES,
     "runs": RUNS,
 }
 """Schemas by table name."""
+
+
+def read_columns(table: str, columns: bytes) -> pa.Table:
+    """Return rows that came as columns.
+
+    Args:
+        table: whose they are.
+        columns: Arrow IPC stream of all columns but ``record``; no bytes, no rows.
+
+    Raises:
+        MalformedMessage: not such a stream, or columns of other names or types.
+    """
+    schema = TABLES[table].remove(0)
+    if not columns:
+        return schema.empty_table()
+    try:
+        with pa.ipc.open_stream(columns) as reader:
+            found = reader.read_all()
+        if not found.schema.equals(schema):
+            raise MalformedMessage(
+                f"{table}: columns must be {_described(schema)}, got "
+                f"{_described(found.schema)}"
+            )
+        found.validate(full=True)
+    except (pa.ArrowException, OSError) as error:
+        raise MalformedMessage(f"{table}: no Arrow stream: {error}") from None
+    return found
+
+
+def _described(schema: pa.Schema) -> str:
+    return ", ".join(f"{field.name}: {field.type}" for field in schema)
 
 
 def repeatable(schema: pa.Schema) -> list[str]:

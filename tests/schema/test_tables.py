@@ -32,6 +32,9 @@ def birth(genome: Genome, record: int) -> dict[str, object]:
         "genome": encode_genome(genome),
         "body": body_rows(robot),
         **sizes(robot, genome, BUILT_IN),
+        "sim_time_s": None if record else 15.0,
+        "x": None if record else -1.5,
+        "y": None if record else 0.0,
     }
 
 
@@ -55,6 +58,10 @@ def test_every_table_says_what_it_holds(name: str) -> None:
         ("births", set()),
         ("evaluations", {"wall_s", "worker", "platform"}),
         ("population", set()),
+        ("fitness", set()),
+        ("poses", set()),
+        ("deaths", set()),
+        ("touches", set()),
         ("runs", {"versions", "platform", "cpu_flags", "start", "end"}),
     ],
 )
