@@ -89,6 +89,21 @@ class AdvanceAnswer:
     snapshot: bytes = b""
 
 
+@dataclass(frozen=True, slots=True)
+class Live:
+    """What is published after each advance, best effort, for those who watch.
+
+    Attributes:
+        run: name of the run.
+        shard: number of the island whose arena it is.
+        advance: what it came to, poses included.
+    """
+
+    run: str
+    shard: int
+    advance: Advance
+
+
 def encode_advance_request(request: AdvanceRequest) -> bytes:
     """Return the bytes of a request."""
     message = pb.AdvanceRequest(
@@ -126,6 +141,16 @@ def decode_advance_request(data: bytes) -> AdvanceRequest:
     return decoded(data, pb.AdvanceRequest(), _request)
 
 
+def is_advance_request(data: bytes) -> bool:
+    """Return whether a job is about an arena, and not about a single robot.
+
+    Raises:
+        MalformedMessage: bytes that are no request of either kind.
+    """
+    # Only a request about an arena speaks of changes, if only to say: none.
+    return decoded(data, pb.AdvanceRequest(), lambda said: said.HasField("changes"))
+
+
 def encode_advance_answer(answer: AdvanceAnswer) -> bytes:
     """Return the bytes of an answer."""
     message = pb.AdvanceAnswer(
@@ -149,6 +174,26 @@ def decode_advance_answer(data: bytes) -> AdvanceAnswer:
             none, a number that is not finite.
     """
     return decoded(data, pb.AdvanceAnswer(), _answer)
+
+
+def encode_live(live: Live) -> bytes:
+    """Return the bytes of what is published after an advance."""
+    message = pb.Live(run=live.run, shard=live.shard)
+    message.advance.CopyFrom(advance_to_message(live.advance))
+    return message.SerializeToString(deterministic=True)
+
+
+def decode_live(data: bytes) -> Live:
+    """Return what was published after an advance.
+
+    Raises:
+        MalformedMessage: other bytes, or an advance that breaks its rules.
+    """
+    return decoded(data, pb.Live(), _live)
+
+
+def _live(message: pb.Live) -> Live:
+    return Live(message.run, message.shard, advance_from_message(message.advance))
 
 
 def _request(message: pb.AdvanceRequest) -> AdvanceRequest:

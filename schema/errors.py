@@ -46,3 +46,7 @@ class JobRefused(RevolveError):  # noqa: N818 - reads as what it says
 
 class SimulationDiverged(RevolveError):  # noqa: N818 - reads as what it says
     """The physics left the realm of numbers: nobody's fault, a result."""
+
+
+class StateDiffers(RevolveError):  # noqa: N818 - reads as what it says
+    """A rebuilt arena is not what it was: this machine computes otherwise."""

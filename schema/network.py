@@ -57,6 +57,7 @@ class Agent:
         tls: files, for a ``tls/`` address.
         platform: tag of CPU, system and libraries.
         version: of Revolve Islands.
+        threads: that advance one arena together.
     """
 
     role: Role
@@ -67,6 +68,7 @@ class Agent:
     tls: Tls | None = None
     platform: str = ""
     version: str = ""
+    threads: int = 1
 
 
 def parse_address(address: str) -> tuple[str, str, int]:

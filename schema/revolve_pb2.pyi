@@ -433,3 +433,63 @@ class Entry(_message.Message):
     advanced: AdvanceEntry
     commanded: Command
     def __init__(self, island: _Optional[int] = ..., birth: _Optional[int] = ..., attempt: _Optional[int] = ..., provenance: _Optional[_Union[Provenance, _Mapping]] = ..., vetted: _Optional[_Union[Report, _Mapping]] = ..., vetting_failed: _Optional[str] = ..., evaluated: _Optional[_Union[Evaluation, _Mapping]] = ..., evaluation_failed: _Optional[str] = ..., advanced: _Optional[_Union[AdvanceEntry, _Mapping]] = ..., commanded: _Optional[_Union[Command, _Mapping]] = ...) -> None: ...
+
+class PlacedRobot(_message.Message):
+    __slots__ = ("robot", "has_place", "x", "y")
+    ROBOT_FIELD_NUMBER: _ClassVar[int]
+    HAS_PLACE_FIELD_NUMBER: _ClassVar[int]
+    X_FIELD_NUMBER: _ClassVar[int]
+    Y_FIELD_NUMBER: _ClassVar[int]
+    robot: Robot
+    has_place: bool
+    x: float
+    y: float
+    def __init__(self, robot: _Optional[_Union[Robot, _Mapping]] = ..., has_place: _Optional[bool] = ..., x: _Optional[float] = ..., y: _Optional[float] = ...) -> None: ...
+
+class Transplant(_message.Message):
+    __slots__ = ("birth", "robot")
+    BIRTH_FIELD_NUMBER: _ClassVar[int]
+    ROBOT_FIELD_NUMBER: _ClassVar[int]
+    birth: BirthName
+    robot: Robot
+    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., robot: _Optional[_Union[Robot, _Mapping]] = ...) -> None: ...
+
+class OperatorRequest(_message.Message):
+    __slots__ = ("request_id", "island", "list", "pause", "resume", "insert", "remove", "replace_brain", "snapshot")
+    REQUEST_ID_FIELD_NUMBER: _ClassVar[int]
+    ISLAND_FIELD_NUMBER: _ClassVar[int]
+    LIST_FIELD_NUMBER: _ClassVar[int]
+    PAUSE_FIELD_NUMBER: _ClassVar[int]
+    RESUME_FIELD_NUMBER: _ClassVar[int]
+    INSERT_FIELD_NUMBER: _ClassVar[int]
+    REMOVE_FIELD_NUMBER: _ClassVar[int]
+    REPLACE_BRAIN_FIELD_NUMBER: _ClassVar[int]
+    SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
+    request_id: str
+    island: int
+    list: Nothing
+    pause: Nothing
+    resume: Nothing
+    insert: PlacedRobot
+    remove: BirthName
+    replace_brain: Transplant
+    snapshot: Nothing
+    def __init__(self, request_id: _Optional[str] = ..., island: _Optional[int] = ..., list: _Optional[_Union[Nothing, _Mapping]] = ..., pause: _Optional[_Union[Nothing, _Mapping]] = ..., resume: _Optional[_Union[Nothing, _Mapping]] = ..., insert: _Optional[_Union[PlacedRobot, _Mapping]] = ..., remove: _Optional[_Union[BirthName, _Mapping]] = ..., replace_brain: _Optional[_Union[Transplant, _Mapping]] = ..., snapshot: _Optional[_Union[Nothing, _Mapping]] = ...) -> None: ...
+
+class OperatorReply(_message.Message):
+    __slots__ = ("is_refused", "text")
+    IS_REFUSED_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    is_refused: bool
+    text: str
+    def __init__(self, is_refused: _Optional[bool] = ..., text: _Optional[str] = ...) -> None: ...
+
+class Live(_message.Message):
+    __slots__ = ("run", "shard", "advance")
+    RUN_FIELD_NUMBER: _ClassVar[int]
+    SHARD_FIELD_NUMBER: _ClassVar[int]
+    ADVANCE_FIELD_NUMBER: _ClassVar[int]
+    run: str
+    shard: int
+    advance: Advance
+    def __init__(self, run: _Optional[str] = ..., shard: _Optional[int] = ..., advance: _Optional[_Union[Advance, _Mapping]] = ...) -> None: ...

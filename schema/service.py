@@ -48,11 +48,39 @@ class Tally:
     malformed: int = 0
 
 
+class Outlet:
+    """Where an agent publishes for those who watch: best effort, nothing waits."""
+
+    def __init__(self) -> None:
+        """Lead nowhere until there is a session."""
+        self._session: zenoh.Session | None = None
+        self._publishers: dict[str, zenoh.Publisher] = {}
+
+    def lead_to(self, session: zenoh.Session | None) -> None:
+        """Publish by a session from now on, or no more."""
+        self._session = session
+        self._publishers = {}
+
+    def put(self, key: str, data: bytes) -> None:
+        """Publish bytes; lost if nobody listens or the line is full."""
+        if self._session is None:
+            return
+        publisher = self._publishers.get(key)
+        if publisher is None:
+            publisher = self._publishers[key] = self._session.declare_publisher(
+                key,
+                congestion_control=zenoh.CongestionControl.DROP,
+                priority=zenoh.Priority.DATA_LOW,
+            )
+        publisher.put(data)
+
+
 def serve(
     answer: Callable[[bytes], bytes],
     agent: Agent,
     stop: threading.Event,
     say: Callable[[str], None] = tell_user,
+    outlet: Outlet | None = None,
 ) -> Tally:
     """Answer jobs until told to stop; wait for the hub as long as it takes.
 
@@ -65,6 +93,7 @@ def serve(
         agent: who this is and where its hub is.
         stop: ends it; looked at between jobs.
         say: told, in one line, when there is no hub and when there is one again.
+        outlet: publishes by this agent's session while there is one.
 
     Raises:
         NetworkError: a name or an address that is none.
@@ -78,29 +107,48 @@ def serve(
     session = _open(config, hub, stop)
     if session is not None:
         with session:
+            if outlet is not None:
+                outlet.lead_to(session)
             _serve_session(session, server, hub, stop)
+            if outlet is not None:
+                outlet.lead_to(None)
     return server.tally
 
 
-def serve_as_process(
-    answer: Callable[[bytes], bytes], agent: Agent, index: int
-) -> None:
-    """Be one process of a crew: serve until asked to end, or left alone.
+def own_agent(agent: Agent, index: int) -> Agent:
+    """Return what one process of a crew calls itself and says of itself.
 
     Args:
-        answer: as for ``serve``.
-        agent: of the whole crew; this process gets a name of its own.
-        index: of the process; the first one speaks for all.
+        agent: of the whole crew.
+        index: of the process.
     """
-    stop = stop_on_signals()
-    stop_with_parent(stop)
-    own = replace(
+    return replace(
         agent,
         name=unique_name(f"{agent.name}-{index}"),
         platform=platform_tag(),
         version=our_version(),
     )
-    tally = serve(answer, own, stop, tell_user if index == 0 else _keep_quiet)
+
+
+def serve_as_process(
+    answer: Callable[[bytes], bytes],
+    agent: Agent,
+    index: int,
+    outlet: Outlet | None = None,
+) -> None:
+    """Be one process of a crew: serve until asked to end, or left alone.
+
+    Args:
+        answer: as for ``serve``.
+        agent: of this process, or of the whole crew if it has no version yet.
+        index: of the process; the first one speaks for all.
+        outlet: as for ``serve``.
+    """
+    stop = stop_on_signals()
+    stop_with_parent(stop)
+    own = agent if agent.version else own_agent(agent, index)
+    say = tell_user if index == 0 else _keep_quiet
+    tally = serve(answer, own, stop, say, outlet)
     if tally.refused:
         tell_user(
             f"{own.name} refused {tally.refused} requests, "

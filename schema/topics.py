@@ -51,6 +51,15 @@ class Member:
         return f"{self._prefix}/jobs"
 
     @property
+    def command(self) -> str:
+        """Key that takes one ``OperatorRequest`` and gives one ``OperatorReply``."""
+        return f"{self._prefix}/command"
+
+    def poses(self, shard: int) -> str:
+        """Key on which a ``Live`` appears after each advance of a shard."""
+        return f"{self._prefix}/arena/{shard}/pose"
+
+    @property
     def _prefix(self) -> str:
         return f"revolve/{self.fleet}/{_CHUNKS[self.role]}/{self.name}"
 

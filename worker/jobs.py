@@ -1,13 +1,48 @@
-"""One evaluation request in, one answer out: what the service hands to a process."""
+"""One request in, one answer out: what the service hands to a process."""
 
 import time
+from collections.abc import Callable
+from importlib import import_module
 
+from schema.arena_codec import Live, is_advance_request
 from schema.codec import Answer, decode_request, encode_answer
 from schema.errors import FitnessUndefined, SimulationDiverged
 from schema.evaluation import Evaluation
 from schema.experiment import body_space, read_evaluation_settings
 from schema.robot import check_robot
 from worker.evaluation import evaluate
+from worker.shards import Shards
+
+
+class Jobs:
+    """All that one worker process does: evaluations, and its arena shards."""
+
+    def __init__(
+        self, *, threads: int = 1, publish: Callable[[Live], None] = lambda _: None
+    ) -> None:
+        """Hold no shard yet.
+
+        Args:
+            threads: that advance one arena together; the result is the same.
+            publish: told of each advance, for those who watch.
+        """
+        self._threads = threads
+        self._publish = publish
+        self._shards: Shards | None = None
+
+    def answer(self, request: bytes) -> bytes:
+        """Return the encoded answer to an encoded request of either kind.
+
+        Raises:
+            RevolveError: a request that cannot be done here; see ``answer`` and
+                ``Shards.answer``.
+        """
+        if not is_advance_request(request):
+            return answer(request)
+        if self._shards is None:
+            world = import_module("worker.world").World
+            self._shards = Shards(world, threads=self._threads, publish=self._publish)
+        return self._shards.answer(request)
 
 
 def answer(request: bytes) -> bytes:

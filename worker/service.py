@@ -1,10 +1,20 @@
-"""The worker on the network: one process that evaluates robots until told to end."""
+"""The worker on the network: one process that does jobs until told to end."""
 
+from schema.arena_codec import Live, encode_live
 from schema.network import Agent
-from schema.service import serve_as_process
-from worker.jobs import answer
+from schema.service import Outlet, own_agent, serve_as_process
+from schema.topics import Member
+from worker.jobs import Jobs
 
 
 def process(agent: Agent, index: int) -> None:
     """Be one process of a crew of workers; returns when asked to end."""
-    serve_as_process(answer, agent, index)
+    own = own_agent(agent, index)
+    member = Member(own.fleet, own.role, own.name)
+    outlet = Outlet()
+
+    def publish(live: Live) -> None:
+        outlet.put(member.poses(live.shard), encode_live(live))
+
+    jobs = Jobs(threads=agent.threads, publish=publish)
+    serve_as_process(jobs.answer, own, index, outlet)
