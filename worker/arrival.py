@@ -1,0 +1,104 @@
+"""How robots come into an arena, and which changes are none."""
+
+from schema.arena import Casualty, Changes, Insertion
+from schema.birth import BirthId
+from schema.codec import encode_robot
+from schema.errors import UnexpectedEvent
+from schema.experiment import body_space
+from schema.robot import Robot, check_robot
+from worker.cluster import Body
+from worker.company import Company
+from worker.controller import pack
+from worker.inhabitant import Inhabitant, put
+from worker.window import Window
+
+
+def check_changes(changes: Changes, company: Company, step: int) -> None:
+    """Raise unless changes can be made to a company.
+
+    Args:
+        changes: removals first, then insertions, then brains.
+        company: who lives there.
+        step: the arena's.
+
+    Raises:
+        UnexpectedEvent: somebody is not there, or there already, named twice, or
+            born between two ticks of the brains.
+        InvalidRobot: a robot that breaks the rules, a brain that does not fit.
+    """
+    gone = _once(changes.removals)
+    new = _once(tuple(insertion.birth for insertion in changes.insertions))
+    _once(tuple(change.birth for change in changes.brains))
+    for birth in gone:
+        if birth not in company:
+            raise UnexpectedEvent(f"apply: {birth} does not live here")
+    for birth in new:
+        if birth in company and birth not in gone:
+            raise UnexpectedEvent(f"apply: {birth} lives here already")
+    tick = company.shop.settings.simulation.brain_steps
+    if new and step % tick:
+        raise UnexpectedEvent(
+            "apply: births must fall on multiples of simulation.brain_steps = "
+            f"{tick}, got step {step}"
+        )
+    robots = {insertion.birth: insertion.robot for insertion in changes.insertions}
+    for change in changes.brains:
+        birth = change.birth
+        if birth not in new and (birth in gone or birth not in company):
+            raise UnexpectedEvent(f"apply: {birth} does not live here")
+        body = robots[birth] if birth in new else company.find(birth).robot
+        robots[birth] = Robot(body.parts, change.brain)
+    for robot in robots.values():
+        check_robot(robot, body_space(company.shop.settings.space))
+        pack(robot.brain, company.shop.width)
+
+
+def _once(births: tuple[BirthId, ...]) -> tuple[BirthId, ...]:
+    if len(set(births)) < len(births):
+        raise UnexpectedEvent(f"apply: somebody is named twice in {births}")
+    return births
+
+
+def newborn(insertion: Insertion, company: Company, step: int) -> Inhabitant | Casualty:
+    """Return a robot that has come into being at its place, or why it did not.
+
+    Args:
+        insertion: who, what, where.
+        company: that it is to join.
+        step: the arena's.
+
+    Raises:
+        ExperimentError: a sensor that the arena has nothing for.
+    """
+    try:
+        body = company.shop.body(insertion.birth, insertion.robot)
+    except ValueError as error:
+        place = (*insertion.place, 0.0)
+        return Casualty(insertion.birth, step, f"cannot be built: {error}", place)
+    seat = body.home.seats[0]
+    put(seat, insertion.place, insertion.heading)
+    x, y, z = seat.qpos[:3].tolist()
+    window = Window(company.shop.settings.simulation, step)
+    one = inhabitant(insertion.birth, insertion.robot, body, window, company)
+    one.thinks_since, one.place = step, (x, y, z)
+    window.add(step, one.place)
+    return one
+
+
+def inhabitant(
+    birth: BirthId, robot: Robot, body: Body, window: Window, company: Company
+) -> Inhabitant:
+    """Return a robot at home, its mind at rest, before anything is known of it."""
+    network = pack(robot.brain, company.shop.width)
+    return Inhabitant(
+        birth=birth,
+        robot=robot,
+        encoded=encode_robot(robot),
+        body=body,
+        seat=body.home.seats[0],
+        network=network,
+        states=network.numbers[0] * 0.0,
+        thinks_since=0,
+        window=window,
+        place=(0.0, 0.0, 0.0),
+    )

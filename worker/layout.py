@@ -1,0 +1,86 @@
+"""Where each robot's numbers stand when the states of all clusters are put in a row.
+
+Reading robot by robot costs more than the physics allows; so all clusters' states
+are concatenated and robots are picked out of that by index, in birth order.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from schema.evaluation import Floats
+from worker.cluster import Cluster
+from worker.inhabitant import Inhabitant
+
+_FREE = 7
+"""Numbers of a free joint's position: place and quaternion."""
+
+
+class Layout:
+    """Indices into the states of R robots in their clusters.
+
+    Attributes:
+        islands, numbers: (R,) names of the robots, ascending.
+        roots: (R, 7) where place and quaternion stand in all positions.
+        joints: where the joint angles stand, robot by robot.
+        joint_counts: (R,) how many each has.
+    """
+
+    def __init__(
+        self, clusters: Sequence[Cluster], everybody: Sequence[Inhabitant]
+    ) -> None:
+        """Find everybody.
+
+        Args:
+            clusters: all of an arena, in any order that lasts.
+            everybody: all robots, by birth.
+        """
+        self._qpos = [cluster.qpos for cluster in clusters]
+        self._qvel = [cluster.qvel for cluster in clusters]
+        row_of = {one.birth: row for row, one in enumerate(everybody)}
+        starts = np.zeros(len(everybody), dtype=np.intp)
+        seated: list[int] = []
+        dofs: list[int] = []
+        joint = dof = 0
+        for cluster in clusters:
+            for birth, seat in zip(cluster.members, cluster.seats, strict=True):
+                row = row_of[birth]
+                starts[row] = joint + seat.joints
+                dofs.append(dof + seat.dofs)
+                seated.append(row)
+            joint += len(cluster.qpos)
+            dof += len(cluster.qvel)
+        births = [one.birth for one in everybody]
+        self.islands = np.array([birth.island for birth in births], dtype=np.int32)
+        self.numbers = np.array([birth.number for birth in births], dtype=np.int64)
+        self.roots = starts[:, None] + np.arange(_FREE)
+        sizes = [len(one.seat.qpos) - _FREE for one in everybody]
+        self.joint_counts = np.array(sizes, dtype=np.int32)
+        self.joints = np.concatenate(
+            [
+                np.arange(start + _FREE, start + _FREE + size)
+                for start, size in zip(starts.tolist(), sizes, strict=True)
+            ]
+            or [np.zeros(0, dtype=np.intp)]
+        )
+        self._weights = np.concatenate(
+            [everybody[row].body.reach.weights for row in seated] or [np.zeros(0)]
+        )
+        self._dofs = np.array(dofs, dtype=np.intp)
+        # Rows by birth, of what comes in the order of the clusters.
+        self._seated = np.argsort(np.array(seated, dtype=np.intp))
+
+    def positions(self) -> Floats:
+        """Return all clusters' positions in a row, a copy."""
+        return np.concatenate(self._qpos) if self._qpos else np.zeros(0)
+
+    def velocities(self) -> Floats:
+        """Return all clusters' velocities in a row, a copy."""
+        return np.concatenate(self._qvel) if self._qvel else np.zeros(0)
+
+    def speeds(self, velocities: Floats) -> Floats:
+        """Return a bound on the speed of each robot's fastest point, (R,) [m/s]."""
+        if not len(self._dofs):
+            return np.zeros(0)
+        bounds = np.add.reduceat(np.abs(velocities) * self._weights, self._dofs)
+        return np.asarray(bounds[self._seated])

@@ -1,0 +1,131 @@
+"""How far a robot reaches and how fast any point of it may move.
+
+A robot's boxes are covered by few spheres, each fixed to one body. They, and
+bounds that hold at any joint angle, tell from below how far two robots are apart.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import product
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from schema.evaluation import Floats
+
+Indices = npt.NDArray[np.intp]
+
+SLENDERNESS = 1.6
+"""A box is cut where it is longer than this many times its middle width."""
+GROWTH = 1.2
+"""Two spheres become one that is at most this many times the larger of them."""
+
+_Ball = tuple[Floats, float]
+"""Centre and radius [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """What bounds one robot, whatever its joints do.
+
+    Attributes:
+        bodies: (B,) body of each sphere, counted from the robot's first.
+        centres: (B, 3) in the frames of their bodies [m].
+        radii: (B,) [m].
+        radius: of a sphere about the core's centre that holds all of it [m].
+        weights: (V,) of the absolute velocities of its degrees of freedom in a
+            bound on the speed of its fastest point.
+    """
+
+    bodies: Indices
+    centres: Floats
+    radii: Floats
+    radius: float
+    weights: Floats
+
+
+def reach_of(model: mujoco.MjModel) -> Reach:
+    """Return what bounds the one robot of a model.
+
+    Args:
+        model: as ``schema.mjcf.solo_model`` makes it; static geoms do not count.
+    """
+    root = int(model.jnt_bodyid[0])
+    covers: list[list[_Ball]] = []
+    for body in range(root, model.nbody):
+        first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
+        balls: list[_Ball] = []
+        for geom in range(first, first + count):
+            balls += _cut(model, geom)
+        covers.append(_merged(balls))
+    # Of each body: how far anything beyond its joint may be from its origin.
+    far = [
+        max((float(np.linalg.norm(c)) + r for c, r in cover), default=0.0)
+        for cover in covers
+    ]
+    for body in range(model.nbody - 1, root, -1):
+        parent = int(model.body_parentid[body]) - root
+        arm = float(np.linalg.norm(model.body_pos[body]))
+        far[parent] = max(far[parent], arm + far[body - root])
+    weights = np.empty(model.nv)
+    weights[:3], weights[3:6] = 1.0, far[0]
+    for joint in range(1, model.njnt):
+        body = int(model.jnt_bodyid[joint]) - root
+        weights[int(model.jnt_dofadr[joint])] = far[body]
+    counts = [len(cover) for cover in covers]
+    balls = [ball for cover in covers for ball in cover]
+    return Reach(
+        np.repeat(np.arange(len(covers)), counts),
+        np.array([centre for centre, _ in balls]),
+        np.array([radius for _, radius in balls]),
+        far[0],
+        weights,
+    )
+
+
+def _cut(model: mujoco.MjModel, geom: int) -> list[_Ball]:
+    """Return spheres that cover a box, in its body's frame."""
+    size = 2.0 * model.geom_size[geom]
+    middle = float(np.sort(size)[1])
+    pieces = [max(1, math.ceil(edge / (SLENDERNESS * middle))) for edge in size]
+    if min(pieces) == max(pieces) == 1 and float(np.min(size)) * 2 <= middle * 1.01:
+        # A flat box: its width is what makes its sphere large.
+        is_large = middle > LARGE
+        pieces = [2 if is_large and edge >= middle else 1 for edge in size]
+    cell = size / pieces
+    rotation = np.empty(9)
+    mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+    radius = 0.5 * float(np.linalg.norm(cell))
+    found = []
+    for index in product(*map(range, pieces)):
+        local = (np.array(index) + 0.5) * cell - 0.5 * size
+        found.append((model.geom_pos[geom] + rotation.reshape(3, 3) @ local, radius))
+    return found
+
+
+LARGE = 0.06
+"""A flat box wider than this is cut in four [m]."""
+
+
+def _merged(balls: list[_Ball]) -> list[_Ball]:
+    """Return fewer spheres that cover the same, hardly larger ones."""
+    left = sorted(balls, key=lambda ball: -ball[1])
+    kept: list[_Ball] = []
+    while left:
+        centre, radius = left.pop(0)
+        largest = GROWTH * radius
+        rest: list[_Ball] = []
+        for other, other_radius in left:
+            apart = float(np.linalg.norm(other - centre))
+            if apart + other_radius <= radius:
+                continue
+            joint = 0.5 * (apart + radius + other_radius)
+            if joint <= largest:
+                centre = centre + (other - centre) * ((joint - radius) / apart)
+                radius = joint
+            else:
+                rest.append((other, other_radius))
+        kept.append((centre, radius))
+        left = rest
+    return kept

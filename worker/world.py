@@ -1,0 +1,280 @@
+"""An arena: robots that come, live together, are judged all the time, and go.
+
+All that happens at a step happens on arriving there, in this order: the diverged
+fall; brains tick; positions are sampled; touches are counted; those who may touch
+soon join. Then physics goes on, with nothing but steps, to the next such moment.
+So a state between two advances is whole, and how an arena gets somewhere does not
+depend on how many advances it took.
+"""
+
+import hashlib
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from schema.arena import Advance, Casualty, Changes, Insertion, Judgement
+from schema.birth import BirthId
+from schema.codec import encode_robot
+from schema.errors import UnexpectedEvent
+from schema.evaluation import Floats
+from schema.experiment import ArenaSettings
+from schema.robot import Robot
+from worker import light, state
+from worker.arrival import check_changes, newborn
+from worker.company import Company
+from worker.controller import pack
+from worker.divergence import diverged
+from worker.evaluation import silence_engine
+from worker.inhabitant import Inhabitant
+from worker.judging import judgement
+from worker.minds import Minds
+from worker.pool import Pool
+from worker.poses import Poses
+from worker.touches import Touches
+
+LOOKS_PER_PARTING = 10
+"""Clusters are looked at for parts that drifted apart every so many looks."""
+_FEW = 5
+"""Clusters that one thread steps faster than several."""
+
+
+class World:
+    """One arena shard; a pure function of its settings, changes and advances.
+
+    Attributes:
+        step: physics steps since it began.
+        company: the living and their clusters, to look at.
+    """
+
+    def __init__(self, settings: ArenaSettings, threads: int = 1) -> None:
+        """Begin with nobody.
+
+        Args:
+            settings: the arena's.
+            threads: that step clusters, the caller's included; what happens does
+                not depend on their number.
+        """
+        silence_engine()
+        self._settings = settings
+        self._clock = settings.simulation
+        self._look_steps = settings.arena.proximity_steps
+        self._pool = Pool(threads)
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, with nobody."""
+        self.step = 0
+        self.company = Company(self._settings)
+        self._minds = Minds(self.company.shop.width, self._clock)
+        self._casualties: list[Casualty] = []
+        self._touches = Touches(self._settings)
+        self._poses = Poses(self._clock.timestep_s)
+
+    def close(self) -> None:
+        """Let the threads end; the world cannot be advanced any more."""
+        self._pool.close()
+
+    @property
+    def births(self) -> tuple[BirthId, ...]:
+        """The names of the living, ascending."""
+        return tuple(one.birth for one in self.company.everybody)
+
+    def poses(self) -> bytes:
+        """Return where everybody is now: Arrow IPC of ``schema.tables.POSES``."""
+        now = Poses(self._clock.timestep_s)
+        now.add(self.step, self.company.layout, self.company.layout.positions())
+        return now.columns()
+
+    def apply(self, changes: Changes) -> None:
+        """Take robots out, put robots in, replace brains, in this order.
+
+        A robot that the engine cannot build is a casualty of the next advance.
+
+        Args:
+            changes: what is done before the next advance.
+
+        Raises:
+            UnexpectedEvent: somebody is not there, or there already, named twice,
+                or born between two ticks of the brains; nothing is changed.
+            InvalidRobot: a robot that breaks the rules, or a brain that does not
+                fit its body; nothing is changed.
+        """
+        check_changes(changes, self.company, self.step)
+        self.company.remove(changes.removals)
+        if changes.insertions:
+            self._insert(changes.insertions)
+        for change in changes.brains:
+            one = self.company.find(change.birth)
+            self._equip(one, Robot(one.robot.parts, change.brain))
+        if changes.removals or changes.insertions or changes.brains:
+            self._minds.gather(self.company.everybody)
+
+    def advance(
+        self, until: int, watch: Callable[[bytes], None] | None = None
+    ) -> Advance:
+        """Let time pass.
+
+        Args:
+            until: step to reach, later than now.
+            watch: is shown each sample of poses as it happens, as ``poses`` does.
+
+        Raises:
+            UnexpectedEvent: ``until`` is not later than now.
+        """
+        if until <= self.step:
+            raise UnexpectedEvent(
+                f"advance: until must be > step = {self.step}, got {until}"
+            )
+        while self.step < until:
+            stop = min(until, *map(self._next, self._intervals()))
+            self._move(stop - self.step)
+            self.step = stop
+            self._arrive(watch)
+        return self._report()
+
+    def snapshot(self) -> bytes:
+        """Return the whole state; ``restore`` goes on from it bit for bit."""
+        return state.write(
+            self._settings, self.step, self.company, tuple(self._casualties)
+        )
+
+    def digest(self) -> bytes:
+        """Return the SHA-256 of the state."""
+        return hashlib.sha256(self.snapshot()).digest()
+
+    @classmethod
+    def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> "World":
+        """Return the world of a snapshot.
+
+        Args:
+            settings: those that it was taken with.
+            data: the snapshot.
+            threads: that step clusters, the caller's included.
+
+        Raises:
+            MalformedMessage: not a snapshot, or of other settings.
+        """
+        world = cls(settings, threads)
+        world.step, casualties = state.read(settings, data, world.company)
+        world._casualties = list(casualties)
+        world._minds.gather(world.company.everybody)
+        return world
+
+    # --- time -------------------------------------------------------------------
+
+    def _intervals(self) -> tuple[int, int, int]:
+        return self._clock.brain_steps, self._clock.pose_steps, self._look_steps
+
+    def _next(self, interval: int) -> int:
+        return self.step - self.step % interval + interval
+
+    def _move(self, steps: int) -> None:
+        clusters = self.company.by_cost
+        if len(clusters) < _FEW or self._pool.threads == 1:
+            for cluster in clusters:
+                cluster.step(steps)
+            return
+        self._pool.run([partial(cluster.step, steps) for cluster in clusters])
+
+    def _arrive(self, watch: Callable[[bytes], None] | None) -> None:
+        is_tick = self.step % self._clock.brain_steps == 0
+        is_look = self.step % self._look_steps == 0
+        velocities: Floats | None = None
+        if is_tick or is_look:
+            velocities = self._drop_diverged(is_tick=is_tick)
+        if is_tick:
+            self._tick()
+        if self.step % self._clock.pose_steps == 0:
+            self._sample()
+            if watch is not None:
+                watch(self.poses())
+        if is_look and velocities is not None:
+            self._touches.count(self.company.clusters)
+            self.company.look(self.step, velocities)
+            if self.step % (LOOKS_PER_PARTING * self._look_steps) == 0:
+                self.company.part()
+
+    def _tick(self) -> None:
+        everybody = self.company.everybody
+        tick_s = self._clock.brain_steps * self._clock.timestep_s
+        for one in everybody:
+            one.seat.feel(tick_s)
+        self._shine(everybody)
+        self._minds.tick(self.step)
+
+    def _shine(self, people: Sequence[Inhabitant]) -> None:
+        source, clusters = self._settings.arena.light, self.company.clusters
+        seats = [one.seat for one in people]
+        if source is not None and any(seat.senses.lights for seat in seats):
+            self.company.kinematics()
+            light.shine(source, clusters, seats)
+
+    def _sample(self) -> None:
+        layout = self.company.layout
+        positions = layout.positions()
+        places = positions[layout.roots[:, :3]].tolist()
+        for one, (x, y, z) in zip(self.company.everybody, places, strict=True):
+            one.place = (x, y, z)
+            one.window.add(self.step, one.place)
+        self._poses.add(self.step, layout, positions)
+
+    # --- births and deaths ------------------------------------------------------
+
+    def _insert(self, insertions: Sequence[Insertion]) -> None:
+        newcomers: list[Inhabitant] = []
+        for insertion in insertions:
+            one = newborn(insertion, self.company, self.step)
+            if isinstance(one, Casualty):
+                self._casualties.append(one)
+            else:
+                newcomers.append(one)
+        self.company.add(newcomers)
+        for one in newcomers:
+            one.seat.start()
+        self._shine(newcomers)
+        for one in newcomers:
+            self._minds.first_tick(one)
+        self.company.kinematics()
+        self.company.look(self.step, self.company.layout.velocities())
+
+    def _equip(self, one: Inhabitant, robot: Robot) -> None:
+        """Give a robot another brain: at rest, its clock from the next tick."""
+        one.robot, one.encoded = robot, encode_robot(robot)
+        one.network = pack(robot.brain, self.company.shop.width)
+        one.states = np.zeros_like(one.states)
+        one.thinks_since = self._next(self._clock.brain_steps)
+
+    def _drop_diverged(self, *, is_tick: bool) -> Floats:
+        """Let the diverged go and return the velocities of the others."""
+        company = self.company
+        velocities = company.layout.velocities()
+        fallen = diverged(company, velocities, self.step, looks_closely=is_tick)
+        if not fallen:
+            return velocities
+        self._casualties += fallen
+        self._dismiss([casualty.birth for casualty in fallen])
+        return company.layout.velocities()
+
+    def _dismiss(self, births: Sequence[BirthId]) -> None:
+        self.company.remove(births)
+        self._minds.gather(self.company.everybody)
+
+    def _report(self) -> Advance:
+        judged = [
+            judgement(one, self.step, self._settings) for one in self.company.everybody
+        ]
+        undefined = [one for one in judged if isinstance(one, Casualty)]
+        if undefined:
+            self._casualties += undefined
+            self._dismiss([casualty.birth for casualty in undefined])
+        casualties, self._casualties = tuple(self._casualties), []
+        poses, self._poses = self._poses, Poses(self._clock.timestep_s)
+        return Advance(
+            step=self.step,
+            digest=self.digest(),
+            judgements=tuple(one for one in judged if isinstance(one, Judgement)),
+            casualties=casualties,
+            touches=self._touches.hand_over(),
+            poses=poses.columns(),
+        )
