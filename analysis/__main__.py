@@ -3,8 +3,12 @@
 import sys
 from pathlib import Path
 
+import pyarrow as pa
+from rich.console import Console
+from rich.table import Table
+
 from analysis.load import load_table, run_folders
-from analysis.measures import progression
+from analysis.measures import final_fitness, progression
 from schema.agent_command import Flags
 from schema.errors import RevolveError
 
@@ -28,7 +32,7 @@ def main(arguments: list[str]) -> int:
     """
     flags = Flags(
         prog="revolve analyze",
-        description="Draw fitness over births of runs, grouped by experiment.",
+        description="Tell how fit runs became, and draw fitness over births.",
         epilog="for example: revolve analyze runs --out figures",
     )
     flags.add_argument("runs", nargs="+", type=Path, help="run folders, or above some")
@@ -40,11 +44,27 @@ def main(arguments: list[str]) -> int:
         raise MissingExtra(
             f"figures need {error.name}: pip install 'revolve-islands[analysis]'"
         ) from None
-    table = progression(load_table(run_folders(options.runs), "population"))
+    population = load_table(run_folders(options.runs), "population")
+    _show(final_fitness(population))
     options.out.mkdir(parents=True, exist_ok=True)
-    save(progression_figure(table), options.out / "progression")
+    save(progression_figure(progression(population)), options.out / "progression")
     print(f"{options.out / 'progression.png'}: fitness over births (also .pdf)")
     return 0
+
+
+def _show(final: pa.Table) -> None:
+    """Print the last population of each run."""
+    table = Table("experiment", "run", "births", "size", "mean fitness", "best")
+    for row in final.to_pylist():
+        table.add_row(
+            row["experiment"],
+            Path(row["folder"]).name,
+            str(row["births"]),
+            str(row["size"]),
+            f"{row['mean']:.4f}",
+            f"{row['best']:.4f}",
+        )
+    Console().print(table)
 
 
 if __name__ == "__main__":

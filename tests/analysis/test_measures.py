@@ -1,13 +1,14 @@
 """Measures of hand-worked tables."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pyarrow as pa
 import pytest
 
 from analysis.load import load_table, run_folders
-from analysis.measures import progression
+from analysis.measures import final_fitness, progression
 from schema.errors import RunFolderError
 
 
@@ -42,9 +43,29 @@ def test_progression_of_two_runs_and_of_another_experiment() -> None:
     assert [row["high"] for row in found] == pytest.approx([0.4, 0.4, 0.25])
 
 
-def test_nothing_born_is_said() -> None:
+def test_final_fitness_is_that_of_each_run_s_own_last_population() -> None:
+    table = _population(
+        [
+            ("a", "x", 15, 0.9),
+            ("a", "x", 30, 0.5),
+            ("a", "x", 30, None),
+            ("a", "y", 15, 0.4),
+            ("a", "y", 15, 0.2),
+        ]
+    )
+    found = final_fitness(table).to_pylist()
+    assert [(row["folder"], row["births"], row["size"]) for row in found] == [
+        ("x", 30, 2),
+        ("y", 15, 2),
+    ]
+    assert [row["mean"] for row in found] == pytest.approx([0.25, 0.3])
+    assert [row["best"] for row in found] == [0.5, 0.4]
+
+
+@pytest.mark.parametrize("measure", [progression, final_fitness])
+def test_nothing_born_is_said(measure: Callable[[pa.Table], pa.Table]) -> None:
     with pytest.raises(RunFolderError, match="nothing has been born"):
-        progression(_population([("a", "x", 1, 0.0)]).slice(1))
+        measure(_population([("a", "x", 1, 0.0)]).slice(1))
 
 
 def test_runs_are_found_below_and_named(tmp_path: Path) -> None:
