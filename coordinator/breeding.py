@@ -5,6 +5,7 @@ attempts are numbered through all couples of a birth, so that no two draw alike.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,11 +21,34 @@ from coordinator.selection import (
 from coordinator.variation import mate
 from schema.birth import BirthId
 from schema.errors import ExperimentError
-from schema.experiment import Experiment
-from schema.genome import Genome
+from schema.experiment import Experiment, body_space
+from schema.genome import Genome, develop
+from schema.robot import Robot
+
+BARREN = "crossover found no fitting subtree, or the child had no motor"
+"""Why an attempt comes to no candidate."""
 
 _COUPLES = 100
 """Couples that may fail at one birth before a document is called impossible."""
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Who may be born under a number.
+
+    Attributes:
+        birth: the number.
+        attempt: that came to this one, from 0.
+        couple: its parents; None for a random robot.
+        genome: what it inherits.
+        robot: what that develops into.
+    """
+
+    birth: BirthId
+    attempt: int
+    couple: Couple | None
+    genome: Genome
+    robot: Robot
 
 
 class Breeder:
@@ -36,6 +60,33 @@ class Breeder:
         self._experiment = experiment
         self._seed = seed
         self._run = run
+
+    def attempt(
+        self,
+        birth: BirthId,
+        number: int,
+        population: Sequence[Individual],
+        couple: Couple | None,
+        why: str,
+    ) -> tuple[Couple | None, Candidate | None]:
+        """Return one attempt's parents, and the candidate if they come to one.
+
+        Args:
+            birth: who is to be born.
+            number: of the attempt, from 0, through all couples of this birth.
+            population: who may mate; empty for a founder.
+            couple: parents of the attempt before; None at the first.
+            why: the attempt before failed; empty at the first.
+
+        Raises:
+            ExperimentError: restrictions that (nearly) no robot meets.
+        """
+        self.check_patience(birth, number, population, why)
+        couple, genome = self.conceive(birth, number, population, couple)
+        if genome is None:
+            return couple, None
+        robot = develop(genome, body_space(self._experiment.space))
+        return couple, Candidate(birth, number, couple, genome, robot)
 
     def conceive(
         self,

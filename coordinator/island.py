@@ -9,7 +9,7 @@ Source: Hupkes 2016, section 5.3; facts of the original, section 5.1.
 from dataclasses import dataclass
 from math import isfinite
 
-from coordinator.breeding import Breeder
+from coordinator.breeding import BARREN, Breeder, Candidate
 from coordinator.events import (
     Answered,
     Evaluate,
@@ -28,19 +28,13 @@ from coordinator.selection import Couple, Individual
 from schema.birth import BirthId
 from schema.errors import UnexpectedEvent
 from schema.experiment import Experiment, body_space
-from schema.genome import Genome, develop
-from schema.robot import Robot
 
 
 @dataclass(slots=True)
-class _Candidate:
-    """Who is to be born under a number; ``attempt`` is the one being judged."""
+class _Unborn:
+    """Who is to be born under a number; ``candidate`` is the one being judged."""
 
-    birth: BirthId
-    attempt: int
-    couple: Couple | None
-    genome: Genome
-    robot: Robot
+    candidate: Candidate
     is_viable: bool = False
     outcome: Evaluated | EvaluationFailed | None = None
 
@@ -75,7 +69,7 @@ class Island:
         self._begun = 0
         # Founders need nobody's fitness: all of them are in flight together.
         self._window = self._brood_end = experiment.selection.population
-        self._candidates: dict[int, _Candidate] = {}
+        self._unborn: dict[int, _Unborn] = {}
         self._brood: list[Individual] = []
 
     @property
@@ -98,23 +92,24 @@ class Island:
                 raise self._unexpected(event, "it has started before")
             self._has_started = True
             return self._proceed()
-        candidate = self._asked(event)
-        if candidate is None:
+        unborn = self._asked(event)
+        if unborn is None:
             return []
         match event:
             case Vetted(report=report) if report.is_viable:
-                candidate.is_viable = True
+                unborn.is_viable = True
+                candidate = unborn.candidate
                 return [Evaluate(candidate.birth, candidate.robot)]
             case Vetted(report=report):
-                return [self._retry(candidate, report.reason)]
+                return [self._retry(unborn.candidate, report.reason)]
             case VettingFailed(reason=reason):
-                return [self._retry(candidate, reason)]
+                return [self._retry(unborn.candidate, reason)]
             case Evaluated() | EvaluationFailed():
-                candidate.outcome = event
+                unborn.outcome = event
                 return self._proceed()
 
-    def _asked(self, event: Answered) -> _Candidate | None:
-        """Return the candidate that an answer is news of, None if it is none.
+    def _asked(self, event: Answered) -> _Unborn | None:
+        """Return the unborn that an answer is news of, None if it is none.
 
         Raises:
             UnexpectedEvent: an answer to what was never asked.
@@ -122,19 +117,20 @@ class Island:
         birth = event.birth
         if birth.island != self._number or not 0 <= birth.number < self._begun:
             raise self._unexpected(event, f"births 0..{self._begun - 1} have begun")
-        candidate = self._candidates.get(birth.number)
-        if candidate is None or candidate.outcome is not None:
+        unborn = self._unborn.get(birth.number)
+        if unborn is None or unborn.outcome is not None:
             return None
         if isinstance(event, Vetted | VettingFailed):
-            if event.attempt > candidate.attempt:
-                raise self._unexpected(event, f"it is at attempt {candidate.attempt}")
-            is_old = event.attempt < candidate.attempt or candidate.is_viable
-            return None if is_old else candidate
-        if not candidate.is_viable:
+            attempt = unborn.candidate.attempt
+            if event.attempt > attempt:
+                raise self._unexpected(event, f"it is at attempt {attempt}")
+            is_old = event.attempt < attempt or unborn.is_viable
+            return None if is_old else unborn
+        if not unborn.is_viable:
             raise self._unexpected(event, "it has not been vetted")
         if isinstance(event, Evaluated) and not isfinite(event.evaluation.fitness):
             raise self._unexpected(event, "fitness must be finite")
-        return candidate
+        return unborn
 
     def _unexpected(self, event: IslandEvent, why: str) -> UnexpectedEvent:
         return UnexpectedEvent(
@@ -146,42 +142,40 @@ class Island:
     def _proceed(self) -> list[IslandCommand]:
         """Commit who is judged and next in turn, and begin what the window allows."""
         commands: list[IslandCommand] = []
-        while (first := self._candidates.get(self.births)) and first.outcome:
-            commands += self._commit(first, first.outcome)
+        while (first := self._unborn.get(self.births)) and first.outcome:
+            commands += self._commit(first.candidate, first.outcome)
         if self.births == self._brood_end:
             commands += self._close_brood()
         while self._begun < min(self._brood_end, self.births + self._window):
             birth = BirthId(self._number, self._begun)
             candidate = self._conceived(birth, 0, None, "")
-            self._candidates[self._begun] = candidate
+            self._unborn[self._begun] = _Unborn(candidate)
             self._begun += 1
             commands.append(Vet(birth, candidate.attempt, candidate.robot))
         return commands
 
-    def _retry(self, candidate: _Candidate, why: str) -> Vet:
+    def _retry(self, candidate: Candidate, why: str) -> Vet:
         """Replace a candidate that cannot live by the next of its birth."""
         birth = candidate.birth
         following = self._conceived(birth, candidate.attempt + 1, candidate.couple, why)
-        self._candidates[birth.number] = following
+        self._unborn[birth.number] = _Unborn(following)
         return Vet(birth, following.attempt, following.robot)
 
     def _conceived(
         self, birth: BirthId, attempt: int, couple: Couple | None, why: str
-    ) -> _Candidate:
+    ) -> Candidate:
         """Return the candidate of the first attempt, from this one, that gives one."""
         while True:
-            self._breeder.check_patience(birth, attempt, self.population, why)
-            couple, genome = self._breeder.conceive(
-                birth, attempt, self.population, couple
+            couple, candidate = self._breeder.attempt(
+                birth, attempt, self.population, couple, why
             )
-            if genome is not None:
-                robot = develop(genome, self._space)
-                return _Candidate(birth, attempt, couple, genome, robot)
+            if candidate is not None:
+                return candidate
             attempt += 1
-            why = "crossover found no fitting subtree, or the child had no motor"
+            why = BARREN
 
     def _commit(
-        self, candidate: _Candidate, outcome: Evaluated | EvaluationFailed
+        self, candidate: Candidate, outcome: Evaluated | EvaluationFailed
     ) -> list[IslandCommand]:
         """Make a judged candidate an individual."""
         parents = candidate.couple or ()
@@ -194,7 +188,7 @@ class Island:
             self._generation,
             has_failed=not is_judged,
         )
-        del self._candidates[self.births]
+        del self._unborn[self.births]
         self._brood.append(individual)
         self.births += 1
         attempts = candidate.attempt + 1

@@ -316,7 +316,7 @@ def test_new_parents_come_after_so_many_attempts() -> None:
     couples = []
     while waiting:
         question = waiting.popleft()
-        candidate = island._candidates[question.birth.number]
+        candidate = island._unborn[question.birth.number].candidate
         if question.birth.number == 9 and candidate.attempt < 9:
             assert candidate.couple is not None
             names = tuple(one.birth.number for one in candidate.couple)
