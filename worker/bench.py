@@ -2,7 +2,8 @@
 
 ``revolve bench evaluate`` compares whole evaluations with the bare engine doing
 the same steps; ``revolve bench fidelity RUN`` simulates a run's robots anew with a
-time step five times finer (``worker.fidelity``).
+time step five times finer (``worker.fidelity``); ``revolve bench arena`` and
+``revolve bench spider`` repeat the thesis's benchmarks (``worker.arena_bench``).
 """
 
 import argparse
@@ -32,7 +33,7 @@ from schema.genome import Genome, develop
 from schema.mjcf import solo_model
 from schema.plugin import load
 from schema.robot import Robot
-from worker import evaluation, fidelity
+from worker import arena_bench, evaluation, fidelity
 
 LEAST_RATIO = 0.85
 """Of bare engine time to evaluation time: the promise of the design, section 9."""
@@ -137,7 +138,7 @@ def random_robots(experiment: Experiment, count: int, seed: int) -> list[Robot]:
 
 
 def main(arguments: list[str]) -> int:
-    """Run ``revolve bench evaluate`` or ``revolve bench fidelity``.
+    """Run one of the commands ``revolve bench ...``.
 
     Args:
         arguments: the command's name first.
@@ -148,6 +149,8 @@ def main(arguments: list[str]) -> int:
     options = _parser().parse_args(arguments[1:])
     if options.what == "evaluate":
         return _evaluate(options)
+    if options.what in ("arena", "spider"):
+        return arena_bench.run(options)
     return _fidelity(options)
 
 
@@ -173,6 +176,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="KEY=VALUE",
         help="compare with this simulation setting instead of a finer time step",
     )
+    arena_bench.add_commands(kinds)
     return parser
 
 

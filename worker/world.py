@@ -10,6 +10,7 @@ depend on how many advances it took.
 import hashlib
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Self
 
 import numpy as np
 
@@ -144,7 +145,7 @@ class World:
         return hashlib.sha256(self.snapshot()).digest()
 
     @classmethod
-    def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> "World":
+    def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> Self:
         """Return the world of a snapshot.
 
         Args:

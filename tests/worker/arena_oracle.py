@@ -1,0 +1,77 @@
+"""A joint model of all robots of an arena: what the clusters must not overlook."""
+
+import mujoco
+import numpy as np
+
+from schema.birth import BirthId
+from schema.experiment import body_space
+from schema.mjcf import robot_spec, shared_model
+from worker.world import World
+
+
+class Oracle:
+    """Sees every contact between robots at every physics step of a world.
+
+    Attributes:
+        pair_steps: pairs of robots in contact, summed over steps.
+        missed: those of them whose robots did not live together.
+        merges: of the world, also before a reset of its counts.
+    """
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.pair_steps = 0
+        self.missed: list[tuple[int, BirthId, BirthId]] = []
+        self._births: tuple[BirthId, ...] = ()
+        self._model: mujoco.MjModel | None = None
+        self._move = world._move
+        world._move = self._watched_move  # type: ignore[method-assign]
+
+    def _watched_move(self, steps: int) -> None:
+        for number in range(steps):
+            self._look(self.world.step + number)
+            self._move(1)
+
+    def _look(self, step: int) -> None:
+        company = self.world.company
+        if self.world.births != self._births:
+            self._build()
+        if self._model is None or self._data is None:
+            return
+        data = self._data
+        data.qpos[:] = np.concatenate([one.seat.qpos for one in company.everybody])
+        mujoco.mj_kinematics(self._model, data)
+        mujoco.mj_comPos(self._model, data)
+        mujoco.mj_collision(self._model, data)
+        owners = self._owners[data.contact.geom]
+        owners = np.sort(owners[(owners >= 0).all(axis=1)], axis=1)
+        for a, b in sorted({(a, b) for a, b in owners.tolist() if a != b}):
+            self.pair_steps += 1
+            first, second = self._births[a], self._births[b]
+            if company.cluster_of(first) is not company.cluster_of(second):
+                self.missed.append((step, first, second))
+
+    def _build(self) -> None:
+        company = self.world.company
+        self._births = self.world.births
+        self._model = self._data = None
+        if len(self._births) < 2:
+            return
+        settings = company.shop.settings
+        types = body_space(settings.space)
+        prefixes = [f"{number}/" for number in range(len(self._births))]
+        specs = [
+            robot_spec(one.robot, types, settings.simulation).spec
+            for one in company.everybody
+        ]
+        self._model = shared_model(
+            list(zip(prefixes, specs, strict=True)), settings.simulation
+        )
+        self._data = mujoco.MjData(self._model)
+        root_of = self._model.body_rootid[self._model.geom_bodyid]
+        roots = [
+            mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_BODY, f"{prefix}root")
+            for prefix in prefixes
+        ]
+        owner = {root: index for index, root in enumerate(roots)}
+        self._owners = np.array([owner.get(int(root), -1) for root in root_of])

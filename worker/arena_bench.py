@@ -1,0 +1,194 @@
+"""``revolve bench arena`` and ``revolve bench spider``: the thesis's benchmarks.
+
+Source: Hupkes 2016, figures 6.1 and 7.1; facts of the original, section 9.
+"""
+
+import argparse
+import sys
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from msgspec.structs import replace
+
+from schema.birth import BirthId
+from schema.errors import ExperimentError
+from schema.evaluation import Report
+from schema.experiment import ArenaSettings, Experiment, body_space, read_experiment
+from schema.genome import develop
+from schema.plugin import load
+from schema.robot import Robot
+from worker import arena_timing as timing
+from worker.spider import CLEARANCE_M, grid, spider
+
+THESIS = (-0.26, 34.78, 20.41)
+"""The thesis's real-time factor: a + b / p + c / p^2 on an i7-4790K."""
+SIZES = tuple(range(5, 51, 5))
+
+RESULTS = pa.schema(
+    [
+        pa.field("benchmark", pa.string()),
+        pa.field("population", pa.int32()),
+        pa.field("repetition", pa.int32()),
+        pa.field("threads", pa.int32()),
+        pa.field("step_s", pa.float64()),
+        pa.field("simulated_s", pa.float64()),
+        pa.field("wall_s", pa.float64()),
+        pa.field("factor", pa.float64()),
+    ],
+    metadata={"revolve.schema": "arena-benchmark", "revolve.schema_version": "1"},
+)
+"""One row per repetition; ``factor`` is simulated over wall time."""
+
+Row = dict[str, Any]
+
+
+def add_commands(kinds: Any) -> None:  # noqa: ANN401 - argparse hides its type
+    """Add the two benchmarks to the sub-commands of ``revolve bench``."""
+    for name, text, seconds, repetitions in (
+        ("arena", "random robots in one arena, thesis figure 6.1", 10, 20),
+        ("spider", "spiders on a grid, thesis figure 7.1", 5, 20),
+    ):
+        parser = kinds.add_parser(name, help=text)
+        parser.add_argument("experiment", nargs="?", default="scenario3")
+        parser.add_argument("--sizes", type=int, nargs="+", default=SIZES)
+        parser.add_argument("--seconds", type=int, default=seconds)
+        parser.add_argument("--repetitions", type=int, default=repetitions)
+        parser.add_argument("--threads", type=int, default=1)
+        parser.add_argument("--seed", type=int, default=1)
+        parser.add_argument("--out", type=Path, help="Parquet file for the results")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run one of the two and say what came out.
+
+    Args:
+        options: as ``add_commands`` parses them.
+
+    Returns:
+        0.
+    """
+    experiment = read_experiment(options.experiment)
+    source = _spiders if options.what == "spider" else _random
+    rows: list[Row] = []
+    for size in options.sizes:
+        rows += [
+            _row(options, number, found)
+            for number, found in enumerate(source(experiment, size, options))
+        ]
+        factors = [row["factor"] for row in rows if row["population"] == size]
+        _say(_line(size, factors, options.what))
+    if options.what == "arena" and len(options.sizes) >= len(THESIS):
+        found = timing.quadratic_fit(
+            [row["population"] for row in rows], [row["factor"] for row in rows]
+        )
+        _say(f"fit:    {_formula(found)}", f"thesis: {_formula(THESIS)}")
+    if options.out is not None:
+        pq.write_table(pa.Table.from_pylist(rows, schema=RESULTS), options.out)
+        _say(f"{len(rows)} rows in {options.out}")
+    return 0
+
+
+def arena_settings_of(experiment: Experiment) -> ArenaSettings:
+    """Return the settings of an experiment's arena.
+
+    Raises:
+        ExperimentError: it is off-line.
+    """
+    if experiment.arena is None:
+        raise ExperimentError(f"{experiment.name}: has no [arena]")
+    return ArenaSettings(
+        space=experiment.space,
+        simulation=experiment.simulation,
+        fitness=experiment.fitness,
+        arena=experiment.arena,
+    )
+
+
+def vetted_robots(experiment: Experiment, count: int, seed: int) -> list[Robot]:
+    """Return random robots that can be built, as founders are made.
+
+    Generator and analyzer belong to other rooms, so they are named, as plug-ins are.
+    """
+    generate = cast(
+        "Callable[..., Any]", load("coordinator.generation:generate", "generator")
+    )
+    analyze = cast("Callable[..., Report]", load("analyzer.report:analyze", "analyzer"))
+    rng, space = np.random.default_rng(seed), body_space(experiment.space)
+    robots: list[Robot] = []
+    while len(robots) < count:
+        genome = generate(rng, experiment, BirthId(0, len(robots)))
+        robot = develop(genome, space)
+        if analyze(robot, space, experiment.vetting).is_viable:
+            robots.append(robot)
+    return robots
+
+
+def _random(
+    experiment: Experiment, size: int, options: argparse.Namespace
+) -> Iterable[timing.ArenaTiming]:
+    settings = arena_settings_of(experiment)
+    for number in range(options.repetitions):
+        seed = options.seed + 1000 * size + number
+        robots = vetted_robots(experiment, size, seed)
+        rng = np.random.default_rng(seed)
+        places = timing.birth_places(rng, size, settings)
+        yield timing.time_arena(
+            settings,
+            timing.insertions(robots, places),
+            seconds=options.seconds,
+            threads=options.threads,
+        )
+
+
+def _spiders(
+    experiment: Experiment, size: int, options: argparse.Namespace
+) -> Iterable[timing.ArenaTiming]:
+    settings = arena_settings_of(experiment)
+    settings = replace(settings, arena=replace(settings.arena, drop_m=CLEARANCE_M))
+    for _ in range(options.repetitions):
+        yield timing.time_arena(
+            settings,
+            timing.insertions([spider()] * size, grid(size)),
+            seconds=options.seconds,
+            threads=options.threads,
+        )
+
+
+def _row(options: argparse.Namespace, number: int, found: timing.ArenaTiming) -> Row:
+    experiment = read_experiment(options.experiment)
+    return {
+        "benchmark": options.what,
+        "population": found.robots,
+        "repetition": number,
+        "threads": options.threads,
+        "step_s": experiment.simulation.timestep_s,
+        "simulated_s": found.simulated_s,
+        "wall_s": found.wall_s,
+        "factor": found.factor,
+    }
+
+
+def _line(size: int, factors: Sequence[float], what: str) -> str:
+    values = np.asarray(factors)
+    line = (
+        f"{size:4d} robots: {values.mean():6.2f} x real time "
+        f"(sd {values.std():.2f}, {values.min():.2f}..{values.max():.2f})"
+    )
+    if what == "arena":
+        a, b, c = THESIS
+        line += f"; thesis {a + b / size + c / size**2:.2f}"
+    return line
+
+
+def _formula(numbers: Iterable[float]) -> str:
+    a, b, c = numbers
+    return f"factor = {a:.2f} {b:+.2f} / p {c:+.2f} / p^2"
+
+
+def _say(*lines: str) -> None:
+    sys.stdout.write("\n".join(lines) + "\n")
+    sys.stdout.flush()
