@@ -1,0 +1,196 @@
+"""A world without physics: judges by a function, and remembers who is in it."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import msgspec
+import pyarrow as pa
+
+from coordinator.arena import Arena
+from coordinator.events import (
+    Advanced,
+    AdvanceShard,
+    Append,
+    ArenaCommand,
+    ArenaEvent,
+    Finish,
+    Record,
+    Started,
+    Vet,
+    Vetted,
+    VettingFailed,
+)
+from schema.arena import Advance, Casualty, Judgement, Touch
+from schema.birth import BirthId
+from schema.evaluation import Provenance, Report
+from schema.experiment import Experiment, read_experiment
+from schema.tables import POSES
+
+ORIGIN = (0.0, 0.0, 0.0)
+VIABLE = Report(
+    is_viable=True, reason="", intersections=(), lower=ORIGIN, upper=ORIGIN,
+    mass=0.1, motors=1,
+)  # fmt: skip
+CROWDED = Report(
+    is_viable=False, reason="parts 1 and 2 intersect", intersections=((1, 2),),
+    lower=ORIGIN, upper=ORIGIN, mass=0.1, motors=1,
+)  # fmt: skip
+SOMEBODY = Provenance("worker-1", "x86", 0.5)
+DT = 0.005
+MATURE = 3000
+"""Steps of 15 s: 3 s of warm-up and a window of 12 s."""
+
+Fit = Callable[[BirthId, int], float]
+Verdict = Callable[[Vet], Vetted | VettingFailed]
+
+
+def experiment(births: int = 3000, **arena: Any) -> Experiment:  # noqa: ANN401
+    """Return scenario 3 with some other rules."""
+    shipped = read_experiment("scenario3")
+    assert shipped.arena is not None
+    rules = msgspec.structs.replace(shipped.arena, **arena)
+    return msgspec.structs.replace(shipped, births=births, arena=rules)
+
+
+def equal(birth: BirthId, step: int) -> float:
+    """Find everybody equally fit."""
+    del birth, step
+    return 0.1
+
+
+def golden(birth: BirthId, step: int) -> float:
+    """Find nobody as fit as another, or as at another time; in (0, 1)."""
+    return (birth.number * 0.6180339887498949 + step * 1e-5 + 0.1) % 1.0
+
+
+def viable(vet: Vet) -> Vetted:
+    """Find every body viable."""
+    return Vetted(vet.birth, vet.attempt, VIABLE)
+
+
+def picky(vet: Vet) -> Vetted | VettingFailed:
+    """Refuse every third attempt, and break at some."""
+    if (vet.birth.number + vet.attempt) % 3 == 1:
+        return Vetted(vet.birth, vet.attempt, CROWDED)
+    if (vet.birth.number + vet.attempt) % 8 == 7:
+        return VettingFailed(vet.birth, vet.attempt, "analyzer broke thrice")
+    return viable(vet)
+
+
+@dataclass
+class World:
+    """Who is where since when; ``falls`` tells who diverges during an advance."""
+
+    fit: Fit = equal
+    falls: Callable[[BirthId, int], bool] = lambda _birth, _step: False
+    step: int = 0
+    born: dict[BirthId, int] = field(default_factory=dict)
+    places: dict[BirthId, tuple[float, float]] = field(default_factory=dict)
+
+    def advance(self, command: AdvanceShard) -> Advanced:
+        """Do what a worker does."""
+        for birth in command.changes.removals:
+            del self.born[birth]
+        for each in command.changes.insertions:
+            assert each.birth not in self.born
+            self.born[each.birth] = self.step
+            self.places[each.birth] = each.place
+        assert all(each.birth in self.born for each in command.changes.brains)
+        self.step = command.until
+        fallen = [one for one in sorted(self.born) if self.falls(one, self.step)]
+        casualties = tuple(
+            Casualty(one, self.step - 1, "diverged: qacc", (*self.places[one], 0.5))
+            for one in fallen
+        )
+        for one in fallen:
+            del self.born[one]
+        living = sorted(self.born)
+        advance = Advance(
+            step=self.step,
+            digest=self.step.to_bytes(32, "big"),
+            judgements=tuple(self.judged(one) for one in living),
+            casualties=casualties,
+            touches=tuple(Touch(a, b, 0.25) for a, b in pairwise(living[:3])),
+            poses=poses(living, self.step * DT),
+        )
+        return Advanced(command.island, command.number, advance, len(living), SOMEBODY)
+
+    def judged(self, birth: BirthId) -> Judgement:
+        age = self.step - self.born[birth]
+        fitness = self.fit(birth, self.step)
+        place = (*self.places[birth], 0.02)
+        is_mature = age >= MATURE
+        return Judgement(birth, age * DT, 0.0, fitness / 5, fitness, is_mature, place)
+
+
+def poses(births: list[BirthId], time_s: float) -> bytes:
+    """Return a pose for each robot as columns."""
+    schema = POSES.remove(0)
+    rows = [
+        {"island": one.island, "birth": one.number, "sim_time_s": time_s}
+        | dict.fromkeys(("x", "y", "z", "qx", "qy", "qz"), 0.0)
+        | {"qw": 1.0, "angles": [0.5]}
+        for one in births
+    ]
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, schema) as writer:
+        writer.write_batch(pa.RecordBatch.from_pylist(rows, schema=schema))
+    return bytes(sink.getvalue().to_pybytes())
+
+
+@dataclass
+class Life:
+    """An arena, its world, and all that either said."""
+
+    arena: Arena
+    world: World = field(default_factory=World)
+    verdict: Verdict = viable
+    order: Iterator[int] | None = None
+    events: list[ArenaEvent] = field(default_factory=list)
+    commands: list[ArenaCommand] = field(default_factory=list)
+    waiting: deque[Vet | AdvanceShard] = field(default_factory=deque)
+
+    def tell(self, event: ArenaEvent) -> list[ArenaCommand]:
+        found = self.arena.handle(event)
+        self.events.append(event)
+        self.commands += found
+        self.waiting += [one for one in found if isinstance(one, Vet | AdvanceShard)]
+        return found
+
+    def turn(self) -> list[ArenaCommand]:
+        """Answer one question."""
+        self.waiting.rotate(-next(self.order) if self.order else 0)
+        asked = self.waiting.popleft()
+        if isinstance(asked, Vet):
+            return self.tell(self.verdict(asked))
+        return self.tell(self.world.advance(asked))
+
+    def live(self, until_s: float = 1e9) -> "Life":
+        """Go on to a time, or to the end."""
+        if not self.events:
+            self.tell(Started())
+        while self.waiting and self.arena.next_step * DT <= until_s:
+            self.turn()
+        return self
+
+    def rows(self, table: str) -> list[Any]:
+        return [
+            one.row
+            for one in self.commands
+            if isinstance(one, Record) and one.table == table
+        ]
+
+    @property
+    def advances(self) -> list[AdvanceShard]:
+        return [one for one in self.commands if isinstance(one, AdvanceShard)]
+
+    @property
+    def is_done(self) -> bool:
+        return isinstance(self.commands[-1], Finish) and self.arena.is_finished
+
+    @property
+    def bulk(self) -> list[Append]:
+        return [one for one in self.commands if isinstance(one, Append)]
