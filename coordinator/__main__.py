@@ -1,6 +1,7 @@
 """Commands of the coordinator: ``run``, ``coordinator``, ``resume``, ``compare``."""
 
 import argparse
+import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -9,12 +10,15 @@ from msgspec.structs import replace
 
 from coordinator.compare import compare
 from coordinator.events import AgentKind
+from coordinator.folder import read_details
 from coordinator.running import Deployment, resume, start
 from schema.agent_command import Flags, add_network_flags, tls_of
 from schema.crew import cores
 from schema.errors import RunFolderError
 from schema.experiment import (
+    Experiment,
     check_experiment,
+    experiment_from_text,
     fitness_function,
     read_experiment,
     shipped_experiments,
@@ -41,9 +45,11 @@ def main(arguments: list[str]) -> int:
     options = _parser(command).parse_args(words)
     if command == "compare":
         return _compare(options)
-    deployment = _deployment(options)
     if command == "resume":
-        return resume(Path(options.folder), deployment)
+        folder = Path(options.folder)
+        document = read_details(folder).document
+        experiment = experiment_from_text(document)
+        return resume(folder, _deployment(options, experiment))
     experiment = read_experiment(options.experiment)
     if options.births is not None:
         experiment = replace(experiment, births=options.births)
@@ -51,19 +57,21 @@ def main(arguments: list[str]) -> int:
     fitness_function(experiment.fitness)
     default = Path("runs") / f"{experiment.name}-seed{options.seed}"
     folder = Path(options.out) if options.out else default
-    return start(folder, experiment, options.seed, deployment)
+    return start(folder, experiment, options.seed, _deployment(options, experiment))
 
 
-def _deployment(options: argparse.Namespace) -> Deployment:
+def _deployment(options: argparse.Namespace, experiment: Experiment) -> Deployment:
     """Return who does the work; the one place that names the other rooms."""
     import analyzer.jobs
     import analyzer.service
     import worker.jobs
     import worker.service
 
+    # One arena is one process's; single robots spread over processes.
+    threads = options.threads or (cores() if experiment.arena else 1)
     answers: dict[AgentKind, Callable[[bytes], bytes]] = {
         "analyzer": analyzer.jobs.answer,
-        "worker": worker.jobs.answer,
+        "worker": worker.jobs.Jobs(threads=threads).answer,
     }
     return Deployment(
         workers=options.workers,
@@ -77,6 +85,8 @@ def _deployment(options: argparse.Namespace) -> Deployment:
         tls=tls_of(options),
         quiet=options.quiet,
         fsync=options.fsync,
+        threads=threads,
+        speed=options.speed,
     )
 
 
@@ -104,13 +114,19 @@ def _parser(command: str) -> argparse.ArgumentParser:
             "--out", help="run folder; default: runs/EXPERIMENT-seedSEED"
         )
     if command == "coordinator":
-        parser.set_defaults(workers=0, in_process=False)
+        parser.set_defaults(workers=0, in_process=False, threads=1)
     else:
         parser.add_argument(
             "--workers",
             type=_whole,
             default=cores(),
             help="worker processes to start here; default: one per core",
+        )
+        parser.add_argument(
+            "--threads",
+            type=_count,
+            help="threads of each worker that advance one arena together; default: "
+            "one per core for an arena, else 1",
         )
         parser.add_argument(
             "--in-process",
@@ -124,6 +140,12 @@ def _parser(command: str) -> argparse.ArgumentParser:
         help="where others may connect, as tcp/127.0.0.1:7447",
     )
     add_network_flags(parser)
+    parser.add_argument(
+        "--speed",
+        type=_speed,
+        metavar="X",
+        help="for watching an arena: at most X simulated seconds per second",
+    )
     parser.add_argument("--quiet", action="store_true", help="show no progress")
     parser.add_argument(
         "--fsync", action="store_true", help="survive power loss too; slower"
@@ -150,6 +172,13 @@ def _count(text: str) -> int:
     value = int(text)
     if value < 1:
         raise argparse.ArgumentTypeError(f"must be >= 1, got {value}")
+    return value
+
+
+def _speed(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"must be > 0 and finite, got {value}")
     return value
 
 

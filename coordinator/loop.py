@@ -6,27 +6,26 @@ comes back to the same decisions by replaying its journal.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from itertools import count
 from typing import Protocol
 
+from coordinator.advances import Advances, Terms, Vault
+from coordinator.arena import Arena
 from coordinator.dispatch import Dispatch
 from coordinator.events import (
     Advanced,
-    Answered,
-    Assign,
+    AdvanceShard,
+    Append,
+    ArenaCommand,
     Commanded,
-    Deliver,
     DispatchEvent,
     Evaluate,
     Evaluated,
     EvaluationFailed,
     Finish,
     IslandCommand,
-    Job,
     Journalled,
     Record,
-    Requested,
-    Returned,
     Started,
     Ticked,
     Vet,
@@ -34,14 +33,16 @@ from coordinator.events import (
     VettingFailed,
 )
 from coordinator.island import Island
+from coordinator.pacing import Pace
+from coordinator.questions import Question, Questions
 from schema.birth import BirthId
-from schema.codec import Answer, decode_answer, encode_request, encode_robot
-from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
-from schema.evaluation import Evaluation, Provenance, Report
-from schema.robot import Robot
+from schema.errors import UnexpectedEvent
 
 Key = tuple[str, BirthId, int]
 """What an open question is known by: kind, birth, attempt."""
+
+Asked = Vet | Evaluate | AdvanceShard
+"""What islands and arenas have others do."""
 
 
 class Agents(Protocol):
@@ -57,7 +58,7 @@ class Agents(Protocol):
 class Log(Protocol):
     """What survives a crash of this process."""
 
-    def append(self, events: Sequence[Answered]) -> None:
+    def append(self, events: Sequence[Journalled]) -> None:
         """Keep events, durably, before anybody acts on them."""
 
 
@@ -67,50 +68,63 @@ class Rows(Protocol):
     def write(self, record: Record) -> None:
         """Take one row."""
 
+    def store(self, rows: Append) -> None:
+        """Bring bulk rows to disk before the journal has what they belong to."""
 
-@dataclass(frozen=True, slots=True)
-class Question:
-    """What every request of a run carries beside the robot."""
-
-    run: str
-    epoch: int
-    vetting: bytes
-    evaluation: bytes
+    def append(self, rows: Append) -> None:
+        """Take bulk rows that the journal has."""
 
 
 class Loop:
     """One run's machines and what connects them to the world.
 
     Attributes:
-        malformed: answers that did not decode or did not fit their question.
-        dispatch: who does what.
+        islands: the machines, by their numbers.
+        advances: those of the arenas.
     """
 
     def __init__(
         self,
-        islands: Mapping[int, Island],
+        islands: Mapping[int, Island | Arena],
         *,
         question: Question,
         agents: Agents,
         log: Log,
         rows: Rows,
+        vault: Vault,
+        pace: Pace | None = None,
     ) -> None:
         """Connect machines; nothing happens before ``start``."""
+        numbers = count(1)
         self.islands = dict(islands)
-        self.dispatch = Dispatch()
-        self.malformed = 0
-        self._question = question
+        self.advances = Advances(
+            Terms(question.run, question.epoch, question.arena),
+            vault,
+            numbers=numbers,
+            send=agents.send,
+        )
+        self._questions = Questions(question, numbers=numbers, send=agents.send)
         self._agents = agents
         self._log = log
         self._rows = rows
-        self._numbers = 0
-        self._answers: dict[int, Answer] = {}
-        self._encoded: dict[BirthId, tuple[Robot, bytes]] = {}
+        self._pace = pace
+        self._held_back: dict[int, float] = {}
+        self._now_s = 0.0
 
     @property
     def is_finished(self) -> bool:
         """Every island is done."""
         return all(island.is_finished for island in self.islands.values())
+
+    @property
+    def dispatch(self) -> Dispatch:
+        """Who does what, of single robots' questions."""
+        return self._questions.dispatch
+
+    @property
+    def malformed(self) -> int:
+        """Answers that did not decode or did not fit their question."""
+        return self._questions.malformed + self.advances.malformed
 
     def start(self, history: Iterable[Journalled]) -> None:
         """Begin, or come back: replay a journal, then ask what is still open.
@@ -122,16 +136,24 @@ class Loop:
             UnexpectedEvent: the history of another kind of run.
         """
         unanswered: dict[Key, Vet | Evaluate] = {}
+
+        def note(commands: Iterable[Asked]) -> None:
+            for command in commands:
+                if isinstance(command, AdvanceShard):
+                    self.advances.note(command)
+                else:
+                    unanswered[_key(command)] = command
+
         for number in sorted(self.islands):
-            asked = self._obey(self.islands[number].handle(Started()))
-            unanswered.update((_key(command), command) for command in asked)
+            note(self._tell(number, Started()))
         for event in history:
-            if isinstance(event, Advanced | Commanded):
-                raise UnexpectedEvent(f"no island here is an arena, got {event}")
-            unanswered.pop(_key(event), None)
-            unanswered.update((_key(command), command) for command in self._tell(event))
+            if not isinstance(event, Advanced | Commanded):
+                unanswered.pop(_key(event), None)
+            note(self._tell(_island(event), event))
         for command in unanswered.values():
-            self._request(command)
+            self._questions.ask(command)
+        for number in sorted(self.islands):
+            self.advances.request(number)
 
     def step(self, timeout_s: float, now_s: float) -> int:
         """Take what came and act on it.
@@ -143,119 +165,102 @@ class Loop:
         Returns:
             The number of island events that were taken.
         """
-        events: list[Answered] = []
-        wake_s = self.dispatch.wake_s
-        if wake_s is not None:
-            timeout_s = min(timeout_s, max(0.0, wake_s - now_s))
+        self._now_s = now_s
+        for shard, due_s in sorted(self._held_back.items()):
+            if due_s <= now_s:
+                del self._held_back[shard]
+                self.advances.request(shard)
+        wakes_s = (self.dispatch.wake_s, self.advances.dispatch.wake_s)
+        for wake_s in (*wakes_s, *self._held_back.values()):
+            if wake_s is not None:
+                timeout_s = min(timeout_s, max(0.0, wake_s - now_s))
+        events: list[Journalled] = []
         for event in (Ticked(now_s), *self._agents.receive(timeout_s)):
-            for command in self.dispatch.handle(self._checked(event)):
-                if isinstance(command, Assign):
-                    self._assign(command)
-                elif isinstance(command, Deliver):
-                    events.append(self._delivered(command))
-        if events:
-            self._log.append(events)
-        for answered in events:
-            for question in self._tell(answered):
-                self._request(question)
+            events += self._questions.tell(event)
+            events += self.advances.tell(event)
+        self._take(events)
         return len(events)
 
-    def _tell(self, event: Answered) -> list[Vet | Evaluate]:
-        """Give an island its answer; return what it asks next."""
-        return self._obey(self.islands[event.birth.island].handle(event))
+    def order(self, event: Commanded) -> None:
+        """Take what an operator ordered; the journal has it on return.
 
-    def _obey(self, commands: Iterable[IslandCommand]) -> list[Vet | Evaluate]:
+        Raises:
+            UnexpectedEvent: it is not for an arena of this run.
+        """
+        if not isinstance(self.islands.get(event.island), Arena):
+            raise UnexpectedEvent(f"no arena {event.island}: {event}")
+        self._take([event])
+
+    def _take(self, events: Sequence[Journalled]) -> None:
+        """Keep events, then act on them."""
+        if not events:
+            return
+        for event in events:
+            if isinstance(event, Advanced) and event.pose_rows:
+                poses = event.advance.poses
+                self._rows.store(Append("poses", event.pose_rows, poses))
+        self._log.append(events)
+        for event in events:
+            for command in self._tell(_island(event), event):
+                if isinstance(command, AdvanceShard):
+                    self._advance(command)
+                else:
+                    self._questions.ask(command)
+
+    def _advance(self, command: AdvanceShard) -> None:
+        """Ask for an advance, now or when it is due."""
+        shard = command.island
+        self.advances.note(command)
+        if self._pace is not None:
+            step = self.advances.step(shard)
+            due_s = self._pace.due_s(shard, step, self._now_s)
+            if due_s > self._now_s:
+                self._held_back[shard] = due_s
+                return
+        self.advances.request(shard)
+
+    def _tell(self, number: int, event: Started | Journalled) -> list[Asked]:
+        """Give an island its event; return what it asks next.
+
+        Raises:
+            UnexpectedEvent: nobody here takes such an event.
+        """
+        machine = self.islands.get(number)
+        if isinstance(machine, Arena):
+            if isinstance(event, Advanced):
+                self.advances.take(event)
+            if not isinstance(event, Evaluated | EvaluationFailed):
+                return self._obey(machine.handle(event))
+        elif machine is not None and not isinstance(event, Advanced | Commanded):
+            return self._obey(machine.handle(event))
+        raise UnexpectedEvent(f"no island here takes {event}")
+
+    def _obey(self, commands: Iterable[IslandCommand | ArenaCommand]) -> list[Asked]:
         """Write the rows; return the questions."""
-        asked: list[Vet | Evaluate] = []
+        asked: list[Asked] = []
         for command in commands:
             match command:
                 case Record():
                     self._rows.write(command)
-                case Vet() | Evaluate():
+                case Append():
+                    self._rows.append(command)
+                case Vet() | Evaluate() | AdvanceShard():
                     asked.append(command)
                 case Finish():
                     pass
         return asked
 
-    def _request(self, command: Vet | Evaluate) -> None:
-        self._numbers += 1
-        number, birth = self._numbers, command.birth
-        cached = self._encoded.get(birth)
-        if cached is not None and cached[0] is command.robot:
-            robot = cached[1]
-        else:
-            robot = encode_robot(command.robot)
-        asks = self._question
-        if isinstance(command, Vet):
-            self._encoded[birth] = (command.robot, robot)
-            kind, attempt, settings = "vet", command.attempt, asks.vetting
-        else:
-            self._encoded.pop(birth, None)
-            kind, attempt, settings = "evaluate", 0, asks.evaluation
-        payload = encode_request(
-            run=asks.run,
-            epoch=asks.epoch,
-            number=number,
-            settings=settings,
-            robot=robot,
-        )
-        job = Job(number, kind, birth, attempt, payload)  # type: ignore[arg-type]
-        for reaction in self.dispatch.handle(Requested(job)):
-            if isinstance(reaction, Assign):
-                self._assign(reaction)
 
-    def _assign(self, command: Assign) -> None:
-        self._agents.send(command.job.number, command.agent, command.job.payload)
-
-    def _checked(self, event: DispatchEvent) -> DispatchEvent:
-        """Return the event; an answer that is none becomes the agent's error."""
-        if not isinstance(event, Returned) or event.outcome != "ok":
-            return event
-        try:
-            answer = decode_answer(event.answer)
-        except MalformedMessage as error:
-            return self._dropped(event, str(error))
-        expected = (self._question.epoch, event.number)
-        if (answer.epoch, answer.number) != expected:
-            return self._dropped(
-                event,
-                f"answer must be to (epoch, job) {expected}, "
-                f"got {(answer.epoch, answer.number)}",
-            )
-        self._answers[event.number] = answer
-        return event
-
-    def _dropped(self, event: Returned, reason: str) -> Returned:
-        """Count an answer of no use and return it as the agent's error."""
-        self.malformed += 1
-        return replace(event, outcome="error", answer=b"", reason=reason)
-
-    def _delivered(self, command: Deliver) -> Answered:
-        """Return the island's event that a finished job comes to.
-
-        Raises:
-            JobRefused: no agent that was asked can do it; the run stops as it is.
-        """
-        job = command.job
-        if command.reason:
-            raise JobRefused(
-                f"birth {job.birth.number}: several agents cannot {job.kind} it, the "
-                f"last of them {command.agent}: {command.reason}; mend that and resume"
-            )
-        answer = self._answers.pop(job.number)
-        result = answer.result
-        if job.kind == "vet":
-            if isinstance(result, Report):
-                return Vetted(job.birth, job.attempt, result)
-            return VettingFailed(job.birth, job.attempt, str(result))
-        platform = self.dispatch.platform(command.agent)
-        provenance = Provenance(command.agent, platform, answer.wall_s)
-        if isinstance(result, Evaluation):
-            return Evaluated(job.birth, result, provenance)
-        return EvaluationFailed(job.birth, str(result), provenance)
+def _island(event: Journalled) -> int:
+    """Return whose event it is."""
+    if isinstance(event, Advanced | Commanded):
+        return event.island
+    return event.birth.island
 
 
-def _key(about: Answered | Vet | Evaluate) -> Key:
+def _key(
+    about: Vet | Evaluate | Vetted | VettingFailed | Evaluated | EvaluationFailed,
+) -> Key:
     """Return what a question and its answer have in common."""
     if isinstance(about, Vet | Vetted | VettingFailed):
         return ("vet", about.birth, about.attempt)

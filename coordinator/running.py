@@ -12,19 +12,24 @@ from importlib import metadata
 from pathlib import Path
 from threading import Event
 
+from coordinator.arena import Arena
 from coordinator.events import AgentKind, Record
 from coordinator.folder import DETAILS, RunDetails, RunFolder, read_state
 from coordinator.island import Island
 from coordinator.journal import Journal
 from coordinator.local import LocalAgents
-from coordinator.loop import Agents, Loop, Question
+from coordinator.loop import Agents, Loop
+from coordinator.pacing import Pace
 from coordinator.progress import Display
+from coordinator.questions import Question
 from coordinator.record import Recorder
 from coordinator.service import Network
+from coordinator.snapshots import Snapshots
 from coordinator.summary import tell_result
 from schema.crew import Crew, stop_on_signals
 from schema.experiment import (
     Experiment,
+    arena_settings,
     evaluation_settings,
     experiment_from_text,
     experiment_text,
@@ -56,6 +61,8 @@ class Deployment:
         tls: files for a ``tls/`` address.
         quiet: show nothing but the end.
         fsync: survive power loss, too.
+        threads: that advance one arena together in a process here.
+        speed: simulated seconds per second at most, of arenas; None: no limit.
     """
 
     workers: int
@@ -66,6 +73,8 @@ class Deployment:
     tls: Tls | None
     quiet: bool
     fsync: bool
+    threads: int = 1
+    speed: float | None = None
 
 
 def start(
@@ -109,21 +118,19 @@ def _run(folder: Path, details: RunDetails | None, deployment: Deployment) -> in
         stack.callback(recorder.close)
         experiment = experiment_from_text(held.details.document)
         agents, crews = stack.enter_context(_agents(held, deployment))
+        machine = Arena if experiment.arena else Island
         loop = Loop(
-            {0: Island(experiment, held.details.seed, held.details.run)},
-            question=Question(
-                run=f"{socket.gethostname()}:{folder.resolve()}",
-                epoch=held.epoch,
-                vetting=vetting_settings(experiment),
-                evaluation=evaluation_settings(experiment),
-            ),
+            {0: machine(experiment, held.details.seed, held.details.run)},
+            question=_question(held, experiment),
             agents=agents,
             log=journal,
             rows=recorder,
+            vault=Snapshots(folder),
+            pace=_pace(experiment, deployment),
         )
         loop.start(journal.replay())
         held.set_state("running")
-        with Display(loop, experiment.births, quiet=deployment.quiet) as display:
+        with Display(loop, experiment, quiet=deployment.quiet) as display:
             _turn(loop, display, stop, [recorder.flush, held.confirm, *crews])
         if not loop.is_finished:
             recorder.flush()
@@ -136,6 +143,24 @@ def _run(folder: Path, details: RunDetails | None, deployment: Deployment) -> in
         held.set_state("finished")
     tell_result(folder, experiment, loop.islands[0])
     return 0
+
+
+def _question(held: RunFolder, experiment: Experiment) -> Question:
+    """Return what all requests of a run have in common."""
+    return Question(
+        run=f"{socket.gethostname()}:{held.path.resolve()}",
+        epoch=held.epoch,
+        vetting=vetting_settings(experiment),
+        evaluation=evaluation_settings(experiment),
+        arena=arena_settings(experiment) if experiment.arena else b"",
+    )
+
+
+def _pace(experiment: Experiment, deployment: Deployment) -> Pace | None:
+    """Return what holds arenas back, None if nothing shall."""
+    if deployment.speed is None:
+        return None
+    return Pace(deployment.speed, experiment.simulation.timestep_s)
 
 
 def _turn(
@@ -180,7 +205,7 @@ def _agents(
         for kind, size in sizes.items() if deployment.workers else ():
             agent = Agent(
                 kind, f"own-{kind}", network.address, deployment.fleet,
-                tls=deployment.tls,
+                tls=deployment.tls, threads=deployment.threads,
             )  # fmt: skip
             crew = Crew(deployment.bodies[kind], (agent,), size=size)
             crews.append(stack.enter_context(crew).look_after)

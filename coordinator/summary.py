@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+from coordinator.arena import Arena
 from coordinator.island import Island
 from schema.experiment import Experiment, body_space
 from schema.genome import develop
@@ -11,7 +12,7 @@ from schema.robot_file import write_robot
 BEST = "best.yaml"
 
 
-def tell_result(folder: Path, experiment: Experiment, island: Island) -> None:
+def tell_result(folder: Path, experiment: Experiment, island: Island | Arena) -> None:
     """Write the best robot of an island to a file; say what there is to see.
 
     Args:
@@ -19,6 +20,12 @@ def tell_result(folder: Path, experiment: Experiment, island: Island) -> None:
         experiment: what was run.
         island: finished.
     """
+    if isinstance(island, Arena) and island.is_extinct:
+        sys.stdout.write(
+            f"after {island.births} of {experiment.births} births too few are left "
+            f"to mate\ntables:     {folder / 'tables'}\n"
+        )
+        return
     best = max(island.population, key=lambda one: (one.fitness, -one.birth.number))
     mean = sum(one.fitness for one in island.population) / len(island.population)
     space = body_space(experiment.space)
@@ -35,6 +42,8 @@ def tell_result(folder: Path, experiment: Experiment, island: Island) -> None:
         f"tables:     {folder / 'tables'}",
         "try next:",
         f"  revolve robot show {folder / BEST}",
-        "  revolve run no-selection --seed 1 --births 600",
+        f"  revolve analyze {folder}"
+        if isinstance(island, Arena)
+        else "  revolve run no-selection --seed 1 --births 600",
     ]
     sys.stdout.write("\n".join(lines) + "\n")

@@ -89,6 +89,7 @@ def run_crew(
             options.connect,
             check_name(options.fleet, "--fleet"),
             tls=tls_of(options),
+            threads=options.threads,
         )
         client_config(agent.connect, agent.tls)
     except RevolveError as error:
@@ -140,6 +141,14 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
         action="store_true",
         help="end when standard input is closed, too",
     )
+    flags.set_defaults(threads=1)
+    if role == "worker":
+        flags.add_argument(
+            "--threads",
+            type=_at_least_one,
+            metavar="N",
+            help="of each process, to advance one arena together (default: 1)",
+        )
     add_network_flags(flags)
     return flags
 

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from importlib import import_module
 
 from schema.arena_codec import Live, is_advance_request
 from schema.codec import Answer, decode_request, encode_answer
@@ -12,6 +11,7 @@ from schema.experiment import body_space, read_evaluation_settings
 from schema.robot import check_robot
 from worker.evaluation import evaluate
 from worker.shards import Shards
+from worker.world import World
 
 
 class Jobs:
@@ -26,9 +26,7 @@ class Jobs:
             threads: that advance one arena together; the result is the same.
             publish: told of each advance, for those who watch.
         """
-        self._threads = threads
-        self._publish = publish
-        self._shards: Shards | None = None
+        self._shards = Shards(World, threads=threads, publish=publish)
 
     def answer(self, request: bytes) -> bytes:
         """Return the encoded answer to an encoded request of either kind.
@@ -37,12 +35,9 @@ class Jobs:
             RevolveError: a request that cannot be done here; see ``answer`` and
                 ``Shards.answer``.
         """
-        if not is_advance_request(request):
-            return answer(request)
-        if self._shards is None:
-            world = import_module("worker.world").World
-            self._shards = Shards(world, threads=self._threads, publish=self._publish)
-        return self._shards.answer(request)
+        if is_advance_request(request):
+            return self._shards.answer(request)
+        return answer(request)
 
 
 def answer(request: bytes) -> bytes:

@@ -7,7 +7,8 @@ every step of that with what it was when it happened first.
 
 import time
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol, Self
 
@@ -56,6 +57,9 @@ class World(Protocol):
 
     def digest(self) -> bytes:
         """Return the SHA-256 of the whole state."""
+
+    def close(self) -> None:
+        """Let its threads end."""
 
 
 @dataclass(slots=True)
@@ -117,9 +121,10 @@ class Shards:
         advance: Advance | None = None
         snapshot = b""
         if held is not None:
-            held.world.apply(job.changes)
-            advance = held.world.advance(job.until)
-            snapshot = held.world.snapshot() if job.wants_snapshot else b""
+            with _closed_on_error(held.world) as world:
+                world.apply(job.changes)
+                advance = world.advance(job.until)
+                snapshot = world.snapshot() if job.wants_snapshot else b""
             held.digest = advance.digest
             self._keep((job.run, job.shard), held)
             self._publish(Live(job.run, job.shard, advance))
@@ -137,12 +142,14 @@ class Shards:
             and held.digest == job.from_digest
             and held.settings == job.settings
         )
+        if held is not None and not is_it:
+            held.world.close()
         return held if is_it else None
 
     def _keep(self, key: Key, held: _Held) -> None:
         self._held[key] = held
         if len(self._held) > MOST_HELD:
-            self._held.popitem(last=False)
+            self._held.popitem(last=False)[1].world.close()
 
     def _rebuilt(self, job: AdvanceRequest, rebuild: Rebuild) -> World:
         """Return the arena in the state to start from.
@@ -155,17 +162,29 @@ class Shards:
             world = self._world.restore(settings, rebuild.snapshot, self._threads)
         else:
             world = self._world(settings, self._threads)
-        for past in rebuild.history:
-            world.apply(past.changes)
-            _check_digest(world.step, world.advance(past.until).digest, past.digest)
-        if world.step != job.from_step:
-            raise StateDiffers(
-                f"shard {job.shard}: rebuilt to step {world.step}, must be "
-                f"{job.from_step}"
-            )
-        if not rebuild.history and job.from_digest:
-            _check_digest(world.step, world.digest(), job.from_digest)
+        with _closed_on_error(world):
+            for past in rebuild.history:
+                world.apply(past.changes)
+                digest = world.advance(past.until).digest
+                _check_digest(world.step, digest, past.digest)
+            if world.step != job.from_step:
+                raise StateDiffers(
+                    f"shard {job.shard}: rebuilt to step {world.step}, must be "
+                    f"{job.from_step}"
+                )
+            if not rebuild.history and job.from_digest:
+                _check_digest(world.step, world.digest(), job.from_digest)
         return world
+
+
+@contextmanager
+def _closed_on_error(world: World) -> Iterator[World]:
+    """Give up a world that an error left half-way."""
+    try:
+        yield world
+    except BaseException:
+        world.close()
+        raise
 
 
 def _check_robots(changes: Changes, settings: ArenaSettings) -> None:

@@ -18,10 +18,12 @@ from coordinator.folder import RunDetails, RunFolder
 from coordinator.generation import generate
 from coordinator.island import Island
 from coordinator.journal import Journal
-from coordinator.loop import Loop, Question
+from coordinator.loop import Loop
+from coordinator.questions import Question
 from coordinator.record import Recorder
 from coordinator.rows import evaluation_record
 from coordinator.service import Network
+from coordinator.snapshots import Snapshots
 from schema.birth import BirthId
 from schema.crew import Crew
 from schema.experiment import (
@@ -51,7 +53,7 @@ class Judged(Island):
     def __init__(self, experiment: Experiment, robots: list[Robot]) -> None:
         super().__init__(experiment, 1, 0)
         self._robots = robots
-        self._asked = 0
+        self._requested = 0
         self._births_wanted = experiment.births
 
     def handle(self, event: IslandEvent) -> list[IslandCommand]:
@@ -63,10 +65,10 @@ class Judged(Island):
             self.births += 1
             commands.append(evaluation_record(event))
             asked = 1
-        for _ in range(min(asked, self._births_wanted - self._asked)):
-            robot = self._robots[self._asked % len(self._robots)]
-            commands.append(Evaluate(BirthId(0, self._asked), robot))
-            self._asked += 1
+        for _ in range(min(asked, self._births_wanted - self._requested)):
+            robot = self._robots[self._requested % len(self._robots)]
+            commands.append(Evaluate(BirthId(0, self._requested), robot))
+            self._requested += 1
         return commands
 
 
@@ -108,6 +110,7 @@ def run(
             agents=network,
             log=stack.enter_context(Journal.open(folder)),
             rows=recorder,
+            vault=Snapshots(folder),
         )
         loop.start([])
         while (

@@ -17,8 +17,10 @@ from coordinator.folder import RunDetails, RunFolder
 from coordinator.island import Island
 from coordinator.journal import NAME, Journal
 from coordinator.local import LocalAgents
-from coordinator.loop import Loop, Question
+from coordinator.loop import Loop
+from coordinator.questions import Question
 from coordinator.record import Recorder
+from coordinator.snapshots import Snapshots
 from schema.codec import Answer, decode_request, encode_answer, encode_robot
 from schema.evaluation import Evaluation
 from schema.experiment import (
@@ -78,6 +80,7 @@ def run(path: Path, *, answers: int = 10**9) -> int:
             ),
             log=journal,
             rows=rows,
+            vault=Snapshots(path),
         )
         try:
             loop.start(journal.replay())

@@ -1,0 +1,168 @@
+"""Single robots' questions, to analyzers and workers, and what comes of them."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from coordinator.dispatch import Dispatch
+from coordinator.events import (
+    Answered,
+    Assign,
+    Deliver,
+    DispatchCommand,
+    DispatchEvent,
+    Evaluate,
+    Evaluated,
+    EvaluationFailed,
+    Job,
+    Requested,
+    Returned,
+    Vet,
+    Vetted,
+    VettingFailed,
+)
+from schema.birth import BirthId
+from schema.codec import Answer, decode_answer, encode_request, encode_robot
+from schema.errors import JobRefused, MalformedMessage
+from schema.evaluation import Evaluation, Provenance, Report
+from schema.robot import Robot
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What every request of a run carries beside the robot or the changes.
+
+    Attributes:
+        run, epoch: of the coordinator.
+        vetting, evaluation, arena: the settings of each kind, as JSON.
+    """
+
+    run: str
+    epoch: int
+    vetting: bytes
+    evaluation: bytes
+    arena: bytes = b""
+
+
+class Questions:
+    """The questions of all islands of a run.
+
+    Attributes:
+        dispatch: who does what.
+        malformed: answers that did not decode or did not fit their question.
+    """
+
+    def __init__(
+        self,
+        question: Question,
+        *,
+        numbers: Iterator[int],
+        send: Callable[[int, str, bytes], None],
+    ) -> None:
+        """Have nothing to ask yet.
+
+        Args:
+            question: what all of them have in common.
+            numbers: of jobs, each used once, ascending.
+            send: takes number, agent and payload of a job.
+        """
+        self.dispatch = Dispatch()
+        self.malformed = 0
+        self._question = question
+        self._numbers = numbers
+        self._send = send
+        self._answers: dict[int, Answer] = {}
+        self._encoded: dict[BirthId, tuple[Robot, bytes]] = {}
+
+    def ask(self, command: Vet | Evaluate) -> None:
+        """Have a robot vetted or evaluated."""
+        number, birth = next(self._numbers), command.birth
+        cached = self._encoded.get(birth)
+        if cached is not None and cached[0] is command.robot:
+            robot = cached[1]
+        else:
+            robot = encode_robot(command.robot)
+        asks = self._question
+        if isinstance(command, Vet):
+            self._encoded[birth] = (command.robot, robot)
+            kind, attempt, settings = "vet", command.attempt, asks.vetting
+        else:
+            kind, attempt, settings = "evaluate", 0, asks.evaluation
+            self._encoded.pop(birth, None)
+        payload = encode_request(
+            run=asks.run,
+            epoch=asks.epoch,
+            number=number,
+            settings=settings,
+            robot=robot,
+        )
+        job = Job(number, kind, birth, attempt, payload)  # type: ignore[arg-type]
+        self._obey(self.dispatch.handle(Requested(job)))
+
+    def tell(self, event: DispatchEvent) -> list[Answered]:
+        """Take news of agents and jobs; return the answers that came.
+
+        News of jobs that are none of these changes nothing.
+
+        Raises:
+            JobRefused: no agent that was asked can do a job; the run stops as it is.
+        """
+        if isinstance(event, Returned) and not self.dispatch.is_open(event.number):
+            return []
+        return self._obey(self.dispatch.handle(self._checked(event)))
+
+    def _obey(self, commands: Sequence[DispatchCommand]) -> list[Answered]:
+        answers: list[Answered] = []
+        for command in commands:
+            if isinstance(command, Assign):
+                job = command.job
+                self._send(job.number, command.agent, job.payload)
+            elif isinstance(command, Deliver):
+                answers.append(self._delivered(command))
+        return answers
+
+    def _checked(self, event: DispatchEvent) -> DispatchEvent:
+        """Return the event; an answer that is none becomes the agent's error."""
+        if not isinstance(event, Returned) or event.outcome != "ok":
+            return event
+        try:
+            answer = decode_answer(event.answer)
+        except MalformedMessage as error:
+            return self._dropped(event, str(error))
+        expected = (self._question.epoch, event.number)
+        if (answer.epoch, answer.number) != expected:
+            return self._dropped(
+                event,
+                f"answer must be to (epoch, job) {expected}, "
+                f"got {(answer.epoch, answer.number)}",
+            )
+        self._answers[event.number] = answer
+        return event
+
+    def _dropped(self, event: Returned, reason: str) -> Returned:
+        """Count an answer of no use and return it as the agent's error."""
+        self.malformed += 1
+        return replace(event, outcome="error", answer=b"", reason=reason)
+
+    def _delivered(self, command: Deliver) -> Answered:
+        """Return the island's event that a finished job comes to.
+
+        Raises:
+            JobRefused: no agent that was asked can do it.
+        """
+        job = command.job
+        if command.reason:
+            raise JobRefused(
+                f"birth {job.birth.number}: several agents cannot {job.kind} it, the "
+                f"last of them {command.agent}: {command.reason}; mend that and resume"
+            )
+        answer = self._answers.pop(job.number)
+        result = answer.result
+        if job.kind == "vet":
+            if isinstance(result, Report):
+                return Vetted(job.birth, job.attempt, result)
+            return VettingFailed(job.birth, job.attempt, str(result))
+        platform = self.dispatch.platform(command.agent)
+        provenance = Provenance(command.agent, platform, answer.wall_s)
+        if isinstance(result, Evaluation):
+            return Evaluated(job.birth, result, provenance)
+        return EvaluationFailed(job.birth, str(result), provenance)

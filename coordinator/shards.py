@@ -1,0 +1,258 @@
+"""Which worker holds which arena shard: a pure machine.
+
+A shard's state lives in one worker, and its advances go there. If that worker is
+gone, errs or does not have the state after all, the advance goes, with all that is
+needed to rebuild the state, to another one of an equal platform: the one with the
+fewest shards, ties break on the name. Where none is there the shard waits.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from coordinator.events import Joined, Left, Ticked
+from schema.errors import UnexpectedEvent
+
+MAX_ERRORS = 3
+REST_S = 0.05
+LONGEST_REST_S = 3.2
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A journal tells on what platform a shard has been advanced."""
+
+    shard: int
+    platform: str
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """A shard is to be advanced; comes again only after ``Accept``."""
+
+    shard: int
+
+
+@dataclass(frozen=True, slots=True)
+class Came:
+    """What became of an advance that was handed out.
+
+    Attributes:
+        number: of the ``Hand``.
+        outcome: "done"; "stateless" (the worker does not have the state); "error"
+            with a reason; "lost" (no word).
+        reason: empty unless error.
+    """
+
+    number: int
+    outcome: Literal["done", "stateless", "error", "lost"]
+    reason: str = ""
+
+
+ShardEvent = Joined | Left | Ticked | Placed | Wanted | Came
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """Send a shard's advance to a worker.
+
+    Attributes:
+        number: of the job, used once.
+        shard: whose advance.
+        agent: the worker.
+        is_whole: with what it takes to rebuild the state.
+    """
+
+    number: int
+    shard: int
+    agent: str
+    is_whole: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Accept:
+    """The advance of a shard is done, by this worker."""
+
+    shard: int
+    agent: str
+
+
+@dataclass(frozen=True, slots=True)
+class GiveUp:
+    """Several workers cannot advance a shard, the last of them this one."""
+
+    shard: int
+    agent: str
+    reason: str
+
+
+ShardCommand = Hand | Accept | GiveUp
+
+
+@dataclass(slots=True)
+class _Shard:
+    """A shard; ``holder`` is bound to it and, if ``has_state``, fit to go on.
+
+    ``number`` is that of the job that is out, -1 if none is; ``avoid`` are those
+    who failed at the present advance.
+    """
+
+    platform: str = ""
+    holder: str = ""
+    has_state: bool = False
+    is_wanted: bool = False
+    number: int = -1
+    is_whole: bool = False
+    errors: int = 0
+    failures: int = 0
+    avoid: tuple[str, ...] = ()
+    rests_until_s: float | None = None
+
+
+class ShardDispatch:
+    """The machine; ``handle`` is its only door."""
+
+    def __init__(self, numbers: Iterator[int]) -> None:
+        """Know nobody.
+
+        Args:
+            numbers: of jobs, each used once.
+        """
+        self._numbers = numbers
+        self._shards: dict[int, _Shard] = {}
+        self._workers: dict[str, Joined] = {}
+        self._out: dict[int, int] = {}
+        self._now_s = 0.0
+
+    @property
+    def wake_s(self) -> float | None:
+        """When the next ``Ticked`` can change something [s]; None: no need."""
+        rests = [shard.rests_until_s for shard in self._shards.values()]
+        return min((until for until in rests if until is not None), default=None)
+
+    @property
+    def waiting(self) -> dict[int, str]:
+        """Platforms of the shards that wait for a worker; "" is any platform."""
+        return {
+            number: shard.platform
+            for number, shard in sorted(self._shards.items())
+            if shard.is_wanted and not self._fit(shard)
+        }
+
+    def holder(self, shard: int) -> str:
+        """Return which worker holds a shard; empty if none does."""
+        known = self._shards.get(shard)
+        return known.holder if known else ""
+
+    def has_out(self, number: int) -> bool:
+        """Return whether a job of this number is out."""
+        return number in self._out
+
+    def shard_of(self, number: int) -> int:
+        """Return whose advance a job is that is out."""
+        return self._out[number]
+
+    def handle(self, event: ShardEvent) -> list[ShardCommand]:
+        """Take an event and return what is to be done, in this order.
+
+        Late news of a job, and whoever joins or leaves twice, change nothing.
+
+        Raises:
+            UnexpectedEvent: a shard that is wanted twice.
+        """
+        match event:
+            case Joined():
+                if event.kind != "worker":
+                    return []
+                self._workers[event.agent] = event
+            case Left():
+                self._leave(event.agent)
+            case Ticked():
+                self._tick(event.now_s)
+            case Placed():
+                self._shard(event.shard).platform = event.platform
+            case Wanted():
+                shard = self._shard(event.shard)
+                if shard.is_wanted:
+                    raise UnexpectedEvent(f"shard {event.shard}: is wanted already")
+                shard.is_wanted = True
+            case Came():
+                return [*self._came(event), *self._hands()]
+        return list(self._hands())
+
+    def _shard(self, number: int) -> _Shard:
+        return self._shards.setdefault(number, _Shard())
+
+    def _leave(self, agent: str) -> None:
+        self._workers.pop(agent, None)
+        for shard in self._shards.values():
+            if shard.holder == agent:
+                self._unbind(shard)
+
+    def _unbind(self, shard: _Shard) -> None:
+        self._out.pop(shard.number, None)
+        shard.holder, shard.has_state, shard.number = "", False, -1
+
+    def _tick(self, now_s: float) -> None:
+        self._now_s = now_s
+        for shard in self._shards.values():
+            if shard.rests_until_s is not None and shard.rests_until_s <= now_s:
+                shard.rests_until_s = None
+
+    def _came(self, event: Came) -> list[ShardCommand]:
+        number = self._out.pop(event.number, None)
+        if number is None:
+            return []
+        shard = self._shards[number]
+        agent, shard.number = shard.holder, -1
+        if event.outcome == "done":
+            shard.platform = self._workers[agent].platform
+            shard.has_state, shard.is_wanted = True, False
+            shard.errors, shard.failures, shard.avoid = 0, 0, ()
+            return [Accept(number, agent)]
+        if event.outcome == "stateless" and not shard.is_whole:
+            shard.has_state = False
+            return []
+        self._unbind(shard)
+        shard.avoid = (*shard.avoid, agent)
+        shard.rests_until_s = self._now_s + min(
+            REST_S * 2**shard.failures, LONGEST_REST_S
+        )
+        shard.failures += 1
+        shard.errors += event.outcome != "lost"
+        if shard.errors < MAX_ERRORS:
+            return []
+        shard.is_wanted, shard.errors, shard.avoid = False, 0, ()
+        reason = event.reason or "asks for a state that it was given"
+        return [GiveUp(number, agent, reason)]
+
+    def _hands(self) -> Iterator[ShardCommand]:
+        """Hand out what waits and may go to somebody."""
+        for number, shard in sorted(self._shards.items()):
+            is_ready = shard.is_wanted and shard.number < 0
+            if not is_ready or shard.rests_until_s is not None:
+                continue
+            if not shard.holder:
+                shard.holder = self._choice(shard)
+            if shard.holder:
+                shard.number = next(self._numbers)
+                shard.is_whole = not shard.has_state
+                self._out[shard.number] = number
+                yield Hand(shard.number, number, shard.holder, shard.is_whole)
+
+    def _fit(self, shard: _Shard) -> list[str]:
+        """Return the workers that may hold a shard, by name."""
+        return [
+            name
+            for name, worker in sorted(self._workers.items())
+            if shard.platform in ("", worker.platform)
+        ]
+
+    def _choice(self, shard: _Shard) -> str:
+        """Return the best worker for a shard, others before those who failed."""
+        fit = self._fit(shard)
+        fresh = [name for name in fit if name not in shard.avoid]
+        holders = [each.holder for each in self._shards.values()]
+        return min(
+            fresh or fit, key=lambda name: (holders.count(name), name), default=""
+        )
