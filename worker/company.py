@@ -58,18 +58,19 @@ class Company:
     def add(self, newcomers: Iterable[Inhabitant]) -> None:
         """Take robots in, each in its own home."""
         added = sorted(newcomers, key=lambda one: one.birth)
+        self._anchor()
         self._number(sorted((*self.everybody, *added), key=lambda one: one.birth))
         for one in added:
             self.proximity.insert(self._rows[one.birth])
         homes = [one.body.home for one in added]
         self._settle([*self.clusters, *homes])
-        self.proximity.gather([one.body.reach for one in self.everybody])
 
     def remove(self, births: Iterable[BirthId]) -> None:
         """Let robots go; those who lived with them stay together."""
         gone = sorted(births)
         if not gone:
             return
+        self._anchor()
         self.proximity.remove([self._rows[birth] for birth in gone])
         homes: dict[Group, Cluster] = {}
         for birth in gone:
@@ -85,19 +86,16 @@ class Company:
         for birth in gone:
             self.shop.forget(birth)
         self._settle(kept)
-        self.proximity.gather([one.body.reach for one in self.everybody])
 
-    def look(self, step: int, velocities: Floats) -> None:
+    def look(self, velocities: Floats) -> None:
         """Join those who may touch before the next look.
 
         Args:
-            step: the arena's.
-            velocities: all clusters' in a row.
+            velocities: all clusters' in a row, absolute.
         """
         layout = self.layout
-        places = layout.positions()[layout.roots[:, :3]]
         pairs = self.proximity.look(
-            step, layout.speeds(velocities), places, self._balls
+            layout, layout.positions(), layout.speeds(velocities), self._balls
         )
         if not pairs:
             return
@@ -124,6 +122,8 @@ class Company:
             if members in present:
                 settled.append(present[members])
                 continue
+            if not changed:
+                self._anchor()
             changed = True
             before = {self._cluster_of[birth].members for birth in members}
             self.merges += len(before) - 1
@@ -155,6 +155,13 @@ class Company:
         }
         self.layout = Layout(self.clusters, self.everybody)
         self.by_cost = sorted(self.clusters, key=lambda cluster: -cluster.cost)
+        reaches = [one.body.reach for one in self.everybody]
+        self.proximity.gather(reaches, self.layout.positions())
+
+    def _anchor(self) -> None:
+        """Note how far all have moved, before they stand elsewhere in the layout."""
+        proximity, positions = self.proximity, self.layout.positions()
+        proximity.settle(self.layout.moves(positions, proximity.anchor))
 
     def _number(self, everybody: Sequence[Inhabitant]) -> None:
         self.everybody = tuple(everybody)
@@ -179,12 +186,12 @@ class Company:
         return groups
 
     def _balls(self, row: int) -> Floats:
-        """Return the spheres that cover a robot, (B, 3), world frame [m]."""
+        """Return the spheres that cover a robot, (3, B), world frame [m]."""
         one = self.everybody[row]
         reach, seat = one.body.reach, one.seat
-        turns = seat.xmat.reshape(-1, 3, 3)[reach.bodies]
-        moved = np.matmul(turns, reach.centres[:, :, None])[:, :, 0]
-        return np.asarray(moved + seat.xpos[reach.bodies])
+        turned = seat.xmat[reach.bodies] * reach.centres
+        moved = turned[:, 0::3] + turned[:, 1::3] + turned[:, 2::3]
+        return np.asarray((moved + seat.xpos[reach.bodies]).T)
 
 
 def _across(groups: Sequence[Sequence[int]]) -> tuple[np.ndarray, np.ndarray]:

@@ -24,6 +24,7 @@ STATE_LIMIT = 1e6
 """Linear neurons may feed themselves for ever: their states stop here."""
 SHORTEST_PERIOD_S = 1e-6
 """Of an oscillator; a period of 0 would divide by zero."""
+_LOWEST, _HIGHEST = np.array(-STATE_LIMIT), np.array(STATE_LIMIT)
 _NUMBER_LIMIT = 1e100
 """Of weights and parameters, so that no sum of products overflows."""
 
@@ -159,6 +160,8 @@ class Bank:
             kinds[:, row] = network.kinds
         self._frequency, self._shift, self._scale, self._offset = numbers
         self._is_sigmoid, self._is_oscillator = kinds
+        self._has_sigmoids = bool(kinds[0].any())
+        self._has_oscillators = bool(kinds[1].any())
         # Inputs and previous states side by side, as the weights expect them.
         self._sources = np.zeros((count, width.inputs + states, 1))
         self._readings = self._sources[:, : width.inputs, 0]
@@ -182,15 +185,19 @@ class Bank:
         new, other = self._next, self._other
         self._readings[...] = readings
         np.matmul(self._weights, self._sources, out=self._sums)
-        np.multiply(self._frequency, age_ticks * self._tick_s, out=other)
-        np.add(new, other, out=new)
+        # Where there is no oscillator, all frequencies are 0.
+        if self._has_oscillators:
+            np.multiply(self._frequency, age_ticks * self._tick_s, out=other)
+            np.add(new, other, out=new)
         np.subtract(new, self._shift, out=new)
-        np.tanh(new, out=other)
-        np.copyto(new, other, where=self._is_sigmoid)
-        np.sin(new, out=other)
-        np.copyto(new, other, where=self._is_oscillator)
+        if self._has_sigmoids:
+            np.tanh(new, out=other)
+            np.putmask(new, self._is_sigmoid, other)
+        if self._has_oscillators:
+            np.sin(new, out=other)
+            np.putmask(new, self._is_oscillator, other)
         np.multiply(new, self._scale, out=new)
         np.add(new, self._offset, out=new)
-        np.maximum(new, -STATE_LIMIT, out=new)
-        np.minimum(new, STATE_LIMIT, out=self.states)
+        np.maximum(new, _LOWEST, out=new)
+        np.minimum(new, _HIGHEST, out=self.states)
         return self._outputs

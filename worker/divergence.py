@@ -28,12 +28,12 @@ def diverged(
 
     Args:
         company: the living.
-        velocities: all clusters' in a row.
+        velocities: all clusters' in a row, absolute.
         step: the arena's.
-        looks_closely: the engine's warnings are read as well.
+        looks_closely: the engine's warnings are read in any case.
     """
     # A sum is finite only if all its terms are, and small if all of them are.
-    loud = float(np.abs(velocities).max(initial=0.0))
+    loud = float(velocities.max(initial=0.0))
     is_quiet = math.isfinite(loud) and loud <= FASTEST_CORE
     if is_quiet and not looks_closely:
         return _failed(company, step)

@@ -23,9 +23,10 @@ from schema.experiment import (
 )
 from schema.mjcf import solo_model
 from schema.robot import Robot
-from worker.controller import Bank, pack, widths
+from worker.controller import pack, widths
 from worker.fitness import FitnessFunction, path_velocity, straight_velocity
 from worker.sensors import Senses, Servos
+from worker.solo import Solo
 
 
 def evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
@@ -106,11 +107,11 @@ def simulate(
     life = _Life(robot, space, simulation, model)
     start = simulation.warmup_steps
     end = start + simulation.window_steps
-    positions = np.empty((simulation.window_steps // simulation.pose_steps + 1, 3))
+    positions: list[float] = []
     step, next_tick, next_sample = 0, 0, start
     while True:
         if step == next_sample:
-            positions[(step - start) // simulation.pose_steps] = life.data.qpos[:3]
+            positions += life.core.tolist()
             next_sample += simulation.pose_steps
         if step == end:
             break
@@ -120,10 +121,13 @@ def simulate(
             if watch is not None:
                 watch(life.data)
         until = min(next_tick, next_sample)
-        mujoco.mj_step(model, life.data, nstep=until - step)
+        mujoco.mj_step(model, life.data, until - step)
         step = until
     _check_warnings(life.data, end * simulation.timestep_s)
-    return Track(simulation.pose_steps * simulation.timestep_s, positions)
+    return Track(
+        simulation.pose_steps * simulation.timestep_s,
+        np.array(positions).reshape(-1, 3),
+    )
 
 
 class _Life:
@@ -138,32 +142,31 @@ class _Life:
     ) -> None:
         types, width = body_space(space), widths(space)
         self.data = mujoco.MjData(model)
+        self.core = self.data.qpos[:3].data
+        self._velocities = self.data.qvel.data
         self._model = model
         self._timestep_s = simulation.timestep_s
         self._brain_steps = simulation.brain_steps
         self._tick_s = simulation.brain_steps * simulation.timestep_s
         self._senses = Senses(robot, types, model, width=width.inputs)
         self._servos = Servos(robot, types, model)
-        self._bank = Bank([pack(robot.brain, width)], width, self._tick_s)
+        ends = simulation.warmup_steps + simulation.window_steps
+        self._mind = Solo(
+            pack(robot.brain, width), width, self._tick_s, ends // self._brain_steps + 1
+        )
 
     def tick(self, step: int) -> None:
         """Read, think and command; ``step`` counts from birth."""
         if step:
-            _check(self.data, step * self._timestep_s)
+            # A sum is finite only if all its terms are; nothing plausible overflows
+            # it, and one velocity that is no number breaks all of a robot's.
+            if not math.isfinite(sum(self._velocities.tolist())):
+                _raise_diverged(self.data, step * self._timestep_s)
             readings = self._senses.read(self._model, self.data, self._tick_s)
         else:
             readings = self._senses.start(self._model, self.data)
-        outputs = self._bank.step(readings, float(step // self._brain_steps))
-        self._servos.drive(self.data, outputs[0])
-
-
-def _check(data: mujoco.MjData, time_s: float) -> None:
-    """Raise if the velocities are no longer numbers: one breaks all of a robot's.
-
-    A sum is finite only if all its terms are; nothing plausible overflows it.
-    """
-    if not math.isfinite(data.qvel.sum()):
-        _raise_diverged(data, time_s)
+        outputs = self._mind.step(readings[0], step // self._brain_steps)
+        self._servos.drive(self.data, outputs)
 
 
 def _check_warnings(data: mujoco.MjData, time_s: float) -> None:

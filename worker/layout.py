@@ -11,6 +11,7 @@ import numpy as np
 from schema.evaluation import Floats
 from worker.cluster import Cluster
 from worker.inhabitant import Inhabitant
+from worker.reach import Indices
 
 _FREE = 7
 """Numbers of a free joint's position: place and quaternion."""
@@ -63,10 +64,12 @@ class Layout:
             ]
             or [np.zeros(0, dtype=np.intp)]
         )
-        self._weights = np.concatenate(
-            [everybody[row].body.reach.weights for row in seated] or [np.zeros(0)]
-        )
+        reaches = [everybody[row].body.reach for row in seated]
+        none = [np.zeros(0)]
+        self._weights = np.concatenate([r.weights for r in reaches] or none)
+        self._shifts = np.concatenate([r.shifts for r in reaches] or none)
         self._dofs = np.array(dofs, dtype=np.intp)
+        self._starts = starts[np.array(seated, dtype=np.intp)]
         # Rows by birth, of what comes in the order of the clusters.
         self._seated = np.argsort(np.array(seated, dtype=np.intp))
 
@@ -78,9 +81,30 @@ class Layout:
         """Return all clusters' velocities in a row, a copy."""
         return np.concatenate(self._qvel) if self._qvel else np.zeros(0)
 
+    def part(self, row: int) -> slice:
+        """Return where a robot's configuration stands in all positions."""
+        start = int(self.roots[row, 0])
+        return slice(start, start + _FREE + int(self.joint_counts[row]))
+
     def speeds(self, velocities: Floats) -> Floats:
-        """Return a bound on the speed of each robot's fastest point, (R,) [m/s]."""
-        if not len(self._dofs):
+        """Return a bound on the speed of each robot's fastest point, (R,) [m/s].
+
+        Args:
+            velocities: of all clusters in a row, absolute.
+        """
+        return self._sums(velocities * self._weights, self._dofs)
+
+    def moves(self, positions: Floats, others: Floats) -> Floats:
+        """Return how far a point of each robot is at most from where it was, (R,).
+
+        Args:
+            positions: of all clusters in a row.
+            others: the same at another time.
+        """
+        return self._sums(np.abs(positions - others) * self._shifts, self._starts)
+
+    def _sums(self, terms: Floats, starts: Indices) -> Floats:
+        """Return each robot's sum of terms, by birth."""
+        if not len(starts):
             return np.zeros(0)
-        bounds = np.add.reduceat(np.abs(velocities) * self._weights, self._dofs)
-        return np.asarray(bounds[self._seated])
+        return np.asarray(np.add.reduceat(terms, starts)[self._seated])

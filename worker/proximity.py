@@ -13,6 +13,7 @@ import numpy as np
 
 from schema.evaluation import Floats
 from schema.experiment import ArenaSettings
+from worker.layout import Layout
 from worker.reach import Indices, Reach
 
 FASTEST = 10.0
@@ -21,18 +22,22 @@ _FAR_M = 0.1
 """Beyond this gap of their whole spheres a pair is not measured more closely."""
 
 Balls = Callable[[int], Floats]
-"""Row of a robot to the (B, 3) centres of its spheres, world frame [m]."""
+"""Row of a robot to the (3, B) centres of its spheres, world frame [m]."""
 
 
 class Proximity:
     """Distances between R robots, row by row in the order of their births.
 
+    How far a point of a robot can have moved is bounded by how its configuration
+    differs from one that is kept, its anchor; a robot that is measured is anchored
+    anew, and what it had moved until then adds to its travel.
+
     Attributes:
-        travel: (R,) how far each can have moved since it came [m].
-        speeds: (R,) bounds at the last look [m/s].
+        travel: (R,) how far each can have moved up to its anchor [m].
         slack: (R, R) upper triangle: distance at the last measurement plus both
             travels then [m]; infinite for pairs that live together.
-        looked: step of the last look.
+        anchor: configurations that the present ones are compared with, in the
+            layout's order.
     """
 
     def __init__(self, settings: ArenaSettings) -> None:
@@ -44,19 +49,17 @@ class Proximity:
         arena, clock = settings.arena, settings.simulation
         self._merge_m = arena.merge_distance_m
         self._split_m = max(arena.split_distance_m, arena.merge_distance_m)
-        self._timestep_s = clock.timestep_s
         # Frames of bodies are those before the last step: one step older.
         self._ahead_s = (arena.proximity_steps + 1) * clock.timestep_s
         self.travel = np.zeros(0)
-        self.speeds = np.zeros(0)
         self.slack = np.zeros((0, 0))
-        self.looked = 0
-        self._set_reaches(())
+        self.anchor = np.zeros(0)
+        self._margins = np.zeros(0)
+        self.gather((), self.anchor)
 
     def insert(self, row: int) -> None:
         """Make room for a newcomer, whose distance to nobody is known."""
         self.travel = np.insert(self.travel, row, 0.0)
-        self.speeds = np.insert(self.speeds, row, 0.0)
         slack = np.insert(self.slack, row, -np.inf, axis=0)
         slack = np.insert(slack, row, -np.inf, axis=1)
         slack[np.tril_indices(len(slack))] = np.inf
@@ -65,73 +68,71 @@ class Proximity:
     def remove(self, rows: Sequence[int]) -> None:
         """Forget robots."""
         self.travel = np.delete(self.travel, rows)
-        self.speeds = np.delete(self.speeds, rows)
         self.slack = np.delete(np.delete(self.slack, rows, axis=0), rows, axis=1)
 
-    def gather(self, reaches: Sequence[Reach]) -> None:
-        """Take the bounds of all robots, after some came or went."""
-        self._set_reaches(reaches)
-
-    def _set_reaches(self, reaches: Sequence[Reach]) -> None:
+    def gather(self, reaches: Sequence[Reach], positions: Floats) -> None:
+        """Take the bounds and the anchors of all robots, after some came or went."""
         self._radius = np.array([reach.radius for reach in reaches])
-        width = max((len(reach.radii) for reach in reaches), default=0)
-        # Missing spheres have no size at all, and lose every comparison.
-        self._radii = np.full((len(reaches), width), -1e9)
-        for row, reach in enumerate(reaches):
-            self._radii[row, : len(reach.radii)] = reach.radii
+        self._radii = [reach.radii[:, None] for reach in reaches]
+        self.anchor = positions
 
     def look(
-        self, step: int, speeds: Floats, places: Floats, balls: Balls
+        self, layout: Layout, positions: Floats, speeds: Floats, balls: Balls
     ) -> list[tuple[int, int]]:
         """Return the pairs of rows that are to live together from now on.
 
         Args:
-            step: the arena's.
+            layout: where robots stand in the positions.
+            positions: of all clusters in a row.
             speeds: (R,) bounds on the speed of each robot's fastest point [m/s].
-            places: (R, 3) centres of the cores, world frame [m].
             balls: gives spheres, those that are needed.
         """
-        elapsed_s = (step - self.looked) * self._timestep_s
-        self.travel += np.maximum(speeds, self.speeds) * elapsed_s
-        self.speeds, self.looked = speeds, step
-        margins = self._margins()
-        bound = self.travel + margins
+        moved = layout.moves(positions, self.anchor)
+        margins = np.minimum(speeds, FASTEST) * self._ahead_s + 0.5 * self._merge_m
+        self._margins = margins
+        bound = self.travel + moved + margins
         first, second = np.nonzero(self.slack < bound[:, None] + bound)
         if not len(first):
             return []
-        gap = self._gaps(places, first, second)
-        near = np.nonzero(gap < margins[first] + margins[second] + _FAR_M)[0]
+        gap = self._gaps(positions[layout.roots[:, :3]], first, second)
+        meet = margins[first] + margins[second]
+        near = np.nonzero(gap < meet + _FAR_M)[0]
         if len(near):
             gap[near] = self.distances(first[near], second[near], balls)
+        rows = np.unique(np.concatenate([first, second]))
+        self._anchor(rows, moved[rows], layout, positions)
         self.slack[first, second] = gap + self.travel[first] + self.travel[second]
-        close = gap < margins[first] + margins[second]
+        close = gap < meet
         return list(zip(first[close].tolist(), second[close].tolist(), strict=True))
 
+    def settle(self, moved: Floats) -> None:
+        """Add to all travels what robots moved; they are anchored anew."""
+        self.travel = self.travel + moved
+
+    def _anchor(
+        self, rows: Indices, moved: Floats, layout: Layout, positions: Floats
+    ) -> None:
+        self.travel[rows] += moved
+        for row in rows.tolist():
+            part = layout.part(row)
+            self.anchor[part] = positions[part]
+
     def near(self, first: Indices, second: Indices, balls: Balls) -> Indices:
-        """Return which of some pairs that live together are to go on doing so."""
-        margins = self._margins()
+        """Return which of some pairs that live together are to go on doing so.
+
+        Asked right after a look; the others are measured again at the next.
+        """
+        margins = self._margins
         apart = self.distances(first, second, balls)
-        enough = np.maximum(
-            self._split_m,
-            margins[first] + margins[second] + self._split_m - self._merge_m,
-        )
-        self.slack[first, second] = apart + self.travel[first] + self.travel[second]
-        return np.nonzero(apart < enough)[0]
+        enough = margins[first] + margins[second] + self._split_m - self._merge_m
+        self.slack[first, second] = -np.inf
+        return np.nonzero(apart < np.maximum(self._split_m, enough))[0]
 
     def join(self, rows: Sequence[int]) -> None:
         """Stop measuring the pairs of robots that live together."""
         ordered = sorted(rows)
         for number, row in enumerate(ordered):
             self.slack[row, ordered[number + 1 :]] = np.inf
-
-    def part(self, first: int, second: int) -> None:
-        """Have a pair that lives together no more measured at the next look."""
-        self.slack[first, second] = -np.inf
-
-    def _margins(self) -> Floats:
-        """Return each robot's share of the distance at which a pair must meet."""
-        moves = np.minimum(self.speeds, FASTEST) * self._ahead_s
-        return np.asarray(moves + 0.5 * self._merge_m)
 
     def _gaps(self, places: Floats, first: Indices, second: Indices) -> Floats:
         apart = places[first] - places[second]
@@ -142,21 +143,21 @@ class Proximity:
     def distances(self, first: Indices, second: Indices, balls: Balls) -> Floats:
         """Return how far pairs are apart, (K,), at least, from their spheres.
 
-        Every number is found by the same arithmetic whoever else is measured.
+        A pair's arithmetic does not depend on who else is measured.
         """
-        rows = np.unique(np.concatenate([first, second]))
-        width = self._radii.shape[1]
-        centres = np.zeros((len(rows), 3, width))
-        for place, row in enumerate(rows.tolist()):
-            found = balls(row)
-            centres[place, :, : len(found)] = found.T
-        a, b = np.searchsorted(rows, first), np.searchsorted(rows, second)
-        total = np.zeros((len(first), width, width))
-        for axis in range(3):
-            apart = centres[a, axis, :, None] - centres[b, axis, None, :]
-            np.multiply(apart, apart, out=apart)
-            total += apart
-        np.sqrt(total, out=total)
-        total -= self._radii[first][:, :, None]
-        total -= self._radii[second][:, None, :]
-        return np.asarray(total.min(axis=(1, 2)))
+        cache: dict[int, Floats] = {}
+        apart = np.empty(len(first))
+        for number, pair in enumerate(
+            zip(first.tolist(), second.tolist(), strict=True)
+        ):
+            for row in pair:
+                if row not in cache:
+                    cache[row] = balls(row)
+            here, there = pair
+            difference = cache[here][:, :, None] - cache[there][:, None, :]
+            np.multiply(difference, difference, out=difference)
+            distance = np.sqrt(difference[0] + difference[1] + difference[2])
+            distance -= self._radii[here]
+            distance -= self._radii[there].T
+            apart[number] = distance.min()
+        return apart

@@ -31,11 +31,14 @@ class Reach:
 
     Attributes:
         bodies: (B,) body of each sphere, counted from the robot's first.
-        centres: (B, 3) in the frames of their bodies [m].
+        centres: (B, 9) in the frames of their bodies, thrice over, to be
+            multiplied with the rows of rotations [m].
         radii: (B,) [m].
         radius: of a sphere about the core's centre that holds all of it [m].
         weights: (V,) of the absolute velocities of its degrees of freedom in a
             bound on the speed of its fastest point.
+        shifts: (Q,) of the absolute differences of its coordinates in a bound on
+            how far any point of it is from where it was.
     """
 
     bodies: Indices
@@ -43,6 +46,7 @@ class Reach:
     radii: Floats
     radius: float
     weights: Floats
+    shifts: Floats
 
 
 def reach_of(model: mujoco.MjModel) -> Reach:
@@ -73,14 +77,19 @@ def reach_of(model: mujoco.MjModel) -> Reach:
     for joint in range(1, model.njnt):
         body = int(model.jnt_bodyid[joint]) - root
         weights[int(model.jnt_dofadr[joint])] = far[body]
+    # Turning a unit quaternion by a chord d moves a point at radius r by 2 r d at
+    # most.
+    turn = np.full(4, 2.0 * far[0])
+    shifts = np.concatenate([weights[:3], turn, weights[6:]])
     counts = [len(cover) for cover in covers]
     balls = [ball for cover in covers for ball in cover]
     return Reach(
         np.repeat(np.arange(len(covers)), counts),
-        np.array([centre for centre, _ in balls]),
+        np.tile([centre for centre, _ in balls], 3),
         np.array([radius for _, radius in balls]),
         far[0],
         weights,
+        shifts,
     )
 
 

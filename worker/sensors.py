@@ -67,6 +67,8 @@ class Senses:
         self.readings: Floats = np.zeros((1, width))
         self.velocities: list[_Velocity] = []
         self._row = self.readings[0]
+        self._cells = _cells(self._row)
+        self._data: mujoco.MjData | None = None
         self._pads: list[tuple[int, int]] = []
         self._core_imu = -1
         self._imus: list[tuple[int, int]] = []
@@ -127,43 +129,54 @@ class Senses:
             ``readings``, new values.
         """
         if self._core_imu >= 0:
-            self._read_core(data, interval_s)
+            if data is not self._data:
+                self._bind(data)
+            self._read_core(interval_s)
         if self._imus:
             self._read_sites(model, data, interval_s)
         if self._pads:
             touching = set(data.contact.geom.ravel().tolist())
             for geom, place in self._pads:
-                self._row[place] = geom in touching
+                self._cells[place] = float(geom in touching)
         return self.readings
 
-    def _read_core(self, data: mujoco.MjData, interval_s: float) -> None:
+    def _bind(self, data: mujoco.MjData) -> None:
+        """Look at another state from now on."""
+        self._data = data
+        self._pose = _cells(data.qpos[self._qpos + 3 : self._qpos + 7])
+        self._motion = _cells(data.qvel[self._qvel : self._qvel + 6])
+
+    def _read_core(self, interval_s: float) -> None:
         """Read the imu of the core straight from the free joint's state.
 
-        Plain floats: at one robot they are twice as fast as arrays of three.
+        Plain floats by memory views: at one robot they take a third of the time
+        of arrays of three.
         """
-        w, x, y, z = data.qpos[self._qpos + 3 : self._qpos + 7].tolist()
-        vx, vy, vz, gx, gy, gz = data.qvel[self._qvel : self._qvel + 6].tolist()
+        w, x, y, z = self._pose.tolist()
+        vx, vy, vz, gx, gy, gz = self._motion.tolist()
         ux, uy, uz = self.velocities[0]
         self.velocities[0] = (vx, vy, vz)
         ax = (vx - ux) / interval_s
         ay = (vy - uy) / interval_s
         az = (vz - uz) / interval_s + self._gravity
-        place = self._core_imu
-        # The rows are the columns of the core's rotation: world into core frame.
-        self._row[place : place + 6] = (
+        row, place = self._cells, self._core_imu
+        # These three are the columns of the core's rotation: world into core frame.
+        row[place] = (
             (1 - 2 * (y * y + z * z)) * ax
             + 2 * (x * y + w * z) * ay
-            + 2 * (x * z - w * y) * az,
+            + 2 * (x * z - w * y) * az
+        )
+        row[place + 1] = (
             2 * (x * y - w * z) * ax
             + (1 - 2 * (x * x + z * z)) * ay
-            + 2 * (y * z + w * x) * az,
+            + 2 * (y * z + w * x) * az
+        )
+        row[place + 2] = (
             2 * (x * z + w * y) * ax
             + 2 * (y * z - w * x) * ay
-            + (1 - 2 * (x * x + y * y)) * az,
-            gx,
-            gy,
-            gz,
+            + (1 - 2 * (x * x + y * y)) * az
         )
+        row[place + 3], row[place + 4], row[place + 5] = gx, gy, gz
 
     def _read_sites(
         self, model: mujoco.MjModel, data: mujoco.MjData, interval_s: float
@@ -221,6 +234,7 @@ class Servos:
             )
         first = actuators[0] if actuators else 0
         self.slots = slice(first, first + len(actuators))
+        self._data: mujoco.MjData | None = None
         assert actuators == list(range(first, first + len(actuators)))
 
     def drive(self, data: mujoco.MjData, outputs: Floats) -> None:
@@ -230,15 +244,26 @@ class Servos:
             data: the state; its ``ctrl`` is written [rad/s].
             outputs: (O,) of the network, unclipped; O may exceed the motors.
         """
-        position = data.qpos
-        commands = []
-        for (address, low, span, gain, fastest), output in zip(
-            self._joints, outputs.tolist(), strict=False
+        if data is not self._data:
+            self._data = data
+            self._angles = _cells(data.qpos)
+            self._commands = _cells(data.ctrl[self.slots])
+        angles, commands = self._angles, self._commands
+        for index, ((address, low, span, gain, fastest), output) in enumerate(
+            zip(self._joints, outputs.tolist(), strict=False)
         ):
-            share = min(max(output, LOWEST_OUTPUT), HIGHEST_OUTPUT)
-            command = gain * (low + share * span - position.item(address))
-            commands.append(min(max(command, -fastest), fastest))
-        data.ctrl[self.slots] = commands
+            # Bounds by comparison: twice as fast as min and max.
+            share = output
+            if share < LOWEST_OUTPUT:
+                share = LOWEST_OUTPUT
+            elif share > HIGHEST_OUTPUT:
+                share = HIGHEST_OUTPUT
+            command = gain * (low + share * span - angles[address])
+            if command < -fastest:
+                command = -fastest
+            elif command > fastest:
+                command = fastest
+            commands[index] = command
 
 
 def free_joint(model: mujoco.MjModel, prefix: str = "") -> int:
@@ -267,3 +292,8 @@ def _site_motion(model: mujoco.MjModel, data: mujoco.MjData, site: int) -> Float
 
 def _velocity_of(vector: Floats) -> _Velocity:
     return cast("_Velocity", tuple(vector.tolist()))
+
+
+def _cells(array: Floats) -> "memoryview[float]":
+    """Return a view of an array (N,) that is faster than it, number by number."""
+    return cast("memoryview[float]", array.data)

@@ -53,7 +53,7 @@ class ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tru
         settings: SHA-256 of the settings it goes with.
         robots: by birth.
         clusters: who lives together, as indices into the robots.
-        travel, speeds, slack, looked: of ``worker.proximity``.
+        travel, slack, anchor: of ``worker.proximity``.
         casualties: not yet told.
     """
 
@@ -63,9 +63,8 @@ class ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tru
     robots: list[RobotState]
     clusters: list[list[int]]
     travel: bytes
-    speeds: bytes
     slack: bytes
-    looked: int
+    anchor: bytes
     casualties: list[CasualtyState]
 
 

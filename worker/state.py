@@ -48,9 +48,8 @@ def write(
             robots=[_robot_state(one) for one in company.everybody],
             clusters=[[rows[b] for b in c.members] for c in company.clusters],
             travel=pack_floats(proximity.travel),
-            speeds=pack_floats(proximity.speeds),
             slack=pack_floats(proximity.slack[upper]),
-            looked=proximity.looked,
+            anchor=pack_floats(proximity.anchor),
             casualties=[
                 CasualtyState(_name(c.birth), c.step, c.reason, c.place)
                 for c in casualties
@@ -82,11 +81,10 @@ def read(
     company.merges = company.splits = 0
     proximity, count = company.proximity, len(births)
     proximity.travel = unpack_floats(state.travel, count)
-    proximity.speeds = unpack_floats(state.speeds, count)
     proximity.slack[np.triu_indices(count, 1)] = unpack_floats(
         state.slack, count * (count - 1) // 2
     )
-    proximity.looked = state.looked
+    proximity.anchor = unpack_floats(state.anchor, *proximity.anchor.shape)
     return state.step, tuple(
         Casualty(BirthId(*c.birth), c.step, c.reason, c.place) for c in state.casualties
     )

@@ -34,7 +34,7 @@ from worker.pool import Pool
 from worker.poses import Poses
 from worker.touches import Touches
 
-LOOKS_PER_PARTING = 10
+LOOKS_PER_PARTING = 25
 """Clusters are looked at for parts that drifted apart every so many looks."""
 _FEW = 5
 """Clusters that one thread steps faster than several."""
@@ -181,9 +181,10 @@ class World:
     def _arrive(self, watch: Callable[[bytes], None] | None) -> None:
         is_tick = self.step % self._clock.brain_steps == 0
         is_look = self.step % self._look_steps == 0
+        is_parting = self.step % (LOOKS_PER_PARTING * self._look_steps) == 0
         velocities: Floats | None = None
         if is_tick or is_look:
-            velocities = self._drop_diverged(is_tick=is_tick)
+            velocities = self._drop_diverged(looks_closely=is_parting)
         if is_tick:
             self._tick()
         if self.step % self._clock.pose_steps == 0:
@@ -192,8 +193,8 @@ class World:
                 watch(self.poses())
         if is_look and velocities is not None:
             self._touches.count(self.company.clusters)
-            self.company.look(self.step, velocities)
-            if self.step % (LOOKS_PER_PARTING * self._look_steps) == 0:
+            self.company.look(velocities)
+            if is_parting:
                 self.company.part()
 
     def _tick(self) -> None:
@@ -237,7 +238,7 @@ class World:
         for one in newcomers:
             self._minds.first_tick(one)
         self.company.kinematics()
-        self.company.look(self.step, self.company.layout.velocities())
+        self.company.look(np.abs(self.company.layout.velocities()))
 
     def _equip(self, one: Inhabitant, robot: Robot) -> None:
         """Give a robot another brain: at rest, its clock from the next tick."""
@@ -246,16 +247,16 @@ class World:
         one.states = np.zeros_like(one.states)
         one.thinks_since = self._next(self._clock.brain_steps)
 
-    def _drop_diverged(self, *, is_tick: bool) -> Floats:
-        """Let the diverged go and return the velocities of the others."""
+    def _drop_diverged(self, *, looks_closely: bool) -> Floats:
+        """Let the diverged go and return the others' velocities, absolute."""
         company = self.company
-        velocities = company.layout.velocities()
-        fallen = diverged(company, velocities, self.step, looks_closely=is_tick)
+        velocities = np.abs(company.layout.velocities())
+        fallen = diverged(company, velocities, self.step, looks_closely=looks_closely)
         if not fallen:
             return velocities
         self._casualties += fallen
         self._dismiss([casualty.birth for casualty in fallen])
-        return company.layout.velocities()
+        return np.abs(company.layout.velocities())
 
     def _dismiss(self, births: Sequence[BirthId]) -> None:
         self.company.remove(births)
