@@ -244,25 +244,23 @@ class _Builder:
         """Return the segment beyond a joint; ``own`` is the one on the near side."""
         rotation = self.rotations[index]
         anchor = self.positions[index] + rotation @ joint.anchor
-        body = near[0].add_body(name=f"body{index}", pos=anchor - near[1])
+        # Here and below set one by one: half of the time that keywords take.
+        body = near[0].add_body()
+        body.name, body.pos = f"body{index}", anchor - near[1]
         # The angle is that of segment 1 against segment 0, also where segment 1
         # is the one that carries segment 0.
         axis = rotation @ joint.axis
-        made = body.add_joint(
-            name=f"joint{index}",
-            axis=axis if own == 0 else -axis,
-            range=(-joint.limit, joint.limit),
-        )
+        made = body.add_joint()
+        made.name, made.axis = f"joint{index}", axis if own == 0 else -axis
+        made.range = (-joint.limit, joint.limit)
         motor = self.types[index].motor
         if motor is not None:
             made.armature = self.simulation.servo_armature
-            actuator = self.spec.add_actuator(
-                name=f"joint{index}",
-                target=f"joint{index}",
-                trntype=mujoco.mjtTrn.mjTRN_JOINT,
-                forcelimited=1,
-                forcerange=(-motor.max_torque, motor.max_torque),
-            )
+            actuator = self.spec.add_actuator()
+            actuator.name = actuator.target = f"joint{index}"
+            actuator.trntype = mujoco.mjtTrn.mjTRN_JOINT
+            actuator.forcelimited = 1
+            actuator.forcerange = (-motor.max_torque, motor.max_torque)
             actuator.set_to_velocity(kv=self.simulation.servo_stiffness)
         return body, anchor.tolist()
 
@@ -270,7 +268,8 @@ class _Builder:
         """Add a part's boxes to its segments, and its imus to their boxes."""
         boxes, rotation = self.shapes[index].boxes, self.rotations[index]
         imus = {s.box for s in self.types[index].sensors if s.kind == "imu"}
-        colour = (*self.robot.parts[index].parameters[-3:], 1.0)
+        # Arrays where more than one box takes them: half of a tuple's time.
+        colour = np.array((*self.robot.parts[index].parameters[-3:], 1.0))
         upright = _quaternion(rotation)
         ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = rotation.tolist()
         px, py, pz = self.positions[index].tolist()
@@ -294,7 +293,6 @@ class _Builder:
                 centre[1] - origin[1],
                 centre[2] - origin[2],
             )
-            # Set one by one: a third of the time that keywords take.
             geom = body.add_geom()
             geom.name = f"{index}/{box.name}"
             geom.size, geom.pos, geom.quat = half, place, quaternion
