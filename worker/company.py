@@ -87,16 +87,14 @@ class Company:
             self.shop.forget(birth)
         self._settle(kept)
 
-    def look(self, velocities: Floats) -> None:
+    def look(self, state: Floats, differences: Floats) -> None:
         """Join those who may touch before the next look.
 
         Args:
-            velocities: all clusters' in a row, absolute.
+            state: of all clusters, as the layout reads it.
+            differences: from the anchor of ``proximity``, absolute.
         """
-        layout = self.layout
-        pairs = self.proximity.look(
-            layout, layout.positions(), layout.speeds(velocities), self._balls
-        )
+        pairs = self.proximity.look(self.layout, state, differences, self._balls)
         if not pairs:
             return
         births = [one.birth for one in self.everybody]
@@ -134,6 +132,10 @@ class Company:
         if changed:
             self._settle(settled)
 
+    def differences(self, state: Floats) -> Floats:
+        """Return how a state differs from what distances were measured in."""
+        return np.abs(state - self.proximity.anchor)
+
     def kinematics(self) -> None:
         """Bring the frames of all bodies up to the present state."""
         for cluster in self.clusters:
@@ -156,12 +158,12 @@ class Company:
         self.layout = Layout(self.clusters, self.everybody)
         self.by_cost = sorted(self.clusters, key=lambda cluster: -cluster.cost)
         reaches = [one.body.reach for one in self.everybody]
-        self.proximity.gather(reaches, self.layout.positions())
+        self.proximity.gather(reaches, self.layout)
 
     def _anchor(self) -> None:
         """Note how far all have moved, before they stand elsewhere in the layout."""
-        proximity, positions = self.proximity, self.layout.positions()
-        proximity.settle(self.layout.moves(positions, proximity.anchor))
+        moved, _ = self.layout.bounds(self.differences(self.layout.read()))
+        self.proximity.settle(moved)
 
     def _number(self, everybody: Sequence[Inhabitant]) -> None:
         self.everybody = tuple(everybody)
@@ -176,10 +178,10 @@ class Company:
         groups = _components(alone, touching)
         if len(groups) == 1:
             return groups
-        first, second = _across([[self._rows[b] for b in group] for group in groups])
-        near = self.proximity.near(first, second, self._balls)
+        pairs = _across([[self._rows[b] for b in group] for group in groups])
         births = [one.birth for one in self.everybody]
-        links = [(births[first[k]], births[second[k]]) for k in near.tolist()]
+        near = self.proximity.near(pairs, self._balls)
+        links = [(births[first], births[second]) for first, second in near]
         groups = _components(groups, links)
         for group in groups:
             self.proximity.join([self._rows[birth] for birth in group])
@@ -194,17 +196,15 @@ class Company:
         return np.asarray((moved + seat.xpos[reach.bodies]).T)
 
 
-def _across(groups: Sequence[Sequence[int]]) -> tuple[np.ndarray, np.ndarray]:
+def _across(groups: Sequence[Sequence[int]]) -> list[tuple[int, int]]:
     """Return the pairs of rows whose ends are in two groups, lesser row first."""
-    pairs = sorted(
+    return sorted(
         (min(a, b), max(a, b))
         for number, group in enumerate(groups)
         for other in groups[number + 1 :]
         for a in group
         for b in other
     )
-    both = np.array(pairs, dtype=np.intp)
-    return both[:, 0], both[:, 1]
 
 
 def _components(

@@ -11,7 +11,6 @@ import numpy as np
 from schema.evaluation import Floats
 from worker.cluster import Cluster
 from worker.inhabitant import Inhabitant
-from worker.reach import Indices
 
 _FREE = 7
 """Numbers of a free joint's position: place and quaternion."""
@@ -25,6 +24,7 @@ class Layout:
         roots: (R, 7) where place and quaternion stand in all positions.
         joints: where the joint angles stand, robot by robot.
         joint_counts: (R,) how many each has.
+        size: number of all positions.
     """
 
     def __init__(
@@ -36,8 +36,8 @@ class Layout:
             clusters: all of an arena, in any order that lasts.
             everybody: all robots, by birth.
         """
-        self._qpos = [cluster.qpos for cluster in clusters]
-        self._qvel = [cluster.qvel for cluster in clusters]
+        self._views = [cluster.qpos for cluster in clusters]
+        self._views += [cluster.qvel for cluster in clusters]
         row_of = {one.birth: row for row, one in enumerate(everybody)}
         starts = np.zeros(len(everybody), dtype=np.intp)
         seated: list[int] = []
@@ -51,6 +51,7 @@ class Layout:
                 seated.append(row)
             joint += len(cluster.qpos)
             dof += len(cluster.qvel)
+        self.size = joint
         births = [one.birth for one in everybody]
         self.islands = np.array([birth.island for birth in births], dtype=np.int32)
         self.numbers = np.array([birth.number for birth in births], dtype=np.int64)
@@ -65,46 +66,35 @@ class Layout:
             or [np.zeros(0, dtype=np.intp)]
         )
         reaches = [everybody[row].body.reach for row in seated]
-        none = [np.zeros(0)]
-        self._weights = np.concatenate([r.weights for r in reaches] or none)
-        self._shifts = np.concatenate([r.shifts for r in reaches] or none)
-        self._dofs = np.array(dofs, dtype=np.intp)
-        self._starts = starts[np.array(seated, dtype=np.intp)]
+        self._weights = np.concatenate(
+            [r.shifts for r in reaches] + [r.weights for r in reaches] or [np.zeros(0)]
+        )
+        own = starts[np.array(seated, dtype=np.intp)]
+        self._starts = np.concatenate([own, np.array(dofs, dtype=np.intp) + joint])
         # Rows by birth, of what comes in the order of the clusters.
-        self._seated = np.argsort(np.array(seated, dtype=np.intp))
+        rows = np.argsort(np.array(seated, dtype=np.intp))
+        self._seated = np.concatenate([rows, rows + len(rows)])
 
-    def positions(self) -> Floats:
-        """Return all clusters' positions in a row, a copy."""
-        return np.concatenate(self._qpos) if self._qpos else np.zeros(0)
+    def read(self) -> Floats:
+        """Return all clusters' positions in a row, then their velocities: a copy."""
+        return np.concatenate(self._views) if self._views else np.zeros(0)
 
-    def velocities(self) -> Floats:
-        """Return all clusters' velocities in a row, a copy."""
-        return np.concatenate(self._qvel) if self._qvel else np.zeros(0)
+    def bounds(self, differences: Floats) -> Floats:
+        """Return how far robots moved and how fast they are at most, (2, R).
+
+        The first row bounds how far any point of a robot is from where it was [m],
+        the second the speed of its fastest point [m/s].
+
+        Args:
+            differences: of positions from what they were, then velocities, all
+                absolute, in the order of ``read``.
+        """
+        if not len(self._starts):
+            return np.zeros((2, 0))
+        sums = np.add.reduceat(differences * self._weights, self._starts)
+        return np.asarray(sums[self._seated].reshape(2, -1))
 
     def part(self, row: int) -> slice:
         """Return where a robot's configuration stands in all positions."""
         start = int(self.roots[row, 0])
         return slice(start, start + _FREE + int(self.joint_counts[row]))
-
-    def speeds(self, velocities: Floats) -> Floats:
-        """Return a bound on the speed of each robot's fastest point, (R,) [m/s].
-
-        Args:
-            velocities: of all clusters in a row, absolute.
-        """
-        return self._sums(velocities * self._weights, self._dofs)
-
-    def moves(self, positions: Floats, others: Floats) -> Floats:
-        """Return how far a point of each robot is at most from where it was, (R,).
-
-        Args:
-            positions: of all clusters in a row.
-            others: the same at another time.
-        """
-        return self._sums(np.abs(positions - others) * self._shifts, self._starts)
-
-    def _sums(self, terms: Floats, starts: Indices) -> Floats:
-        """Return each robot's sum of terms, by birth."""
-        if not len(starts):
-            return np.zeros(0)
-        return np.asarray(np.add.reduceat(terms, starts)[self._seated])

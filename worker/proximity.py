@@ -7,6 +7,7 @@ distance is less than ``merge_distance_m`` and what both may move until the next
 look: that grows with their speed, so that the falling meet in time.
 """
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from schema.evaluation import Floats
 from schema.experiment import ArenaSettings
 from worker.layout import Layout
-from worker.reach import Indices, Reach
+from worker.reach import Reach
 
 FASTEST = 10.0
 """What is faster has broken the physics, and does not gather others [m/s]."""
@@ -36,8 +37,8 @@ class Proximity:
         travel: (R,) how far each can have moved up to its anchor [m].
         slack: (R, R) upper triangle: distance at the last measurement plus both
             travels then [m]; infinite for pairs that live together.
-        anchor: configurations that the present ones are compared with, in the
-            layout's order.
+        anchor: positions that the present ones are compared with, in the layout's
+            order, then zeros for the velocities.
     """
 
     def __init__(self, settings: ArenaSettings) -> None:
@@ -55,7 +56,7 @@ class Proximity:
         self.slack = np.zeros((0, 0))
         self.anchor = np.zeros(0)
         self._margins = np.zeros(0)
-        self.gather((), self.anchor)
+        self.gather((), Layout((), ()))
 
     def insert(self, row: int) -> None:
         """Make room for a newcomer, whose distance to nobody is known."""
@@ -70,63 +71,70 @@ class Proximity:
         self.travel = np.delete(self.travel, rows)
         self.slack = np.delete(np.delete(self.slack, rows, axis=0), rows, axis=1)
 
-    def gather(self, reaches: Sequence[Reach], positions: Floats) -> None:
-        """Take the bounds and the anchors of all robots, after some came or went."""
-        self._radius = np.array([reach.radius for reach in reaches])
+    def gather(self, reaches: Sequence[Reach], layout: Layout) -> None:
+        """Take the bounds of all robots and anchor them where they are now."""
+        self._radius = [reach.radius for reach in reaches]
         self._radii = [reach.radii[:, None] for reach in reaches]
-        self.anchor = positions
+        self.anchor = layout.read()
+        self.anchor[layout.size :] = 0.0
 
     def look(
-        self, layout: Layout, positions: Floats, speeds: Floats, balls: Balls
+        self, layout: Layout, state: Floats, differences: Floats, balls: Balls
     ) -> list[tuple[int, int]]:
         """Return the pairs of rows that are to live together from now on.
 
         Args:
-            layout: where robots stand in the positions.
-            positions: of all clusters in a row.
-            speeds: (R,) bounds on the speed of each robot's fastest point [m/s].
+            layout: where robots stand in the state.
+            state: of all clusters in a row.
+            differences: of the state from the anchor, absolute.
             balls: gives spheres, those that are needed.
         """
-        moved = layout.moves(positions, self.anchor)
-        margins = np.minimum(speeds, FASTEST) * self._ahead_s + 0.5 * self._merge_m
+        moved, speeds = layout.bounds(differences)
+        margins = np.minimum(speeds, FASTEST) * self._ahead_s
         self._margins = margins
-        bound = self.travel + moved + margins
+        bound = self.travel + moved + (margins + 0.5 * self._merge_m)
         first, second = np.nonzero(self.slack < bound[:, None] + bound)
-        if not len(first):
+        # Few, as a rule: plain numbers are faster than arrays.
+        due = list(zip(first.tolist(), second.tolist(), strict=True))
+        if not due:
             return []
-        gap = self._gaps(positions[layout.roots[:, :3]], first, second)
-        meet = margins[first] + margins[second]
-        near = np.nonzero(gap < meet + _FAR_M)[0]
-        if len(near):
-            gap[near] = self.distances(first[near], second[near], balls)
-        rows = np.unique(np.concatenate([first, second]))
-        self._anchor(rows, moved[rows], layout, positions)
-        self.slack[first, second] = gap + self.travel[first] + self.travel[second]
-        close = gap < meet
-        return list(zip(first[close].tolist(), second[close].tolist(), strict=True))
+        for row in sorted({row for pair in due for row in pair}):
+            self.travel[row] += moved[row]
+            part = layout.part(row)
+            self.anchor[part] = state[part]
+        found, cache = [], dict[int, Floats]()
+        places: dict[int, list[float]] = {}
+        for a, b in due:
+            for row in (a, b):
+                if row not in places:
+                    places[row] = state[layout.roots[row, :3]].tolist()
+            meet = float(margins[a] + margins[b]) + self._merge_m
+            apart = math.dist(places[a], places[b]) - self._radius[a] - self._radius[b]
+            if apart < meet + _FAR_M:
+                apart = self._distance(a, b, balls, cache)
+            self.slack[a, b] = apart + self.travel[a] + self.travel[b]
+            if apart < meet:
+                found.append((a, b))
+        return found
 
     def settle(self, moved: Floats) -> None:
         """Add to all travels what robots moved; they are anchored anew."""
         self.travel = self.travel + moved
 
-    def _anchor(
-        self, rows: Indices, moved: Floats, layout: Layout, positions: Floats
-    ) -> None:
-        self.travel[rows] += moved
-        for row in rows.tolist():
-            part = layout.part(row)
-            self.anchor[part] = positions[part]
-
-    def near(self, first: Indices, second: Indices, balls: Balls) -> Indices:
+    def near(
+        self, pairs: Sequence[tuple[int, int]], balls: Balls
+    ) -> list[tuple[int, int]]:
         """Return which of some pairs that live together are to go on doing so.
 
         Asked right after a look; the others are measured again at the next.
         """
-        margins = self._margins
-        apart = self.distances(first, second, balls)
-        enough = margins[first] + margins[second] + self._split_m - self._merge_m
-        self.slack[first, second] = -np.inf
-        return np.nonzero(apart < np.maximum(self._split_m, enough))[0]
+        found, cache = [], dict[int, Floats]()
+        for a, b in pairs:
+            moves = float(self._margins[a] + self._margins[b])
+            if self._distance(a, b, balls, cache) < moves + self._split_m:
+                found.append((a, b))
+            self.slack[a, b] = -np.inf
+        return found
 
     def join(self, rows: Sequence[int]) -> None:
         """Stop measuring the pairs of robots that live together."""
@@ -134,30 +142,16 @@ class Proximity:
         for number, row in enumerate(ordered):
             self.slack[row, ordered[number + 1 :]] = np.inf
 
-    def _gaps(self, places: Floats, first: Indices, second: Indices) -> Floats:
-        apart = places[first] - places[second]
-        squares = apart * apart
-        distance = np.sqrt(squares[:, 0] + squares[:, 1] + squares[:, 2])
-        return np.asarray(distance - self._radius[first] - self._radius[second])
-
-    def distances(self, first: Indices, second: Indices, balls: Balls) -> Floats:
-        """Return how far pairs are apart, (K,), at least, from their spheres.
-
-        A pair's arithmetic does not depend on who else is measured.
-        """
-        cache: dict[int, Floats] = {}
-        apart = np.empty(len(first))
-        for number, pair in enumerate(
-            zip(first.tolist(), second.tolist(), strict=True)
-        ):
-            for row in pair:
-                if row not in cache:
-                    cache[row] = balls(row)
-            here, there = pair
-            difference = cache[here][:, :, None] - cache[there][:, None, :]
-            np.multiply(difference, difference, out=difference)
-            distance = np.sqrt(difference[0] + difference[1] + difference[2])
-            distance -= self._radii[here]
-            distance -= self._radii[there].T
-            apart[number] = distance.min()
-        return apart
+    def _distance(
+        self, here: int, there: int, balls: Balls, cache: dict[int, Floats]
+    ) -> float:
+        """Return how far two robots are apart at least, from their spheres."""
+        for row in (here, there):
+            if row not in cache:
+                cache[row] = balls(row)
+        difference = cache[here][:, :, None] - cache[there][:, None, :]
+        np.multiply(difference, difference, out=difference)
+        distance = np.sqrt(difference[0] + difference[1] + difference[2])
+        distance -= self._radii[here]
+        distance -= self._radii[there].T
+        return float(distance.min())

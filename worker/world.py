@@ -84,7 +84,7 @@ class World:
     def poses(self) -> bytes:
         """Return where everybody is now: Arrow IPC of ``schema.tables.POSES``."""
         now = Poses(self._clock.timestep_s)
-        now.add(self.step, self.company.layout, self.company.layout.positions())
+        now.add(self.step, self.company.layout, self.company.layout.read())
         return now.columns()
 
     def apply(self, changes: Changes) -> None:
@@ -179,23 +179,31 @@ class World:
         self._pool.run([partial(cluster.step, steps) for cluster in clusters])
 
     def _arrive(self, watch: Callable[[bytes], None] | None) -> None:
-        is_tick = self.step % self._clock.brain_steps == 0
-        is_look = self.step % self._look_steps == 0
+        is_tick, is_sample, is_look = (
+            self.step % interval == 0 for interval in self._intervals()
+        )
+        if not (is_tick or is_sample or is_look):
+            return
         is_parting = self.step % (LOOKS_PER_PARTING * self._look_steps) == 0
-        velocities: Floats | None = None
-        if is_tick or is_look:
-            velocities = self._drop_diverged(looks_closely=is_parting)
+        company, numbers, differences = self._read()
+        if self._drop_diverged(differences, looks_closely=is_parting):
+            company, numbers, differences = self._read()
         if is_tick:
             self._tick()
-        if self.step % self._clock.pose_steps == 0:
-            self._sample()
+        if is_sample:
+            self._sample(numbers)
             if watch is not None:
                 watch(self.poses())
-        if is_look and velocities is not None:
-            self._touches.count(self.company.clusters)
-            self.company.look(velocities)
-            if is_parting:
-                self.company.part()
+        if is_look:
+            self._touches.count(company.clusters)
+            company.look(numbers, differences)
+        if is_parting:
+            company.part()
+
+    def _read(self) -> tuple[Company, Floats, Floats]:
+        """Return the living, their state in a row, and its change since measured."""
+        numbers = self.company.layout.read()
+        return self.company, numbers, self.company.differences(numbers)
 
     def _tick(self) -> None:
         everybody = self.company.everybody
@@ -212,9 +220,8 @@ class World:
             self.company.kinematics()
             light.shine(source, clusters, seats)
 
-    def _sample(self) -> None:
+    def _sample(self, positions: Floats) -> None:
         layout = self.company.layout
-        positions = layout.positions()
         places = positions[layout.roots[:, :3]].tolist()
         for one, (x, y, z) in zip(self.company.everybody, places, strict=True):
             one.place = (x, y, z)
@@ -238,7 +245,8 @@ class World:
         for one in newcomers:
             self._minds.first_tick(one)
         self.company.kinematics()
-        self.company.look(np.abs(self.company.layout.velocities()))
+        company, numbers, differences = self._read()
+        company.look(numbers, differences)
 
     def _equip(self, one: Inhabitant, robot: Robot) -> None:
         """Give a robot another brain: at rest, its clock from the next tick."""
@@ -247,16 +255,16 @@ class World:
         one.states = np.zeros_like(one.states)
         one.thinks_since = self._next(self._clock.brain_steps)
 
-    def _drop_diverged(self, *, looks_closely: bool) -> Floats:
-        """Let the diverged go and return the others' velocities, absolute."""
-        company = self.company
-        velocities = np.abs(company.layout.velocities())
-        fallen = diverged(company, velocities, self.step, looks_closely=looks_closely)
-        if not fallen:
-            return velocities
+    def _drop_diverged(self, differences: Floats, *, looks_closely: bool) -> bool:
+        """Let the diverged go; return whether there were any."""
+        velocities = differences[self.company.layout.size :]
+        fallen = diverged(
+            self.company, velocities, self.step, looks_closely=looks_closely
+        )
         self._casualties += fallen
-        self._dismiss([casualty.birth for casualty in fallen])
-        return np.abs(company.layout.velocities())
+        if fallen:
+            self._dismiss([casualty.birth for casualty in fallen])
+        return bool(fallen)
 
     def _dismiss(self, births: Sequence[BirthId]) -> None:
         self.company.remove(births)
