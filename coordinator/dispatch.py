@@ -84,10 +84,6 @@ class Dispatch:
         kind = self._kind_of.get(agent)
         return self._pools[kind].agents[agent].joined.platform if kind else ""
 
-    def is_open(self, number: int) -> bool:
-        """Return whether a job was requested and is not delivered."""
-        return number in self._jobs
-
     @property
     def wake_s(self) -> float | None:
         """When the next ``Ticked`` can change something [s]; None: no need."""

@@ -14,6 +14,7 @@ from coordinator.events import (
     Evaluated,
     EvaluationFailed,
     Job,
+    JobKind,
     Requested,
     Returned,
     Vet,
@@ -70,6 +71,7 @@ class Questions:
         self._question = question
         self._numbers = numbers
         self._send = send
+        self._open: dict[int, JobKind] = {}
         self._answers: dict[int, Answer] = {}
         self._encoded: dict[BirthId, tuple[Robot, bytes]] = {}
 
@@ -84,9 +86,9 @@ class Questions:
         asks = self._question
         if isinstance(command, Vet):
             self._encoded[birth] = (command.robot, robot)
-            kind, attempt, settings = "vet", command.attempt, asks.vetting
+            attempt, settings = command.attempt, asks.vetting
         else:
-            kind, attempt, settings = "evaluate", 0, asks.evaluation
+            attempt, settings = 0, asks.evaluation
             self._encoded.pop(birth, None)
         payload = encode_request(
             run=asks.run,
@@ -95,7 +97,9 @@ class Questions:
             settings=settings,
             robot=robot,
         )
-        job = Job(number, kind, birth, attempt, payload)  # type: ignore[arg-type]
+        kind: JobKind = "vet" if isinstance(command, Vet) else "evaluate"
+        self._open[number] = kind
+        job = Job(number, kind, birth, attempt, payload)
         self._obey(self.dispatch.handle(Requested(job)))
 
     def tell(self, event: DispatchEvent) -> list[Answered]:
@@ -106,7 +110,7 @@ class Questions:
         Raises:
             JobRefused: no agent that was asked can do a job; the run stops as it is.
         """
-        if isinstance(event, Returned) and not self.dispatch.is_open(event.number):
+        if isinstance(event, Returned) and event.number not in self._open:
             return []
         return self._obey(self.dispatch.handle(self._checked(event)))
 
@@ -135,6 +139,9 @@ class Questions:
                 f"answer must be to (epoch, job) {expected}, "
                 f"got {(answer.epoch, answer.number)}",
             )
+        unfit = Evaluation if self._open[event.number] == "vet" else Report
+        if isinstance(answer.result, unfit):
+            return self._dropped(event, f"the answer is of type {unfit.__name__}")
         self._answers[event.number] = answer
         return event
 
@@ -150,6 +157,7 @@ class Questions:
             JobRefused: no agent that was asked can do it.
         """
         job = command.job
+        del self._open[job.number]
         if command.reason:
             raise JobRefused(
                 f"birth {job.birth.number}: several agents cannot {job.kind} it, the "

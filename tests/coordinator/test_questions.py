@@ -1,0 +1,145 @@
+"""Questions about single robots: what becomes of answers, good and bad."""
+
+from collections.abc import Callable
+from itertools import count
+
+import pytest
+
+from coordinator.events import (
+    Evaluate,
+    Evaluated,
+    EvaluationFailed,
+    Joined,
+    Left,
+    Returned,
+    Ticked,
+    Vet,
+    Vetted,
+    VettingFailed,
+)
+from coordinator.questions import Question, Questions
+from schema.birth import BirthId
+from schema.codec import Answer, decode_request, encode_answer
+from schema.errors import JobRefused
+from schema.evaluation import Evaluation, Report
+from schema.robot import Part, Robot
+
+EPOCH = 3
+BIRTH = BirthId(0, 7)
+ROBOT = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),))
+JUDGED = Evaluation(0.25, 0.0, 0.05, 12.0)
+VIABLE = Report(True, "", (), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.1, 1)
+
+
+class Desk:
+    """Questions whose jobs are caught, with two workers and an analyzer."""
+
+    def __init__(self) -> None:
+        self.sent: list[tuple[int, str, bytes]] = []
+        self.questions = Questions(
+            Question("run", EPOCH, b"vetting", b"evaluation"),
+            numbers=count(),
+            send=lambda *job: self.sent.append(job),
+        )
+        for name in ("one", "two"):
+            self.questions.tell(Joined(name, "worker", 1, f"platform-{name}"))
+        self.questions.tell(Joined("judge", "analyzer", 1, "platform"))
+        self.questions.tell(Ticked(0.0))
+
+    def reply(self, result: Evaluation | Report | str, **changes: int) -> Returned:
+        """Return the answer to the newest job."""
+        number, agent, _ = self.sent[-1]
+        fields = {"epoch": EPOCH, "number": number, **changes}
+        data = encode_answer(Answer(**fields, wall_s=0.5, result=result))
+        return Returned(number, agent, "ok", data)
+
+
+@pytest.fixture
+def desk() -> Desk:
+    return Desk()
+
+
+def test_a_request_carries_the_run_its_settings_and_the_robot(desk: Desk) -> None:
+    desk.questions.ask(Vet(BIRTH, 2, ROBOT))
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    (vet, judge, vetting), (_, worker, evaluation) = desk.sent
+    assert (judge, worker) == ("judge", "one")
+    asked = decode_request(vetting)
+    assert (asked.run, asked.epoch, asked.number) == ("run", EPOCH, vet)
+    assert (asked.settings, asked.robot) == (b"vetting", ROBOT)
+    assert decode_request(evaluation).settings == b"evaluation"
+
+
+def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    (event,) = desk.questions.tell(desk.reply(JUDGED))
+    assert isinstance(event, Evaluated)
+    assert (event.birth, event.evaluation) == (BIRTH, JUDGED)
+    assert event.provenance.agent == "one"
+    assert event.provenance.platform == "platform-one"
+    assert event.provenance.wall_s == 0.5
+
+
+def test_a_failed_simulation_is_a_result(desk: Desk) -> None:
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    (event,) = desk.questions.tell(desk.reply("diverged"))
+    assert isinstance(event, EvaluationFailed)
+    assert event.reason == "diverged"
+
+
+def test_a_report_is_a_verdict_and_a_failure_a_failed_attempt(desk: Desk) -> None:
+    desk.questions.ask(Vet(BIRTH, 4, ROBOT))
+    assert desk.questions.tell(desk.reply(VIABLE)) == [Vetted(BIRTH, 4, VIABLE)]
+    desk.questions.ask(Vet(BIRTH, 5, ROBOT))
+    failed = VettingFailed(BIRTH, 5, "no box")
+    assert desk.questions.tell(desk.reply("no box")) == [failed]
+
+
+def test_a_second_answer_and_one_to_nothing_change_nothing(desk: Desk) -> None:
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    reply = desk.reply(JUDGED)
+    assert len(desk.questions.tell(reply)) == 1
+    assert desk.questions.tell(reply) == []
+    assert desk.questions.tell(Returned(99, "one", "ok", b"")) == []
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda desk: desk.reply(JUDGED, epoch=EPOCH - 1),
+        lambda desk: desk.reply(JUDGED, number=41),
+        lambda desk: desk.reply(VIABLE),
+        lambda desk: Returned(desk.sent[-1][0], desk.sent[-1][1], "ok", b"\xff"),
+    ],
+    ids=["other epoch", "other job", "a verdict", "no message"],
+)
+def test_a_useless_answer_is_counted_and_the_job_goes_to_another(
+    desk: Desk, spoil: Callable[[Desk], Returned]
+) -> None:
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    assert desk.questions.tell(spoil(desk)) == []
+    assert desk.questions.malformed == 1
+    assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
+    (event,) = desk.questions.tell(desk.reply(JUDGED))
+    assert isinstance(event, Evaluated)
+
+
+def test_a_lost_job_goes_to_another(desk: Desk) -> None:
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    assert desk.questions.tell(Left("one")) == []
+    assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
+
+
+def test_a_job_that_several_refuse_stops_the_run_and_is_no_result(
+    desk: Desk,
+) -> None:
+    desk.questions.tell(Joined("three", "worker", 1, ""))
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    for _ in range(2):
+        number, agent, _ = desk.sent[-1]
+        refusal = Returned(number, agent, "error", reason="no such plug-in")
+        assert desk.questions.tell(refusal) == []
+    number, agent, _ = desk.sent[-1]
+    with pytest.raises(JobRefused, match=r"birth 7.*cannot evaluate.*no such plug-in"):
+        desk.questions.tell(Returned(number, agent, "error", reason="no such plug-in"))
+    assert sorted(agent for _, agent, _ in desk.sent) == ["one", "three", "two"]
