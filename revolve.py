@@ -8,6 +8,7 @@ COMMANDS = {
     "run": (_COORDINATOR, "evolve an experiment on this machine"),
     "resume": (_COORDINATOR, "go on with a run after any crash"),
     "coordinator": (_COORDINATOR, "run an experiment for remote workers"),
+    "arena": ("coordinator.arena_command", "give orders to a running arena"),
     "compare": (_COORDINATOR, "tell whether two runs are equal"),
     "worker": ("worker.__main__", "simulate robots for a coordinator"),
     "analyzer": ("analyzer.__main__", "vet bodies for a coordinator"),

@@ -19,6 +19,7 @@ from coordinator.island import Island
 from coordinator.journal import Journal
 from coordinator.local import LocalAgents
 from coordinator.loop import Agents, Loop
+from coordinator.operator import Desk
 from coordinator.pacing import Pace
 from coordinator.progress import Display
 from coordinator.questions import Question
@@ -130,8 +131,10 @@ def _run(folder: Path, details: RunDetails | None, deployment: Deployment) -> in
         )
         loop.start(journal.replay())
         held.set_state("running")
+        desk = Desk(loop, experiment)
         with Display(loop, experiment, quiet=deployment.quiet) as display:
-            _turn(loop, display, stop, [recorder.flush, held.confirm, *crews])
+            chores = [recorder.flush, held.confirm, *crews]
+            _turn(loop, display, stop, chores, lambda: _serve(desk, agents))
         if not loop.is_finished:
             recorder.flush()
             held.set_state("stopped")
@@ -163,13 +166,25 @@ def _pace(experiment: Experiment, deployment: Deployment) -> Pace | None:
     return Pace(deployment.speed, experiment.simulation.timestep_s)
 
 
+def _serve(desk: Desk, agents: Agents) -> None:
+    """Answer the operators that wrote; nobody can to a run without a network."""
+    if isinstance(agents, Network):
+        for order in agents.orders():
+            order.reply(desk.answer(order.data))
+
+
 def _turn(
-    loop: Loop, display: Display, stop: Event, chores: list[Callable[[], None]]
+    loop: Loop,
+    display: Display,
+    stop: Event,
+    chores: list[Callable[[], None]],
+    serve: Callable[[], None],
 ) -> None:
     """Step until all is done or somebody says stop; do the chores once a second."""
     shown_s = done_s = -math.inf
     while not (loop.is_finished or stop.is_set()):
         loop.step(_LOOK_S, time.monotonic())
+        serve()
         now_s = time.monotonic()
         if now_s - shown_s >= _LOOK_S:
             shown_s = now_s

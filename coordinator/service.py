@@ -30,7 +30,7 @@ from schema.network import (
     parse_address,
 )
 from schema.platform_tag import our_version
-from schema.topics import Member, agents_alive, check_name
+from schema.topics import Member, agents_alive, check_name, member_of
 
 _LOG = logging.getLogger(__name__)
 _KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
@@ -59,7 +59,21 @@ class _Asked:
         self.inbox.put(self)
 
 
-_News = _Asked | zenoh.Sample
+_News = _Asked | zenoh.Sample | zenoh.Query
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What an operator sent, and where the reply goes; ``reply`` it once."""
+
+    data: bytes
+    query: zenoh.Query
+    key: str
+
+    def reply(self, data: bytes) -> None:
+        """Answer the operator, whether it still waits or not."""
+        with self.query as query:
+            query.reply(self.key, data)
 
 
 class Network:
@@ -105,6 +119,7 @@ class Network:
         self._inbox: SimpleQueue[_News] = SimpleQueue()
         self._roster = Roster(our_version())
         self._ask_again: list[tuple[float, str]] = []
+        self._orders: list[Order] = []
 
     @property
     def refused(self) -> Mapping[str, str]:
@@ -149,6 +164,9 @@ class Network:
             )
             for kind in _KINDS
         ]
+        self._operators = self._session.declare_queryable(
+            self._me.command, put, complete=True
+        )
         self._token = self._session.liveliness().declare_token(self._me.alive)
 
     def _free_address(self) -> str:
@@ -209,8 +227,17 @@ class Network:
         except Empty:
             return events
 
+    def orders(self) -> list[Order]:
+        """Return what operators sent since the last call; ``receive`` waits for it."""
+        orders, self._orders = self._orders, []
+        return orders
+
     def _understand(self, news: _News) -> DispatchEvent | None:
         """Return what news means for who gives out jobs, if anything."""
+        if isinstance(news, zenoh.Query):
+            data = b"" if news.payload is None else news.payload.to_bytes()
+            self._orders.append(Order(data, news, self._me.command))
+            return None
         try:
             if isinstance(news, zenoh.Sample):
                 return self._token_changed(news)
@@ -263,3 +290,44 @@ class Network:
         if reason.startswith(FENCED):
             raise NetworkError(f"this coordinator stops: {reason[len(FENCED) :]}")
         return Returned(number, agent, "error", reason=reason or "no reason given")
+
+
+def ask_coordinator(
+    data: bytes, *, connect: str, fleet: str = DEFAULT_FLEET, tls: Tls | None = None
+) -> bytes:
+    """Return what the coordinator at an address replies to an operator.
+
+    Args:
+        data: an encoded ``OperatorRequest``.
+        connect: address of the hub.
+        fleet: name of the fleet.
+        tls: files, for a ``tls/`` address.
+
+    Raises:
+        NetworkError: no hub, not exactly one coordinator, or none that answers.
+    """
+    config = client_config(connect, tls)
+    check_name(fleet, "fleet")
+    zenoh.init_log_from_env_or("error")
+    try:
+        session = zenoh.open(zenoh.Config.from_json5(config))
+    except zenoh.ZError:
+        raise NetworkError(f"no coordinator at {connect}") from None
+    with session:
+        tokens = session.liveliness().get(agents_alive(fleet, "coordinator"))
+        keys = [str(token.ok.key_expr) for token in tokens if token.ok is not None]
+        if len(keys) != 1:
+            raise NetworkError(
+                f"{connect}: there must be one coordinator of fleet {fleet}, "
+                f"got {len(keys)}"
+            )
+        replies = session.get(
+            member_of(keys[0]).command,
+            payload=data,
+            timeout=ASK_TIMEOUT_S,
+            consolidation=_NOW,
+        )
+        for reply in replies:
+            if reply.ok is not None:
+                return bytes(reply.ok.payload.to_bytes())
+    raise NetworkError(f"{connect}: the coordinator does not answer")

@@ -84,3 +84,35 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     words = ("scenario1", "--seed", "5", "--births", str(BIRTHS), "--quiet")
     stage.run("run", *words, "--in-process", "--out", "run")
     return stage.folder / "run"
+
+
+CROWD = """
+name = "crowd"
+births = 25
+[selection]
+population = 8
+[simulation]
+warmup_steps = 600
+[arena]
+birth_radius_m = 0.5
+record_touches = true
+snapshot_interval_s = 30.0
+"""
+"""An arena so small that its robots are in each other's way."""
+
+
+@pytest.fixture
+def arena_stage(stage: Stage) -> Stage:
+    """Return a stage on which ``crowd.toml`` lies."""
+    (stage.folder / "crowd.toml").write_text(CROWD)
+    return stage
+
+
+@pytest.fixture(scope="session")
+def calm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of an arena in one process, to which nothing happened."""
+    stage = Stage(tmp_path_factory.mktemp("calm"))
+    (stage.folder / "crowd.toml").write_text(CROWD)
+    words = ("crowd.toml", "--seed", "4", "--quiet", "--out", "run")
+    stage.run("run", *words, "--in-process", "--threads", "1")
+    return stage.folder / "run"

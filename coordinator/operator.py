@@ -1,0 +1,139 @@
+"""What operators want of a run's arenas: checked, journalled, carried out.
+
+An order takes effect at the arena's next decision and stands in the journal with
+that step before the operator is told, so that a replay obeys it, too.
+"""
+
+from coordinator.arena import Arena
+from coordinator.events import (
+    Commanded,
+    Insert,
+    Order,
+    Pause,
+    Remove,
+    ReplaceBrain,
+    Resume,
+)
+from coordinator.loop import Loop
+from coordinator.orders import check_order
+from schema.birth import BirthId
+from schema.errors import RevolveError
+from schema.experiment import Experiment, body_space
+from schema.heredity import genome_of
+from schema.operator_codec import (
+    BrainWish,
+    InsertWish,
+    ListWish,
+    OperatorReply,
+    PauseWish,
+    RemoveWish,
+    ResumeWish,
+    SnapshotWish,
+    decode_operator_request,
+    encode_operator_reply,
+)
+from schema.robot import check_robot
+
+
+class Refused(RevolveError):  # noqa: N818 - reads as what it says
+    """A wish that cannot be granted: the operator is told why."""
+
+
+class Desk:
+    """Where operators of one run are served."""
+
+    def __init__(self, loop: Loop, experiment: Experiment) -> None:
+        """Serve the arenas of a loop that has started."""
+        self._loop = loop
+        self._experiment = experiment
+
+    def answer(self, data: bytes) -> bytes:
+        """Return the encoded reply to an encoded request.
+
+        On return the journal has what was ordered. Whatever is wrong with the
+        request is told to the operator and changes nothing.
+
+        Raises:
+            RunFolderError: the disk is full or failed.
+        """
+        try:
+            request = decode_operator_request(data)
+            arena = self._arena(request.island)
+            wish = request.wish
+            if isinstance(wish, ListWish):
+                text = self._list(arena)
+            elif isinstance(wish, SnapshotWish):
+                self._loop.advances.wish_snapshot(request.island)
+                text = "the state is kept at the end of the next advance"
+            else:
+                order = self._order(wish, arena)
+                event = Commanded(
+                    request.island, request.request_id, arena.next_step, order
+                )
+                text = self._effect(event.step)
+        except RevolveError as error:
+            return encode_operator_reply(OperatorReply(str(error), is_refused=True))
+        if not isinstance(wish, ListWish | SnapshotWish):
+            self._loop.order(event)
+        return encode_operator_reply(OperatorReply(text))
+
+    def _arena(self, number: int) -> Arena:
+        arena = self._loop.islands.get(number)
+        if not isinstance(arena, Arena):
+            raise Refused(f"island {number}: no arena of this run")
+        if arena.is_finished:
+            raise Refused(f"arena {number}: has finished")
+        return arena
+
+    def _order(
+        self,
+        wish: PauseWish | ResumeWish | InsertWish | RemoveWish | BrainWish,
+        arena: Arena,
+    ) -> Order:
+        """Return the order that a wish comes to.
+
+        Raises:
+            Refused: nobody of that name lives there.
+            InvalidRobot: a robot that breaks the rules of the experiment.
+        """
+        space = body_space(self._experiment.space)
+        order: Order
+        match wish:
+            case PauseWish():
+                order = Pause()
+            case ResumeWish():
+                order = Resume()
+            case InsertWish():
+                check_robot(wish.robot, space)
+                order = Insert(genome_of(wish.robot), wish.place)
+            case RemoveWish():
+                _check_lives(wish.birth, arena)
+                order = Remove(wish.birth)
+            case BrainWish():
+                _check_lives(wish.birth, arena)
+                order = ReplaceBrain(wish.birth, wish.robot.brain)
+        check_order(order, self._experiment)
+        return order
+
+    def _effect(self, step: int) -> str:
+        return f"takes effect at {step * self._experiment.simulation.timestep_s:g} s"
+
+    def _list(self, arena: Arena) -> str:
+        """Return a line on the arena and one on each of the living."""
+        state = "paused" if arena.is_paused else "running"
+        now_s = arena.step * self._experiment.simulation.timestep_s
+        births = self._experiment.births
+        about = f"{arena.births} of {births} born, {len(arena.population)} alive"
+        lines = [f"{state} at {now_s:g} s, {about}", "birth  rank  fitness"]
+        lines += [
+            f"{one.birth.number:5}  {one.rank:4}  {one.fitness:7.4f}"
+            for one in arena.population
+        ]
+        return "\n".join(lines)
+
+
+def _check_lives(birth: BirthId, arena: Arena) -> None:
+    living = [one.birth for one in arena.population]
+    if birth not in living:
+        numbers = ", ".join(str(each.number) for each in living) or "nobody"
+        raise Refused(f"birth {birth.number}: does not live; alive are {numbers}")
