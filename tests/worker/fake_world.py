@@ -1,0 +1,95 @@
+"""A world without physics that keeps the promises of a real one.
+
+What it tells depends on all that ever happened in it, and its snapshot holds that.
+"""
+
+import hashlib
+import json
+from typing import Self
+
+from schema.arena import Advance, Casualty, Changes, Judgement
+from schema.birth import BirthId
+from schema.experiment import ArenaSettings
+from tests.coordinator.arena_world import DT, MATURE, poses
+
+
+class FakeWorld:
+    """Everybody stands where the past of the whole world puts them."""
+
+    made = 0
+    """Worlds that were ever begun or restored; reset it before use."""
+
+    def __init__(self, settings: ArenaSettings, threads: int = 1) -> None:
+        """Begin with nobody."""
+        del settings
+        assert threads >= 1
+        type(self).made += 1
+        self.step = 0
+        self.born: dict[BirthId, int] = {}
+        self.past = "begun"
+        self.is_closed = False
+
+    @classmethod
+    def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> Self:
+        world = cls(settings, threads)
+        world.step, born, world.past = json.loads(data)
+        world.born = {BirthId(*name): step for *name, step in born}
+        return world
+
+    def apply(self, changes: Changes) -> None:
+        for birth in changes.removals:
+            del self.born[birth]
+        for each in changes.insertions:
+            self.born[each.birth] = self.step
+        self._happened(repr((changes.removals, [i.place for i in changes.insertions])))
+
+    def advance(self, until: int) -> Advance:
+        assert until > self.step
+        assert not self.is_closed
+        self.step = until
+        self._happened(str(until))
+        fallen = [one for one in sorted(self.born) if self._chance(one) < 0.01]
+        for one in fallen:
+            del self.born[one]
+        living = sorted(self.born)
+        return Advance(
+            step=until,
+            digest=self.digest(),
+            judgements=tuple(map(self._judged, living)),
+            casualties=tuple(
+                Casualty(o, until, "fell", (0.0, 0.0, 0.1)) for o in fallen
+            ),
+            touches=(),
+            poses=poses(living, until * DT),
+        )
+
+    def snapshot(self) -> bytes:
+        born = [(*name, step) for name, step in sorted(self.born.items())]
+        return json.dumps([self.step, born, self.past]).encode()
+
+    def digest(self) -> bytes:
+        return hashlib.sha256(self.snapshot()).digest()
+
+    def close(self) -> None:
+        self.is_closed = True
+
+    def _happened(self, what: str) -> None:
+        self.past = hashlib.sha256((self.past + what).encode()).hexdigest()
+
+    def _chance(self, birth: BirthId) -> float:
+        drawn = hashlib.sha256(f"{self.past}{birth}".encode()).digest()
+        return int.from_bytes(drawn[:6], "big") / 2**48
+
+    def _judged(self, birth: BirthId) -> Judgement:
+        age = self.step - self.born[birth]
+        fitness = self._chance(birth)
+        place = (fitness, -fitness, 0.02)
+        return Judgement(birth, age * DT, 0.0, fitness, fitness, age >= MATURE, place)
+
+
+class OddWorld(FakeWorld):
+    """A machine that computes otherwise."""
+
+    def advance(self, until: int) -> Advance:
+        self._happened("oddly")
+        return super().advance(until)
