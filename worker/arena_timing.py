@@ -35,6 +35,7 @@ class ArenaTiming:
         bare_s: the same robots' steps alone, one after the other, with nothing
             else [s]; 0 if not measured.
         coming_s: of ``wall_s``, births, deaths and regrouping [s].
+        looking_s: of ``wall_s``, finding out who may touch whom [s].
         merges, splits: how often clusters were joined and parted.
         largest: cluster at the end.
     """
@@ -44,6 +45,7 @@ class ArenaTiming:
     wall_s: float
     bare_s: float
     coming_s: float
+    looking_s: float
     merges: int
     splits: int
     largest: int
@@ -159,12 +161,17 @@ def time_arena(
     """
     clock = time.thread_time if threads == 1 else time.perf_counter
     second = round(1.0 / settings.simulation.timestep_s)
-    world, watch = World(settings, threads), Stopwatch(clock)
+    world, coming, looking = (
+        World(settings, threads),
+        Stopwatch(clock),
+        Stopwatch(clock),
+    )
     world.apply(Changes(insertions=tuple(newcomers)))
     if warm_s:
         world.advance(warm_s * second)
-    watch.wrap(world.company, "look", "part", "add", "remove")
-    watch.wrap(world, "apply")
+    looking.wrap(world.company, "look")
+    coming.wrap(world.company, "regroup", "part", "remove")
+    coming.wrap(world, "apply")
     company, wall, bare, steps = world.company, 0.0, 0.0, 0
     merges, splits = company.merges, company.splits
     waiting = list(spares)
@@ -186,7 +193,8 @@ def time_arena(
         simulated_s=steps * settings.simulation.timestep_s,
         wall_s=wall,
         bare_s=bare,
-        coming_s=watch.total_s,
+        coming_s=coming.total_s,
+        looking_s=looking.total_s,
         merges=company.merges - merges,
         splits=company.splits - splits,
         largest=max((len(c.members) for c in company.clusters), default=0),

@@ -115,6 +115,7 @@ class Company:
         """Have exactly these groups live together, each ascending by birth."""
         present = {cluster.members: cluster for cluster in self.clusters}
         settled: list[Cluster] = []
+        torn: list[Group] = []
         changed = False
         for members in groups:
             if members in present:
@@ -123,12 +124,13 @@ class Company:
             if not changed:
                 self._anchor()
             changed = True
-            before = {self._cluster_of[birth].members for birth in members}
+            before = sorted({self._cluster_of[birth].members for birth in members})
             self.merges += len(before) - 1
-            self.splits += len(before) == 1
+            torn += before if len(before) == 1 else ()
             rows = [self._rows[birth] for birth in members]
             self.proximity.join(rows)
             settled.append(self._move(members))
+        self.splits += len(torn) - len(set(torn))
         if changed:
             self._settle(settled)
 

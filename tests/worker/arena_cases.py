@@ -1,0 +1,74 @@
+"""Arenas for tests: settings, newcomers, and how to go on with two of them."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from msgspec.structs import replace
+
+from schema.arena import Advance, Changes, Insertion
+from schema.birth import BirthId
+from schema.experiment import Arena, ArenaSettings, Experiment
+from schema.robot import Robot
+from worker.world import World
+
+EXPERIMENT = Experiment(name="test")
+SECOND = 200
+"""Physics steps."""
+Robots = Callable[[int], Robot]
+
+
+def settings_of(**arena: Any) -> ArenaSettings:  # noqa: ANN401 - any of its keys
+    """Return the settings of scenario 3 with some keys of its arena changed."""
+    return ArenaSettings(
+        space=EXPERIMENT.space,
+        simulation=replace(EXPERIMENT.simulation, warmup_steps=600),
+        fitness=EXPERIMENT.fitness,
+        arena=Arena(**arena),
+    )
+
+
+SETTINGS = settings_of()
+
+
+def crowd(
+    robot_of: Robots, count: int, radius_m: float, *, seed: int = 1, first: int = 0
+) -> tuple[Insertion, ...]:
+    """Return newcomers at random places and headings, never on top of each other."""
+    rng = np.random.default_rng(seed)
+    found: list[Insertion] = []
+    places: list[tuple[float, float]] = []
+    least = 0.3
+    while len(found) < count:
+        angle, share = rng.uniform(0.0, 2.0 * math.pi), rng.uniform()
+        reach = radius_m * math.sqrt(share)
+        place = (reach * math.cos(angle), reach * math.sin(angle))
+        heading = float(rng.uniform(0.0, 2.0 * math.pi))
+        least *= 0.999
+        if all(math.dist(place, other) >= least for other in places):
+            birth = BirthId(0, first + len(found))
+            places.append(place)
+            found.append(Insertion(birth, robot_of(birth.number), place, heading))
+    return tuple(found)
+
+
+def inhabited(
+    settings: ArenaSettings, newcomers: Sequence[Insertion], threads: int = 1
+) -> World:
+    """Return a world into which robots have just been dropped."""
+    world = World(settings, threads)
+    world.apply(Changes(insertions=tuple(newcomers)))
+    return world
+
+
+def state_of(world: World, birth: BirthId) -> bytes:
+    """Return a robot's physics, readings and mind as bytes."""
+    one = world.company.find(birth)
+    arrays = (one.seat.qpos, one.seat.qvel, one.seat.ctrl, one.seat.senses.readings)
+    return b"".join(np.asarray(a).tobytes() for a in (*arrays, one.states))
+
+
+def seconds(world: World, count: float) -> Advance:
+    """Advance by simulated seconds."""
+    return world.advance(world.step + round(count * SECOND))
