@@ -1,0 +1,82 @@
+"""Operators' requests and replies as bytes."""
+
+from contextlib import suppress
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from schema import revolve_pb2 as pb
+from schema.birth import BirthId
+from schema.errors import MalformedMessage
+from schema.genome import Node, develop
+from schema.operator_codec import (
+    BrainWish,
+    InsertWish,
+    ListWish,
+    OperatorReply,
+    OperatorRequest,
+    PauseWish,
+    RemoveWish,
+    ResumeWish,
+    SnapshotWish,
+    Wish,
+    decode_operator_reply,
+    decode_operator_request,
+    encode_operator_reply,
+    encode_operator_request,
+)
+from schema.parts import BUILT_IN
+
+CORE = develop(Node("Core", -1, 0, (0.5, 0.5, 0.5)), BUILT_IN)
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        ListWish(),
+        PauseWish(),
+        ResumeWish(),
+        SnapshotWish(),
+        InsertWish(CORE),
+        InsertWish(CORE, (0.0, -1.5)),
+        RemoveWish(BirthId(1, 12)),
+        BrainWish(BirthId(0, 3), CORE),
+    ],
+)
+def test_requests_come_back(wish: Wish) -> None:
+    request = OperatorRequest("id", 2, wish)
+    assert decode_operator_request(encode_operator_request(request)) == request
+
+
+@pytest.mark.parametrize("is_refused", [False, True])
+def test_replies_come_back(is_refused: bool) -> None:  # noqa: FBT001 - a case
+    reply = OperatorReply("at 5 s", is_refused=is_refused)
+    assert decode_operator_reply(encode_operator_reply(reply)) == reply
+
+
+def test_a_request_needs_a_name_and_a_wish() -> None:
+    nameless = pb.OperatorRequest(pause=pb.Nothing())
+    with pytest.raises(MalformedMessage, match="request_id"):
+        decode_operator_request(nameless.SerializeToString())
+    with pytest.raises(MalformedMessage, match="no wish"):
+        decode_operator_request(pb.OperatorRequest(request_id="x").SerializeToString())
+
+
+def test_a_place_must_be_one() -> None:
+    placed = pb.PlacedRobot(has_place=True, x=float("nan"))
+    placed.robot.ParseFromString(
+        pb.OperatorRequest.FromString(
+            encode_operator_request(OperatorRequest("x", 0, InsertWish(CORE)))
+        ).insert.robot.SerializeToString()
+    )
+    message = pb.OperatorRequest(request_id="x", insert=placed)
+    with pytest.raises(MalformedMessage, match=r"insert\.x"):
+        decode_operator_request(message.SerializeToString())
+
+
+@given(st.binary(max_size=200))
+def test_any_bytes_decode_or_are_refused(data: bytes) -> None:
+    for decode in (decode_operator_request, decode_operator_reply):
+        with suppress(MalformedMessage):
+            decode(data)
