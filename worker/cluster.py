@@ -30,6 +30,7 @@ class Seat:
     """One robot's place in a cluster: live views, its senses and its motors.
 
     Attributes:
+        model, data: of the cluster.
         qpos, qvel, ctrl: its part of the state.
         xpos, xmat: frames of its bodies as of the last step, (N, 3) and (N, 9).
         joints: where its part of qpos starts in the cluster's.
@@ -47,8 +48,8 @@ class Seat:
             shop: the arena's settings.
             cluster: whose model and data have just been made.
         """
-        self.cluster = cluster
-        model, data = cluster.model, cluster.data
+        self.model, self.data = cluster.model, cluster.data
+        model, data = self.model, self.data
         prefix = cluster.prefixes[len(cluster.seats)]
         free = free_joint(model, prefix)
         first = find(model, mujoco.mjtObj.mjOBJ_BODY, f"{prefix}root")
@@ -76,15 +77,15 @@ class Seat:
 
     def start(self) -> None:
         """Feel for the first time."""
-        self.senses.start(self.cluster.model, self.cluster.data)
+        self.senses.start(self.model, self.data)
 
     def feel(self, interval_s: float) -> None:
         """Read all sensors; ``interval_s`` has passed since the last reading."""
-        self.senses.read(self.cluster.model, self.cluster.data, interval_s)
+        self.senses.read(self.model, self.data, interval_s)
 
     def drive(self, outputs: Floats) -> None:
         """Command the motors; (O,) outputs of the network."""
-        self.servos.drive(self.cluster.data, outputs)
+        self.servos.drive(self.data, outputs)
 
     def take(self, other: "Seat") -> None:
         """Take over a robot's whole state from the seat that it leaves."""

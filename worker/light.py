@@ -44,7 +44,7 @@ def shine(light: Vector, clusters: Sequence[Cluster], seats: Sequence[Seat]) -> 
 def _brightness(
     light: Vector, clusters: Sequence[Cluster], seat: Seat, geom: int
 ) -> float:
-    model, data = seat.cluster.model, seat.cluster.data
+    model, data = seat.model, seat.data
     outward = data.geom_xmat[geom].reshape(3, 3)[:, 0]
     face = float(model.geom_size[geom][0]) + _OUTSIDE_M
     eye = data.geom_xpos[geom] + face * outward

@@ -107,5 +107,5 @@ def test_those_who_part_live_alone_again(turtle: Robot) -> None:
         sizes.append(len(world.company.clusters))
     assert sizes[1] == 1
     assert sizes[-1] == 2
-    assert first.seat.cluster is first.body.home
+    assert first.seat is first.body.home.seats[0]
     assert (world.company.merges, world.company.splits) == (1, 1)
