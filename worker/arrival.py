@@ -1,14 +1,17 @@
 """How robots come into an arena, and which changes are none."""
 
+import numpy as np
+
 from schema.arena import Casualty, Changes, Insertion
 from schema.birth import BirthId
+from schema.brain import Brain
 from schema.codec import encode_robot
 from schema.errors import UnexpectedEvent
 from schema.experiment import body_space
 from schema.robot import Robot, check_robot
 from worker.cluster import Body
 from worker.company import Company
-from worker.controller import pack
+from worker.controller import Widths, pack
 from worker.inhabitant import Inhabitant, put
 from worker.window import Window
 
@@ -97,8 +100,24 @@ def inhabitant(
         body=body,
         seat=body.home.seats[0],
         network=network,
-        states=network.numbers[0] * 0.0,
+        states=np.zeros(company.shop.width.states),
         thinks_since=0,
         window=window,
         place=(0.0, 0.0, 0.0),
     )
+
+
+def equip(one: Inhabitant, brain: Brain, width: Widths, since: int) -> None:
+    """Give a robot another brain, at rest.
+
+    Args:
+        one: the robot; its held commands stay until its next tick.
+        brain: that fits its body.
+        width: of every network.
+        since: step of that tick, from which the brain's clock counts.
+    """
+    one.robot = Robot(one.robot.parts, brain)
+    one.encoded = encode_robot(one.robot)
+    one.network = pack(brain, width)
+    one.states = np.zeros_like(one.states)
+    one.thinks_since = since

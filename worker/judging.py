@@ -1,11 +1,27 @@
 """How a living robot does, from its sliding window."""
 
+from collections.abc import Iterable
+
 from schema.arena import Casualty, Judgement
 from schema.errors import FitnessUndefined
 from schema.experiment import ArenaSettings
 from worker.evaluation import judge
 from worker.fitness import path_velocity, straight_velocity
 from worker.inhabitant import Inhabitant
+
+
+def judge_all(
+    everybody: Iterable[Inhabitant], step: int, settings: ArenaSettings
+) -> tuple[list[Judgement], list[Casualty]]:
+    """Return how all do, and those of whom it cannot be told, in their order."""
+    judgements, undefined = [], []
+    for one in everybody:
+        found = judgement(one, step, settings)
+        if isinstance(found, Judgement):
+            judgements.append(found)
+        else:
+            undefined.append(found)
+    return judgements, undefined
 
 
 def judgement(

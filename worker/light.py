@@ -15,6 +15,8 @@ import numpy as np
 
 from schema.parts import Vector
 from worker.cluster import Cluster, Seat
+from worker.company import Company
+from worker.inhabitant import Inhabitant
 
 FULL_WITHIN_M = 1.0
 """Within this distance the light is as bright as it gets."""
@@ -22,23 +24,23 @@ _OUTSIDE_M = 1e-6
 """So far before its face a sensor's ray starts."""
 
 
-def is_needed(clusters: Sequence[Cluster]) -> bool:
-    """Return whether any robot has a light sensor."""
-    return any(seat.senses.lights for c in clusters for seat in c.seats)
-
-
-def shine(light: Vector, clusters: Sequence[Cluster], seats: Sequence[Seat]) -> None:
-    """Fill in what the light sensors of some robots read.
+def shine(company: Company, people: Sequence[Inhabitant]) -> None:
+    """Fill in what the light sensors of some robots read, if there is a light.
 
     Args:
-        light: where it is, world frame [m].
-        clusters: all of the arena, any of which may stand in the way; their
-            frames are up to date.
-        seats: whose sensors.
+        company: all of the arena, any of whom may stand in the way.
+        people: whose sensors.
     """
+    source = company.shop.settings.arena.light
+    seats = [one.seat for one in people if one.seat.senses.lights]
+    if source is None or not seats:
+        return
+    company.kinematics()
     for seat in seats:
         for geom, place in seat.senses.lights:
-            seat.senses.readings[0, place] = _brightness(light, clusters, seat, geom)
+            seat.senses.readings[0, place] = _brightness(
+                source, company.clusters, seat, geom
+            )
 
 
 def _brightness(

@@ -12,23 +12,18 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Self
 
-import numpy as np
-
-from schema.arena import Advance, Casualty, Changes, Insertion, Judgement
+from schema.arena import Advance, Casualty, Changes, Insertion
 from schema.birth import BirthId
-from schema.codec import encode_robot
 from schema.errors import UnexpectedEvent
 from schema.evaluation import Floats
 from schema.experiment import ArenaSettings
-from schema.robot import Robot
 from worker import light, state
-from worker.arrival import check_changes, newborn
+from worker.arrival import check_changes, equip, newborn
 from worker.company import Company
-from worker.controller import pack
 from worker.divergence import diverged
 from worker.evaluation import silence_engine
 from worker.inhabitant import Inhabitant
-from worker.judging import judgement
+from worker.judging import judge_all
 from worker.minds import Minds
 from worker.pool import Pool
 from worker.poses import Poses
@@ -107,7 +102,8 @@ class World:
             self._insert(changes.insertions)
         for change in changes.brains:
             one = self.company.find(change.birth)
-            self._equip(one, Robot(one.robot.parts, change.brain))
+            since = self._next(self._clock.brain_steps)
+            equip(one, change.brain, self.company.shop.width, since)
         if changes.removals or changes.insertions or changes.brains:
             self._minds.gather(self.company.everybody)
 
@@ -210,15 +206,8 @@ class World:
         tick_s = self._clock.brain_steps * self._clock.timestep_s
         for one in everybody:
             one.seat.feel(tick_s)
-        self._shine(everybody)
+        light.shine(self.company, everybody)
         self._minds.tick(self.step)
-
-    def _shine(self, people: Sequence[Inhabitant]) -> None:
-        source, clusters = self._settings.arena.light, self.company.clusters
-        seats = [one.seat for one in people]
-        if source is not None and any(seat.senses.lights for seat in seats):
-            self.company.kinematics()
-            light.shine(source, clusters, seats)
 
     def _sample(self, positions: Floats) -> None:
         layout = self.company.layout
@@ -241,19 +230,12 @@ class World:
         self.company.add(newcomers)
         for one in newcomers:
             one.seat.start()
-        self._shine(newcomers)
+        light.shine(self.company, newcomers)
         for one in newcomers:
             self._minds.first_tick(one)
         self.company.kinematics()
         company, numbers, differences = self._read()
         company.look(numbers, differences)
-
-    def _equip(self, one: Inhabitant, robot: Robot) -> None:
-        """Give a robot another brain: at rest, its clock from the next tick."""
-        one.robot, one.encoded = robot, encode_robot(robot)
-        one.network = pack(robot.brain, self.company.shop.width)
-        one.states = np.zeros_like(one.states)
-        one.thinks_since = self._next(self._clock.brain_steps)
 
     def _drop_diverged(self, differences: Floats, *, looks_closely: bool) -> bool:
         """Let the diverged go; return whether there were any."""
@@ -271,19 +253,18 @@ class World:
         self._minds.gather(self.company.everybody)
 
     def _report(self) -> Advance:
-        judged = [
-            judgement(one, self.step, self._settings) for one in self.company.everybody
-        ]
-        undefined = [one for one in judged if isinstance(one, Casualty)]
+        judgements, undefined = judge_all(
+            self.company.everybody, self.step, self._settings
+        )
+        self._casualties += undefined
         if undefined:
-            self._casualties += undefined
             self._dismiss([casualty.birth for casualty in undefined])
         casualties, self._casualties = tuple(self._casualties), []
         poses, self._poses = self._poses, Poses(self._clock.timestep_s)
         return Advance(
             step=self.step,
             digest=self.digest(),
-            judgements=tuple(one for one in judged if isinstance(one, Judgement)),
+            judgements=tuple(judgements),
             casualties=casualties,
             touches=self._touches.hand_over(),
             poses=poses.columns(),
