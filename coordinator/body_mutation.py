@@ -5,19 +5,11 @@ section 4.4.6; facts of the original, section 4.5. Its traps are avoided: a new 
 may connect to every neuron, and the mean size of what could be duplicated is a mean.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from math import ceil
 
-from coordinator.branch import (
-    Branch,
-    Tally,
-    copied,
-    free_places,
-    lineage,
-    preorder,
-    tallies,
-)
+from coordinator.branch import Branch, copied, free_places, lineage, preorder
 from coordinator.draws import Draws
 from coordinator.growth import (
     endings,
@@ -28,6 +20,7 @@ from coordinator.growth import (
     usable_types,
     wire,
 )
+from coordinator.tally import Tally, greatest, tallies, tally
 from schema.experiment import Experiment, Space, body_space
 
 
@@ -43,11 +36,9 @@ def deletable(sizes: dict[Branch, Tally], space: Space) -> list[Branch]:
 
 def duplicable(sizes: dict[Branch, Tally], space: Space) -> list[Branch]:
     """Return the subtrees of which a tree may hold one more."""
-    total = next(iter(sizes.values()))
+    room = greatest(space).plus(next(iter(sizes.values())), -1)
     return [
-        branch
-        for branch, size in sizes.items()
-        if branch.parent and total.plus(size).fits(space)
+        branch for branch, size in sizes.items() if branch.parent and size.fits(room)
     ]
 
 
@@ -55,7 +46,7 @@ def delete_subtree(draws: Draws, root: Branch, experiment: Experiment) -> None:
     """Delete a random subtree, with the experiment's probability."""
     if not draws.chance(experiment.variation.p_delete_subtree):
         return
-    if candidates := deletable(tallies(root), experiment.space):
+    if candidates := deletable(tallies(preorder(root)), experiment.space):
         draws.pick(candidates).cut()
 
 
@@ -63,8 +54,9 @@ def duplicate_subtree(draws: Draws, root: Branch, experiment: Experiment) -> Non
     """Put a copy of a random subtree on a free slot, with a probability."""
     if not draws.chance(experiment.variation.p_duplicate_subtree):
         return
-    candidates = duplicable(tallies(root), experiment.space)
-    places = free_places(root)
+    branches = preorder(root)
+    candidates = duplicable(tallies(branches), experiment.space)
+    places = free_places(branches)
     if candidates and places:
         twin = copied(draws.pick(candidates))
         parent, slot = draws.pick(places)
@@ -93,9 +85,9 @@ def _seat(branch: Branch) -> tuple[Branch, int]:
     return branch.parent, branch.parent_slot
 
 
-def vary_parts(draws: Draws, root: Branch, epsilon: float) -> None:
+def vary_parts(draws: Draws, branches: Iterable[Branch], epsilon: float) -> None:
     """Move every part's parameters, but for its colour, towards random values."""
-    for branch in preorder(root):
+    for branch in branches:
         if branch.kind.own_parameters:
             branch.parameters = draws.nearby(
                 branch.kind.parameters, branch.parameters, epsilon
@@ -109,7 +101,7 @@ def expected_parts(root: Branch, experiment: Experiment) -> float:
     there is room for.
     """
     variation, space = experiment.variation, experiment.space
-    sizes = tallies(root)
+    sizes = tallies(preorder(root))
     gone = [sizes[branch].parts for branch in deletable(sizes, space)]
     doubled = [sizes[branch].parts for branch in duplicable(sizes, space)]
     more = float(sum(doubled))
@@ -139,9 +131,10 @@ def _add_part(
     draws: Draws, root: Branch, genes: Iterator[int], experiment: Experiment
 ) -> None:
     space = experiment.space
-    size = tallies(root)[root]
+    branches = preorder(root)
+    size = tally(branches)
     usable = usable_types(body_space(space), size, space)
-    growth = pick_growth(draws, free_places(root), usable)
+    growth = pick_growth(draws, free_places(branches), usable)
     if growth is None:
         return
     (parent, slot), kind = growth

@@ -5,25 +5,31 @@ section 4.4.6; facts of the original, section 4.5. Its trap is avoided: deleting
 hidden neuron re-wires nothing.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
-from fractions import Fraction
+from decimal import Decimal
 
-from coordinator.branch import Branch, follow, preorder
+from coordinator.branch import Branch, follow
 from coordinator.draws import Draws
-from coordinator.growth import connect, endings, half_up, random_neuron
+from coordinator.growth import connect, endings, random_neuron
 from schema.brain import NEURON_TYPES
 from schema.experiment import Experiment
 from schema.genome import ConnectionGene, NeuronGene
 
+_HALF = Decimal("0.5")
 
-def delete_hidden_neurons(draws: Draws, root: Branch, probability: float) -> None:
+
+def delete_hidden_neurons(
+    draws: Draws, branches: Sequence[Branch], probability: float
+) -> None:
     """Delete each hidden neuron with a probability, and what led to or from it.
 
     Connections to and from the neurons that stay lead where they led before.
     """
-    branches = preorder(root)
     moved: dict[Branch, list[int | None]] = {}
     for branch in branches:
+        if not branch.hidden:
+            continue
         stays = [not draws.chance(probability) for _ in branch.hidden]
         if not all(stays):
             offsets = iter(range(len(stays)))
@@ -69,74 +75,78 @@ def _renamed(
     )
 
 
-def delete_connections(draws: Draws, root: Branch, probability: float) -> None:
+def delete_connections(
+    draws: Draws, branches: Sequence[Branch], probability: float
+) -> None:
     """Delete each connection with a probability."""
-    for branch in preorder(root):
+    for branch in branches:
         if branch.connections:
             branch.connections = tuple(
                 gene for gene in branch.connections if draws.number() >= probability
             )
 
 
-def vary_neurons(draws: Draws, root: Branch, epsilon: float) -> None:
+def vary_neurons(draws: Draws, branches: Sequence[Branch], epsilon: float) -> None:
     """Move every neuron's parameters towards random values."""
-    for branch in preorder(root):
-        branch.outputs = _varied(draws, branch.outputs, epsilon)
-        branch.hidden = _varied(draws, branch.hidden, epsilon)
+    for branch in branches:
+        if branch.outputs:
+            branch.outputs = _varied(draws, branch.outputs, epsilon)
+        if branch.hidden:
+            branch.hidden = _varied(draws, branch.hidden, epsilon)
 
 
 def _varied(
     draws: Draws, neurons: tuple[NeuronGene, ...], epsilon: float
 ) -> tuple[NeuronGene, ...]:
     return tuple(
-        NeuronGene(
-            neuron.kind,
-            draws.nearby(NEURON_TYPES[neuron.kind], neuron.parameters, epsilon),
-        )
-        for neuron in neurons
+        [
+            NeuronGene(
+                neuron.kind,
+                draws.nearby(NEURON_TYPES[neuron.kind], neuron.parameters, epsilon),
+            )
+            for neuron in neurons
+        ]
     )
 
 
 def add_hidden_neurons(
-    draws: Draws, root: Branch, before: int, experiment: Experiment
+    draws: Draws, branches: Sequence[Branch], before: int, experiment: Experiment
 ) -> None:
     """Add as many hidden neurons as deletion takes on average.
 
     Args:
         draws: where they come from.
-        root: the tree.
+        branches: the tree, depth first.
         before: hidden neurons that it had before any was deleted.
         experiment: probability, limit and way of rounding.
     """
     variation = experiment.variation
     if variation.hidden_rounding == "half-up":
-        wanted = half_up(before * _decimal(variation.p_delete_hidden_neuron))
+        wanted = _share(before, variation.p_delete_hidden_neuron)
     else:
         wanted = draws.rounded(before * variation.p_delete_hidden_neuron)
-    branches = preorder(root)
     room = experiment.space.max_hidden - sum(len(b.hidden) for b in branches)
     for _ in range(min(wanted, room)):
         draws.pick(branches).hidden += (random_neuron(draws),)
 
 
 def add_connections(
-    draws: Draws, root: Branch, before: int, experiment: Experiment
+    draws: Draws, branches: Sequence[Branch], before: int, experiment: Experiment
 ) -> None:
     """Add as many connections as deletion takes on average, rounded half up.
 
     Args:
         draws: where they come from.
-        root: the tree.
+        branches: the tree, depth first.
         before: connections that it had before any was deleted.
         experiment: probability of deletion.
     """
     probability = experiment.variation.p_remove_brain_connection
-    count = half_up(before * _decimal(probability))
+    count = _share(before, probability)
     if not count:
         return
-    branches = preorder(root)
     sources = endings(branches, "input", "output", "hidden")
-    targets = endings(branches, "output", "hidden")
+    targets = [ending for ending in sources if ending[1][0] != "input"]
     if not (sources and targets):
         return
     for _ in range(count):
@@ -144,6 +154,9 @@ def add_connections(
         source[0].connections += (connect(draws, source, target),)
 
 
-def _decimal(number: float) -> Fraction:
-    """Return the decimal number that a document wrote, so that halves are exact."""
-    return Fraction(repr(number))
+def _share(count: int, probability: float) -> int:
+    """Return a share of a count, rounded half up.
+
+    The probability is the decimal number that a document wrote: halves are exact.
+    """
+    return int(count * Decimal(repr(probability)) + _HALF)

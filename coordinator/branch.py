@@ -4,15 +4,13 @@ A genome never changes; a `Branch` may. It is thawed from a genome, worked upon
 within one function call, and frozen into a new genome.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import count
-from typing import NamedTuple
 
 from schema.birth import BirthId
 from schema.brain import Layer
-from schema.experiment import Space
-from schema.genome import ConnectionGene, Genome, NeuronGene, Node
+from schema.genome import ConnectionGene, Genome, NeuronGene, Node, walk
 from schema.parts import BodySpace, PartType
 
 
@@ -20,7 +18,8 @@ from schema.parts import BodySpace, PartType
 class Branch:
     """A node that may still change; its fields are those of `Node`.
 
-    ``parent`` and ``parent_slot`` are None and -1 at the root.
+    ``parent`` and ``parent_slot`` are None and -1 at the root; ``children`` stand by
+    ascending slot.
     """
 
     kind: PartType
@@ -46,7 +45,7 @@ class Branch:
     def graft(self, child: "Branch", slot: int) -> None:
         """Put a child on a slot, in the place of whatever sat there."""
         child.parent, child.parent_slot = self, slot
-        self.children[slot] = child
+        self.children = dict(sorted({**self.children, slot: child}.items()))
 
     def cut(self) -> None:
         """Take this branch, which must not be a root, off its parent."""
@@ -64,33 +63,6 @@ class Branch:
         return [(layer, k) for layer in layers for k in range(counts[layer])]
 
 
-class Tally(NamedTuple):
-    """What restrictions limit, of a tree or a part of one."""
-
-    parts: int
-    inputs: int
-    outputs: int
-    hidden: int
-
-    def plus(self, other: "Tally", sign: int = 1) -> "Tally":
-        """Return the sum with another tally, or the difference for sign -1."""
-        return Tally(
-            self.parts + sign * other.parts,
-            self.inputs + sign * other.inputs,
-            self.outputs + sign * other.outputs,
-            self.hidden + sign * other.hidden,
-        )
-
-    def fits(self, space: Space) -> bool:
-        """Return whether it exceeds none of the greatest numbers."""
-        return (
-            self.parts <= space.max_parts
-            and self.inputs <= space.max_inputs
-            and self.outputs <= space.max_outputs
-            and self.hidden <= space.max_hidden
-        )
-
-
 def gene_ids(birth: BirthId) -> Iterator[int]:
     """Return the gene identities that an individual may give to its new parts.
 
@@ -102,34 +74,30 @@ def gene_ids(birth: BirthId) -> Iterator[int]:
 
 def thaw(genome: Genome, space: BodySpace) -> Branch:
     """Return a genome as a tree that may change."""
-    root = _thaw_node(genome, space)
-    stack = [(genome, root)]
-    while stack:
-        node, branch = stack.pop()
-        for slot, child in node.children:
-            twig = _thaw_node(child, space)
-            branch.graft(twig, slot)
-            stack.append((child, twig))
-    return root
+    branches: list[Branch] = []
+    for node, parent, slot in walk(genome):
+        branch = Branch(
+            space[node.kind],
+            node.slot,
+            node.orientation,
+            node.parameters,
+            node.gene,
+            node.outputs,
+            node.hidden,
+            node.connections,
+        )
+        branches.append(branch)
+        if parent >= 0:
+            above = branch.parent = branches[parent]
+            branch.parent_slot = slot
+            above.children[slot] = branch
+    return branches[0]
 
 
-def _thaw_node(node: Node, space: BodySpace) -> Branch:
-    return Branch(
-        space[node.kind],
-        node.slot,
-        node.orientation,
-        node.parameters,
-        node.gene,
-        node.outputs,
-        node.hidden,
-        node.connections,
-    )
-
-
-def freeze(root: Branch) -> Genome:
-    """Return a tree as a genome."""
+def freeze(branches: Sequence[Branch]) -> Genome:
+    """Return a tree, given depth first, as a genome."""
     frozen: dict[Branch, Node] = {}
-    for branch in reversed(preorder(root)):
+    for branch in reversed(branches):
         frozen[branch] = Node(
             branch.kind.name,
             branch.slot,
@@ -139,11 +107,9 @@ def freeze(root: Branch) -> Genome:
             branch.outputs,
             branch.hidden,
             branch.connections,
-            tuple(
-                (slot, frozen[child]) for slot, child in sorted(branch.children.items())
-            ),
+            tuple([(slot, frozen[child]) for slot, child in branch.children.items()]),
         )
-    return frozen[root]
+    return frozen[branches[0]]
 
 
 def preorder(root: Branch) -> list[Branch]:
@@ -154,7 +120,7 @@ def preorder(root: Branch) -> list[Branch]:
         branch = stack.pop()
         order.append(branch)
         if branch.children:
-            stack += [branch.children[s] for s in sorted(branch.children, reverse=True)]
+            stack.extend(reversed(branch.children.values()))
     return order
 
 
@@ -178,24 +144,9 @@ def copied(root: Branch) -> Branch:
     return twins[root]
 
 
-def tallies(root: Branch) -> dict[Branch, Tally]:
-    """Return the tally of every subtree, in depth-first order of their tops."""
-    order = preorder(root)
-    sums = {
-        branch: [1, branch.kind.inputs, len(branch.outputs), len(branch.hidden)]
-        for branch in order
-    }
-    for branch in reversed(order[1:]):
-        assert branch.parent is not None
-        above, own = sums[branch.parent], sums[branch]
-        for index, number in enumerate(own):
-            above[index] += number
-    return {branch: Tally(*numbers) for branch, numbers in sums.items()}
-
-
-def free_places(root: Branch) -> list[tuple[Branch, int]]:
-    """Return every (branch, free slot) of a tree, depth first."""
-    return [(branch, slot) for branch in preorder(root) for slot in branch.free_slots()]
+def free_places(branches: Iterable[Branch]) -> list[tuple[Branch, int]]:
+    """Return every (branch, free slot) of some branches, in their order."""
+    return [(branch, slot) for branch in branches for slot in branch.free_slots()]
 
 
 def lineage(branch: Branch) -> list[Branch]:
@@ -231,8 +182,8 @@ def follow(branch: Branch, path: tuple[int, ...]) -> Branch | None:
     return here
 
 
-def level(root: Branch) -> None:
-    """Turn a tree's levelled parts back into the plane of its core.
+def level(branches: Iterable[Branch]) -> None:
+    """Turn the levelled parts of a tree, given depth first, to its core's plane.
 
     Walking outwards, the turns add up; every part that is levelled gets the turn
     that brings the sum back to zero, all others keep theirs.
@@ -240,7 +191,7 @@ def level(root: Branch) -> None:
     Source: facts of the original, section 2 (planarity).
     """
     turns: dict[Branch, int] = {}
-    for branch in preorder(root):
+    for branch in branches:
         if branch.parent is None:
             branch.orientation = turns[branch] = 0
             continue

@@ -67,13 +67,15 @@ class Draws:
             values: one for each parameter.
             epsilon: 0 leaves them, 1 draws them anew.
         """
-        return tuple(
+        moved: list[float] = []
+        for p, v in zip(parameters, values, strict=True):
+            if not p.is_mutable:
+                moved.append(v)
+                continue
+            near = (1.0 - epsilon) * v + epsilon * self.value(p)
             # Rounding must not carry a value out of its range.
-            min(max((1.0 - epsilon) * v + epsilon * self.value(p), p.low), p.high)
-            if p.is_mutable
-            else v
-            for p, v in zip(parameters, values, strict=True)
-        )
+            moved.append(p.low if near < p.low else min(near, p.high))
+        return tuple(moved)
 
     def normal(self, mean: float, sd: float) -> float:
         """Return a normally distributed number; the mean itself where sd is 0."""

@@ -5,19 +5,11 @@ are avoided: an experiment's least number of parts is kept, not only aimed at, a
 every part has an identity of its own beside the colour that it shares.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from coordinator.branch import (
-    Branch,
-    Tally,
-    freeze,
-    gene_ids,
-    level,
-    preorder,
-    tallies,
-)
+from coordinator.branch import Branch, freeze, gene_ids, level, preorder
 from coordinator.draws import Draws
 from coordinator.growth import (
     Place,
@@ -28,6 +20,7 @@ from coordinator.growth import (
     usable_types,
     wire,
 )
+from coordinator.tally import Tally, tally
 from schema.birth import BirthId
 from schema.errors import ExperimentError
 from schema.experiment import Experiment, body_space
@@ -58,12 +51,13 @@ def generate(
     least = experiment.space.min_parts
     for _ in range(MAX_TREES):
         root = _random_body(draws, experiment, gene_ids(birth))
-        size = tallies(root)[root]
+        branches = preorder(root)
+        size = tally(branches)
         if size.outputs and size.parts >= least:
-            _add_brain(draws, root, experiment)
+            _add_brain(draws, branches, experiment)
             if experiment.space.planar:
-                level(root)
-            return freeze(root)
+                level(branches)
+            return freeze(branches)
     raise ExperimentError(
         f"space: {MAX_TREES} random trees had no motor or fewer than "
         f"space.min_parts = {least} parts: the restrictions and "
@@ -94,9 +88,10 @@ def _random_body(draws: Draws, experiment: Experiment, genes: Iterator[int]) -> 
     return root
 
 
-def _add_brain(draws: Draws, root: Branch, experiment: Experiment) -> None:
+def _add_brain(
+    draws: Draws, branches: Sequence[Branch], experiment: Experiment
+) -> None:
     """Give a tree its hidden neurons, and connections among all neurons."""
-    branches = preorder(root)
     hosts = branches
     if experiment.generation.hidden_on == "wired":
         hosts = [b for b in branches if b.kind.inputs or b.outputs]

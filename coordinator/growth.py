@@ -6,8 +6,9 @@ Source: facts of the original, sections 4.3 and 4.5.
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
-from coordinator.branch import Branch, Tally, path_between
+from coordinator.branch import Branch, path_between
 from coordinator.draws import Draws
+from coordinator.tally import Tally
 from schema.brain import NEURON_TYPES, Layer
 from schema.experiment import Space
 from schema.genome import ConnectionGene, NeuronGene

@@ -22,8 +22,9 @@ from coordinator.brain_mutation import (
     delete_hidden_neurons,
     vary_neurons,
 )
-from coordinator.branch import Branch, freeze, gene_ids, level, preorder, tallies, thaw
+from coordinator.branch import Branch, freeze, gene_ids, level, preorder, thaw
 from coordinator.draws import Draws
+from coordinator.tally import greatest, tallies, tally
 from schema.birth import BirthId
 from schema.experiment import Experiment, body_space
 from schema.genome import Genome
@@ -55,11 +56,12 @@ def mate(
     if not crossover(draws, root, thaw(second, types), experiment):
         return None
     mutate(draws, root, gene_ids(birth), experiment)
-    if not any(branch.outputs for branch in preorder(root)):
+    branches = preorder(root)
+    if not any(branch.outputs for branch in branches):
         return None
     if experiment.space.planar:
-        level(root)
-    return freeze(root)
+        level(branches)
+    return freeze(branches)
 
 
 def crossover(
@@ -80,15 +82,14 @@ def crossover(
         Whether it was done; if not, the trees are as they were.
     """
     space = experiment.space
-    sizes, gifts = tallies(root), tallies(donor)
-    if len(sizes) == 1:
+    branches, gifts = preorder(root), tallies(preorder(donor))
+    if len(branches) == 1:
         return False
-    gone = draws.pick(list(sizes)[1:])
-    rest = sizes[root].plus(sizes[gone], -1)
+    gone = draws.pick(branches[1:])
+    rest = tally(branches).plus(tally(preorder(gone)), -1)
+    room = greatest(space).plus(rest, -1)
     candidates = [
-        branch
-        for branch, size in gifts.items()
-        if branch.parent and rest.plus(size).fits(space)
+        branch for branch, size in gifts.items() if branch.parent and size.fits(room)
     ]
     if not candidates:
         return False
@@ -117,13 +118,13 @@ def mutate(
     delete_subtree(draws, root, experiment)
     duplicate_subtree(draws, root, experiment)
     swap_subtrees(draws, root, experiment)
-    sizes = tallies(root)
-    hidden = sizes[root].hidden
-    connections = sum(len(branch.connections) for branch in sizes)
-    delete_hidden_neurons(draws, root, variation.p_delete_hidden_neuron)
-    delete_connections(draws, root, variation.p_remove_brain_connection)
-    vary_parts(draws, root, variation.body_epsilon)
-    vary_neurons(draws, root, variation.brain_epsilon)
-    add_hidden_neurons(draws, root, hidden, experiment)
-    add_connections(draws, root, connections, experiment)
+    branches = preorder(root)
+    hidden = sum(len(branch.hidden) for branch in branches)
+    connections = sum(len(branch.connections) for branch in branches)
+    delete_hidden_neurons(draws, branches, variation.p_delete_hidden_neuron)
+    delete_connections(draws, branches, variation.p_remove_brain_connection)
+    vary_parts(draws, branches, variation.body_epsilon)
+    vary_neurons(draws, branches, variation.brain_epsilon)
+    add_hidden_neurons(draws, branches, hidden, experiment)
+    add_connections(draws, branches, connections, experiment)
     add_parts(draws, root, genes, experiment)

@@ -7,7 +7,6 @@ therefore move between genomes and keep their wiring; a path that leads nowhere
 in the new place is kept, and ignored in the robot.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from schema.brain import INPUT, Brain, Connection, Layer, Neuron
@@ -71,34 +70,20 @@ Genome = Node
 """A genome is its root node."""
 
 
-def walk(genome: Genome) -> Iterator[tuple[Node, int, int]]:
-    """Yield (node, index of its parent, slot of its parent), depth first.
+def walk(genome: Genome) -> list[tuple[Node, int, int]]:
+    """Return (node, index of its parent, slot of its parent), depth first.
 
     The core comes first, with (-1, -1); children by ascending slot, as the parts
     of a robot stand.
     """
+    entries: list[tuple[Node, int, int]] = []
     stack: list[tuple[Node, int, int]] = [(genome, -1, -1)]
-    index = 0
     while stack:
         entry = stack.pop()
-        yield entry
-        stack.extend(
-            (child, index, slot) for slot, child in reversed(entry[0].children)
-        )
-        index += 1
-
-
-def node_part(node: Node, parent: int, parent_slot: int) -> Part:
-    """Return the part that a node becomes on a slot of the parent at an index."""
-    return Part(
-        node.kind,
-        parent,
-        parent_slot,
-        node.slot,
-        node.orientation,
-        node.parameters,
-        node.gene,
-    )
+        index = len(entries)
+        entries.append(entry)
+        stack += [(child, index, slot) for slot, child in reversed(entry[0].children)]
+    return entries
 
 
 def develop(genome: Genome, space: BodySpace) -> Robot:
@@ -114,40 +99,59 @@ def develop(genome: Genome, space: BodySpace) -> Robot:
     Returns:
         The robot: parts in depth-first order, neurons by layer and then by part.
     """
-    entries = list(walk(genome))
-    parts = tuple(
-        node_part(node, parent, parent_slot) for node, parent, parent_slot in entries
-    )
+    entries = walk(genome)
+    parts: list[Part] = []
     inputs: list[Neuron] = []
     outputs: list[Neuron] = []
     hidden: list[Neuron] = []
-    first: list[dict[Layer, tuple[int, int]]] = []
-    for index, (node, _, _) in enumerate(entries):
-        input_count = space[node.kind].inputs
-        first.append(
-            {
-                "input": (len(inputs), input_count),
-                "output": (len(outputs), len(node.outputs)),
-                "hidden": (len(hidden), len(node.hidden)),
-            }
+    starts: list[tuple[int, int, int]] = []
+    for index, (node, parent, slot) in enumerate(entries):
+        parts.append(
+            Part(
+                node.kind,
+                parent,
+                slot,
+                node.slot,
+                node.orientation,
+                node.parameters,
+                node.gene,
+            )
         )
-        inputs.extend(Neuron("input", INPUT, index) for _ in range(input_count))
-        outputs.extend(
+        starts.append((len(inputs), len(outputs), len(hidden)))
+        if count := space[node.kind].inputs:
+            inputs += [Neuron("input", INPUT, index)] * count
+        outputs += [
             Neuron("output", gene.kind, index, gene.parameters) for gene in node.outputs
-        )
-        hidden.extend(
+        ]
+        hidden += [
             Neuron("hidden", gene.kind, index, gene.parameters) for gene in node.hidden
-        )
-    layer_start: dict[Layer, int] = {
-        "input": 0,
-        "output": len(inputs),
-        "hidden": len(inputs) + len(outputs),
+        ]
+    starts.append((len(inputs), len(outputs), len(hidden)))
+    edges = _edges(entries, starts)
+    return Robot(tuple(parts), Brain((*inputs, *outputs, *hidden), edges))
+
+
+def _edges(
+    entries: list[tuple[Node, int, int]], starts: list[tuple[int, int, int]]
+) -> tuple[Connection, ...]:
+    """Return the connections of a genome that lead from a neuron to a neuron.
+
+    Args:
+        entries: its nodes, as ``walk`` gives them.
+        starts: how many inputs, outputs and hidden neurons stand before those of
+            each node; how many there are, at the end.
+    """
+    inputs, outputs, _ = starts[-1]
+    layers: dict[Layer, tuple[int, int]] = {
+        "input": (0, 0),
+        "output": (1, inputs),
+        "hidden": (2, inputs + outputs),
     }
 
     def find(index: int, neuron: tuple[Layer, int]) -> int | None:
-        layer, offset = neuron
-        start, count = first[index][layer]
-        return layer_start[layer] + start + offset if offset < count else None
+        layer, begin = layers[neuron[0]]
+        place = starts[index][layer] + neuron[1]
+        return begin + place if place < starts[index + 1][layer] else None
 
     neighbours = _neighbours(entries)
     edges: dict[tuple[int, int], Connection] = {}
@@ -162,7 +166,7 @@ def develop(genome: Genome, space: BodySpace) -> Robot:
             if source is not None and target is not None:
                 edge = Connection(source, target, gene.weight)
                 edges.setdefault((source, target), edge)
-    return Robot(parts, Brain((*inputs, *outputs, *hidden), tuple(edges.values())))
+    return tuple(edges.values())
 
 
 def _neighbours(entries: list[tuple[Node, int, int]]) -> list[dict[int, int]]:

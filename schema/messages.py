@@ -8,7 +8,7 @@ import math
 from schema import revolve_pb2 as pb
 from schema.brain import NEURON_TYPES, Brain, Connection, Layer, Neuron, check_brain
 from schema.errors import MalformedMessage
-from schema.genome import ConnectionGene, Genome, NeuronGene, Node, node_part, walk
+from schema.genome import ConnectionGene, Genome, NeuronGene, Node, walk
 from schema.robot import Part, Robot, check_tree
 
 _LAYER_CODES: dict[Layer, pb.Layer] = {
@@ -24,7 +24,7 @@ def robot_to_message(robot: Robot) -> pb.Robot:
     message = pb.Robot()
     add_part = message.parts.add
     for part in robot.parts:
-        _write_part(part, add_part())
+        _write_part(part, part.parent, part.parent_slot, add_part())
     write_brain(robot.brain, message)
     return message
 
@@ -45,12 +45,11 @@ def write_brain(brain: Brain, message: pb.Robot | pb.BrainChange) -> None:
     """Put a brain into a message that has neurons and connections."""
     add_neuron = message.neurons.add
     for neuron in brain.neurons:
-        add_neuron(
-            layer=_LAYER_CODES[neuron.layer],
-            kind=neuron.kind,
-            part=neuron.part,
-            parameters=neuron.parameters,
-        )
+        item = add_neuron()
+        item.layer = _LAYER_CODES[neuron.layer]
+        item.kind, item.part = neuron.kind, neuron.part
+        if neuron.parameters:
+            item.parameters.extend(neuron.parameters)
     add_connection = message.connections.add
     for edge in brain.connections:
         entry = add_connection()
@@ -84,7 +83,7 @@ def genome_to_message(genome: Genome) -> pb.Genome:
     message = pb.Genome()
     for node, parent, parent_slot in walk(genome):
         entry = message.nodes.add()
-        _write_part(node_part(node, parent, parent_slot), entry.part)
+        _write_part(node, parent, parent_slot, entry.part)
         for gene in node.outputs:
             entry.outputs.add(kind=gene.kind, parameters=gene.parameters)
         for gene in node.hidden:
@@ -132,11 +131,13 @@ def genome_from_message(message: pb.Genome) -> Genome:
     raise MalformedMessage("genome: needs at least one node")
 
 
-def _write_part(part: Part, message: pb.Part) -> None:
+def _write_part(
+    part: Part | Node, parent: int, parent_slot: int, message: pb.Part
+) -> None:
     # Assignments take a quarter less time than keyword arguments.
     message.kind = part.kind
-    message.parent = part.parent
-    message.parent_slot = part.parent_slot
+    message.parent = parent
+    message.parent_slot = parent_slot
     message.slot = part.slot
     message.orientation = part.orientation
     message.parameters.extend(part.parameters)

@@ -15,9 +15,10 @@ from coordinator.body_mutation import (
     swap_subtrees,
     vary_parts,
 )
-from coordinator.branch import freeze, gene_ids, preorder, tallies, thaw
+from coordinator.branch import freeze, gene_ids, preorder, thaw
 from coordinator.draws import Draws
 from coordinator.generation import generate
+from coordinator.tally import greatest, tally
 from schema.birth import BirthId
 from schema.experiment import Experiment, Generation, Space, Variation, body_space
 from schema.genome import Genome, NeuronGene, Node, walk
@@ -77,13 +78,13 @@ def test_deleting_takes_any_subtree_that_leaves_enough() -> None:
     for seed in range(N):
         root = thaw(CHAIN, TYPES)
         delete_subtree(draws(seed), root, setting)
-        found[shape(freeze(root))] += 1
+        found[shape(freeze(preorder(root)))] += 1
     # Without the brick's subtree only two parts would be left.
     assert sorted(found) == ["C(1F 2T)", "C(1F(1H(1A)))", "C(1F(1H) 2T)"]
     assert all(is_near(n, N / 3) for n in found.values())
     nothing = thaw(CHAIN, TYPES)
     delete_subtree(draws(), nothing, experiment({"min_parts": 5}, p_delete_subtree=1.0))
-    assert freeze(nothing) == CHAIN
+    assert freeze(preorder(nothing)) == CHAIN
 
 
 def test_duplicating_puts_a_copy_on_any_free_slot() -> None:
@@ -93,7 +94,7 @@ def test_duplicating_puts_a_copy_on_any_free_slot() -> None:
     for seed in range(N):
         root = thaw(small, TYPES)
         duplicate_subtree(draws(seed), root, setting)
-        found[shape(freeze(root))] += 1
+        found[shape(freeze(preorder(root)))] += 1
     assert sorted(found) == sorted(
         [
             *("C(0H 1H 2T)", "C(1H 2T 3H)", "C(1H(0H) 2T)"),
@@ -109,11 +110,11 @@ def test_duplicating_keeps_within_every_limit() -> None:
         for seed in range(200):
             root = thaw(CHAIN, TYPES)
             duplicate_subtree(draws(seed), root, setting)
-            assert tallies(root)[root].fits(setting.space)
+            assert tally(preorder(root)).fits(greatest(setting.space))
     full = experiment({"max_parts": 5}, p_duplicate_subtree=1.0)
     root = thaw(CHAIN, TYPES)
     duplicate_subtree(draws(), root, full)
-    assert freeze(root) == CHAIN
+    assert freeze(preorder(root)) == CHAIN
 
 
 def test_swapping_exchanges_places_and_keeps_own_slots() -> None:
@@ -122,7 +123,7 @@ def test_swapping_exchanges_places_and_keeps_own_slots() -> None:
     for seed in range(N):
         root = thaw(CHAIN, TYPES)
         swap_subtrees(draws(seed), root, setting)
-        swapped = freeze(root)
+        swapped = freeze(preorder(root))
         found[shape(swapped)] += 1
         assert sorted(
             str(one.slot) + one.kind for one, _, _ in walk(swapped)
@@ -142,7 +143,7 @@ def test_swapping_skips_a_tree_of_one_line() -> None:
     root = thaw(line, TYPES)
     for seed in range(20):
         swap_subtrees(draws(seed), root, experiment(p_swap_subtree=1.0))
-    assert freeze(root) == line
+    assert freeze(preorder(root)) == line
 
 
 @pytest.mark.parametrize(
@@ -165,7 +166,7 @@ def test_each_step_happens_with_its_probability(
     for seed in range(N):
         root = thaw(CHAIN, TYPES)
         step(draws(seed), root, setting)
-        happened += freeze(root) != CHAIN
+        happened += freeze(preorder(root)) != CHAIN
     assert is_near(happened, N * probability)
 
 
@@ -174,7 +175,7 @@ def test_parameters_of_parts_move_and_colours_stay() -> None:
     lengths = []
     for seed in range(N):
         root = thaw(bar, TYPES)
-        vary_parts(draws(seed), root, 0.05)
+        vary_parts(draws(seed), preorder(root), 0.05)
         core, part, hinge = preorder(root)
         length, alpha, beta, *colour = part.parameters
         lengths.append(length)
@@ -207,7 +208,7 @@ def test_expected_parts_by_hand() -> None:
 def added(seed: int, setting: Experiment, genome: Genome = CHAIN) -> Genome:
     root = thaw(genome, TYPES)
     add_parts(draws(seed), root, gene_ids(BirthId(0, 7)), setting)
-    return freeze(root)
+    return freeze(preorder(root))
 
 
 @pytest.mark.parametrize(("option", "most"), [("loop", 4), ("once", 1)])

@@ -87,7 +87,7 @@ CORE = Node(
 def test_deleting_a_hidden_neuron_drops_its_connections_and_shifts_the_rest() -> None:
     root = thaw(CORE, TYPES)
     # Three hidden neurons are asked in turn; only the second goes.
-    delete_hidden_neurons(scripted(0.9, 0.01, 0.9), root, 0.05)
+    delete_hidden_neurons(scripted(0.9, 0.01, 0.9), preorder(root), 0.05)
     core, hinge = preorder(root)
     assert hinge.hidden == (neuron(0.1), neuron(0.3))
     assert hinge.connections == (
@@ -118,8 +118,8 @@ def test_deleting_hidden_neurons_rewires_nothing(seed: int, probability: float) 
     """An oracle that works on the robot: drop the lost neurons' edges, no more."""
     genome = generate(np.random.default_rng(seed), experiment())
     root = thaw(genome, TYPES)
-    delete_hidden_neurons(draws(seed), root, probability)
-    after = freeze(root)
+    delete_hidden_neurons(draws(seed), preorder(root), probability)
+    after = freeze(preorder(root))
     left = {n.parameters for one, _, _ in walk(after) for n in one.hidden}
     expected = Counter(
         {
@@ -138,10 +138,10 @@ def test_neurons_and_connections_go_with_their_probabilities(
     neurons = edges = 0
     for seed in range(N):
         root = thaw(CORE, TYPES)
-        delete_hidden_neurons(draws(seed), root, probability)
+        delete_hidden_neurons(draws(seed), preorder(root), probability)
         neurons += 3 - len(preorder(root)[1].hidden)
         root = thaw(CORE, TYPES)
-        delete_connections(draws(seed), root, probability)
+        delete_connections(draws(seed), preorder(root), probability)
         edges += 10 - sum(len(branch.connections) for branch in preorder(root))
     spread = 5 * (probability * (1 - probability)) ** 0.5
     assert abs(neurons / N / 3 - probability) <= spread / (3 * N) ** 0.5
@@ -152,7 +152,7 @@ def test_neuron_parameters_move_by_their_share_and_types_stay() -> None:
     moved = []
     for seed in range(N):
         root = thaw(CORE, TYPES)
-        vary_neurons(draws(seed), root, 0.1)
+        vary_neurons(draws(seed), preorder(root), 0.1)
         hinge = preorder(root)[1]
         moved.append(hinge.outputs[0].parameters)
         assert hinge.connections == HINGE.connections, "weights never mutate"
@@ -182,7 +182,7 @@ def test_how_many_hidden_neurons_are_added(
     kinds: Counter[str] = Counter()
     for seed in range(N):
         root = thaw(CORE, TYPES)
-        add_hidden_neurons(draws(seed), root, before, setting)
+        add_hidden_neurons(draws(seed), preorder(root), before, setting)
         core, hinge = preorder(root)
         found.append(len(core.hidden) + len(hinge.hidden) - 3)
         kinds.update(one.kind for one in (*core.hidden, *hinge.hidden[3:]))
@@ -200,7 +200,7 @@ def test_hidden_neurons_are_added_up_to_the_limit() -> None:
         variation=Variation(p_delete_hidden_neuron=1.0),
     )
     root = thaw(CORE, TYPES)
-    add_hidden_neurons(draws(), root, 9, setting)
+    add_hidden_neurons(draws(), preorder(root), 9, setting)
     assert sum(len(branch.hidden) for branch in preorder(root)) == 5
 
 
@@ -209,7 +209,7 @@ def test_hidden_neurons_are_added_up_to_the_limit() -> None:
 )
 def test_how_many_connections_are_added(before: int, count: int) -> None:
     root = thaw(CORE, TYPES)
-    add_connections(draws(), root, before, experiment())
+    add_connections(draws(), preorder(root), before, experiment())
     assert sum(len(branch.connections) for branch in preorder(root)) == 10 + count
 
 
@@ -236,8 +236,8 @@ def test_added_connections_join_any_neuron_with_any_output_or_hidden() -> None:
     found: Counter[tuple[int, int]] = Counter()
     for seed in range(N):
         root = thaw(bare, TYPES)
-        add_connections(draws(seed), root, 10, experiment())
-        (made,) = develop(freeze(root), TYPES).brain.connections
+        add_connections(draws(seed), preorder(root), 10, experiment())
+        (made,) = develop(freeze(preorder(root)), TYPES).brain.connections
         found[made.source, made.target] += 1
         assert 0.0 <= made.weight < 1.0
     # Inputs 0..5, output 6, hidden 7: eight sources, two targets.
@@ -248,8 +248,8 @@ def test_added_connections_join_any_neuron_with_any_output_or_hidden() -> None:
 def test_nothing_is_added_where_there_is_no_target() -> None:
     lone = Node("Core", -1, 0, GREY, children=((0, Node("Hinge", 0, 0, GREY)),))
     root = thaw(lone, TYPES)
-    add_connections(draws(), root, 40, experiment())
-    assert freeze(root) == lone
+    add_connections(draws(), preorder(root), 40, experiment())
+    assert freeze(preorder(root)) == lone
 
 
 def test_halves_are_rounded_up_exactly() -> None:

@@ -16,10 +16,10 @@ from coordinator.branch import (
     level,
     path_between,
     preorder,
-    tallies,
     thaw,
 )
 from coordinator.generation import generate
+from coordinator.tally import tallies
 from schema.assembly import place_parts
 from schema.birth import BirthId
 from schema.experiment import Experiment, Space, body_space
@@ -68,8 +68,8 @@ TREE = node(
 def test_thawing_and_freezing_gives_the_genome_back(seed: int) -> None:
     genome = random_genome(seed)
     root = thaw(genome, TYPES)
-    assert freeze(root) == genome
-    assert freeze(copied(root)) == genome
+    assert freeze(preorder(root)) == genome
+    assert freeze(preorder(copied(root))) == genome
 
 
 @given(SEEDS)
@@ -100,7 +100,7 @@ def test_a_path_goes_up_by_own_slots_and_down_by_the_parents() -> None:
 
 
 def test_tallies_count_every_subtree() -> None:
-    found = [tuple(size) for size in tallies(thaw(TREE, TYPES)).values()]
+    found = [tuple(size) for size in tallies(preorder(thaw(TREE, TYPES))).values()]
     assert found == [
         (6, 10, 1, 2),
         (2, 2, 1, 2),
@@ -112,7 +112,9 @@ def test_tallies_count_every_subtree() -> None:
 
 
 def test_free_places_are_those_that_nothing_sits_on() -> None:
-    found = [(b.kind.name, slot) for b, slot in free_places(thaw(TREE, TYPES))]
+    found = [
+        (b.kind.name, slot) for b, slot in free_places(preorder(thaw(TREE, TYPES)))
+    ]
     core = [("Core", 0), ("Core", 2)]
     assert found == [*core, ("FixedBrick", 1), ("Hinge", 1)]
 
@@ -135,7 +137,7 @@ def test_levelling_undoes_all_turns_before_a_brick() -> None:
     inner = node("Hinge", (1, brick), orientation=180)
     genome = node("Core", (0, node("ActiveHinge", (1, inner), orientation=270)))
     root = thaw(genome, TYPES)
-    level(root)
+    level(preorder(root))
     # 270 + 180 = 90 before the brick, so it turns by 270; 270 before the bar.
     assert [b.orientation for b in preorder(root)] == [0, 270, 180, 270, 270, 90]
 

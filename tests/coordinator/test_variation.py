@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.branch import freeze, gene_ids, preorder, tallies, thaw
+from coordinator.branch import freeze, gene_ids, preorder, thaw
 from coordinator.draws import Draws
 from coordinator.generation import generate
+from coordinator.tally import greatest, tallies
 from coordinator.variation import crossover, mate, mutate
 from schema.assembly import place_parts
 from schema.birth import BirthId
@@ -71,9 +72,9 @@ def crossed(
     draws = Draws(np.random.default_rng(seed))
     done = crossover(draws, root, thaw(second, TYPES), setting)
     if not done:
-        assert freeze(root) == first, "a failure changes nothing"
+        assert freeze(preorder(root)) == first, "a failure changes nothing"
         return None
-    return freeze(root)
+    return freeze(preorder(root))
 
 
 MOTHER = node(
@@ -159,7 +160,7 @@ def test_nothing_mutates_where_all_probabilities_are_zero() -> None:
         mutate(Draws(np.random.default_rng(seed)), root, gene_ids(CHILD), setting)
         for one, other in zip(preorder(root), walk(genome), strict=True):
             assert one.parameters == other[0].parameters
-        assert freeze(root) == genome
+        assert freeze(preorder(root)) == genome
 
 
 def offspring(seed: int, setting: Experiment = DEFAULT) -> Genome | None:
@@ -224,8 +225,8 @@ def test_a_lineage_stays_within_all_restrictions() -> None:
         population = children
         for genome in population:
             check_robot(develop(genome, TYPES), TYPES)
-            size = tallies(thaw(genome, TYPES))
-            assert next(iter(size.values())).fits(DEFAULT.space), generation
+            size = tallies(preorder(thaw(genome, TYPES)))
+            assert next(iter(size.values())).fits(greatest(DEFAULT.space)), generation
 
 
 def test_a_child_without_a_motor_is_refused() -> None:
