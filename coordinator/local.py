@@ -1,5 +1,6 @@
 """Agents that live in this process: plain functions in place of the network."""
 
+import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
@@ -28,7 +29,6 @@ class LocalAgents:
 
     def receive(self, timeout_s: float) -> Sequence[DispatchEvent]:
         """Do the oldest job; the first call tells who is there."""
-        del timeout_s  # nothing ever comes from outside
         news, self._news = self._news, []
         if self._asked:
             number, agent, payload = self._asked.popleft()
@@ -37,4 +37,7 @@ class LocalAgents:
                 news.append(Returned(number, agent, "ok", answer))
             except RevolveError as error:
                 news.append(Returned(number, agent, "error", reason=str(error)))
+        elif not news:
+            # Nothing ever comes from outside: somebody wants to wait.
+            time.sleep(timeout_s)
         return news

@@ -205,11 +205,11 @@ def test_killed_in_a_cluster_a_snapshot_and_a_segment_change(
     resume_until(arena_stage, until, reached(due), "a snapshot")
     tally.note("coordinator", folder)
     for _ in range(2):
-        before = newest(folder, "poses")
+        known = {table: newest(folder, table) for table in ("poses", "fitness")}
         resume_until(
             arena_stage,
             until,
-            lambda: newest(folder, "poses") > before,  # noqa: B023
+            lambda: any(newest(folder, table) > known[table] for table in known),  # noqa: B023
             "a new segment",
         )
         tally.note("coordinator", folder)
