@@ -100,12 +100,18 @@ class Fleet:
         self.coordinator = stage.start("coordinator", *words("run"), *listen)
         until((self.folder / "address").exists, "the coordinator listens")
         self.address = (self.folder / "address").read_text().strip()
-        stage.start("analyzer", "--connect", self.address)
+        self.analyzer = stage.start("analyzer", "--connect", self.address)
         self.workers: dict[str, Process] = {}
 
     def join(self, name: str) -> None:
         flags = ("--connect", self.address, "--processes", "1", "--name", name)
         self.workers[name] = self.stage.start("worker", *flags)
+
+    def has_come_to(self, position: float) -> bool:
+        """Return whether the journal is so long [bytes]; all must be alive."""
+        for process in (self.coordinator, self.analyzer, *self.workers.values()):
+            assert process.poll() is None, process.communicate()
+        return size(self.folder) > position
 
     def kill_holder(self) -> str:
         """Kill the worker that made the last advance, and whoever would revive it."""
@@ -135,7 +141,7 @@ def test_holder_killed_twice_while_another_stands_by(
     for number, share in enumerate(shares, start=1):
         fleet.join(f"w{number}")
         until(
-            lambda: bool(size(fleet.folder) > share * whole),  # noqa: B023
+            lambda: fleet.has_come_to(share * whole),  # noqa: B023
             "the run is on its way",
         )
         name = fleet.kill_holder()
