@@ -13,6 +13,7 @@ from pathlib import Path
 from threading import Event
 
 from coordinator.arena import Arena
+from coordinator.disk import replace_durably
 from coordinator.events import AgentKind, Record
 from coordinator.folder import DETAILS, RunDetails, RunFolder, read_state
 from coordinator.island import Island
@@ -213,7 +214,9 @@ def _agents(
             )
         )
         note = held.path / ADDRESS
-        note.write_text(f"{network.address}\n", encoding="utf-8")
+        # Whoever waits for the file shall find the address in it.
+        text = f"{network.address}\n"
+        replace_durably(note, lambda file: file.write_text(text, encoding="utf-8"))
         stack.callback(note.unlink, missing_ok=True)
         crews: list[Callable[[], None]] = []
         sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
