@@ -1,7 +1,7 @@
 """What a birth costs the coordinator, and what a second worker brings."""
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +13,14 @@ from msgspec.structs import replace
 import analyzer.service
 import worker.null
 import worker.service
-from coordinator.events import Evaluate, Evaluated, IslandCommand, IslandEvent, Started
+from coordinator.events import (
+    Evaluate,
+    Evaluated,
+    IslandCommand,
+    IslandEvent,
+    Journalled,
+    Started,
+)
 from coordinator.folder import RunDetails, RunFolder
 from coordinator.generation import generate
 from coordinator.island import Island
@@ -72,9 +79,24 @@ class Judged(Island):
         return commands
 
 
+class Counted:
+    """A journal that counts the evaluations that it keeps.
+
+    Births are committed in order and so come in leaps; evaluations do not.
+    """
+
+    def __init__(self, journal: Journal) -> None:
+        self.evaluations = 0
+        self._journal = journal
+
+    def append(self, events: Sequence[Journalled]) -> None:
+        self._journal.append(events)
+        self.evaluations += sum(isinstance(event, Evaluated) for event in events)
+
+
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """Births per second, and CPU of this process, its network included [s]."""
+    """Evaluations per second; CPU of this process for each, its network's too [s]."""
 
     per_s: float
     cpu_s: float
@@ -83,7 +105,7 @@ class Figures:
 def run(
     folder: Path, island: Island, experiment: Experiment, workers: int, body: Body
 ) -> Figures:
-    """Run an island to its end; count from its second tenth on."""
+    """Run an island to its end; count all but its first and last tenth."""
     details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
     with ExitStack() as stack:
         held = stack.enter_context(RunFolder(folder, details))
@@ -99,6 +121,7 @@ def run(
                 "analyzer" if role == "analyzer" else "worker", role, network.address
             )
             stack.enter_context(Crew(target, (agent,), size=size))
+        journal = Counted(stack.enter_context(Journal.open(folder)))
         loop = Loop(
             {0: island},
             question=Question(
@@ -108,24 +131,28 @@ def run(
                 evaluation_settings(experiment),
             ),
             agents=network,
-            log=stack.enter_context(Journal.open(folder)),
+            log=journal,
             rows=recorder,
             vault=Snapshots(folder),
         )
         loop.start([])
         while (
-            island.births < experiment.births // 10
+            journal.evaluations < experiment.births // 10
             or loop.dispatch.agents("worker") < workers
         ):
             loop.step(0.2, time.monotonic())
-        born, wall_s, cpu_s = island.births, time.perf_counter(), time.process_time()
-        while not island.is_finished:
+        before = journal.evaluations
+        wall_s, cpu_s = time.perf_counter(), time.process_time()
+        # The end, when workers run out of jobs one by one, is left out.
+        while journal.evaluations < experiment.births * 9 // 10:
             loop.step(0.2, time.monotonic())
-        born = island.births - born
+        done = journal.evaluations - before
         wall_s = time.perf_counter() - wall_s
         cpu_s = time.process_time() - cpu_s
+        while not island.is_finished:
+            loop.step(0.2, time.monotonic())
         recorder.finish()
-    return Figures(born / wall_s, cpu_s / born)
+    return Figures(done / wall_s, cpu_s / done)
 
 
 def _experiment(births: int, brood: int) -> Experiment:
