@@ -8,7 +8,7 @@ STAMP := $(VENV)/.installed
 
 # What `make demo` runs; make SEED=2 BIRTHS=3000 demo changes it.
 SEED ?= 1
-BIRTHS ?= 600
+BIRTHS ?= 1500
 DEMO = $(BIN)/revolve run scenario1 --seed $(SEED) --births $(BIRTHS) \
 	--out runs/demo-$$(date +%Y%m%d-%H%M%S)-$$$$
 
