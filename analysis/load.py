@@ -34,7 +34,8 @@ def load_table(folders: list[Path], name: str) -> pa.Table:
         name: of the table.
 
     Returns:
-        The table's columns, ``experiment`` (its name) and ``folder`` (the run's).
+        The table's columns, ``experiment`` (its name), ``folder`` (the run's) and
+        ``is_online`` (the run is an arena).
 
     Raises:
         RunFolderError: a folder whose run cannot be told, or a table that cannot
@@ -45,11 +46,14 @@ def load_table(folders: list[Path], name: str) -> pa.Table:
 
 def _owned(folder: Path, name: str) -> pa.Table:
     try:
-        experiment = str(json.loads((folder / _DETAILS).read_text())["name"])
-    except (OSError, ValueError, KeyError) as error:
+        details = json.loads((folder / _DETAILS).read_text(encoding="utf-8"))
+        experiment = str(details["name"])
+        is_online = json.loads(details["document"])["arena"] is not None
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise RunFolderError(f"{folder / _DETAILS}: cannot be read: {error}") from None
     table = read_table(folder, name)
-    for column, value in (("experiment", experiment), ("folder", str(folder))):
-        filled = pa.array([value] * table.num_rows, pa.string())
+    owned = {"experiment": experiment, "folder": str(folder), "is_online": is_online}
+    for column, value in owned.items():
+        filled = pa.repeat(pa.scalar(value), table.num_rows)
         table = table.append_column(column, filled)
     return table

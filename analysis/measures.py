@@ -6,15 +6,33 @@ import pyarrow.compute as pc
 from schema.errors import RunFolderError
 
 
+def _judged(population: pa.Table) -> pa.Table:
+    """Return those whose fitness counts: off-line all, on-line the mature.
+
+    Without a fitness is off-line who failed, and counts 0 as in selection; on-line
+    it is who is not mature yet, and does not count.
+
+    Raises:
+        RunFolderError: no rows.
+    """
+    if not population.num_rows:
+        raise RunFolderError("population: has no rows, nothing has been born")
+    fitness = population["fitness"]
+    filled = pc.if_else(population["is_online"], fitness, pc.fill_null(fitness, 0.0))
+    index = population.schema.get_field_index("fitness")
+    return population.set_column(index, "fitness", filled).filter(pc.is_valid(filled))
+
+
 def progression(population: pa.Table) -> pa.Table:
     """Return how fit populations are as births go by, over runs.
 
-    A failed individual counts as fitness 0, as it does in selection. A run counts
-    at every number of births that its own population was recorded at.
+    Off-line a failed individual counts as fitness 0, as it does in selection;
+    on-line only the mature count. A run counts at every number of births that its
+    own population was recorded at.
 
     Args:
         population: of several runs: ``experiment``, ``folder`` (which run),
-            ``births``, ``fitness``.
+            ``is_online``, ``births``, ``fitness``.
 
     Returns:
         One row per experiment and births, ascending: ``experiment``, ``births``,
@@ -26,16 +44,9 @@ def progression(population: pa.Table) -> pa.Table:
 
     Source: Hupkes 2016, figure 6.3; the spread is ours, the thesis omits it.
     """
-    if not population.num_rows:
-        raise RunFolderError("population: has no rows, nothing has been born")
-    index = population.schema.get_field_index("fitness")
-    fitness = pc.fill_null(population["fitness"], 0.0)
     keys = ["experiment", "births"]
-    by_run = (
-        population.set_column(index, "fitness", fitness)
-        .group_by([*keys, "folder"])
-        .aggregate([("fitness", "mean")])
-    )
+    groups = _judged(population).group_by([*keys, "folder"])
+    by_run = groups.aggregate([("fitness", "mean")])
     totals = by_run.group_by(keys).aggregate(
         [
             ("fitness_mean", "mean"),
@@ -52,8 +63,7 @@ def final_fitness(population: pa.Table) -> pa.Table:
     """Return how fit each run's last recorded population is.
 
     Args:
-        population: of several runs: ``experiment``, ``folder``, ``births``,
-            ``fitness``; a failed individual counts as fitness 0.
+        population: as for ``progression``, with the same meaning.
 
     Returns:
         One row per run, by experiment and folder: ``experiment``, ``folder``,
@@ -64,14 +74,11 @@ def final_fitness(population: pa.Table) -> pa.Table:
 
     Source: Hupkes 2016, figure 6.2.
     """
-    if not population.num_rows:
-        raise RunFolderError("population: has no rows, nothing has been born")
     keys = ["experiment", "folder"]
-    last = population.group_by(keys).aggregate([("births", "max")])
-    joined = population.select([*keys, "births", "fitness"]).join(last, keys)
+    judged = _judged(population).select([*keys, "births", "fitness"])
+    last = judged.group_by(keys).aggregate([("births", "max")])
+    joined = judged.join(last, keys)
     rows = joined.filter(pc.equal(joined["births"], joined["births_max"]))
-    index = rows.schema.get_field_index("fitness")
-    rows = rows.set_column(index, "fitness", pc.fill_null(rows["fitness"], 0.0))
     totals = rows.group_by([*keys, "births"]).aggregate(
         [("fitness", "mean"), ("fitness", "max"), ("fitness", "count")]
     )

@@ -12,10 +12,13 @@ from analysis.measures import final_fitness, progression
 from schema.errors import RunFolderError
 
 
-def _population(rows: list[tuple[str, str, int, float | None]]) -> pa.Table:
+def _population(
+    rows: list[tuple[str, str, int, float | None]], *, is_online: bool = False
+) -> pa.Table:
     names = ["experiment", "folder", "births", "fitness"]
     columns = zip(*rows, strict=True)
-    return pa.table(dict(zip(names, map(list, columns), strict=True)))
+    table = pa.table(dict(zip(names, map(list, columns), strict=True)))
+    return table.append_column("is_online", pa.array([is_online] * len(rows)))
 
 
 def test_progression_of_two_runs_and_of_another_experiment() -> None:
@@ -62,6 +65,14 @@ def test_final_fitness_is_that_of_each_run_s_own_last_population() -> None:
     assert [row["best"] for row in found] == [0.5, 0.4]
 
 
+def test_in_an_arena_who_is_not_mature_does_not_count() -> None:
+    rows = [("a", "x", 30, 0.2), ("a", "x", 30, None), ("a", "x", 30, 0.4)]
+    table = _population(rows, is_online=True)
+    assert progression(table)["mean"].to_pylist() == pytest.approx([0.3])
+    (row,) = final_fitness(table).to_pylist()
+    assert (row["size"], row["mean"]) == (2, pytest.approx(0.3))
+
+
 @pytest.mark.parametrize("measure", [progression, final_fitness])
 def test_nothing_born_is_said(measure: Callable[[pa.Table], pa.Table]) -> None:
     with pytest.raises(RunFolderError, match="nothing has been born"):
@@ -72,12 +83,13 @@ def test_runs_are_found_below_and_named(tmp_path: Path) -> None:
     for name in ("two", "one"):
         folder = tmp_path / "all" / name
         folder.mkdir(parents=True)
-        (folder / "run.json").write_text(json.dumps({"name": f"of-{name}"}))
+        details = {"name": f"of-{name}", "document": json.dumps({"arena": None})}
+        (folder / "run.json").write_text(json.dumps(details))
     folders = run_folders([tmp_path])
     assert [folder.name for folder in folders] == ["one", "two"]
     table = load_table(folders, "population")
     assert table.num_rows == 0
-    assert {"experiment", "folder"} <= set(table.column_names)
+    assert {"experiment", "folder", "is_online"} <= set(table.column_names)
 
 
 def test_no_run_is_said_with_where(tmp_path: Path) -> None:
