@@ -111,18 +111,20 @@ class Genome(_message.Message):
     def __init__(self, nodes: _Optional[_Iterable[_Union[Node, _Mapping]]] = ...) -> None: ...
 
 class Request(_message.Message):
-    __slots__ = ("run", "epoch", "number", "settings", "robot")
+    __slots__ = ("run", "epoch", "number", "settings", "robot", "plugins")
     RUN_FIELD_NUMBER: _ClassVar[int]
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     NUMBER_FIELD_NUMBER: _ClassVar[int]
     SETTINGS_FIELD_NUMBER: _ClassVar[int]
     ROBOT_FIELD_NUMBER: _ClassVar[int]
+    PLUGINS_FIELD_NUMBER: _ClassVar[int]
     run: str
     epoch: int
     number: int
     settings: bytes
     robot: bytes
-    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., settings: _Optional[bytes] = ..., robot: _Optional[bytes] = ...) -> None: ...
+    plugins: str
+    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., settings: _Optional[bytes] = ..., robot: _Optional[bytes] = ..., plugins: _Optional[str] = ...) -> None: ...
 
 class Vector(_message.Message):
     __slots__ = ("x", "y", "z")
@@ -188,19 +190,35 @@ class Answer(_message.Message):
     failure: str
     def __init__(self, epoch: _Optional[int] = ..., number: _Optional[int] = ..., wall_s: _Optional[float] = ..., report: _Optional[_Union[Report, _Mapping]] = ..., evaluation: _Optional[_Union[Evaluation, _Mapping]] = ..., failure: _Optional[str] = ...) -> None: ...
 
+class Death(_message.Message):
+    __slots__ = ("agent", "run", "epoch", "number", "cause")
+    AGENT_FIELD_NUMBER: _ClassVar[int]
+    RUN_FIELD_NUMBER: _ClassVar[int]
+    EPOCH_FIELD_NUMBER: _ClassVar[int]
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    CAUSE_FIELD_NUMBER: _ClassVar[int]
+    agent: str
+    run: str
+    epoch: int
+    number: int
+    cause: str
+    def __init__(self, agent: _Optional[str] = ..., run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., cause: _Optional[str] = ...) -> None: ...
+
 class AgentInfo(_message.Message):
-    __slots__ = ("agent", "kind", "slots", "platform", "version")
+    __slots__ = ("agent", "kind", "slots", "platform", "version", "deaths")
     AGENT_FIELD_NUMBER: _ClassVar[int]
     KIND_FIELD_NUMBER: _ClassVar[int]
     SLOTS_FIELD_NUMBER: _ClassVar[int]
     PLATFORM_FIELD_NUMBER: _ClassVar[int]
     VERSION_FIELD_NUMBER: _ClassVar[int]
+    DEATHS_FIELD_NUMBER: _ClassVar[int]
     agent: str
     kind: str
     slots: int
     platform: str
     version: str
-    def __init__(self, agent: _Optional[str] = ..., kind: _Optional[str] = ..., slots: _Optional[int] = ..., platform: _Optional[str] = ..., version: _Optional[str] = ...) -> None: ...
+    deaths: _containers.RepeatedCompositeFieldContainer[Death]
+    def __init__(self, agent: _Optional[str] = ..., kind: _Optional[str] = ..., slots: _Optional[int] = ..., platform: _Optional[str] = ..., version: _Optional[str] = ..., deaths: _Optional[_Iterable[_Union[Death, _Mapping]]] = ...) -> None: ...
 
 class Provenance(_message.Message):
     __slots__ = ("agent", "platform", "wall_s")
@@ -321,7 +339,7 @@ class PastAdvance(_message.Message):
     def __init__(self, changes: _Optional[_Union[Changes, _Mapping]] = ..., until: _Optional[int] = ..., digest: _Optional[bytes] = ...) -> None: ...
 
 class AdvanceRequest(_message.Message):
-    __slots__ = ("run", "epoch", "number", "settings", "shard", "from_step", "from_digest", "changes", "until", "wants_snapshot", "snapshot", "history", "is_rebuild")
+    __slots__ = ("run", "epoch", "number", "settings", "shard", "from_step", "from_digest", "changes", "until", "wants_snapshot", "snapshot", "history", "is_rebuild", "plugins")
     RUN_FIELD_NUMBER: _ClassVar[int]
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     NUMBER_FIELD_NUMBER: _ClassVar[int]
@@ -335,6 +353,7 @@ class AdvanceRequest(_message.Message):
     SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
     HISTORY_FIELD_NUMBER: _ClassVar[int]
     IS_REBUILD_FIELD_NUMBER: _ClassVar[int]
+    PLUGINS_FIELD_NUMBER: _ClassVar[int]
     run: str
     epoch: int
     number: int
@@ -348,7 +367,8 @@ class AdvanceRequest(_message.Message):
     snapshot: bytes
     history: _containers.RepeatedCompositeFieldContainer[PastAdvance]
     is_rebuild: bool
-    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., settings: _Optional[bytes] = ..., shard: _Optional[int] = ..., from_step: _Optional[int] = ..., from_digest: _Optional[bytes] = ..., changes: _Optional[_Union[Changes, _Mapping]] = ..., until: _Optional[int] = ..., wants_snapshot: _Optional[bool] = ..., snapshot: _Optional[bytes] = ..., history: _Optional[_Iterable[_Union[PastAdvance, _Mapping]]] = ..., is_rebuild: _Optional[bool] = ...) -> None: ...
+    plugins: str
+    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., settings: _Optional[bytes] = ..., shard: _Optional[int] = ..., from_step: _Optional[int] = ..., from_digest: _Optional[bytes] = ..., changes: _Optional[_Union[Changes, _Mapping]] = ..., until: _Optional[int] = ..., wants_snapshot: _Optional[bool] = ..., snapshot: _Optional[bytes] = ..., history: _Optional[_Iterable[_Union[PastAdvance, _Mapping]]] = ..., is_rebuild: _Optional[bool] = ..., plugins: _Optional[str] = ...) -> None: ...
 
 class AdvanceAnswer(_message.Message):
     __slots__ = ("epoch", "number", "wall_s", "advance", "needs_state", "snapshot")
@@ -411,7 +431,7 @@ class AdvanceEntry(_message.Message):
     def __init__(self, number: _Optional[int] = ..., advance: _Optional[_Union[Advance, _Mapping]] = ..., pose_rows: _Optional[int] = ...) -> None: ...
 
 class Entry(_message.Message):
-    __slots__ = ("island", "birth", "attempt", "provenance", "vetted", "vetting_failed", "evaluated", "evaluation_failed", "advanced", "commanded")
+    __slots__ = ("island", "birth", "attempt", "provenance", "vetted", "vetting_failed", "evaluated", "evaluation_failed", "advanced", "commanded", "audited")
     ISLAND_FIELD_NUMBER: _ClassVar[int]
     BIRTH_FIELD_NUMBER: _ClassVar[int]
     ATTEMPT_FIELD_NUMBER: _ClassVar[int]
@@ -422,6 +442,7 @@ class Entry(_message.Message):
     EVALUATION_FAILED_FIELD_NUMBER: _ClassVar[int]
     ADVANCED_FIELD_NUMBER: _ClassVar[int]
     COMMANDED_FIELD_NUMBER: _ClassVar[int]
+    AUDITED_FIELD_NUMBER: _ClassVar[int]
     island: int
     birth: int
     attempt: int
@@ -432,7 +453,16 @@ class Entry(_message.Message):
     evaluation_failed: str
     advanced: AdvanceEntry
     commanded: Command
-    def __init__(self, island: _Optional[int] = ..., birth: _Optional[int] = ..., attempt: _Optional[int] = ..., provenance: _Optional[_Union[Provenance, _Mapping]] = ..., vetted: _Optional[_Union[Report, _Mapping]] = ..., vetting_failed: _Optional[str] = ..., evaluated: _Optional[_Union[Evaluation, _Mapping]] = ..., evaluation_failed: _Optional[str] = ..., advanced: _Optional[_Union[AdvanceEntry, _Mapping]] = ..., commanded: _Optional[_Union[Command, _Mapping]] = ...) -> None: ...
+    audited: AuditEntry
+    def __init__(self, island: _Optional[int] = ..., birth: _Optional[int] = ..., attempt: _Optional[int] = ..., provenance: _Optional[_Union[Provenance, _Mapping]] = ..., vetted: _Optional[_Union[Report, _Mapping]] = ..., vetting_failed: _Optional[str] = ..., evaluated: _Optional[_Union[Evaluation, _Mapping]] = ..., evaluation_failed: _Optional[str] = ..., advanced: _Optional[_Union[AdvanceEntry, _Mapping]] = ..., commanded: _Optional[_Union[Command, _Mapping]] = ..., audited: _Optional[_Union[AuditEntry, _Mapping]] = ...) -> None: ...
+
+class AuditEntry(_message.Message):
+    __slots__ = ("first", "second")
+    FIRST_FIELD_NUMBER: _ClassVar[int]
+    SECOND_FIELD_NUMBER: _ClassVar[int]
+    first: Entry
+    second: Entry
+    def __init__(self, first: _Optional[_Union[Entry, _Mapping]] = ..., second: _Optional[_Union[Entry, _Mapping]] = ...) -> None: ...
 
 class PlacedRobot(_message.Message):
     __slots__ = ("robot", "has_place", "x", "y")
