@@ -4,8 +4,9 @@ import time
 
 from analyzer.report import analyze
 from schema.codec import Answer, decode_request, encode_answer
-from schema.experiment import body_space, read_vetting_settings
+from schema.experiment import body_space
 from schema.robot import check_robot
+from schema.settings import read_vetting_settings
 
 
 def answer(request: bytes) -> bytes:

@@ -15,14 +15,14 @@ from coordinator.running import Deployment, resume, start
 from schema.agent_command import Flags, add_network_flags, tls_of
 from schema.crew import cores
 from schema.errors import RunFolderError
-from schema.experiment import (
-    Experiment,
-    check_experiment,
+from schema.experiment import Experiment
+from schema.experiment_check import check_experiment
+from schema.experiment_file import (
     experiment_from_text,
-    fitness_function,
     read_experiment,
     shipped_experiments,
 )
+from schema.settings import fitness_function
 
 _EXAMPLES = {
     "run": "revolve run scenario1 --seed 1 --births 600",

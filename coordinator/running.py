@@ -29,17 +29,12 @@ from coordinator.service import Network
 from coordinator.snapshots import Snapshots
 from coordinator.summary import tell_result
 from schema.crew import Crew, stop_on_signals
-from schema.experiment import (
-    Experiment,
-    arena_settings,
-    evaluation_settings,
-    experiment_from_text,
-    experiment_text,
-    vetting_settings,
-)
+from schema.experiment import Experiment
+from schema.experiment_file import experiment_from_text, experiment_text
 from schema.network import THIS_MACHINE, Agent, Tls
 from schema.platform_tag import cpu_flags, our_version, platform_tag
 from schema.service import tell_user
+from schema.settings import arena_settings, evaluation_settings, vetting_settings
 from schema.topics import unique_name
 
 ADDRESS = "address"

@@ -5,7 +5,8 @@ import sys
 from pathlib import Path
 
 from schema.errors import RevolveError
-from schema.experiment import body_space, read_experiment
+from schema.experiment import body_space
+from schema.experiment_file import read_experiment
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot import Robot
 from schema.robot_file import read_robot, write_robot

@@ -13,7 +13,7 @@ from typing import NoReturn
 import yaml
 
 from schema.errors import InvalidRobot
-from schema.experiment import nearest
+from schema.experiment_file import nearest
 
 _SLOT = re.compile("0|[1-9][0-9]{0,3}")
 

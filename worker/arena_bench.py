@@ -17,10 +17,12 @@ from msgspec.structs import replace
 from schema.birth import BirthId
 from schema.errors import ExperimentError
 from schema.evaluation import Report
-from schema.experiment import ArenaSettings, Experiment, body_space, read_experiment
+from schema.experiment import Experiment, body_space
+from schema.experiment_file import read_experiment
 from schema.genome import develop
 from schema.plugin import load
 from schema.robot import Robot
+from schema.settings import ArenaSettings
 from worker import arena_timing as timing
 from worker.spider import CLEARANCE_M, grid, spider
 

@@ -16,8 +16,8 @@ import numpy as np
 from schema.arena import Changes, Insertion
 from schema.birth import BirthId
 from schema.evaluation import Floats
-from schema.experiment import ArenaSettings
 from schema.robot import Robot
+from schema.settings import ArenaSettings
 from worker.pool import Pool
 from worker.world import World
 

@@ -21,18 +21,13 @@ from msgspec.structs import replace
 from schema.birth import BirthId
 from schema.errors import SimulationDiverged
 from schema.evaluation import Floats
-from schema.experiment import (
-    EvaluationSettings,
-    Experiment,
-    Simulation,
-    body_space,
-    parse_experiment,
-    read_experiment,
-)
+from schema.experiment import Experiment, Simulation, body_space
+from schema.experiment_file import parse_experiment, read_experiment
 from schema.genome import Genome, develop
 from schema.mjcf import solo_model
 from schema.plugin import load
 from schema.robot import Robot
+from schema.settings import EvaluationSettings
 from worker import arena_bench, evaluation, fidelity
 
 LEAST_RATIO = 0.85

@@ -15,9 +15,10 @@ from msgspec.structs import replace
 
 from schema.birth import BirthId
 from schema.evaluation import Floats
-from schema.experiment import ArenaSettings, body_space
+from schema.experiment import body_space
 from schema.mjcf import Scenery, add_ring_wall, robot_spec, shared_model, solo_model
 from schema.robot import Robot
+from schema.settings import ArenaSettings
 from worker.controller import widths
 from worker.reach import Indices, Reach, reach_of
 from worker.sensors import Senses, Servos, find, free_joint

@@ -12,7 +12,7 @@ import numpy as np
 
 from schema.birth import BirthId
 from schema.evaluation import Floats
-from schema.experiment import ArenaSettings
+from schema.settings import ArenaSettings
 from worker.cluster import Cluster, Shop
 from worker.inhabitant import Inhabitant
 from worker.layout import Layout

@@ -13,16 +13,10 @@ import numpy as np
 
 from schema.errors import FitnessUndefined, SimulationDiverged
 from schema.evaluation import Evaluation, Track
-from schema.experiment import (
-    EvaluationSettings,
-    Fitness,
-    Simulation,
-    Space,
-    body_space,
-    fitness_function,
-)
+from schema.experiment import Fitness, Simulation, Space, body_space
 from schema.mjcf import solo_model
 from schema.robot import Robot
+from schema.settings import EvaluationSettings, fitness_function
 from worker.controller import pack, widths
 from worker.fitness import FitnessFunction, path_velocity, straight_velocity
 from worker.sensors import Senses, Servos

@@ -14,16 +14,12 @@ from msgspec.structs import replace
 from schema.codec import decode_genome
 from schema.errors import ExperimentError, SimulationDiverged
 from schema.evaluation import Floats
-from schema.experiment import (
-    EvaluationSettings,
-    Experiment,
-    Simulation,
-    body_space,
-    experiment_from_text,
-)
+from schema.experiment import Experiment, Simulation, body_space
+from schema.experiment_file import experiment_from_text
 from schema.genome import develop
 from schema.robot import Robot
 from schema.run_tables import read_table
+from schema.settings import EvaluationSettings
 from worker.evaluation import evaluate
 
 THIRDS = 3

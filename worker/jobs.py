@@ -7,8 +7,9 @@ from schema.arena_codec import Live, is_advance_request
 from schema.codec import Answer, decode_request, encode_answer
 from schema.errors import FitnessUndefined, SimulationDiverged
 from schema.evaluation import Evaluation
-from schema.experiment import body_space, read_evaluation_settings
+from schema.experiment import body_space
 from schema.robot import check_robot
+from schema.settings import read_evaluation_settings
 from worker.evaluation import evaluate
 from worker.shards import Shards
 from worker.world import World

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from schema.arena import Casualty, Judgement
 from schema.errors import FitnessUndefined
-from schema.experiment import ArenaSettings
+from schema.settings import ArenaSettings
 from worker.evaluation import judge
 from worker.fitness import path_velocity, straight_velocity
 from worker.inhabitant import Inhabitant

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from schema.evaluation import Floats
-from schema.experiment import ArenaSettings
+from schema.settings import ArenaSettings
 from worker.layout import Layout
 from worker.reach import Reach
 

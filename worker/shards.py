@@ -22,8 +22,9 @@ from schema.arena_codec import (
     encode_advance_answer,
 )
 from schema.errors import StateDiffers
-from schema.experiment import ArenaSettings, body_space, read_arena_settings
+from schema.experiment import body_space
 from schema.robot import check_robot
+from schema.settings import ArenaSettings, read_arena_settings
 
 MOST_HELD = 16
 """Shards that one process keeps; the one that rested longest goes first."""

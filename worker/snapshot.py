@@ -14,7 +14,7 @@ from msgspec import Struct
 
 from schema.errors import MalformedMessage
 from schema.evaluation import Floats
-from schema.experiment import ArenaSettings
+from schema.settings import ArenaSettings
 
 FORMAT = 1
 """Goes up when the meaning of a field changes."""

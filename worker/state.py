@@ -5,7 +5,7 @@ import numpy as np
 from schema.arena import Casualty
 from schema.birth import BirthId
 from schema.codec import decode_robot
-from schema.experiment import ArenaSettings
+from schema.settings import ArenaSettings
 from worker.arrival import inhabitant
 from worker.company import Company
 from worker.inhabitant import Inhabitant

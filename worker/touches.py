@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from schema.arena import Touch
 from schema.birth import BirthId
-from schema.experiment import ArenaSettings
+from schema.settings import ArenaSettings
 from worker.cluster import Cluster
 
 

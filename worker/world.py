@@ -16,7 +16,7 @@ from schema.arena import Advance, Casualty, Changes, Insertion
 from schema.birth import BirthId
 from schema.errors import UnexpectedEvent
 from schema.evaluation import Floats
-from schema.experiment import ArenaSettings
+from schema.settings import ArenaSettings
 from worker import light, state
 from worker.arrival import check_changes, equip, newborn
 from worker.company import Company

@@ -7,8 +7,9 @@ from analyzer.report import analyze
 from schema.brain import Brain, Neuron
 from schema.codec import decode_answer, encode_request, encode_robot
 from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
-from schema.experiment import Experiment, body_space, vetting_settings
+from schema.experiment import Experiment, body_space
 from schema.robot import Part, Robot
+from schema.settings import vetting_settings
 
 GREY = (0.5, 0.5, 0.5)
 EXPERIMENT = Experiment(name="test")

@@ -11,7 +11,7 @@ import sys
 import numpy as np
 import pytest
 
-from schema.experiment import read_experiment
+from schema.experiment_file import read_experiment
 from worker.arena_bench import arena_settings_of, vetted_robots
 from worker.arena_timing import (
     ArenaTiming,

@@ -2,7 +2,8 @@
 
 import pytest
 
-from schema.experiment import EvaluationSettings, Experiment
+from schema.experiment import Experiment
+from schema.settings import EvaluationSettings
 from worker.bench import LEAST_RATIO, Timing, random_robots, time_evaluations
 
 EXPERIMENT = Experiment(name="test")

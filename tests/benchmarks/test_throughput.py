@@ -35,17 +35,12 @@ from coordinator.service import Network
 from coordinator.snapshots import Snapshots
 from schema.birth import BirthId
 from schema.crew import Crew, one_thread_each
-from schema.experiment import (
-    Experiment,
-    body_space,
-    evaluation_settings,
-    experiment_text,
-    read_experiment,
-    vetting_settings,
-)
+from schema.experiment import Experiment, body_space
+from schema.experiment_file import experiment_text, read_experiment
 from schema.genome import develop
 from schema.network import Agent
 from schema.robot import Robot
+from schema.settings import evaluation_settings, vetting_settings
 from schema.topics import unique_name
 
 one_thread_each()  # as the command does, before anybody opens a session

@@ -26,7 +26,8 @@ from coordinator.events import (
 from schema.arena import Advance, Casualty, Judgement, Touch
 from schema.birth import BirthId
 from schema.evaluation import Provenance, Report
-from schema.experiment import Experiment, read_experiment
+from schema.experiment import Experiment
+from schema.experiment_file import read_experiment
 from schema.tables import POSES
 
 ORIGIN = (0.0, 0.0, 0.0)

@@ -20,7 +20,8 @@ from coordinator.events import (
 from schema.arena import Advance
 from schema.birth import BirthId
 from schema.errors import ExperimentError, UnexpectedEvent
-from schema.experiment import Experiment, read_experiment
+from schema.experiment import Experiment
+from schema.experiment_file import read_experiment
 from schema.tables import TABLES
 from tests.coordinator.arena_world import (
     CROWDED,

@@ -27,12 +27,7 @@ from coordinator.record import Recorder
 from coordinator.snapshots import Snapshots
 from schema.birth import BirthId
 from schema.errors import JobRefused, RunFolderError
-from schema.experiment import (
-    arena_settings,
-    evaluation_settings,
-    experiment_text,
-    vetting_settings,
-)
+from schema.experiment_file import experiment_text
 from schema.genome import develop
 from schema.operator_codec import (
     InsertWish,
@@ -49,6 +44,7 @@ from schema.operator_codec import (
 from schema.parts import BUILT_IN
 from schema.robot import Part, Robot
 from schema.run_tables import read_table
+from schema.settings import arena_settings, evaluation_settings, vetting_settings
 from tests.coordinator.arena_world import experiment
 from tests.worker.fake_world import FakeWorld, OddWorld
 from worker.shards import Shards

@@ -27,13 +27,8 @@ from schema.birth import BirthId
 from schema.codec import decode_genome
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.evaluation import Evaluation, Provenance, Report
-from schema.experiment import (
-    Experiment,
-    Selection,
-    body_space,
-    read_experiment,
-    shipped_experiments,
-)
+from schema.experiment import Experiment, Selection, body_space
+from schema.experiment_file import read_experiment, shipped_experiments
 from schema.genome import develop
 from schema.tables import TABLES
 

@@ -23,14 +23,10 @@ from coordinator.record import Recorder
 from coordinator.snapshots import Snapshots
 from schema.codec import Answer, decode_request, encode_answer, encode_robot
 from schema.evaluation import Evaluation
-from schema.experiment import (
-    Experiment,
-    Selection,
-    evaluation_settings,
-    experiment_text,
-    vetting_settings,
-)
+from schema.experiment import Experiment, Selection
+from schema.experiment_file import experiment_text
 from schema.run_tables import read_table
+from schema.settings import evaluation_settings, vetting_settings
 
 EXPERIMENT = Experiment(
     name="resume", births=40, selection=Selection(population=8, children=6)

@@ -6,23 +6,23 @@ from pathlib import Path
 import pytest
 
 from schema.errors import ExperimentError, UnknownPlugin
-from schema.experiment import (
-    EvaluationSettings,
-    Experiment,
-    Space,
-    body_space,
-    check_experiment,
-    evaluation_settings,
+from schema.experiment import Experiment, Space, body_space
+from schema.experiment_check import check_experiment
+from schema.experiment_file import (
     experiment_from_text,
     experiment_text,
     parse_experiment,
-    read_evaluation_settings,
     read_experiment,
-    read_vetting_settings,
     shipped_experiments,
-    vetting_settings,
 )
 from schema.parts import BUILT_IN
+from schema.settings import (
+    EvaluationSettings,
+    evaluation_settings,
+    read_evaluation_settings,
+    read_vetting_settings,
+    vetting_settings,
+)
 
 PLUGINS = Path(__file__).parents[1] / "plugins"
 NAME = 'name = "test"\n'

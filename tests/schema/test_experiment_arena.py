@@ -3,16 +3,14 @@
 import pytest
 
 from schema.errors import ExperimentError
-from schema.experiment import (
-    Experiment,
-    arena_settings,
+from schema.experiment import Experiment, steps_of
+from schema.experiment_file import (
     experiment_from_text,
     experiment_text,
     parse_experiment,
-    read_arena_settings,
     read_experiment,
-    steps_of,
 )
+from schema.settings import arena_settings, read_arena_settings
 
 
 def parse(text: str) -> Experiment:

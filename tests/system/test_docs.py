@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from revolve import COMMANDS
-from schema.experiment import parse_experiment
+from schema.experiment_file import parse_experiment
 
 pytestmark = pytest.mark.system
 

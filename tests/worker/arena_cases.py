@@ -9,8 +9,9 @@ from msgspec.structs import replace
 
 from schema.arena import Advance, Changes, Insertion
 from schema.birth import BirthId
-from schema.experiment import Arena, ArenaSettings, Experiment
+from schema.experiment import Arena, Experiment
 from schema.robot import Robot
+from schema.settings import ArenaSettings
 from worker.world import World
 
 EXPERIMENT = Experiment(name="test")

@@ -9,7 +9,7 @@ from typing import Self
 
 from schema.arena import Advance, Casualty, Changes, Judgement
 from schema.birth import BirthId
-from schema.experiment import ArenaSettings
+from schema.settings import ArenaSettings
 from tests.coordinator.arena_world import DT, MATURE, poses
 
 

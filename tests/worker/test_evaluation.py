@@ -22,8 +22,9 @@ from schema.errors import (
     SimulationDiverged,
 )
 from schema.evaluation import Track
-from schema.experiment import EvaluationSettings, Fitness, Simulation, Space
+from schema.experiment import Fitness, Simulation, Space
 from schema.robot import Part, Robot
+from schema.settings import EvaluationSettings
 from worker import evaluation
 from worker.evaluation import evaluate, simulate
 from worker.fitness import FitnessFunction, path_velocity, straight_velocity

@@ -7,7 +7,8 @@ import pytest
 
 from schema.errors import ExperimentError
 from schema.evaluation import Track
-from schema.experiment import Experiment, Fitness, fitness_function
+from schema.experiment import Experiment, Fitness
+from schema.settings import fitness_function
 from worker.fitness import (
     FitnessFunction,
     check_fitness,

@@ -5,13 +5,9 @@ from msgspec.structs import replace
 
 from schema.codec import decode_answer, encode_request, encode_robot
 from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
-from schema.experiment import (
-    Experiment,
-    Simulation,
-    evaluation_settings,
-    read_evaluation_settings,
-)
+from schema.experiment import Experiment, Simulation
 from schema.robot import Robot
+from schema.settings import evaluation_settings, read_evaluation_settings
 from worker.evaluation import evaluate
 from worker.jobs import answer
 

@@ -16,10 +16,11 @@ from schema.arena_codec import (
 )
 from schema.birth import BirthId
 from schema.errors import InvalidRobot, MalformedMessage, StateDiffers
-from schema.experiment import arena_settings, read_experiment
+from schema.experiment_file import read_experiment
 from schema.genome import Node, develop
 from schema.parts import BUILT_IN
 from schema.robot import Part, Robot
+from schema.settings import arena_settings
 from tests.worker.fake_world import FakeWorld, OddWorld
 from worker.shards import MOST_HELD, Shards
 

@@ -1,0 +1,139 @@
+"""Whether the sections of an experiment fit each other."""
+
+from collections.abc import Callable
+from math import isclose, lcm
+
+from schema.errors import ExperimentError
+from schema.experiment import Experiment, body_space, steps_of
+
+
+def check_experiment(experiment: Experiment, where: str) -> None:
+    """Raise unless the sections of an experiment fit each other.
+
+    Raises:
+        ExperimentError: a restriction that no robot can meet, a selection that
+            cannot draw its parents, a window that ends between two samples, an
+            arena too small or with clocks that do not meet, a plug-in that does
+            not exist.
+    """
+    checks: list[Callable[[Experiment], str]] = [
+        _limits_problem,
+        _selection_problem,
+        _clock_problem,
+        _arena_problem,
+        _arena_clock_problem,
+    ]
+    for check in checks:
+        if problem := check(experiment):
+            raise ExperimentError(f"{where}: {problem}")
+    types = body_space(experiment.space)
+    core = next(kind for kind in types.values() if kind.is_root)
+    if core.inputs > experiment.space.max_inputs:
+        raise ExperimentError(
+            f"{where}: space.max_inputs: must be >= {core.inputs}, the inputs of "
+            f"{core.name}, got {experiment.space.max_inputs}"
+        )
+    if not any(kind.outputs for kind in types.values()):
+        raise ExperimentError(f"{where}: space.part_types: none of them has a motor")
+
+
+def _limits_problem(experiment: Experiment) -> str:
+    space = experiment.space
+    if space.min_parts > space.max_parts:
+        return (
+            f"space.min_parts: must be <= space.max_parts = {space.max_parts}, "
+            f"got {space.min_parts}"
+        )
+    return "" if space.max_parts > 1 else "space.max_parts: must be > 1, got 1"
+
+
+def _selection_problem(experiment: Experiment) -> str:
+    selection = experiment.selection
+    needed = selection.tournament_size + 1
+    if selection.parents == "tournament" and selection.population < needed:
+        return (
+            f"selection.population: a tournament of {selection.tournament_size} for "
+            f"two parents needs >= {needed}, got {selection.population}"
+        )
+    if selection.parents == "random" and selection.population < 2:  # noqa: PLR2004
+        return "selection.population: two parents need >= 2, got 1"
+    if not selection.keep_parents and selection.children < selection.population:
+        return (
+            "selection.children: must be >= selection.population = "
+            f"{selection.population} where parents are not kept, "
+            f"got {selection.children}"
+        )
+    if experiment.births < selection.population:
+        return (
+            f"births: must be >= selection.population = {selection.population}, "
+            f"got {experiment.births}"
+        )
+    if experiment.window > selection.children:
+        return (
+            f"selection.window: must be <= selection.children = "
+            f"{selection.children}, got {experiment.window}"
+        )
+    return ""
+
+
+def _clock_problem(experiment: Experiment) -> str:
+    clock = experiment.simulation
+    if clock.window_steps % clock.pose_steps:
+        return (
+            "simulation.window_steps: must be a multiple of simulation.pose_steps = "
+            f"{clock.pose_steps}, got {clock.window_steps}"
+        )
+    return ""
+
+
+def _arena_problem(experiment: Experiment) -> str:
+    arena, selection = experiment.arena, experiment.selection
+    if arena is None:
+        return ""
+    if selection.survivors != "best" or not selection.keep_parents:
+        return (
+            "selection: the survivors of an arena are those that are fit enough; "
+            'survivors must be "best" and keep_parents true'
+        )
+    needed = selection.parents_needed
+    if arena.population_floor < needed:
+        return (
+            f"arena.population_floor: must be >= {needed}, so that there are always "
+            f"two parents to choose, got {arena.population_floor}"
+        )
+    lowest = max(arena.population_floor, selection.population)
+    if arena.population_limit < lowest:
+        return (
+            "arena.population_limit: must be >= arena.population_floor and "
+            f"selection.population, {lowest}, got {arena.population_limit}"
+        )
+    if arena.split_distance_m < arena.merge_distance_m:
+        return (
+            "arena.split_distance_m: must be >= arena.merge_distance_m = "
+            f"{arena.merge_distance_m}, got {arena.split_distance_m}"
+        )
+    return ""
+
+
+def _arena_clock_problem(experiment: Experiment) -> str:
+    """Decisions fall on brain ticks and on poses; all else would be half a state."""
+    arena, clock = experiment.arena, experiment.simulation
+    if arena is None:
+        return ""
+    for name in ("founder", "birth", "cull", "sample", "snapshot"):
+        seconds: float = getattr(arena, f"{name}_interval_s")
+        steps = steps_of(seconds, clock)
+        tick = lcm(clock.brain_steps, clock.pose_steps)
+        is_whole = isclose(steps * clock.timestep_s, seconds, rel_tol=1e-9)
+        if not (steps and is_whole) or steps % tick:
+            return (
+                f"arena.{name}_interval_s: must be a whole multiple of "
+                f"{tick * clock.timestep_s:g} s, where simulation.brain_steps and "
+                f"pose_steps meet, got {seconds:g}"
+            )
+    if clock.warmup_steps % clock.pose_steps:
+        return (
+            "simulation.warmup_steps: must be a multiple of simulation.pose_steps = "
+            f"{clock.pose_steps}, got {clock.warmup_steps}"
+        )
+    return ""

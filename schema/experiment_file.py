@@ -1,0 +1,143 @@
+"""Reads and writes experiment documents: TOML by people, JSON in a run's tables."""
+
+import tomllib
+from difflib import get_close_matches
+from importlib import resources
+from math import isfinite
+from pathlib import Path
+from typing import Any, get_args
+
+import msgspec
+from msgspec import Struct
+
+from schema.errors import ExperimentError
+from schema.experiment import Experiment
+from schema.experiment_check import check_experiment
+
+
+def read_experiment(source: str) -> Experiment:
+    """Return a shipped experiment by its name, or one from a TOML file.
+
+    Args:
+        source: ``scenario1``, or a path that ends in ``.toml``.
+
+    Raises:
+        ExperimentError: no such experiment or file, or a document that is not one.
+    """
+    if source.endswith(".toml"):
+        try:
+            text = Path(source).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ExperimentError(f"{source}: cannot be read: {error}") from None
+        return parse_experiment(text, source)
+    shipped = shipped_experiments()
+    if source not in shipped:
+        near = nearest(source, shipped)
+        raise ExperimentError(
+            f"{source}: no such experiment{near}; "
+            f"shipped are {', '.join(shipped)}, or give a path to a .toml file"
+        )
+    folder = resources.files("coordinator") / "experiments"
+    text = (folder / f"{source}.toml").read_text(encoding="utf-8")
+    return parse_experiment(text, f"{source}.toml")
+
+
+def shipped_experiments() -> list[str]:
+    """Return the names of the experiments that come with the package."""
+    folder = resources.files("coordinator") / "experiments"
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in folder.iterdir()
+        if entry.name.endswith(".toml")
+    )
+
+
+def parse_experiment(text: str, where: str) -> Experiment:
+    """Return the experiment of a TOML text.
+
+    Args:
+        text: the document.
+        where: its name, for messages.
+
+    Raises:
+        ExperimentError: bad TOML, an unknown key (the nearest is named), a wrong
+            type or a value outside its range, or values that exclude each other.
+    """
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ExperimentError(f"{where}: not TOML: {error}") from None
+    _refuse_unknown(document, Experiment, where, "")
+    try:
+        experiment = msgspec.convert(document, type=Experiment)
+    except msgspec.ValidationError as error:
+        raise ExperimentError(f"{where}: {_explain(error, document)}") from None
+    check_experiment(experiment, where)
+    return experiment
+
+
+def experiment_text(experiment: Experiment) -> str:
+    """Return an experiment as one line of JSON, every default written out."""
+    return msgspec.json.encode(experiment).decode()
+
+
+def experiment_from_text(text: str) -> Experiment:
+    """Return the experiment that ``experiment_text`` wrote.
+
+    Raises:
+        ExperimentError: not such a text.
+    """
+    try:
+        return msgspec.json.decode(text.encode(), type=Experiment)
+    except msgspec.MsgspecError as error:
+        raise ExperimentError(f"experiment of a run: {error}") from None
+
+
+def nearest(word: str, words: Any) -> str:  # noqa: ANN401 - any iterable of str
+    """Return ``; did you mean 'x'?`` for the nearest word, or nothing."""
+    found = get_close_matches(word, list(words), n=1, cutoff=0.5)
+    return f"; did you mean {found[0]!r}?" if found else ""
+
+
+def _refuse_unknown(
+    document: dict[str, Any], kind: type[Struct], where: str, prefix: str
+) -> None:
+    """Raise for a key that a section does not have, or a number that is none."""
+    fields = {field.name: field for field in msgspec.structs.fields(kind)}
+    for key, value in document.items():
+        if key not in fields:
+            raise ExperimentError(
+                f"{where}: {prefix}{key}: no such key{nearest(key, fields)}; "
+                f"allowed: {', '.join(fields)}"
+            )
+        for number in value if isinstance(value, list) else (value,):
+            if isinstance(number, float) and not isfinite(number):
+                raise ExperimentError(
+                    f"{where}: {prefix}{key}: must be finite, got {number}"
+                )
+        inner = _section(fields[key].type)
+        if inner is not None:
+            if not isinstance(value, dict):
+                raise ExperimentError(f"{where}: {prefix}{key}: must be a table")
+            _refuse_unknown(value, inner, where, f"{prefix}{key}.")
+
+
+def _section(kind: Any) -> type[Struct] | None:  # noqa: ANN401 - any annotation
+    """Return the section that a key holds, be it optional; None if a plain value."""
+    for each in (kind, *get_args(kind)):
+        if isinstance(each, type) and issubclass(each, Struct):
+            return each
+    return None
+
+
+def _explain(error: msgspec.ValidationError, document: dict[str, Any]) -> str:
+    """Return msgspec's message as ``key: expected, got value``."""
+    message, _, path = str(error).partition(" - at `$.")
+    key = path.rstrip("`")
+    value: Any = document
+    for name in key.split(".") if key else ():
+        name, _, index = name.partition("[")  # noqa: PLW2901 - one word, then its index
+        value = value.get(name) if isinstance(value, dict) else None
+        if index and isinstance(value, list):
+            value = value[int(index.rstrip("]"))]
+    return f"{key}: {message}, got {value!r}" if key else message
