@@ -77,9 +77,11 @@ def _write_answer(
             entry.attempt = event.attempt
             entry.vetting_failed = event.reason
         case Evaluated():
+            entry.trial = event.trial
             entry.evaluated.CopyFrom(evaluation_to_message(event.evaluation))
             _sign(entry, event.provenance)
         case EvaluationFailed():
+            entry.trial = event.trial
             entry.evaluation_failed = event.reason
             _sign(entry, event.provenance)
 
@@ -120,9 +122,11 @@ def _event(entry: pb.Entry) -> Journalled:
         case "vetting_failed":
             return VettingFailed(birth, entry.attempt, entry.vetting_failed)
         case "evaluated":
-            return Evaluated(birth, evaluation_from_message(entry.evaluated), signed)
+            evaluation = evaluation_from_message(entry.evaluated)
+            return Evaluated(birth, evaluation, signed, entry.trial)
         case "evaluation_failed":
-            return EvaluationFailed(birth, entry.evaluation_failed, signed)
+            reason = entry.evaluation_failed
+            return EvaluationFailed(birth, reason, signed, entry.trial)
         case "advanced":
             told = entry.advanced
             advance = advance_from_message(told.advance)

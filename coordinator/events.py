@@ -42,20 +42,36 @@ class VettingFailed:
 
 @dataclass(frozen=True, slots=True)
 class Evaluated:
-    """A robot was simulated and judged."""
+    """A robot was simulated and judged.
+
+    Attributes:
+        birth: whose robot.
+        evaluation: what it came to.
+        provenance: who did it.
+        trial: which evaluation of the robot it is; 0 is the one at its birth.
+    """
 
     birth: BirthId
     evaluation: Evaluation
     provenance: Provenance
+    trial: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class EvaluationFailed:
-    """A robot's simulation ended without a judgement, for a reason of its own."""
+    """A robot's simulation ended without a judgement, for a reason of its own.
+
+    Attributes:
+        birth: whose robot.
+        reason: why.
+        provenance: who found out.
+        trial: as of ``Evaluated``.
+    """
 
     birth: BirthId
     reason: str
     provenance: Provenance
+    trial: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,10 +177,19 @@ class Vet:
 
 @dataclass(frozen=True, slots=True)
 class Evaluate:
-    """Have a robot simulated and judged."""
+    """Have a robot simulated and judged.
+
+    Attributes:
+        birth: whose robot.
+        robot: itself.
+        trial: which evaluation of the robot it is, from 0.
+        steps: of physics to simulate; 0: as the experiment says for all.
+    """
 
     birth: BirthId
     robot: Robot
+    trial: int = 0
+    steps: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,7 +260,7 @@ class Job:
         number: unique within the coordinator's incarnation, ascending.
         kind: what it asks for; "vet" goes to analyzers, "evaluate" to workers.
         birth: whom it is about.
-        attempt: mating attempt, for "vet"; 0 for "evaluate".
+        attempt: mating attempt, for "vet"; trial, for "evaluate".
         payload: the encoded request (schema.codec).
     """
 

@@ -39,7 +39,7 @@ from schema.birth import BirthId
 from schema.errors import UnexpectedEvent
 
 Key = tuple[str, BirthId, int]
-"""What an open question is known by: kind, birth, attempt."""
+"""What an open question is known by: kind, birth, attempt or trial."""
 
 Asked = Vet | Evaluate | AdvanceShard
 """What islands and arenas have others do."""
@@ -264,4 +264,4 @@ def _key(
     """Return what a question and its answer have in common."""
     if isinstance(about, Vet | Vetted | VettingFailed):
         return ("vet", about.birth, about.attempt)
-    return ("evaluate", about.birth, 0)
+    return ("evaluate", about.birth, about.trial)

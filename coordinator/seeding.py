@@ -19,6 +19,7 @@ class Purpose(IntEnum):
     MATE = 3
     SURVIVORS = 4
     PLACE = 5
+    DURATION = 6
 
 
 def stream(

@@ -39,6 +39,7 @@ class Request:
         number: of the job, unique within the epoch.
         settings: JSON of ``VettingSettings`` or ``EvaluationSettings``.
         robot: the robot in question.
+        steps: of physics to simulate; 0: as the settings say.
     """
 
     run: str
@@ -46,6 +47,7 @@ class Request:
     number: int
     settings: bytes
     robot: Robot
+    steps: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,11 +99,16 @@ def decode_genome(data: bytes) -> Genome:
 
 
 def encode_request(
-    *, run: str, epoch: int, number: int, settings: bytes, robot: bytes
+    *, run: str, epoch: int, number: int, settings: bytes, robot: bytes, steps: int = 0
 ) -> bytes:
     """Return the bytes of a request; ``robot`` is already encoded."""
     message = pb.Request(
-        run=run, epoch=epoch, number=number, settings=settings, robot=robot
+        run=run,
+        epoch=epoch,
+        number=number,
+        settings=settings,
+        robot=robot,
+        steps=steps,
     )
     return message.SerializeToString(deterministic=True)
 
@@ -227,6 +234,7 @@ def _request_from_message(message: pb.Request) -> Request:
         number=message.number,
         settings=message.settings,
         robot=decode_robot(message.robot),
+        steps=message.steps,
     )
 
 
