@@ -7,20 +7,23 @@ the agent with the least to do gets it, ties break on its name.
 
 An agent that erred or lost a job without leaving rests before it is given more,
 longer each time in a row, so that a broken one cannot eat the queue.
+
+A job that is late gets a second copy where somebody is idle; who answers first is
+heard. A job that ended several processes by its own doing is given to nobody more.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count
 
 from coordinator.events import (
     AgentKind,
     Assign,
+    Cancel,
     Deliver,
+    Died,
     DispatchCommand,
     DispatchEvent,
-    Job,
     JobKind,
     Joined,
     Left,
@@ -28,34 +31,28 @@ from coordinator.events import (
     Returned,
     Ticked,
 )
-from coordinator.pool import AgentState, Pool
+from coordinator.pool import AgentState, Pending, Pool
+from coordinator.rests import Rests
+from coordinator.stragglers import Stragglers
+from coordinator.twins import Twins
 from schema.errors import UnexpectedEvent
 
 AGENT_OF: dict[JobKind, AgentKind] = {"vet": "analyzer", "evaluate": "worker"}
 MAX_ERRORS = 3
-REST_S = 0.05
-LONGEST_REST_S = 3.2
-
-
-@dataclass(slots=True)
-class _Pending:
-    """A job that is not delivered yet; ``avoid`` are those who failed on it."""
-
-    job: Job
-    holder: str = ""
-    errors: int = 0
-    avoid: tuple[str, ...] = ()
+MAX_DEATHS = 3
 
 
 class Dispatch:
     """The machine; ``handle`` is its only door."""
 
     def __init__(self) -> None:
-        self._jobs: dict[int, _Pending] = {}
+        self._jobs: dict[int, Pending] = {}
         self._pools: dict[AgentKind, Pool] = {"worker": Pool(), "analyzer": Pool()}
         self._kind_of: dict[str, AgentKind] = {}
-        self._resting: list[tuple[float, str, int]] = []
+        self._rests = Rests()
         self._stamps = count(1)
+        self._stragglers = Stragglers()
+        self._twins = Twins()
         self._highest = -1
         self._now_s: float | None = None
         self._doors: dict[type, Callable[..., Iterator[DispatchCommand]]] = {
@@ -63,6 +60,7 @@ class Dispatch:
             Left: self._left,
             Requested: self._requested,
             Returned: self._returned,
+            Died: self._died,
             Ticked: self._ticked,
         }
 
@@ -87,7 +85,7 @@ class Dispatch:
     @property
     def wake_s(self) -> float | None:
         """When the next ``Ticked`` can change something [s]; None: no need."""
-        return self._resting[0][0] if self._resting else None
+        return self._rests.wake_s
 
     def handle(self, event: DispatchEvent) -> list[DispatchCommand]:
         """Take an event and return what is to be done, in this order.
@@ -122,9 +120,16 @@ class Dispatch:
             return
         pool = self._pools[kind]
         for number in pool.agents.pop(event.agent).held:
-            self._jobs[number].holder = ""
-            heappush(pool.waiting, number)
+            if pending := self._jobs.get(number):
+                self._put_back(pending, event.agent)
         yield from self._assign(pool)
+
+    def _put_back(self, pending: Pending, agent: str) -> None:
+        """Take a job from an agent; it waits again if that was the only one."""
+        pending.holders.remove(agent)
+        if not pending.holders:
+            number = pending.job.number
+            heappush(self._pools[AGENT_OF[pending.job.kind]].waiting, number)
 
     def _requested(self, event: Requested) -> Iterator[DispatchCommand]:
         number = event.job.number
@@ -136,82 +141,120 @@ class Dispatch:
             )
         pool = self._pools[AGENT_OF[event.job.kind]]
         self._highest = number
-        self._jobs[number] = _Pending(event.job)
+        self._jobs[number] = Pending(event.job)
         heappush(pool.waiting, number)
         yield from self._assign(pool)
 
     def _returned(self, event: Returned) -> Iterator[DispatchCommand]:
-        pending = self._jobs.get(event.number)
-        if pending is None or not pending.holder or pending.holder != event.agent:
+        kind = self._kind_of.get(event.agent)
+        if kind is None:
             return
-        pool = self._pools[AGENT_OF[pending.job.kind]]
+        pool = self._pools[kind]
         agent = pool.agents[event.agent]
+        if event.number not in agent.held:
+            return
         del agent.held[event.number]
-        pending.holder = ""
-        pending.errors += event.outcome == "error"
-        if event.outcome == "ok" or pending.errors == MAX_ERRORS:
-            del self._jobs[event.number]
-            yield Deliver(pending.job, event.agent, event.answer, event.reason)
-        else:
-            if event.agent not in pending.avoid:
-                pending.avoid = (*pending.avoid, event.agent)
-            heappush(pool.waiting, event.number)
-        if event.outcome == "ok":
-            agent.failures = 0
-        else:
-            self._rest(agent)
+        # A copy that came too late says nothing of the agent but that it is free.
+        if pending := self._jobs.get(event.number):
+            yield from self._outcome(pending, event)
+            if event.outcome == "ok":
+                agent.failures = 0
+            else:
+                self._rests.begin(agent, self._now_s or 0.0)
         pool.offer(event.agent, next(self._stamps))
         yield from self._assign(pool)
 
-    def _rest(self, agent: AgentState) -> None:
-        """Give an agent nothing for a while; one rest at a time."""
-        if agent.rests:
+    def _outcome(self, pending: Pending, event: Returned) -> Iterator[DispatchCommand]:
+        """Deliver a job, or see to it that another agent gets it."""
+        pending.errors += event.outcome == "error"
+        if event.outcome == "ok" or pending.errors == MAX_ERRORS:
+            if event.outcome == "ok" and self._now_s is not None:
+                elapsed_s = self._now_s - pending.since_s
+                self._stragglers.learn(pending.job.kind, elapsed_s)
+            pending.holders.remove(event.agent)
+            yield Deliver(pending.job, event.agent, event.answer, event.reason)
+            yield from self._close(pending)
             return
-        agent.rests = True
-        rest_s = min(REST_S * 2**agent.failures, LONGEST_REST_S)
-        agent.failures += 1
-        until_s = (self._now_s or 0.0) + rest_s
-        heappush(self._resting, (until_s, agent.joined.agent, next(self._stamps)))
+        if event.agent not in pending.avoid:
+            pending.avoid = (*pending.avoid, event.agent)
+        self._put_back(pending, event.agent)
+
+    def _close(self, pending: Pending) -> Iterator[DispatchCommand]:
+        """Forget a job that is delivered; whoever is still at it may stop."""
+        job = pending.job
+        del self._jobs[job.number]
+        if job.twin not in self._jobs:
+            self._twins.forget(job)
+        for agent in pending.holders:
+            yield Cancel(job, agent)
+
+    def _died(self, event: Died) -> Iterator[DispatchCommand]:
+        pending = self._jobs.get(event.number)
+        if pending is None:
+            return
+        pending.killed[event.agent] = event.cause
+        if len(pending.killed) < MAX_DEATHS:
+            return
+        pool = self._pools[AGENT_OF[pending.job.kind]]
+        if not pending.holders:
+            pool.drop(event.number)
+        causes = ", ".join(sorted(set(pending.killed.values())))
+        reason = f"ended its own process {MAX_DEATHS} times, by {causes}"
+        yield Deliver(pending.job, event.agent, b"", reason, is_deadly=True)
+        yield from self._close(pending)
 
     def _ticked(self, event: Ticked) -> Iterator[DispatchCommand]:
         if self._now_s is not None and event.now_s < self._now_s:
             raise UnexpectedEvent(f"{event.now_s} s comes after {self._now_s} s")
         self._now_s = event.now_s
-        while self._resting and self._resting[0][0] <= event.now_s:
-            name = heappop(self._resting)[1]
+        for name in self._rests.over(event.now_s):
             if kind := self._kind_of.get(name):
                 pool = self._pools[kind]
                 pool.agents[name].rests = False
                 pool.offer(name, next(self._stamps))
                 yield from self._assign(pool)
+        if self._stragglers.is_time(event.now_s):
+            for pool in self._pools.values():
+                yield from self._copy(pool, event.now_s)
+
+    def _copy(self, pool: Pool, now_s: float) -> Iterator[DispatchCommand]:
+        """Give who is idle a second copy of what is late, the oldest first."""
+        idle = pool.idle()
+        if not idle:
+            return
+        for pending in list(self._jobs.values()):
+            kind = pending.job.kind
+            is_late = self._stragglers.is_late(kind, now_s - pending.since_s)
+            if len(pending.holders) != 1 or not is_late:
+                continue
+            if self._pools[AGENT_OF[kind]] is not pool:
+                continue
+            avoid = {*self._twins.avoided(pending), *pending.holders}
+            name = next((each for each in idle if each not in avoid), "")
+            if name:
+                idle.remove(name)
+                yield self._give(pending, pool, name)
+
+    def _give(self, pending: Pending, pool: Pool, name: str) -> Assign:
+        """Have an agent do a job."""
+        job = pending.job
+        if not pending.holders:
+            pending.since_s = self._now_s or 0.0
+        pending.holders.append(name)
+        self._twins.note(job, name)
+        pool.agents[name].held[job.number] = None
+        pool.offer(name, next(self._stamps))
+        return Assign(job, name)
 
     def _assign(self, pool: Pool) -> Iterator[DispatchCommand]:
         """Give out what can be given out."""
         passed: list[str] = []
         while pool.waiting and (name := pool.best()):
-            pending = self._take(pool, name)
+            pending = pool.take(name, self._jobs, self._twins.avoided)
             if pending is None:
                 passed.append(name)
                 heappop(pool.free)
                 continue
-            pending.holder = name
-            pool.agents[name].held[pending.job.number] = None
-            pool.offer(name, next(self._stamps))
-            yield Assign(pending.job, name)
+            yield self._give(pending, pool, name)
         for name in passed:
             pool.offer(name, next(self._stamps))
-
-    def _take(self, pool: Pool, name: str) -> _Pending | None:
-        """Take the first waiting job that may go to an agent, if there is one."""
-        passed: list[int] = []
-        taken: _Pending | None = None
-        while pool.waiting and taken is None:
-            number = heappop(pool.waiting)
-            pending = self._jobs[number]
-            if pool.may_take(name, pending.avoid):
-                taken = pending
-            else:
-                passed.append(number)
-        for number in passed:
-            heappush(pool.waiting, number)
-        return taken

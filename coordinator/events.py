@@ -262,6 +262,8 @@ class Job:
         birth: whom it is about.
         attempt: mating attempt, for "vet"; trial, for "evaluate".
         payload: the encoded request (schema.codec).
+        twin: number of a job that somebody else is to do, if there is anybody
+            else; -1 if none is.
     """
 
     number: int
@@ -269,6 +271,7 @@ class Job:
     birth: BirthId
     attempt: int
     payload: bytes
+    twin: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -316,13 +319,31 @@ class Returned:
 
 
 @dataclass(frozen=True, slots=True)
+class Died:
+    """A process ended by the doing of the job that it was at, not of its machine.
+
+    Attributes:
+        run, epoch: whose job.
+        number: the job's.
+        agent: the process, which never comes back.
+        cause: such as "SIGSEGV".
+    """
+
+    run: str
+    epoch: int
+    number: int
+    agent: str
+    cause: str
+
+
+@dataclass(frozen=True, slots=True)
 class Ticked:
     """Time passed [s]; any monotonic origin."""
 
     now_s: float
 
 
-DispatchEvent = Joined | Left | Requested | Returned | Ticked
+DispatchEvent = Joined | Left | Requested | Returned | Died | Ticked
 
 
 @dataclass(frozen=True, slots=True)
@@ -335,12 +356,21 @@ class Assign:
 
 @dataclass(frozen=True, slots=True)
 class Deliver:
-    """A job is done for good: with an answer, or with a reason why never."""
+    """A job is done for good: with an answer, or with a reason why never.
+
+    Attributes:
+        job: which.
+        agent: who had it last.
+        answer: empty if there is a reason.
+        reason: why nobody can do it.
+        is_deadly: it ends whoever tries it.
+    """
 
     job: Job
     agent: str
     answer: bytes
     reason: str = ""
+    is_deadly: bool = False
 
 
 @dataclass(frozen=True, slots=True)

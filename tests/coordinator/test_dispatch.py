@@ -7,11 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.dispatch import LONGEST_REST_S, MAX_ERRORS, REST_S, Dispatch
+from coordinator.dispatch import MAX_DEATHS, MAX_ERRORS, Dispatch
 from coordinator.events import (
     AgentKind,
     Assign,
+    Cancel,
     Deliver,
+    Died,
     DispatchCommand,
     DispatchEvent,
     Job,
@@ -22,6 +24,8 @@ from coordinator.events import (
     Returned,
     Ticked,
 )
+from coordinator.rests import LONGEST_REST_S, REST_S
+from coordinator.stragglers import LEAST_S, PATIENCE
 from schema.birth import BirthId
 from schema.errors import UnexpectedEvent
 
@@ -44,6 +48,10 @@ def error(number: int, agent: str) -> Returned:
 
 def lost(number: int, agent: str) -> Returned:
     return Returned(number, agent, "lost")
+
+
+def died(number: int, agent: str, cause: str = "SIGSEGV") -> Died:
+    return Died("run", 1, number, agent, cause)
 
 
 def told(*events: DispatchEvent) -> Dispatch:
@@ -200,6 +208,99 @@ def test_what_cannot_be_changes_nothing(event: DispatchEvent) -> None:
     assert dispatch.pending == 0
 
 
+def late(typical_s: float = 0.5) -> Dispatch:
+    """Return a machine whose worker a is late with 1, while b has nothing to do."""
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0), Ticked(typical_s))
+    dispatch.handle(ok(0, "a"))
+    for request in requests(1, 2):
+        dispatch.handle(request)
+    dispatch.handle(worker("b"))
+    return dispatch
+
+
+@pytest.mark.parametrize(("typical_s", "patience_s"), [(0.01, LEAST_S), (0.5, 2.0)])
+def test_a_late_job_gets_a_second_copy_where_somebody_is_idle(
+    typical_s: float, patience_s: float
+) -> None:
+    assert PATIENCE == 4.0
+    dispatch = late(typical_s)
+    almost_s = typical_s + patience_s
+    assert given_out(dispatch.handle(Ticked(almost_s))) == []
+    # The oldest first; nobody is idle for the second.
+    assert given_out(dispatch.handle(Ticked(almost_s + 0.3))) == [(1, "b")]
+    assert given_out(dispatch.handle(Ticked(almost_s + 9.0))) == []
+
+
+def test_who_answers_first_is_heard_and_the_other_may_stop() -> None:
+    dispatch = late()
+    dispatch.handle(Ticked(9.0))
+    first = dispatch.handle(ok(1, "b"))
+    assert first == [Deliver(job(1), "b", b"a1"), Cancel(job(1), "a")]
+    assert given_out(dispatch.handle(Ticked(19.0))) == [(2, "b")]
+    # The loser keeps its credit busy until it has answered, too; then it is free.
+    assert given_out(dispatch.handle(Requested(job(3)))) == [(3, "b")]
+    assert dispatch.handle(Requested(job(4))) == []
+    assert given_out(dispatch.handle(error(1, "a"))) == [(4, "a")]
+    assert dispatch.wake_s is None
+
+
+def test_a_copy_survives_the_loss_of_the_other() -> None:
+    for gone in ("a", "b"):
+        dispatch = late()
+        dispatch.handle(Ticked(9.0))
+        dispatch.handle(Left(gone))
+        (other,) = {"a", "b"} - {gone}
+        assert dispatch.handle(ok(1, other))[0] == Deliver(job(1), other, b"a1")
+
+
+def test_nobody_is_given_a_copy_of_what_it_has_or_failed_at() -> None:
+    dispatch = late()
+    dispatch.handle(Ticked(9.0))
+    assert given_out(dispatch.handle(lost(1, "b"))) == []
+    assert given_out(dispatch.handle(Ticked(99.0))) == [(2, "b")]
+    assert dispatch.handle(ok(2, "b"))[0] == Deliver(job(2), "b", b"a2")
+    assert given_out(dispatch.handle(Ticked(199.0))) == []
+
+
+def test_a_job_that_ends_three_processes_is_given_to_nobody_more() -> None:
+    dispatch = told(worker("a"), worker("b"), *requests(0))
+    for number, name in enumerate(("a", "b")):
+        assert given_out(dispatch.handle(Left(name))) == [(0, "b")][number:]
+        assert dispatch.handle(died(0, name)) == []
+    assert dispatch.handle(died(0, "a")) == []  # told twice
+    assert given_out(dispatch.handle(worker("c"))) == [(0, "c")]
+    dispatch.handle(Left("c"))
+    reason = "ended its own process 3 times, by SIGPROF, SIGSEGV"
+    assert dispatch.handle(died(0, "c", "SIGPROF")) == [
+        Deliver(job(0), "c", b"", reason, is_deadly=True)
+    ]
+    assert dispatch.pending == dispatch.waiting("worker") == 0
+    assert dispatch.handle(died(0, "d")) == []
+
+
+def test_who_is_at_a_deadly_job_may_stop() -> None:
+    dispatch = told(worker("z"), *requests(0))
+    commands = [dispatch.handle(died(0, name)) for name in ("a", "b", "c")]
+    assert commands[2][1:] == [Cancel(job(0), "z")]
+
+
+def test_twins_go_to_two_workers_if_there_are_two() -> None:
+    first = Job(1, "evaluate", BirthId(0, 1), 0, b"1", twin=2)
+    second = Job(2, "evaluate", BirthId(0, 1), 0, b"2", twin=1)
+    dispatch = told(worker("a"))
+    assert given_out(dispatch.handle(Requested(first))) == [(1, "a")]
+    assert given_out(dispatch.handle(Requested(second))) == [(2, "a")]
+    dispatch = told(worker("a"), worker("b", 3), Requested(first))
+    assert given_out(dispatch.handle(Requested(second))) == [(2, "b")]
+    assert given_out(dispatch.handle(Left("a"))) == [(1, "b")]
+    dispatch.handle(worker("c"))
+    dispatch.handle(ok(1, "b"))
+    # c did neither of them yet.
+    assert given_out(dispatch.handle(lost(2, "b"))) == [(2, "c")]
+    dispatch.handle(ok(2, "c"))
+    assert len(dispatch._twins) == 0
+
+
 class World:
     """All that can happen to jobs, and what must hold after each step."""
 
@@ -212,6 +313,7 @@ class World:
         self.jobs: dict[int, Job] = {}
         self.delivered: dict[int, Deliver] = {}
         self.errors: dict[int, int] = {}
+        self.killed: dict[int, list[str]] = {}
         self.agents: dict[str, Joined] = {}
         self.held: dict[str, list[int]] = {}
         self.past: list[DispatchEvent] = []
@@ -223,9 +325,13 @@ class World:
                 assert number not in self.delivered
                 self.delivered[number] = command
                 continue
-            assert isinstance(command, Assign)
+            if isinstance(command, Cancel):
+                assert number in self.delivered
+                assert number in self.held[agent]
+                continue
             assert number not in self.delivered
-            assert all(number not in held for held in self.held.values())
+            assert sum(number in held for held in self.held.values()) < 2
+            assert number not in self.held[agent]
             kind: AgentKind = "analyzer" if command.job.kind == "vet" else "worker"
             assert self.agents[agent].kind == kind
             self.held[agent].append(number)
@@ -286,7 +392,7 @@ class World:
         name = self.random.choice(busy)
         held = self.held[name]
         number = held.pop(self.random.randrange(len(held)))
-        if outcome == "error":
+        if outcome == "error" and number not in self.delivered:
             self.errors[number] = self.errors.get(number, 0) + 1
         made = {"ok": ok, "error": error, "lost": lost}[outcome]
         self.tell(made(number, name))
@@ -297,8 +403,15 @@ class World:
     def lose(self) -> None:
         self.give_back("lost")
 
+    def die(self) -> None:
+        """Somebody died of a job that may be long done."""
+        if self.jobs:
+            number = self.random.choice(sorted(self.jobs))
+            self.killed.setdefault(number, []).append(f"dead-{next(self.names)}")
+            self.tell(died(number, self.killed[number][-1]))
+
     def tick(self) -> None:
-        self.now_s += self.random.uniform(0.0, 0.3)
+        self.now_s += self.random.choice((0.1, 0.3, 3.0))
         self.tell(Ticked(self.now_s))
 
     def repeat(self) -> None:
@@ -325,6 +438,8 @@ ACTIONS = ["request"] * 3 + [
     "answer",
     "fail",
     "lose",
+    "die",
+    "tick",
     "tick",
     "repeat",
 ]
@@ -346,6 +461,10 @@ def test_each_job_is_delivered_once_whatever_happens(
     for number, delivered in world.delivered.items():
         failed = world.errors.get(number, 0) == MAX_ERRORS
         assert delivered.job == world.jobs[number]
+        if delivered.is_deadly:
+            assert len(world.killed[number]) >= MAX_DEATHS
+            assert not failed
+            continue
         assert bool(delivered.reason) == failed
         assert delivered.answer == (b"" if failed else b"a%d" % number)
 
