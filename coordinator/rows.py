@@ -58,6 +58,7 @@ def evaluation_record(outcome: Evaluated | EvaluationFailed) -> Record:
     row = {
         "island": outcome.birth.island,
         "birth": outcome.birth.number,
+        "trial": outcome.trial,
         "status": "ok" if isinstance(outcome, Evaluated) else "failed",
         "reason": "" if isinstance(outcome, Evaluated) else outcome.reason,
         "fitness": judged and judged.fitness,

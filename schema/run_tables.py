@@ -15,7 +15,7 @@ import pyarrow.dataset
 from pyarrow.parquet import ParquetFile
 
 from schema.errors import RunFolderError
-from schema.tables import TABLES
+from schema.tables import TABLES, completed, is_earlier
 
 SEGMENTS = "segments"
 FINISHED = "tables"
@@ -74,19 +74,28 @@ def _read_batches(path: Path, schema: pa.Schema) -> list[tuple[int, pa.RecordBat
     try:
         source = pa.BufferReader(data)
         reader = pa.ipc.open_stream(source)
-        if not reader.schema.equals(schema, check_metadata=True):
+        if not is_earlier(reader.schema, schema):
             raise RunFolderError(
                 f"{path}: was written by another version of Revolve: finish the run "
                 "with that one"
             )
         for batch in iter(reader.read_next_batch, None):
-            batches.append((source.tell(), batch))  # noqa: PERF401 - keeps what came
+            batches.append((source.tell(), _whole(batch, schema)))
     except StopIteration:
         pass
     except (pa.ArrowInvalid, OSError, MemoryError):
         # A cut or damaged tail: batches before it are whole.
         pass
     return batches
+
+
+def _whole(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
+    """Return a batch with all columns of its table."""
+    if batch.schema.names == schema.names:
+        return batch
+    columns = completed(pa.Table.from_batches([batch]), schema).columns
+    arrays = [column.combine_chunks() for column in columns]
+    return pa.RecordBatch.from_arrays(arrays, schema=schema)
 
 
 def read_chain(
@@ -137,8 +146,7 @@ def read_table(folder: Path, table: str) -> pa.Table:
         chain, _ = read_chain(folder, table)
         return pa.Table.from_batches(chain, TABLES[table])
     try:
-        # Parquet has its own name for the items of a list.
-        return ParquetFile(finished[0]).read().cast(TABLES[table])
+        return completed(ParquetFile(finished[0]).read(), TABLES[table])
     except (ValueError, OSError) as error:
         raise RunFolderError(f"{finished[0]}: cannot be read: {error}") from None
 

@@ -28,8 +28,12 @@ def _column(
     *,
     is_repeatable: bool = True,
     is_nullable: bool = False,
+    absent: int | None = None,
 ) -> pa.Field:
+    """Return a column; ``absent`` stands for it in rows older than the column."""
     metadata = {"unit": unit, "repeatable": "true" if is_repeatable else "false"}
+    if absent is not None:
+        metadata["absent"] = str(absent)
     return pa.field(name, kind, nullable=is_nullable, metadata=metadata)
 
 
@@ -90,6 +94,7 @@ EVALUATIONS = _table(
     "evaluations",
     _column("island", pa.int32()),
     _column("birth", pa.int64()),
+    _column("trial", pa.int32(), absent=0),
     _column("status", pa.string()),
     _column("reason", pa.string()),
     _column("fitness", pa.float64(), is_nullable=True),
@@ -100,7 +105,10 @@ EVALUATIONS = _table(
     _column("worker", pa.string(), is_repeatable=False),
     _column("platform", pa.string(), is_repeatable=False),
 )
-"""One row per evaluation finished; status is "ok", or "failed" with a reason."""
+"""One row per evaluation finished; status is "ok", or "failed" with a reason.
+
+Trial 0 is the one at birth; where robots are judged anew, more rows have a greater.
+"""
 
 POPULATION = _table(
     "population",
@@ -240,6 +248,35 @@ def read_columns(table: str, columns: bytes) -> pa.Table:
 
 def _described(schema: pa.Schema) -> str:
     return ", ".join(f"{field.name}: {field.type}" for field in schema)
+
+
+def is_earlier(found: pa.Schema, schema: pa.Schema) -> bool:
+    """Return whether rows are of a table, or of it before it got its newest columns.
+
+    Args:
+        found: what the rows are, with metadata.
+        schema: of the table, now.
+    """
+    known = [field for field in schema if field.name in found.names]
+    lacking = [field for field in schema if field.name not in found.names]
+    return found.equals(pa.schema(known, schema.metadata), check_metadata=True) and all(
+        field.nullable or b"absent" in field.metadata for field in lacking
+    )
+
+
+def completed(rows: pa.Table, schema: pa.Schema) -> pa.Table:
+    """Return rows with the columns that their table got since they were written.
+
+    Raises:
+        ValueError: they are none of the table.
+    """
+    lacking = [field for field in schema if field.name not in rows.column_names]
+    for field in lacking:
+        absent = field.metadata.get(b"absent")
+        value = pa.scalar(absent and int(absent), field.type)
+        rows = rows.append_column(field, pa.repeat(value, rows.num_rows))
+    # Parquet has its own name for the items of a list.
+    return rows.select(schema.names).cast(schema)
 
 
 def repeatable(schema: pa.Schema) -> list[str]:

@@ -56,6 +56,7 @@ def evaluation_row(number: int, worker: str, platform: str) -> dict[str, Any]:
     return {
         "island": 0,
         "birth": number,
+        "trial": 0,
         "status": "failed" if is_failed else "ok",
         "reason": "diverged" if is_failed else "",
         "fitness": value,
