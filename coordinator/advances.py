@@ -4,29 +4,16 @@ What a shard was told since its newest snapshot is kept, so that another worker 
 rebuild its state. Nothing here decides what happens in an arena.
 """
 
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from coordinator.events import (
     Advanced,
     AdvanceShard,
-    DispatchEvent,
-    Joined,
-    Left,
     Returned,
-    Ticked,
 )
-from coordinator.shards import (
-    Accept,
-    Came,
-    GiveUp,
-    Hand,
-    Placed,
-    ShardCommand,
-    ShardDispatch,
-    Wanted,
-)
+from coordinator.fleet import Fleet
+from coordinator.shards import Accept, Came, GiveUp, Hand
 from schema.arena_codec import (
     AdvanceAnswer,
     AdvanceRequest,
@@ -90,34 +77,46 @@ class Advances:
     """The advances of all arenas of a run.
 
     Attributes:
-        dispatch: who holds which shard.
         malformed: answers that did not decode or did not fit their question.
     """
 
-    def __init__(
-        self,
-        terms: Terms,
-        vault: Vault,
-        *,
-        numbers: Iterator[int],
-        send: Callable[[int, str, bytes], None],
-    ) -> None:
+    def __init__(self, terms: Terms, vault: Vault, fleet: Fleet) -> None:
         """Know of no shard yet.
 
         Args:
             terms: of the run.
             vault: keeps the snapshots.
-            numbers: of jobs, each used once.
-            send: takes number, agent and payload of a job.
+            fleet: whose workers hold the shards.
         """
-        self.dispatch = ShardDispatch(numbers)
         self.malformed = 0
         self._terms = terms
         self._vault = vault
-        self._send = send
+        self._fleet = fleet
         self._pasts: dict[int, _Past] = {}
-        self._platforms: dict[str, str] = {}
+        # A shard has its island's number here and another one in the fleet.
+        self._numbers: dict[int, int] = {}
+        self._islands: dict[int, int] = {}
         self._answers: dict[int, tuple[AdvanceAnswer, int]] = {}
+        self._came: list[Advanced] = []
+        self._refusal: JobRefused | None = None
+
+    @property
+    def open(self) -> int:
+        """How many advances are asked for and not done."""
+        return sum(past.asked is not None for past in self._pasts.values())
+
+    @property
+    def waiting(self) -> dict[int, str]:
+        """Platforms of the shards that wait for a worker; "" is any platform."""
+        return {
+            self._islands[number]: platform
+            for number, platform in self._fleet.shards.waiting.items()
+            if number in self._islands
+        }
+
+    def holder(self, shard: int) -> str:
+        """Return which worker holds a shard; empty if none does."""
+        return self._fleet.shards.holder(self._number(shard))
 
     def step(self, shard: int) -> int:
         """Return the step at which a shard stands."""
@@ -130,7 +129,7 @@ class Advances:
     def request(self, shard: int) -> None:
         """Have the advance that was noted made, if one was."""
         if self._past(shard).asked is not None:
-            self._obey(self.dispatch.handle(Wanted(shard)))
+            self._fleet.advance(self._number(shard))
 
     def wish_snapshot(self, shard: int) -> None:
         """Have the state kept at the end of the next advance that is handed out."""
@@ -152,55 +151,59 @@ class Advances:
         if self._vault.has(event.island, past.step):
             past.base, past.history = past.step, []
             self._vault.drop_before(event.island, past.step)
-        platform = event.provenance.platform
-        self.dispatch.handle(Placed(event.island, platform))
+        self._fleet.place(self._number(event.island), event.provenance.platform)
 
-    def tell(self, event: DispatchEvent) -> list[Advanced]:
-        """Take news of workers and of jobs; return the advances that are done.
+    def come(self) -> list[Advanced]:
+        """Return the advances that were done since the last call.
 
-        Their snapshots are in the vault. News of other jobs changes nothing.
+        Their snapshots are in the vault.
 
         Raises:
             JobRefused: several workers cannot make an advance.
         """
-        match event:
-            case Joined():
-                self._platforms[event.agent] = event.platform
-                return self._obey(self.dispatch.handle(event))
-            case Left() | Ticked():
-                return self._obey(self.dispatch.handle(event))
-            case Returned() if self.dispatch.has_out(event.number):
-                return self._obey(self.dispatch.handle(self._understood(event)))
-        return []
+        if self._refusal is not None:
+            raise self._refusal
+        came, self._came = self._came, []
+        return came
+
+    def release(self) -> None:
+        """Let the workers have room for others' shards."""
+        for number in self._islands:
+            self._fleet.release(number)
+        self._numbers, self._islands = {}, {}
 
     def _past(self, shard: int) -> _Past:
         return self._pasts.setdefault(shard, _Past())
 
-    def _obey(self, commands: list[ShardCommand]) -> list[Advanced]:
-        done: list[Advanced] = []
-        for command in commands:
-            match command:
-                case Hand():
-                    self._send(command.number, command.agent, self._payload(command))
-                case Accept():
-                    done.append(self._accepted(command))
-                case GiveUp():
-                    raise JobRefused(
-                        f"arena {command.shard}: several workers cannot advance it, "
-                        f"the last of them {command.agent}: {command.reason}; "
-                        "mend that and resume"
-                    )
-        return done
+    def _number(self, shard: int) -> int:
+        """Return the number of a shard in the fleet."""
+        if shard not in self._numbers:
+            number = self._fleet.new_shard(self)
+            self._numbers[shard], self._islands[number] = number, shard
+        return self._numbers[shard]
 
-    def _payload(self, command: Hand) -> bytes:
-        past = self._past(command.shard)
+    def settle(self, command: Accept | GiveUp) -> None:
+        """Keep the end of an advance until ``come``."""
+        shard = self._islands[command.shard]
+        if isinstance(command, Accept):
+            self._came.append(self._accepted(shard, command.agent))
+            return
+        self._refusal = JobRefused(
+            f"arena {shard}: several workers cannot advance it, the last of them "
+            f"{command.agent}: {command.reason}; mend that and resume"
+        )
+
+    def payload(self, command: Hand) -> bytes:
+        """Return the request that a worker is handed."""
+        shard = self._islands[command.shard]
+        past = self._past(shard)
         assert past.asked is not None
         wants_snapshot = past.asked.wants_snapshot or past.wants_snapshot
         past.wants_snapshot = False
         past.asked = replace(past.asked, wants_snapshot=wants_snapshot)
         rebuild: Rebuild | None = None
         if command.is_whole:
-            base = past.base and self._vault.read(command.shard, past.base)
+            base = past.base and self._vault.read(shard, past.base)
             rebuild = Rebuild(base or b"", tuple(past.history))
         return encode_advance_request(
             AdvanceRequest(
@@ -208,7 +211,7 @@ class Advances:
                 epoch=self._terms.epoch,
                 number=command.number,
                 settings=self._terms.settings,
-                shard=command.shard,
+                shard=shard,
                 from_step=past.step,
                 from_digest=past.digest,
                 changes=past.asked.changes,
@@ -218,7 +221,7 @@ class Advances:
             )
         )
 
-    def _understood(self, event: Returned) -> Came:
+    def understood(self, event: Returned) -> Came:
         """Return what a worker's word means; one of no use is its error."""
         if event.outcome != "ok":
             return Came(event.number, event.outcome, event.reason)
@@ -232,12 +235,12 @@ class Advances:
         except MalformedMessage as error:
             self.malformed += 1
             return Came(event.number, "error", str(error))
-        self._answers[self.dispatch.shard_of(event.number)] = (answer, rows)
+        self._answers[self._island(event)] = (answer, rows)
         return Came(event.number, "done")
 
     def _check(self, answer: AdvanceAnswer, event: Returned) -> None:
         """Raise unless an answer is to its question."""
-        asked = self._past(self.dispatch.shard_of(event.number)).asked
+        asked = self._past(self._island(event)).asked
         assert asked is not None
         expected = (self._terms.epoch, event.number)
         if (answer.epoch, answer.number) != expected:
@@ -254,15 +257,18 @@ class Advances:
         if asked.wants_snapshot and not answer.snapshot:
             raise MalformedMessage("advance: a snapshot was wanted, got none")
 
-    def _accepted(self, command: Accept) -> Advanced:
+    def _island(self, event: Returned) -> int:
+        """Return whose advance came back."""
+        return self._islands[self._fleet.shards.shard_of(event.number)]
+
+    def _accepted(self, shard: int, agent: str) -> Advanced:
         """Return an advance that is done, its snapshot in the vault."""
-        answer, rows = self._answers.pop(command.shard)
-        asked, advance = self._past(command.shard).asked, answer.advance
+        answer, rows = self._answers.pop(shard)
+        asked, advance = self._past(shard).asked, answer.advance
         assert asked is not None
         assert advance is not None
         if answer.snapshot:
-            self._vault.write(command.shard, advance.step, answer.snapshot)
-        signed = Provenance(
-            command.agent, self._platforms[command.agent], answer.wall_s
-        )
-        return Advanced(command.shard, asked.number, advance, rows, signed)
+            self._vault.write(shard, advance.step, answer.snapshot)
+        platform = self._fleet.dispatch.platform(agent)
+        signed = Provenance(agent, platform, answer.wall_s)
+        return Advanced(shard, asked.number, advance, rows, signed)

@@ -6,19 +6,17 @@ comes back to the same decisions by replaying its journal.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import count
+from math import inf
 from typing import Protocol
 
 from coordinator.advances import Advances, Terms, Vault
 from coordinator.arena import Arena
-from coordinator.dispatch import Dispatch
 from coordinator.events import (
     Advanced,
     AdvanceShard,
     Append,
     ArenaCommand,
     Commanded,
-    DispatchEvent,
     Evaluate,
     Evaluated,
     EvaluationFailed,
@@ -27,11 +25,11 @@ from coordinator.events import (
     Journalled,
     Record,
     Started,
-    Ticked,
     Vet,
     Vetted,
     VettingFailed,
 )
+from coordinator.fleet import Asker, Fleet, Owner
 from coordinator.island import Island
 from coordinator.pacing import Pace
 from coordinator.questions import Question, Questions
@@ -43,16 +41,6 @@ Key = tuple[str, BirthId, int]
 
 Asked = Vet | Evaluate | AdvanceShard
 """What islands and arenas have others do."""
-
-
-class Agents(Protocol):
-    """Where jobs go and answers come from: a network, or this process."""
-
-    def send(self, number: int, agent: str, payload: bytes) -> None:
-        """Hand a job to an agent; its outcome comes by ``receive``."""
-
-    def receive(self, timeout_s: float) -> Sequence[DispatchEvent]:
-        """Return what happened, waiting at most ``timeout_s`` for the first."""
 
 
 class Log(Protocol):
@@ -88,23 +76,21 @@ class Loop:
         islands: Mapping[int, Island | Arena],
         *,
         question: Question,
-        agents: Agents,
+        fleet: Fleet,
         log: Log,
         rows: Rows,
         vault: Vault,
         pace: Pace | None = None,
     ) -> None:
         """Connect machines; nothing happens before ``start``."""
-        numbers = count(1)
         self.islands = dict(islands)
         self.advances = Advances(
             Terms(question.run, question.epoch, question.arena),
             vault,
-            numbers=numbers,
-            send=agents.send,
+            fleet,
         )
-        self._questions = Questions(question, numbers=numbers, send=agents.send)
-        self._agents = agents
+        self._questions = Questions(question, fleet)
+        self._fleet = fleet
         self._log = log
         self._rows = rows
         self._pace = pace
@@ -117,9 +103,19 @@ class Loop:
         return all(island.is_finished for island in self.islands.values())
 
     @property
-    def dispatch(self) -> Dispatch:
-        """Who does what, of single robots' questions."""
-        return self._questions.dispatch
+    def open(self) -> int:
+        """How many questions and advances others are at."""
+        return self._questions.open + self.advances.open
+
+    @property
+    def askers(self) -> tuple[Asker, Owner]:
+        """Whom the fleet names if there is news for this run."""
+        return self._questions, self.advances
+
+    @property
+    def wake_s(self) -> float:
+        """When ``act`` is due though nothing came, for the sake of the pace [s]."""
+        return min(self._held_back.values(), default=inf)
 
     @property
     def malformed(self) -> int:
@@ -155,31 +151,28 @@ class Loop:
         for number in sorted(self.islands):
             self.advances.request(number)
 
-    def step(self, timeout_s: float, now_s: float) -> int:
+    def act(self, now_s: float) -> None:
         """Take what came and act on it.
 
         Args:
-            timeout_s: how long to wait when nothing is there [s].
             now_s: the time, of any clock that only goes forward [s].
 
-        Returns:
-            The number of island events that were taken.
+        Raises:
+            JobRefused: nobody can do a job; the run stops as it is.
+            ExperimentError: restrictions that no robot meets.
+            RunFolderError: the disk is full or failed.
         """
         self._now_s = now_s
         for shard, due_s in sorted(self._held_back.items()):
             if due_s <= now_s:
                 del self._held_back[shard]
                 self.advances.request(shard)
-        wakes_s = (self.dispatch.wake_s, self.advances.dispatch.wake_s)
-        for wake_s in (*wakes_s, *self._held_back.values()):
-            if wake_s is not None:
-                timeout_s = min(timeout_s, max(0.0, wake_s - now_s))
-        events: list[Journalled] = []
-        for event in (Ticked(now_s), *self._agents.receive(timeout_s)):
-            events += self._questions.tell(event)
-            events += self.advances.tell(event)
-        self._take(events)
-        return len(events)
+        self._take([*self._questions.take(), *self.advances.come()])
+
+    def leave(self) -> None:
+        """Ask no more, and wait for nothing."""
+        self._fleet.leave(self._questions)
+        self.advances.release()
 
     def order(self, event: Commanded) -> None:
         """Take what an operator ordered; the journal has it on return.

@@ -16,6 +16,7 @@ from rich.progress import (
 )
 
 from coordinator.arena import Arena
+from coordinator.dispatch import Dispatch
 from coordinator.island import Island
 from coordinator.loop import Loop
 from schema.experiment import Experiment
@@ -26,9 +27,12 @@ _RATE_SPAN_S = 10.0
 class Display:
     """Progress bars of a run; a line every so often where there is no terminal."""
 
-    def __init__(self, loop: Loop, experiment: Experiment, *, quiet: bool) -> None:
+    def __init__(
+        self, loop: Loop, dispatch: Dispatch, experiment: Experiment, *, quiet: bool
+    ) -> None:
         """Show ``loop``, each of whose islands is run as ``experiment`` says."""
         self._loop = loop
+        self._dispatch = dispatch
         self._births = experiment.births
         self._step_s = experiment.simulation.timestep_s
         self._console = Console(stderr=True)
@@ -93,7 +97,7 @@ class Display:
         # Simulated seconds per second, of all arenas together.
         speed = (steps - first_steps) * self._step_s / span_s if span_s > 0 else 0.0
         arenas = ""
-        workers = self._loop.dispatch.agents("worker")
+        workers = self._dispatch.agents("worker")
         for number, island in self._loop.islands.items():
             best = max((one.fitness for one in island.population), default=None)
             arena = self._about(island, speed)
@@ -127,9 +131,7 @@ class Display:
     def _say_who_is_missing(self, now_s: float) -> None:
         """Say once, after a while, that nobody is there to do the work."""
         missing = [
-            kind
-            for kind in ("worker", "analyzer")
-            if not self._loop.dispatch.agents(kind)
+            kind for kind in ("worker", "analyzer") if not self._dispatch.agents(kind)
         ]
         if not missing:
             self._waits_since = None
@@ -138,7 +140,7 @@ class Display:
         elif now_s - self._waits_since > _RATE_SPAN_S:
             self._waits_since = now_s + 6 * _RATE_SPAN_S
             self._console.print(f"waiting: no {' and no '.join(missing)} has joined")
-        waiting = self._loop.advances.dispatch.waiting
+        waiting = self._loop.advances.waiting
         if "worker" not in missing and waiting != self._said_waiting:
             self._said_waiting = dict(waiting)
             for shard, platform in waiting.items():

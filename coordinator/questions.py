@@ -1,26 +1,21 @@
 """Single robots' questions, to analyzers and workers, and what comes of them."""
 
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from coordinator.dispatch import Dispatch
 from coordinator.events import (
     Answered,
-    Assign,
     Deliver,
-    DispatchCommand,
-    DispatchEvent,
     Evaluate,
     Evaluated,
     EvaluationFailed,
     Job,
     JobKind,
-    Requested,
     Returned,
     Vet,
     Vetted,
     VettingFailed,
 )
+from coordinator.fleet import Fleet
 from schema.birth import BirthId
 from schema.codec import Answer, decode_answer, encode_request, encode_robot
 from schema.errors import JobRefused, MalformedMessage
@@ -48,36 +43,28 @@ class Questions:
     """The questions of all islands of a run.
 
     Attributes:
-        dispatch: who does what.
         malformed: answers that did not decode or did not fit their question.
     """
 
-    def __init__(
-        self,
-        question: Question,
-        *,
-        numbers: Iterator[int],
-        send: Callable[[int, str, bytes], None],
-    ) -> None:
+    def __init__(self, question: Question, fleet: Fleet) -> None:
         """Have nothing to ask yet.
 
         Args:
             question: what all of them have in common.
-            numbers: of jobs, each used once, ascending.
-            send: takes number, agent and payload of a job.
+            fleet: whom to ask.
         """
-        self.dispatch = Dispatch()
         self.malformed = 0
         self._question = question
-        self._numbers = numbers
-        self._send = send
+        self._fleet = fleet
         self._open: dict[int, JobKind] = {}
+        self._came: list[Answered] = []
+        self._refusal: JobRefused | None = None
         self._answers: dict[int, Answer] = {}
         self._encoded: dict[BirthId, tuple[Robot, bytes]] = {}
 
     def ask(self, command: Vet | Evaluate) -> None:
         """Have a robot vetted or evaluated."""
-        number, birth = next(self._numbers), command.birth
+        number, birth = self._fleet.new_number(), command.birth
         cached = self._encoded.get(birth)
         if cached is not None and cached[0] is command.robot:
             robot = cached[1]
@@ -100,33 +87,43 @@ class Questions:
         kind: JobKind = "vet" if isinstance(command, Vet) else "evaluate"
         self._open[number] = kind
         job = Job(number, kind, birth, attempt, payload)
-        self._obey(self.dispatch.handle(Requested(job)))
+        self._fleet.ask(job, self)
 
-    def tell(self, event: DispatchEvent) -> list[Answered]:
-        """Take news of agents and jobs; return the answers that came.
+    @property
+    def open(self) -> int:
+        """How many questions have no answer yet."""
+        return len(self._open)
 
-        News of jobs that are none of these changes nothing.
+    def is_of(self, run: str, epoch: int) -> bool:
+        """Return whether the questions are those of a run's incarnation."""
+        return (run, epoch) == (self._question.run, self._question.epoch)
+
+    def deliver(self, command: Deliver) -> None:
+        """Keep the end of a job until ``take``."""
+        job = command.job
+        del self._open[job.number]
+        if not command.reason:
+            self._came.append(self._answered(command))
+            return
+        self._refusal = JobRefused(
+            f"birth {job.birth.number}: several agents cannot {job.kind} it, the last "
+            f"of them {command.agent}: {command.reason}; mend that and resume"
+        )
+
+    def take(self) -> list[Answered]:
+        """Return the answers that came since the last call.
 
         Raises:
             JobRefused: no agent that was asked can do a job; the run stops as it is.
         """
-        if isinstance(event, Returned) and event.number not in self._open:
-            return []
-        return self._obey(self.dispatch.handle(self._checked(event)))
+        if self._refusal is not None:
+            raise self._refusal
+        came, self._came = self._came, []
+        return came
 
-    def _obey(self, commands: Sequence[DispatchCommand]) -> list[Answered]:
-        answers: list[Answered] = []
-        for command in commands:
-            if isinstance(command, Assign):
-                job = command.job
-                self._send(job.number, command.agent, job.payload)
-            elif isinstance(command, Deliver):
-                answers.append(self._delivered(command))
-        return answers
-
-    def _checked(self, event: DispatchEvent) -> DispatchEvent:
+    def checked(self, event: Returned) -> Returned:
         """Return the event; an answer that is none becomes the agent's error."""
-        if not isinstance(event, Returned) or event.outcome != "ok":
+        if event.outcome != "ok":
             return event
         try:
             answer = decode_answer(event.answer)
@@ -150,26 +147,16 @@ class Questions:
         self.malformed += 1
         return replace(event, outcome="error", answer=b"", reason=reason)
 
-    def _delivered(self, command: Deliver) -> Answered:
-        """Return the island's event that a finished job comes to.
-
-        Raises:
-            JobRefused: no agent that was asked can do it.
-        """
+    def _answered(self, command: Deliver) -> Answered:
+        """Return the island's event that a finished job comes to."""
         job = command.job
-        del self._open[job.number]
-        if command.reason:
-            raise JobRefused(
-                f"birth {job.birth.number}: several agents cannot {job.kind} it, the "
-                f"last of them {command.agent}: {command.reason}; mend that and resume"
-            )
         answer = self._answers.pop(job.number)
         result = answer.result
         if job.kind == "vet":
             if isinstance(result, Report):
                 return Vetted(job.birth, job.attempt, result)
             return VettingFailed(job.birth, job.attempt, str(result))
-        platform = self.dispatch.platform(command.agent)
+        platform = self._fleet.dispatch.platform(command.agent)
         provenance = Provenance(command.agent, platform, answer.wall_s)
         if isinstance(result, Evaluation):
             return Evaluated(job.birth, result, provenance)

@@ -15,11 +15,12 @@ from threading import Event
 from coordinator.arena import Arena
 from coordinator.disk import replace_durably
 from coordinator.events import AgentKind, Record
+from coordinator.fleet import Agents, Fleet
 from coordinator.folder import DETAILS, RunDetails, RunFolder, read_state
 from coordinator.island import Island
 from coordinator.journal import Journal
 from coordinator.local import LocalAgents
-from coordinator.loop import Agents, Loop
+from coordinator.loop import Loop
 from coordinator.operator import Desk
 from coordinator.pacing import Pace
 from coordinator.progress import Display
@@ -116,10 +117,11 @@ def _run(folder: Path, details: RunDetails | None, deployment: Deployment) -> in
         experiment = experiment_from_text(held.details.document)
         agents, crews = stack.enter_context(_agents(held, deployment))
         machine = Arena if experiment.arena else Island
+        fleet = Fleet(agents)
         loop = Loop(
             {0: machine(experiment, held.details.seed, held.details.run)},
             question=_question(held, experiment),
-            agents=agents,
+            fleet=fleet,
             log=journal,
             rows=recorder,
             vault=Snapshots(folder),
@@ -128,9 +130,10 @@ def _run(folder: Path, details: RunDetails | None, deployment: Deployment) -> in
         loop.start(journal.replay())
         held.set_state("running")
         desk = Desk(loop, experiment)
-        with Display(loop, experiment, quiet=deployment.quiet) as display:
+        quiet = deployment.quiet
+        with Display(loop, fleet.dispatch, experiment, quiet=quiet) as display:
             chores = [recorder.flush, held.confirm, *crews]
-            _turn(loop, display, stop, chores, lambda: _serve(desk, agents))
+            _turn(loop, fleet, display, stop, chores, lambda: _serve(desk, agents))
         if not loop.is_finished:
             recorder.flush()
             held.set_state("stopped")
@@ -171,6 +174,7 @@ def _serve(desk: Desk, agents: Agents) -> None:
 
 def _turn(
     loop: Loop,
+    fleet: Fleet,
     display: Display,
     stop: Event,
     chores: list[Callable[[], None]],
@@ -179,7 +183,9 @@ def _turn(
     """Step until all is done or somebody says stop; do the chores once a second."""
     shown_s = done_s = -math.inf
     while not (loop.is_finished or stop.is_set()):
-        loop.step(_LOOK_S, time.monotonic())
+        now_s = time.monotonic()
+        fleet.listen(min(_LOOK_S, max(0.0, loop.wake_s - now_s)), now_s)
+        loop.act(time.monotonic())
         serve()
         now_s = time.monotonic()
         if now_s - shown_s >= _LOOK_S:

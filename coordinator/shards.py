@@ -49,7 +49,14 @@ class Came:
     reason: str = ""
 
 
-ShardEvent = Joined | Left | Ticked | Placed | Wanted | Came
+@dataclass(frozen=True, slots=True)
+class Released:
+    """A shard needs nothing more; whoever holds it may take another."""
+
+    shard: int
+
+
+ShardEvent = Joined | Left | Ticked | Placed | Wanted | Came | Released
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +185,9 @@ class ShardDispatch:
                 shard.is_wanted = True
             case Came():
                 return [*self._came(event), *self._hands()]
+            case Released():
+                self._unbind(self._shard(event.shard))
+                del self._shards[event.shard]
         return list(self._hands())
 
     def _shard(self, number: int) -> _Shard:

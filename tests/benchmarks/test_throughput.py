@@ -23,6 +23,7 @@ from coordinator.events import (
     Journalled,
     Started,
 )
+from coordinator.fleet import Fleet
 from coordinator.folder import RunDetails, RunFolder
 from coordinator.generation import generate
 from coordinator.island import Island
@@ -108,6 +109,7 @@ class Bench:
     """A run on its way: its loop, what it has evaluated, and its workers."""
 
     island: Island
+    fleet: Fleet
     loop: Loop
     journal: Counted
     workers: Crew
@@ -117,7 +119,8 @@ class Bench:
         before = self.journal.evaluations
         wall_s, cpu_s = time.perf_counter(), time.process_time()
         while not is_enough():
-            self.loop.step(0.2, time.monotonic())
+            self.fleet.listen(0.2, time.monotonic())
+            self.loop.act(time.monotonic())
         wall_s = time.perf_counter() - wall_s
         cpu_s = time.process_time() - cpu_s
         done = self.journal.evaluations - before
@@ -140,6 +143,7 @@ def started(
         agent = Agent("worker", "worker", network.address)
         crew = stack.enter_context(Crew(body, (agent,), size=workers))
         journal = Counted(stack.enter_context(Journal.open(folder)))
+        fleet = Fleet(network)
         loop = Loop(
             {0: island},
             question=Question(
@@ -148,16 +152,16 @@ def started(
                 vetting_settings(experiment),
                 evaluation_settings(experiment),
             ),
-            agents=network,
+            fleet=fleet,
             log=journal,
             rows=recorder,
             vault=Snapshots(folder),
         )
         loop.start([])
-        bench = Bench(island, loop, journal, crew)
+        bench = Bench(island, fleet, loop, journal, crew)
         bench.go_on(
             lambda: (
-                journal.evaluations >= 40 and loop.dispatch.agents("worker") == workers
+                journal.evaluations >= 40 and fleet.dispatch.agents("worker") == workers
             )
         )
         yield bench

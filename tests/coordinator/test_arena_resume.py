@@ -16,6 +16,7 @@ import analyzer.jobs
 from coordinator.arena import Arena
 from coordinator.compare import compare
 from coordinator.events import DispatchEvent, Returned
+from coordinator.fleet import Fleet
 from coordinator.folder import RunDetails, RunFolder
 from coordinator.journal import NAME, Journal
 from coordinator.local import LocalAgents
@@ -112,6 +113,7 @@ class Run:
         shards = other.pop("shards", None) or Shards(FakeWorld)
         agents = {"analyzer": analyzer.jobs.answer, "worker": shards.answer}
         self.arena = Arena(EXPERIMENT, DETAILS.seed, DETAILS.run)
+        self.fleet = Fleet(other.pop("agents", LocalAgents)(agents, "any"))
         self.loop = Loop(
             {0: self.arena},
             question=Question(
@@ -121,7 +123,7 @@ class Run:
                 evaluation=evaluation_settings(EXPERIMENT),
                 arena=arena_settings(EXPERIMENT),
             ),
-            agents=other.pop("agents", LocalAgents)(agents, "any"),
+            fleet=self.fleet,
             log=Frail(journal, point, "append"),
             rows=Frail(self.rows, point, "store"),
             vault=Frail(Snapshots(path), point, "write", "drop_before"),
@@ -143,7 +145,8 @@ def run(path: Path, point: Point = lambda _: None, **other: Any) -> bool:  # noq
             one = Run(path, stack, point, **other)
             turns = 0
             while not one.loop.is_finished:
-                one.loop.step(0.0, float(turns))
+                one.fleet.listen(0.0, float(turns))
+                one.loop.act(float(turns))
                 turns += 1
                 if turns % 7 == 0:
                     one.rows.flush()
@@ -275,7 +278,8 @@ def ordered(path: Path, point: Point) -> list[str]:
                 elif one.arena.is_paused:
                     said.append(one.ask(ListWish()).partition("\n")[0])
                     said.append(one.ask(ResumeWish(), "resume"))
-                one.loop.step(0.0, float(turns))
+                one.fleet.listen(0.0, float(turns))
+                one.loop.act(float(turns))
                 turns += 1
         except Killed:
             return said

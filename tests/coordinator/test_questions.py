@@ -1,11 +1,12 @@
 """Questions about single robots: what becomes of answers, good and bad."""
 
 from collections.abc import Callable
-from itertools import count
 
 import pytest
 
 from coordinator.events import (
+    Answered,
+    DispatchEvent,
     Evaluate,
     Evaluated,
     EvaluationFailed,
@@ -17,6 +18,7 @@ from coordinator.events import (
     Vetted,
     VettingFailed,
 )
+from coordinator.fleet import Fleet
 from coordinator.questions import Question, Questions
 from schema.birth import BirthId
 from schema.codec import Answer, decode_request, encode_answer
@@ -36,15 +38,24 @@ class Desk:
 
     def __init__(self) -> None:
         self.sent: list[tuple[int, str, bytes]] = []
-        self.questions = Questions(
-            Question("run", EPOCH, b"vetting", b"evaluation"),
-            numbers=count(),
-            send=lambda *job: self.sent.append(job),
-        )
+        self.fleet = Fleet(self)
+        question = Question("run", EPOCH, b"vetting", b"evaluation")
+        self.questions = Questions(question, self.fleet)
         for name in ("one", "two"):
-            self.questions.tell(Joined(name, "worker", 1, f"platform-{name}"))
-        self.questions.tell(Joined("judge", "analyzer", 1, "platform"))
-        self.questions.tell(Ticked(0.0))
+            self.tell(Joined(name, "worker", 1, f"platform-{name}"))
+        self.tell(Joined("judge", "analyzer", 1, "platform"))
+        self.tell(Ticked(0.0))
+
+    def send(self, number: int, agent: str, payload: bytes) -> None:
+        self.sent.append((number, agent, payload))
+
+    def receive(self, _timeout_s: float) -> list[DispatchEvent]:
+        return []
+
+    def tell(self, event: DispatchEvent) -> list[Answered]:
+        """Tell the fleet; return the answers that this comes to."""
+        self.fleet.tell(event)
+        return self.questions.take()
 
     def reply(self, result: Evaluation | Report | str, **changes: int) -> Returned:
         """Return the answer to the newest job."""
@@ -72,7 +83,7 @@ def test_a_request_carries_the_run_its_settings_and_the_robot(desk: Desk) -> Non
 
 def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:
     desk.questions.ask(Evaluate(BIRTH, ROBOT))
-    (event,) = desk.questions.tell(desk.reply(JUDGED))
+    (event,) = desk.tell(desk.reply(JUDGED))
     assert isinstance(event, Evaluated)
     assert (event.birth, event.evaluation) == (BIRTH, JUDGED)
     assert event.provenance.agent == "one"
@@ -82,25 +93,25 @@ def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:
 
 def test_a_failed_simulation_is_a_result(desk: Desk) -> None:
     desk.questions.ask(Evaluate(BIRTH, ROBOT))
-    (event,) = desk.questions.tell(desk.reply("diverged"))
+    (event,) = desk.tell(desk.reply("diverged"))
     assert isinstance(event, EvaluationFailed)
     assert event.reason == "diverged"
 
 
 def test_a_report_is_a_verdict_and_a_failure_a_failed_attempt(desk: Desk) -> None:
     desk.questions.ask(Vet(BIRTH, 4, ROBOT))
-    assert desk.questions.tell(desk.reply(VIABLE)) == [Vetted(BIRTH, 4, VIABLE)]
+    assert desk.tell(desk.reply(VIABLE)) == [Vetted(BIRTH, 4, VIABLE)]
     desk.questions.ask(Vet(BIRTH, 5, ROBOT))
     failed = VettingFailed(BIRTH, 5, "no box")
-    assert desk.questions.tell(desk.reply("no box")) == [failed]
+    assert desk.tell(desk.reply("no box")) == [failed]
 
 
 def test_a_second_answer_and_one_to_nothing_change_nothing(desk: Desk) -> None:
     desk.questions.ask(Evaluate(BIRTH, ROBOT))
     reply = desk.reply(JUDGED)
-    assert len(desk.questions.tell(reply)) == 1
-    assert desk.questions.tell(reply) == []
-    assert desk.questions.tell(Returned(99, "one", "ok", b"")) == []
+    assert len(desk.tell(reply)) == 1
+    assert desk.tell(reply) == []
+    assert desk.tell(Returned(99, "one", "ok", b"")) == []
 
 
 @pytest.mark.parametrize(
@@ -117,29 +128,29 @@ def test_a_useless_answer_is_counted_and_the_job_goes_to_another(
     desk: Desk, spoil: Callable[[Desk], Returned]
 ) -> None:
     desk.questions.ask(Evaluate(BIRTH, ROBOT))
-    assert desk.questions.tell(spoil(desk)) == []
+    assert desk.tell(spoil(desk)) == []
     assert desk.questions.malformed == 1
     assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
-    (event,) = desk.questions.tell(desk.reply(JUDGED))
+    (event,) = desk.tell(desk.reply(JUDGED))
     assert isinstance(event, Evaluated)
 
 
 def test_a_lost_job_goes_to_another(desk: Desk) -> None:
     desk.questions.ask(Evaluate(BIRTH, ROBOT))
-    assert desk.questions.tell(Left("one")) == []
+    assert desk.tell(Left("one")) == []
     assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
 
 
 def test_a_job_that_several_refuse_stops_the_run_and_is_no_result(
     desk: Desk,
 ) -> None:
-    desk.questions.tell(Joined("three", "worker", 1, ""))
+    desk.tell(Joined("three", "worker", 1, ""))
     desk.questions.ask(Evaluate(BIRTH, ROBOT))
     for _ in range(2):
         number, agent, _ = desk.sent[-1]
         refusal = Returned(number, agent, "error", reason="no such plug-in")
-        assert desk.questions.tell(refusal) == []
+        assert desk.tell(refusal) == []
     number, agent, _ = desk.sent[-1]
     with pytest.raises(JobRefused, match=r"birth 7.*cannot evaluate.*no such plug-in"):
-        desk.questions.tell(Returned(number, agent, "error", reason="no such plug-in"))
+        desk.tell(Returned(number, agent, "error", reason="no such plug-in"))
     assert sorted(agent for _, agent, _ in desk.sent) == ["one", "three", "two"]

@@ -13,6 +13,7 @@ import pytest
 
 import analyzer.jobs
 from coordinator.compare import compare
+from coordinator.fleet import Fleet
 from coordinator.folder import RunDetails, RunFolder
 from coordinator.island import Island
 from coordinator.journal import NAME, Journal
@@ -63,6 +64,11 @@ def run(path: Path, *, answers: int = 10**9) -> int:
     details = None if (path / NAME).exists() else DETAILS
     with RunFolder(path, details) as folder, Journal.open(path) as journal:
         rows = Recorder(path, DETAILS)
+        fleet = Fleet(
+            LocalAgents(
+                {"analyzer": analyzer.jobs.answer, "worker": worker.answer}, "any"
+            )
+        )
         loop = Loop(
             {0: Island(EXPERIMENT, DETAILS.seed, DETAILS.run)},
             question=Question(
@@ -71,9 +77,7 @@ def run(path: Path, *, answers: int = 10**9) -> int:
                 vetting=vetting_settings(EXPERIMENT),
                 evaluation=evaluation_settings(EXPERIMENT),
             ),
-            agents=LocalAgents(
-                {"analyzer": analyzer.jobs.answer, "worker": worker.answer}, "any"
-            ),
+            fleet=fleet,
             log=journal,
             rows=rows,
             vault=Snapshots(path),
@@ -81,7 +85,8 @@ def run(path: Path, *, answers: int = 10**9) -> int:
         try:
             loop.start(journal.replay())
             while not loop.is_finished:
-                loop.step(0.0, 0.0)
+                fleet.listen(0.0, 0.0)
+                loop.act(0.0)
                 rows.flush()
         except Killed:
             rows.close()
