@@ -10,9 +10,10 @@ from functools import lru_cache
 from math import pi
 from typing import Annotated, Literal
 
-from msgspec import Meta
+from msgspec import Meta, structs
 
 from schema.errors import ExperimentError
+from schema.migration import Migration
 from schema.parts import BodySpace, Parameter, PartType
 from schema.plugin import load
 from schema.section import (
@@ -160,8 +161,30 @@ class Arena(Section, frozen=True):
     split_distance_m: NotNegative = 0.06
 
 
+class Islands(Section, frozen=True):
+    """Some islands, and what is different on them; None is as in the document.
+
+    A section that a document holds here changes its own keys only; read, it is
+    whole.
+    """
+
+    count: AtLeastOne = 1
+    births: AtLeastOne | None = None
+    generation: Generation | None = None
+    variation: Variation | None = None
+    selection: Selection | None = None
+    simulation: Simulation | None = None
+    fitness: Fitness | None = None
+    arena: Arena | None = None
+    migration: Migration | None = None
+
+
 class Experiment(Section, frozen=True):
-    """One experiment; ``births`` counts the initial population."""
+    """One experiment; ``births`` counts the initial population.
+
+    Without ``islands`` it is one island. With them they are numbered from 0, in the
+    order of the document, and ``births`` counts on each.
+    """
 
     name: str
     births: AtLeastOne = 3000
@@ -173,11 +196,47 @@ class Experiment(Section, frozen=True):
     simulation: Simulation = Simulation()
     fitness: Fitness = Fitness()
     arena: Arena | None = None
+    islands: tuple[Islands, ...] = ()
+    migration: Migration | None = None
 
     @property
     def window(self) -> int:
         """Births in flight at once: a whole brood unless the document says less."""
         return self.selection.window or self.selection.children
+
+
+def island_count(experiment: Experiment) -> int:
+    """Return how many islands an experiment has."""
+    return sum(islands.count for islands in experiment.islands) or 1
+
+
+@lru_cache(maxsize=1024)
+def island_experiment(experiment: Experiment, number: int) -> Experiment:
+    """Return what is done on one island, as an experiment of its own.
+
+    Its ``migration`` is the island's; it names no ``islands``.
+
+    Raises:
+        ValueError: it has no island of that number.
+    """
+    count = island_count(experiment)
+    if not 0 <= number < count:
+        raise ValueError(f"island must be in 0..{count - 1}, got {number}")
+    changes: dict[str, object] = {}
+    for islands in experiment.islands:
+        if number < islands.count:
+            changes = structs.asdict(islands)
+            break
+        number -= islands.count
+    changes.pop("count", None)
+    changes = {name: value for name, value in changes.items() if value is not None}
+    return structs.replace(experiment, islands=(), **changes)
+
+
+def with_births(experiment: Experiment, births: int) -> Experiment:
+    """Return an experiment that ends, on each of its islands, at ``births``."""
+    islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
+    return structs.replace(experiment, births=births, islands=islands)
 
 
 @lru_cache(maxsize=64)

@@ -4,7 +4,8 @@ from collections.abc import Callable
 from math import isclose, lcm
 
 from schema.errors import ExperimentError
-from schema.experiment import Experiment, body_space, steps_of
+from schema.experiment import Experiment, body_space, island_experiment, steps_of
+from schema.migration_check import migration_problem
 
 
 def check_experiment(experiment: Experiment, where: str) -> None:
@@ -14,7 +15,7 @@ def check_experiment(experiment: Experiment, where: str) -> None:
         ExperimentError: a restriction that no robot can meet, a selection that
             cannot draw its parents, a window that ends between two samples, an
             arena too small or with clocks that do not meet, a plug-in that does
-            not exist.
+            not exist, a migration that can never happen.
     """
     checks: list[Callable[[Experiment], str]] = [
         _limits_problem,
@@ -23,9 +24,19 @@ def check_experiment(experiment: Experiment, where: str) -> None:
         _arena_problem,
         _arena_clock_problem,
     ]
-    for check in checks:
-        if problem := check(experiment):
-            raise ExperimentError(f"{where}: {problem}")
+    first = 0
+    for index, islands in enumerate(experiment.islands):
+        alone = island_experiment(experiment, first)
+        for check in checks:
+            if problem := check(alone):
+                raise ExperimentError(f"{where}: islands[{index}]: {problem}")
+        first += islands.count
+    if not experiment.islands:
+        for check in checks:
+            if problem := check(experiment):
+                raise ExperimentError(f"{where}: {problem}")
+    if problem := migration_problem(experiment):
+        raise ExperimentError(f"{where}: {problem}")
     types = body_space(experiment.space)
     core = next(kind for kind in types.values() if kind.is_root)
     if core.inputs > experiment.space.max_inputs:

@@ -68,12 +68,29 @@ def parse_experiment(text: str, where: str) -> Experiment:
     except tomllib.TOMLDecodeError as error:
         raise ExperimentError(f"{where}: not TOML: {error}") from None
     _refuse_unknown(document, Experiment, where, "")
+    document = _completed(document)
     try:
         experiment = msgspec.convert(document, type=Experiment)
     except msgspec.ValidationError as error:
         raise ExperimentError(f"{where}: {_explain(error, document)}") from None
     check_experiment(experiment, where)
     return experiment
+
+
+def _completed(document: dict[str, Any]) -> dict[str, Any]:
+    """Return a document whose ``islands`` have their sections whole."""
+    if "islands" not in document:
+        return document
+    islands = [
+        {key: _completed_table(document.get(key), value) for key, value in each.items()}
+        for each in document["islands"]
+    ]
+    return {**document, "islands": islands}
+
+
+def _completed_table(kept: Any, changed: Any) -> Any:  # noqa: ANN401 - any TOML value
+    """Return a section in which what islands change stands among what they keep."""
+    return {**(kept or {}), **changed} if isinstance(changed, dict) else changed
 
 
 def experiment_text(experiment: Experiment) -> str:
@@ -116,10 +133,16 @@ def _refuse_unknown(
                     f"{where}: {prefix}{key}: must be finite, got {number}"
                 )
         inner = _section(fields[key].type)
-        if inner is not None:
-            if not isinstance(value, dict):
-                raise ExperimentError(f"{where}: {prefix}{key}: must be a table")
-            _refuse_unknown(value, inner, where, f"{prefix}{key}.")
+        if inner is None:
+            continue
+        if key == "islands" and isinstance(value, list):
+            tables = {f"{prefix}{key}[{at}]": each for at, each in enumerate(value)}
+        else:
+            tables = {f"{prefix}{key}": value}
+        for name, table in tables.items():
+            if not isinstance(table, dict):
+                raise ExperimentError(f"{where}: {name}: must be a table")
+            _refuse_unknown(table, inner, where, f"{name}.")
 
 
 def _section(kind: Any) -> type[Struct] | None:  # noqa: ANN401 - any annotation
@@ -136,8 +159,8 @@ def _explain(error: msgspec.ValidationError, document: dict[str, Any]) -> str:
     key = path.rstrip("`")
     value: Any = document
     for name in key.split(".") if key else ():
-        name, _, index = name.partition("[")  # noqa: PLW2901 - one word, then its index
-        value = value.get(name) if isinstance(value, dict) else None
-        if index and isinstance(value, list):
-            value = value[int(index.rstrip("]"))]
+        word, *places = name.replace("]", "").split("[")
+        value = value.get(word) if isinstance(value, dict) else None
+        for place in places:
+            value = value[int(place)] if isinstance(value, list) else None
     return f"{key}: {message}, got {value!r}" if key else message
