@@ -190,7 +190,7 @@ def test_only_planar_bodies_hold_bars_flat() -> None:
 def test_text_round_trip() -> None:
     experiment = parse("births = 40\n[simulation]\ntimestep_s = 0.001")
     assert experiment_from_text(experiment_text(experiment)) == experiment
-    with pytest.raises(ExperimentError, match="settings"):
+    with pytest.raises(ExperimentError, match="experiment of a run"):
         experiment_from_text("{}")
 
 
