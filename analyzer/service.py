@@ -3,8 +3,9 @@
 from analyzer.jobs import answer
 from schema.network import Agent
 from schema.service import serve_as_process
+from schema.supervision import Post
 
 
-def process(agent: Agent, index: int) -> None:
+def process(agent: Agent, post: Post) -> None:
     """Be one process of a crew of analyzers; returns when asked to end."""
-    serve_as_process(answer, agent, index)
+    serve_as_process(answer, agent, post)

@@ -5,7 +5,7 @@ Pure: tokens and introductions in, news for the dispatch machine out.
 
 from google.protobuf.message import DecodeError
 
-from coordinator.events import AgentKind, Joined, Left
+from coordinator.events import AgentKind, Died, Joined, Left
 from schema import revolve_pb2 as pb
 from schema.errors import MalformedMessage
 from schema.topics import Member, member_of
@@ -24,6 +24,7 @@ class Roster:
         self._version = version
         self._members: dict[str, Member] = {}
         self._joined: set[str] = set()
+        self._mourned: set[str] = set()
 
     def find(self, agent: str) -> Member | None:
         """Return where an agent is reached; None if it is not there."""
@@ -60,12 +61,29 @@ class Roster:
         known = agent in self._joined or agent in self.refused
         return agent in self._members and not known
 
-    def introduce(self, agent: str, data: bytes) -> Joined | None:
-        """Take what an agent says of itself; None if it may not take part.
+    def refuse(self, agent: str, why: str) -> Left | None:
+        """Let an agent take part no more; return what that means for jobs.
+
+        Args:
+            agent: that joined, or that is gone since.
+            why: for the user.
+        """
+        if agent not in self._joined:
+            return None
+        self._joined.remove(agent)
+        self.refused[agent] = why
+        return Left(agent)
+
+    def introduce(self, agent: str, data: bytes) -> list[Died | Joined]:
+        """Take what an agent says of itself and of those whose place it took.
 
         Args:
             agent: that was asked; still a stranger.
             data: bytes of an ``AgentInfo``.
+
+        Returns:
+            Who died that was not known to be dead; last, if it may take part, that
+            the agent joined.
 
         Raises:
             MalformedMessage: not such bytes, no slots, or it says it is another.
@@ -82,7 +100,16 @@ class Roster:
             self.refused[agent] = (
                 f"is of version {info.version!r}, the coordinator of {self._version!r}"
             )
-            return None
+            return []
         self._joined.add(agent)
         kind: AgentKind = "analyzer" if member.role == "analyzer" else "worker"
-        return Joined(agent, kind, info.slots, info.platform)
+        joined = Joined(agent, kind, info.slots, info.platform)
+        return [*self._new_dead(info), joined]
+
+    def _new_dead(self, info: pb.AgentInfo) -> list[Died]:
+        new = [each for each in info.deaths if each.agent not in self._mourned]
+        self._mourned.update(each.agent for each in new)
+        return [
+            Died(each.run, each.epoch, each.number, each.agent, each.cause[:100])
+            for each in new
+        ]

@@ -7,7 +7,7 @@ The network's threads only enqueue; whoever owns ``Network`` calls ``send`` and
 import json
 import logging
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
@@ -15,7 +15,7 @@ from typing import Self
 
 import zenoh
 
-from coordinator.events import AgentKind, DispatchEvent, Returned
+from coordinator.events import AgentKind, DispatchEvent, Left, Returned
 from coordinator.roster import Roster
 from schema.errors import MalformedMessage, NetworkError
 from schema.network import (
@@ -24,12 +24,14 @@ from schema.network import (
     FENCED,
     JOB_TIMEOUT_S,
     THIS_MACHINE,
+    UNFIT,
     Tls,
     client_config,
     hub_config,
     parse_address,
 )
-from schema.platform_tag import our_version
+from schema.platform_tag import wire_version
+from schema.service import Outlet
 from schema.topics import Member, agents_alive, check_name, member_of
 
 _LOG = logging.getLogger(__name__)
@@ -64,14 +66,14 @@ _News = _Asked | zenoh.Sample | zenoh.Query
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What an operator sent, and where the reply goes; ``reply`` it once."""
+    """What somebody asked, and where the reply goes; ``reply`` it once."""
 
     data: bytes
     query: zenoh.Query
     key: str
 
     def reply(self, data: bytes) -> None:
-        """Answer the operator, whether it still waits or not."""
+        """Answer whoever asked, whether it still waits or not."""
         with self.query as query:
             query.reply(self.key, data)
 
@@ -117,9 +119,11 @@ class Network:
         )
         self._is_hub = not connect
         self._inbox: SimpleQueue[_News] = SimpleQueue()
-        self._roster = Roster(our_version())
+        self._roster = Roster(wire_version())
         self._ask_again: list[tuple[float, str]] = []
         self._orders: list[Order] = []
+        self._onlookers: list[Order] = []
+        self._outlet = Outlet()
 
     @property
     def refused(self) -> Mapping[str, str]:
@@ -167,6 +171,10 @@ class Network:
         self._operators = self._session.declare_queryable(
             self._me.command, put, complete=True
         )
+        self._viewers = self._session.declare_queryable(
+            self._me.state, put, complete=True
+        )
+        self._outlet.lead_to(self._session)
         self._token = self._session.liveliness().declare_token(self._me.alive)
 
     def _free_address(self) -> str:
@@ -190,6 +198,16 @@ class Network:
             self._ask(asked, member.jobs, payload, JOB_TIMEOUT_S)
         else:
             asked.end()
+
+    def cancel(self, agent: str, payload: bytes) -> None:
+        """Tell an agent that nobody waits for a job; it may have begun it.
+
+        Args:
+            agent: that was given the job, and may have left.
+            payload: an encoded request that need name only the job.
+        """
+        if member := self._roster.find(agent):
+            self._session.put(member.cancelled, payload)
 
     def _ask(
         self, asked: _Asked, key: str, payload: bytes | None, timeout_s: float
@@ -218,10 +236,8 @@ class Network:
         try:
             news = self._inbox.get(timeout=timeout_s)
             while True:
-                event = self._understand(news)
-                if event is not None:
-                    events.append(event)
-                if len(events) == _MOST_AT_ONCE:
+                events += self._understand(news)
+                if len(events) >= _MOST_AT_ONCE:
                     return events
                 news = self._inbox.get_nowait()
         except Empty:
@@ -232,51 +248,72 @@ class Network:
         orders, self._orders = self._orders, []
         return orders
 
-    def _understand(self, news: _News) -> DispatchEvent | None:
+    def onlookers(self) -> list[Order]:
+        """Return who asked, since the last call, to be told all of a run."""
+        onlookers, self._onlookers = self._onlookers, []
+        return onlookers
+
+    @property
+    def has_audience(self) -> bool:
+        """Somebody listens to the news."""
+        return self._outlet.has_listeners(self._me.events)
+
+    def tell(self, data: bytes) -> None:
+        """Publish news, best effort."""
+        self._outlet.put(self._me.events, data)
+
+    def _understand(self, news: _News) -> Sequence[DispatchEvent]:
         """Return what news means for who gives out jobs, if anything."""
         if isinstance(news, zenoh.Query):
             data = b"" if news.payload is None else news.payload.to_bytes()
-            self._orders.append(Order(data, news, self._me.command))
-            return None
+            is_onlooker = str(news.key_expr) == self._me.state
+            asked = self._onlookers if is_onlooker else self._orders
+            key = self._me.state if is_onlooker else self._me.command
+            asked.append(Order(data, news, key))
+            return []
         try:
             if isinstance(news, zenoh.Sample):
                 return self._token_changed(news)
             if news.number < 0:
                 return self._introduced(news)
-            return self._returned(news)
+            return [self._returned(news)]
         except MalformedMessage as error:
             self.malformed += 1
             _LOG.warning("dropped a malformed message: %s", error)
-            return None
+            return []
 
-    def _token_changed(self, sample: zenoh.Sample) -> DispatchEvent | None:
+    def _token_changed(self, sample: zenoh.Sample) -> list[DispatchEvent]:
         key = str(sample.key_expr)
         if sample.kind != zenoh.SampleKind.PUT:
-            return self._roster.vanish(key)
+            left = self._roster.vanish(key)
+            return [left] if left else []
         if member := self._roster.appear(key):
             self._ask_info(member.name)
-        return None
+        return []
 
     def _ask_info(self, agent: str) -> None:
         if member := self._roster.find(agent):
             asked = _Asked(agent, -1, self._inbox)
             self._ask(asked, member.info, None, ASK_TIMEOUT_S)
 
-    def _introduced(self, asked: _Asked) -> DispatchEvent | None:
+    def _introduced(self, asked: _Asked) -> Sequence[DispatchEvent]:
         """Let an agent take part that says what it is and is of our version."""
         agent, reply = asked.agent, asked.reply
         if not self._roster.is_stranger(agent):
-            return None
+            return []
         if reply is None or reply.ok is None:
             # It lives but does not answer (yet).
             self._ask_again.append((time.monotonic() + _ASK_AGAIN_S, agent))
-            return None
-        joined = self._roster.introduce(agent, reply.ok.payload.to_bytes())
-        if joined is None:
-            _LOG.warning("refused: %s %s", agent, self.refused[agent])
-        return joined
+            return []
+        events = self._roster.introduce(agent, reply.ok.payload.to_bytes())
+        if agent in self.refused:
+            self._say_refused(agent)
+        return events
 
-    def _returned(self, asked: _Asked) -> DispatchEvent:
+    def _say_refused(self, agent: str) -> None:
+        _LOG.warning("refused: %s: %s", agent, self.refused[agent])
+
+    def _returned(self, asked: _Asked) -> Returned | Left:
         number, agent, reply = asked.number, asked.agent, asked.reply
         if reply is None:
             return Returned(number, agent, "lost")
@@ -289,6 +326,11 @@ class Network:
         reason = told.decode("utf-8", "replace")[:_LONGEST_REASON]
         if reason.startswith(FENCED):
             raise NetworkError(f"this coordinator stops: {reason[len(FENCED) :]}")
+        if reason.startswith(UNFIT):
+            if left := self._roster.refuse(agent, reason[len(UNFIT) :]):
+                self._say_refused(agent)
+                return left
+            return Returned(number, agent, "lost")
         return Returned(number, agent, "error", reason=reason or "no reason given")
 
 

@@ -5,6 +5,7 @@ starts those again that are killed, and ends all on Ctrl-C.
 """
 
 import argparse
+import math
 import re
 import socket
 import sys
@@ -15,6 +16,7 @@ from typing import NoReturn
 from schema.crew import Crew, stop_on_signals, stop_with_input
 from schema.errors import NetworkError, RevolveError
 from schema.network import DEFAULT_FLEET, Agent, Tls, client_config
+from schema.supervision import CPU_LIMIT_S, Death, Post
 from schema.topics import Role, check_name
 
 _POLL_S = 0.5
@@ -38,6 +40,18 @@ def add_network_flags(flags: argparse.ArgumentParser) -> None:
     )
     flags.add_argument("--tls-certificate", metavar="FILE", help="own one (PEM)")
     flags.add_argument("--tls-key", metavar="FILE", help="own key (PEM, PKCS#8)")
+
+
+def add_cpu_limit(flags: argparse.ArgumentParser) -> None:
+    """Add how much CPU time a job may take before its process is ended."""
+    flags.add_argument(
+        "--cpu-limit",
+        type=_seconds,
+        default=CPU_LIMIT_S,
+        metavar="S",
+        help="CPU seconds after which a job counts as one that never ends "
+        f"(default: {CPU_LIMIT_S:.0f})",
+    )
 
 
 def tls_of(options: argparse.Namespace) -> Tls | None:
@@ -68,7 +82,7 @@ def host_name() -> str:
 
 def run_crew(
     role: Role,
-    body: Callable[[Agent, int], None],
+    body: Callable[[Agent, Post], None],
     arguments: list[str],
     processes: int,
 ) -> int:
@@ -76,7 +90,7 @@ def run_crew(
 
     Args:
         role: "worker" or "analyzer".
-        body: what each process does with its agent and its number.
+        body: what each process does with its agent and its place.
         arguments: of the user, after the command's name.
         processes: how many unless the user says so.
     """
@@ -90,6 +104,7 @@ def run_crew(
             check_name(options.fleet, "--fleet"),
             tls=tls_of(options),
             threads=options.threads,
+            cpu_limit_s=options.cpu_limit,
         )
         client_config(agent.connect, agent.tls)
     except RevolveError as error:
@@ -97,20 +112,28 @@ def run_crew(
     stop = stop_on_signals()
     if options.until_closed:
         stop_with_input(stop)
-    restarts = 0
+    restarts = deaths = 0
     try:
         with Crew(body, (agent,), size=options.processes) as crew:
             while not stop.is_set():
                 crew.look_after()
                 crew.wait(_POLL_S)
+                for death in crew.deaths[deaths:]:
+                    sys.stderr.write(f"{tell_death(death)}\n")
                 if crew.restarts > restarts:
-                    restarts = crew.restarts
                     sys.stderr.write(f"a {role} was killed; another takes its place\n")
+                restarts, deaths = crew.restarts, len(crew.deaths)
                 if len(crew.exit_codes) == options.processes:
                     return max(crew.exit_codes)
     except KeyboardInterrupt:
         return 130
     return 0
+
+
+def tell_death(death: Death) -> str:
+    """Return, in a line, what a process died of."""
+    task = death.task
+    return f"{task.agent} died of job {task.number} of {task.run}: {death.cause}"
 
 
 def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
@@ -141,6 +164,7 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
         action="store_true",
         help="end when standard input is closed, too",
     )
+    add_cpu_limit(flags)
     flags.set_defaults(threads=1)
     if role == "worker":
         flags.add_argument(
@@ -157,3 +181,10 @@ def _at_least_one(text: str) -> int:
     if not (text.isascii() and text.isdigit() and int(text) >= 1):
         raise argparse.ArgumentTypeError(f"must be a whole number >= 1, got {text!r}")
     return int(text)
+
+
+def _seconds(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"must be > 0 and finite, got {text!r}")
+    return value

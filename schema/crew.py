@@ -1,8 +1,9 @@
 """A crew of processes that one process starts, watches and ends.
 
 Processes are spawned, never forked: the network does not survive a fork. One
-that is killed is started again; one that ends by itself meant to. None outlives
-the one that started it.
+that is killed is started again; one that ends between two jobs meant to. None
+outlives the one that started it. Who takes a dead one's place is told what that one
+died of, if its job did it.
 """
 
 import os
@@ -10,9 +11,12 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from multiprocessing import connection, get_context, parent_process
 from multiprocessing.context import SpawnProcess
 from typing import Any, Self
+
+from schema.supervision import LAST_DEATHS, Death, JobNote, Post, own_doing
 
 # So that results depend on no library's number of threads. These count only if
 # set before numpy is imported: in whoever starts the crew.
@@ -46,7 +50,12 @@ def cores() -> int:
 
 
 class Crew:
-    """Processes that all run ``body(*arguments, index)``; use it in a ``with``."""
+    """Processes that all run ``body(*arguments, post)``; use it in a ``with``.
+
+    Attributes:
+        restarts: how often one was started anew.
+        deaths: of those who died of their job.
+    """
 
     def __init__(
         self, body: Callable[..., None], arguments: tuple[Any, ...], *, size: int
@@ -56,7 +65,10 @@ class Crew:
         self._context = get_context("spawn")
         self._processes: list[SpawnProcess | None] = [None] * size
         self._started_s = [-_BETWEEN_STARTS_S] * size
+        self._posts = [Post(index, JobNote()) for index in range(size)]
+        self._codes: list[int | None] = [None] * size
         self.restarts = 0
+        self.deaths: list[Death] = []
 
     def __enter__(self) -> Self:
         try:
@@ -76,24 +88,39 @@ class Crew:
 
     @property
     def exit_codes(self) -> list[int]:
-        """How those ended that ended by themselves."""
-        codes = [process.exitcode for process in self._processes if process]
-        return [code for code in codes if code is not None and code >= 0]
+        """How those ended that ended by themselves, and meant to."""
+        return [code for code in self._codes if code is not None]
 
     def look_after(self) -> None:
         """Start who is not there yet, and again who was killed; not twice a second."""
         now_s = time.monotonic()
         for index, process in enumerate(self._processes):
-            was_killed = process is not None and (process.exitcode or 0) < 0
-            is_due = now_s - self._started_s[index] >= _BETWEEN_STARTS_S
-            if is_due and (process is None or was_killed):
-                self.restarts += was_killed
+            if process is not None and process.exitcode is not None:
+                self._bury(index, process.exitcode)
+            is_gone = self._processes[index] is None and self._codes[index] is None
+            if is_gone and now_s - self._started_s[index] >= _BETWEEN_STARTS_S:
+                self.restarts += self._started_s[index] >= 0.0
                 self._started_s[index] = now_s
                 self._processes[index] = self._start(index)
 
+    def _bury(self, index: int, code: int) -> None:
+        """Note how a process ended."""
+        self._processes[index] = None
+        post = self._posts[index]
+        assert post.note is not None
+        task = post.note.read()
+        post.note.end()
+        if task is None and code >= 0:
+            self._codes[index] = code
+        elif task is not None and (cause := own_doing(code)):
+            death = Death(task, cause)
+            self.deaths.append(death)
+            deaths = (*post.deaths, death)[-LAST_DEATHS:]
+            self._posts[index] = replace(post, deaths=deaths)
+
     def _start(self, index: int) -> SpawnProcess:
         process = self._context.Process(
-            target=self._body, args=(*self._arguments, index)
+            target=self._body, args=(*self._arguments, self._posts[index])
         )
         # A Ctrl-C of the terminal reaches all; only this process shall act on it.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

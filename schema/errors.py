@@ -16,6 +16,10 @@ class UnknownPlugin(ExperimentError):  # noqa: N818 - reads as what it says
     """A ``module:attribute`` or a name that nothing answers to."""
 
 
+class PluginDiffers(RevolveError):  # noqa: N818 - reads as what it says
+    """A machine without a plug-in of the run, or with another of its name."""
+
+
 class InvalidRobot(RevolveError):  # noqa: N818 - reads as what it says
     """A robot or genome that breaks the rules of its body space."""
 

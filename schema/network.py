@@ -11,6 +11,7 @@ from ipaddress import ip_address
 from typing import Any
 
 from schema.errors import NetworkError
+from schema.supervision import CPU_LIMIT_S
 from schema.topics import Role
 
 # Port 0: whichever is free.
@@ -19,6 +20,8 @@ DEFAULT_FLEET = "default"
 
 # How an agent's refusal begins if a newer coordinator has taken the run over.
 FENCED = "fenced: "
+# And if it cannot do any job of the run, for want of the run's plug-ins.
+UNFIT = "unfit: "
 # No clock of ours ends a job: a week is longer than any [s].
 JOB_TIMEOUT_S = 7 * 24 * 3600.0
 ASK_TIMEOUT_S = 10.0
@@ -58,6 +61,7 @@ class Agent:
         platform: tag of CPU, system and libraries.
         version: of Revolve Islands.
         threads: that advance one arena together.
+        cpu_limit_s: CPU time of a job after which it counts as one that hangs [s].
     """
 
     role: Role
@@ -69,6 +73,7 @@ class Agent:
     platform: str = ""
     version: str = ""
     threads: int = 1
+    cpu_limit_s: float = CPU_LIMIT_S
 
 
 def parse_address(address: str) -> tuple[str, str, int]:

@@ -5,9 +5,12 @@ Two machines with equal tags give equal results; with other tags they may.
 
 import platform
 from collections.abc import Collection
+from hashlib import sha256
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed
 from pathlib import Path
+
+from schema.revolve_pb2 import DESCRIPTOR
 
 # What compilers and libraries choose their code by (x86-64 psABI levels); each
 # level includes those before it.
@@ -33,6 +36,12 @@ def platform_tag() -> str:
 def our_version() -> str:
     """Return the version of Revolve Islands, 0 if it is run without installing."""
     return _version("revolve-islands")
+
+
+def wire_version() -> str:
+    """Return our version and, after a ``+``, which messages it speaks."""
+    messages = sha256(DESCRIPTOR.serialized_pb).hexdigest()
+    return f"{our_version()}+{messages[:8]}"
 
 
 def cpu_class(machine: str, flags: Collection[str]) -> str:

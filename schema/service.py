@@ -9,43 +9,30 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from queue import Empty, SimpleQueue
 
 import zenoh
-from google.protobuf.message import DecodeError
 
-from schema import revolve_pb2 as pb
 from schema.crew import stop_on_signals, stop_with_parent
-from schema.errors import MalformedMessage, RevolveError
-from schema.network import FENCED, Agent, client_config
-from schema.platform_tag import our_version, platform_tag
+from schema.network import Agent, client_config
+from schema.platform_tag import platform_tag, wire_version
+from schema.serving import Server, Tally
+from schema.supervision import Post
 from schema.topics import Member, check_name, unique_name
 
 _POLL_S = 0.2
 _RETRY_S = 0.3
 _SAY_S = 5.0
 
+NOBODYS = Post()
+"""The place of a process that nobody looks after."""
+
 
 def tell_user(line: str) -> None:
     """Write a line to standard error."""
     sys.stderr.write(f"{line}\n")
     sys.stderr.flush()
-
-
-@dataclass(slots=True)
-class Tally:
-    """What an agent did.
-
-    Attributes:
-        answered: jobs with an answer.
-        refused: jobs with a reason why not, the malformed among them.
-        malformed: requests that do not decode.
-    """
-
-    answered: int = 0
-    refused: int = 0
-    malformed: int = 0
 
 
 class Outlet:
@@ -61,18 +48,28 @@ class Outlet:
         self._session = session
         self._publishers = {}
 
+    def has_listeners(self, key: str) -> bool:
+        """Return whether somebody would get what is put: if not, spare the work."""
+        publisher = self._publisher(key)
+        return publisher is not None and bool(publisher.matching_status.matching)
+
     def put(self, key: str, data: bytes) -> None:
         """Publish bytes; lost if nobody listens or the line is full."""
+        publisher = self._publisher(key)
+        if publisher is not None:
+            publisher.put(data)
+
+    def _publisher(self, key: str) -> zenoh.Publisher | None:
+        """Return what publishes on a key; None while there is no session."""
         if self._session is None:
-            return
-        publisher = self._publishers.get(key)
-        if publisher is None:
-            publisher = self._publishers[key] = self._session.declare_publisher(
+            return None
+        if key not in self._publishers:
+            self._publishers[key] = self._session.declare_publisher(
                 key,
                 congestion_control=zenoh.CongestionControl.DROP,
                 priority=zenoh.Priority.DATA_LOW,
             )
-        publisher.put(data)
+        return self._publishers[key]
 
 
 def serve(
@@ -80,7 +77,9 @@ def serve(
     agent: Agent,
     stop: threading.Event,
     say: Callable[[str], None] = tell_user,
+    *,
     outlet: Outlet | None = None,
+    post: Post = NOBODYS,
 ) -> Tally:
     """Answer jobs until told to stop; wait for the hub as long as it takes.
 
@@ -94,6 +93,7 @@ def serve(
         stop: ends it; looked at between jobs.
         say: told, in one line, when there is no hub and when there is one again.
         outlet: publishes by this agent's session while there is one.
+        post: this process's place in a crew, if it has one.
 
     Raises:
         NetworkError: a name or an address that is none.
@@ -101,7 +101,7 @@ def serve(
     check_name(agent.name, "name")
     check_name(agent.fleet, "fleet")
     config = client_config(agent.connect, agent.tls)
-    server = _Server(answer, agent)
+    server = Server(answer, agent, post)
     hub = _Hub(agent.connect, say)
     zenoh.init_log_from_env_or("error")
     session = _open(config, hub, stop)
@@ -126,14 +126,14 @@ def own_agent(agent: Agent, index: int) -> Agent:
         agent,
         name=unique_name(f"{agent.name}-{index}"),
         platform=platform_tag(),
-        version=our_version(),
+        version=wire_version(),
     )
 
 
 def serve_as_process(
     answer: Callable[[bytes], bytes],
     agent: Agent,
-    index: int,
+    post: Post,
     outlet: Outlet | None = None,
 ) -> None:
     """Be one process of a crew: serve until asked to end, or left alone.
@@ -141,14 +141,14 @@ def serve_as_process(
     Args:
         answer: as for ``serve``.
         agent: of this process, or of the whole crew if it has no version yet.
-        index: of the process; the first one speaks for all.
+        post: of the process; the first one speaks for all.
         outlet: as for ``serve``.
     """
     stop = stop_on_signals()
     stop_with_parent(stop)
-    own = agent if agent.version else own_agent(agent, index)
-    say = tell_user if index == 0 else _keep_quiet
-    tally = serve(answer, own, stop, say, outlet)
+    own = agent if agent.version else own_agent(agent, post.index)
+    say = tell_user if post.index == 0 else _keep_quiet
+    tally = serve(answer, own, stop, say, outlet=outlet, post=post)
     if tally.refused:
         tell_user(
             f"{own.name} refused {tally.refused} requests, "
@@ -172,16 +172,26 @@ def _open(config: str, hub: "_Hub", stop: threading.Event) -> zenoh.Session | No
 
 
 def _serve_session(
-    session: zenoh.Session, server: "_Server", hub: "_Hub", stop: threading.Event
+    session: zenoh.Session, server: Server, hub: "_Hub", stop: threading.Event
 ) -> None:
-    me = server.member
+    me = Member(server.agent.fleet, server.agent.role, server.agent.name)
     inbox: SimpleQueue[zenoh.Query] = SimpleQueue()
     take = zenoh.handlers.Callback(inbox.put, indirect=False)
-    tell = zenoh.handlers.Callback(server.tell_info)
+
+    def tell_info(query: zenoh.Query) -> None:
+        with query:
+            query.reply(me.info, server.info)
+
+    def cancel(sample: zenoh.Sample) -> None:
+        server.cancel(sample.payload.to_bytes())
+
     # The keys first, the token last: whoever sees it may ask at once.
     with (
         session.declare_queryable(me.jobs, take, complete=True),
-        session.declare_queryable(me.info, tell, complete=True),
+        session.declare_queryable(
+            me.info, zenoh.handlers.Callback(tell_info), complete=True
+        ),
+        session.declare_subscriber(me.cancelled, zenoh.handlers.Callback(cancel)),
         session.liveliness().declare_token(me.alive),
     ):
         hub.seen(is_there=True)
@@ -192,10 +202,20 @@ def _serve_session(
                 hub.seen(is_there=bool(session.info.routers_zid()))
                 continue
             with query:
-                server.answer_query(query)
+                _answer(query, server, me)
     while not inbox.empty():
         with inbox.get():
             pass  # its end without a reply is the asker's news
+
+
+def _answer(query: zenoh.Query, server: Server, me: Member) -> None:
+    """Reply with an answer, or with the reason why there is none."""
+    payload = query.payload
+    reply = server.reply(b"" if payload is None else payload.to_bytes())
+    if reply.reason:
+        query.reply_err(reply.reason)
+    else:
+        query.reply(me.jobs, reply.answer)
 
 
 @dataclass(slots=True)
@@ -216,69 +236,3 @@ class _Hub:
             self.say(f"no coordinator at {self.address}; trying on, Ctrl-C ends")
             self.said_s = now_s
         self.is_there = is_there
-
-
-@dataclass(slots=True)
-class _Server:
-    """Answers single queries; knows the newest coordinator of each run."""
-
-    answer: Callable[[bytes], bytes]
-    agent: Agent
-    tally: Tally = field(default_factory=Tally)
-    epochs: dict[str, int] = field(default_factory=dict)
-
-    @property
-    def member(self) -> Member:
-        return Member(self.agent.fleet, self.agent.role, self.agent.name)
-
-    def tell_info(self, query: zenoh.Query) -> None:
-        """Say what this agent is."""
-        agent = self.agent
-        info = pb.AgentInfo(
-            agent=agent.name,
-            kind=agent.role,
-            slots=agent.slots,
-            platform=agent.platform,
-            version=agent.version,
-        )
-        with query:
-            query.reply(self.member.info, info.SerializeToString())
-
-    def answer_query(self, query: zenoh.Query) -> None:
-        """Reply with an answer, or with the reason why there is none."""
-        payload = query.payload
-        try:
-            request = b"" if payload is None else payload.to_bytes()
-            self._check_epoch(request)
-            answer = self.answer(request)
-        except RevolveError as error:
-            self.tally.refused += 1
-            self.tally.malformed += isinstance(error, MalformedMessage)
-            query.reply_err(str(error))
-        except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
-            self.tally.refused += 1
-            query.reply_err(f"{type(error).__name__}: {error}")
-        else:
-            self.tally.answered += 1
-            query.reply(self.member.jobs, answer)
-
-    def _check_epoch(self, data: bytes) -> None:
-        """Refuse a coordinator whose run another one has taken over.
-
-        Raises:
-            MalformedMessage: not a request's bytes, or one that names no run.
-            RevolveError: an older epoch than the newest seen of its run.
-        """
-        try:
-            request = pb.Request.FromString(data)
-        except DecodeError as error:
-            raise MalformedMessage(f"not the bytes of a Request: {error}") from None
-        if not request.run:
-            raise MalformedMessage("Request: names no run")
-        newest = self.epochs.get(request.run, 0)
-        if request.epoch < newest:
-            raise RevolveError(
-                f"{FENCED}epoch {request.epoch} of run {request.run} is over: "
-                f"epoch {newest} has begun"
-            )
-        self.epochs[request.run] = request.epoch

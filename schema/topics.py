@@ -51,9 +51,24 @@ class Member:
         return f"{self._prefix}/jobs"
 
     @property
+    def cancelled(self) -> str:
+        """Key that takes a ``Request`` of which only the job's name is needed."""
+        return f"{self._prefix}/cancelled"
+
+    @property
     def command(self) -> str:
         """Key that takes one ``OperatorRequest`` and gives one ``OperatorReply``."""
         return f"{self._prefix}/command"
+
+    @property
+    def state(self) -> str:
+        """Key that gives, to those who watch, a ``News`` of all since the beginning."""
+        return f"{self._prefix}/state"
+
+    @property
+    def events(self) -> str:
+        """Key on which a ``News`` appears when something has happened."""
+        return f"{self._prefix}/events"
 
     def poses(self, shard: int) -> str:
         """Key on which a ``Live`` appears after each advance of a shard."""
@@ -67,6 +82,11 @@ class Member:
 def agents_alive(fleet: str, role: Role) -> str:
     """Return the key expression of all tokens of one role."""
     return f"revolve/{fleet}/{_CHUNKS[role]}/*/alive"
+
+
+def poses_of_all(fleet: str) -> str:
+    """Return the key expression of all that ``Member.poses`` names."""
+    return f"revolve/{fleet}/{_CHUNKS['worker']}/*/arena/*/pose"
 
 
 def member_of(key: str) -> Member:

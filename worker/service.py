@@ -3,18 +3,21 @@
 from schema.arena_codec import Live, encode_live
 from schema.network import Agent
 from schema.service import Outlet, own_agent, serve_as_process
+from schema.supervision import Post
 from schema.topics import Member
 from worker.jobs import Jobs
 
 
-def process(agent: Agent, index: int) -> None:
+def process(agent: Agent, post: Post) -> None:
     """Be one process of a crew of workers; returns when asked to end."""
-    own = own_agent(agent, index)
+    own = own_agent(agent, post.index)
     member = Member(own.fleet, own.role, own.name)
     outlet = Outlet()
 
     def publish(live: Live) -> None:
-        outlet.put(member.poses(live.shard), encode_live(live))
+        key = member.poses(live.shard)
+        if outlet.has_listeners(key):
+            outlet.put(key, encode_live(live))
 
     jobs = Jobs(threads=agent.threads, publish=publish)
-    serve_as_process(jobs.answer, own, index, outlet)
+    serve_as_process(jobs.answer, own, post, outlet)

@@ -12,7 +12,7 @@ from schema import revolve_pb2 as pb
 from schema.crew import stop_on_signals
 from schema.errors import MalformedMessage
 from schema.network import Agent
-from schema.platform_tag import our_version
+from schema.platform_tag import wire_version
 from schema.service import serve
 from schema.topics import Role
 
@@ -39,7 +39,7 @@ def answer(request: bytes) -> bytes:
 
 def main(role: Role, name: str, address: str) -> None:
     """Serve until SIGTERM."""
-    version = "another" if BEHAVIOUR == "old" else our_version()
+    version = "another" if BEHAVIOUR == "old" else wire_version()
     serve(
         answer,
         Agent(role, name, address, platform="p", version=version),

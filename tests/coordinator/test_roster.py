@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.events import Joined, Left
+from coordinator.events import Died, Joined, Left
 from coordinator.roster import Roster
 from schema import revolve_pb2 as pb
 from schema.errors import MalformedMessage
@@ -31,7 +31,7 @@ def roster() -> Roster:
 
 def test_an_agent_joins_by_saying_what_it_is_and_leaves(roster: Roster) -> None:
     assert roster.is_stranger("w")
-    assert roster.introduce("w", info()) == Joined("w", "worker", 2, "p")
+    assert roster.introduce("w", info()) == [Joined("w", "worker", 2, "p")]
     assert not roster.is_stranger("w")
     assert roster.appear(WORKER.alive) is None
     assert roster.vanish(WORKER.alive) == Left("w")
@@ -43,15 +43,39 @@ def test_who_vanishes_unknown_is_no_news(roster: Roster) -> None:
     assert not roster.is_stranger("w")
     # A thawed one stands there again under the same token.
     assert roster.appear(WORKER.alive) == WORKER
-    assert roster.introduce("w", info()) is not None
+    assert roster.introduce("w", info()) != []
 
 
 def test_another_version_is_refused_until_it_goes(roster: Roster) -> None:
-    assert roster.introduce("w", info(version="2")) is None
+    assert roster.introduce("w", info(version="2")) == []
     assert roster.refused == {"w": "is of version '2', the coordinator of '1'"}
     assert not roster.is_stranger("w")
     assert roster.vanish(WORKER.alive) is None
     assert roster.refused == {}
+
+
+def test_who_is_refused_takes_no_more_part_until_it_comes_again(roster: Roster) -> None:
+    assert roster.refuse("w", "too early") is None
+    roster.introduce("w", info())
+    assert roster.refuse("w", "has no plug-in") == Left("w")
+    assert roster.refused == {"w": "has no plug-in"}
+    assert roster.refuse("w", "told twice") is None
+    assert not roster.is_stranger("w")
+    assert roster.vanish(WORKER.alive) is None
+    assert (roster.refused, roster.find("w")) == ({}, None)
+
+
+def test_each_death_is_told_once_and_before_who_took_the_place(roster: Roster) -> None:
+    message = pb.AgentInfo.FromString(info())
+    message.deaths.add(agent="v", run="r", epoch=3, number=7, cause="SIGSEGV")
+    joined = Joined("w", "worker", 2, "p")
+    told = roster.introduce("w", message.SerializeToString())
+    assert told == [Died("r", 3, 7, "v", "SIGSEGV"), joined]
+    roster.vanish(WORKER.alive)
+    roster.appear(WORKER.alive)
+    message.deaths.add(agent="u", run="r", epoch=3, number=7, cause="x" * 999)
+    told = roster.introduce("w", message.SerializeToString())
+    assert told == [Died("r", 3, 7, "u", "x" * 100), joined]
 
 
 @pytest.mark.parametrize(

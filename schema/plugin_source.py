@@ -1,0 +1,91 @@
+"""What code a document names, and whether two machines have the same.
+
+A plug-in is known by its source: the files of its top-level module or package. The
+rooms of this project are no plug-ins; their version stands for them.
+"""
+
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+from hashlib import sha256
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from schema.errors import PluginDiffers
+
+_ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis")
+_PATH = re.compile(r"([A-Za-z_]\w*)(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
+_DIGITS = 12
+
+
+@lru_cache(maxsize=64)
+def plugins_of(settings: bytes) -> str:
+    """Return the plug-ins that settings name, with what they are here.
+
+    Args:
+        settings: JSON; every text ``module:attribute`` in it is a plug-in's.
+
+    Returns:
+        ``module=digest`` for each top-level module, by name, with a space between.
+    """
+    modules = set(_modules(msgspec.json.decode(settings)))
+    return " ".join(f"{name}={_digest(name)}" for name in sorted(modules))
+
+
+@lru_cache(maxsize=64)
+def check_plugins(wanted: str) -> None:
+    """Raise unless all plug-ins are here as they are elsewhere.
+
+    Args:
+        wanted: what ``plugins_of`` returned there.
+
+    Raises:
+        PluginDiffers: one is not here, or has another content.
+    """
+    for each in wanted.split():
+        name, _, digest = each.partition("=")
+        found = _digest(name)
+        if not found:
+            raise PluginDiffers(f"has no plug-in {name!r}")
+        if found != digest:
+            raise PluginDiffers(
+                f"its plug-in {name!r} is another than the coordinator's: source "
+                f"{found}, wanted {digest}"
+            )
+
+
+def _modules(value: Any) -> Iterator[str]:  # noqa: ANN401 - any JSON
+    """Yield the top-level modules of all dotted paths in a value, rooms left out."""
+    if isinstance(value, str):
+        match = _PATH.fullmatch(value)
+        if match and match[1] not in _ROOMS:
+            yield match[1]
+    elif isinstance(value, dict):
+        for each in value.values():
+            yield from _modules(each)
+    elif isinstance(value, list):
+        for each in value:
+            yield from _modules(each)
+
+
+@lru_cache(maxsize=64)
+def _digest(module: str) -> str:
+    """Return the digest of a top-level module's source; empty if it is not here."""
+    try:
+        spec = find_spec(module)
+    except (ImportError, ValueError):
+        return ""
+    if spec is None:
+        return ""
+    hashed = sha256()
+    if spec.submodule_search_locations:
+        for folder in spec.submodule_search_locations:
+            for file in sorted(Path(folder).rglob("*.py")):
+                hashed.update(file.relative_to(folder).as_posix().encode() + b"\0")
+                hashed.update(file.read_bytes() + b"\0")
+    elif spec.has_location and spec.origin:
+        hashed.update(Path(spec.origin).read_bytes())
+    return hashed.hexdigest()[:_DIGITS]
