@@ -73,6 +73,10 @@ class Dispatch:
         """Return how many agents of a kind are there."""
         return len(self._pools[kind].agents)
 
+    def names(self, kind: AgentKind) -> list[str]:
+        """Return who of a kind is there, ascending."""
+        return sorted(self._pools[kind].agents)
+
     def waiting(self, kind: AgentKind) -> int:
         """Return how many jobs no agent of their kind has taken yet."""
         return len(self._pools[kind].waiting)

@@ -13,12 +13,14 @@ from pathlib import Path
 from threading import Event
 
 from coordinator.arena import Arena
+from coordinator.audience import Audience
 from coordinator.disk import replace_durably
 from coordinator.events import AgentKind, Record
 from coordinator.fleet import Agents, Fleet
 from coordinator.folder import DETAILS, RunDetails, RunFolder, read_state
 from coordinator.island import Island
 from coordinator.journal import Journal
+from coordinator.live import Feed, Overheard
 from coordinator.local import LocalAgents
 from coordinator.loop import Loop
 from coordinator.operator import Desk
@@ -118,22 +120,24 @@ def _run(folder: Path, details: RunDetails | None, deployment: Deployment) -> in
         agents, crews = stack.enter_context(_agents(held, deployment))
         machine = Arena if experiment.arena else Island
         fleet = Fleet(agents)
+        question = _question(held, experiment)
+        feed = Feed(question.run, held.epoch, held.details.name)
         loop = Loop(
             {0: machine(experiment, held.details.seed, held.details.run)},
-            question=_question(held, experiment),
+            question=question,
             fleet=fleet,
             log=journal,
-            rows=recorder,
+            rows=Overheard(recorder, feed),
             vault=Snapshots(folder),
             pace=_pace(experiment, deployment),
         )
         loop.start(journal.replay())
         held.set_state("running")
-        desk = Desk(loop, experiment)
+        serve = _servant(Desk(loop, experiment), feed, loop, fleet, agents)
         quiet = deployment.quiet
         with Display(loop, fleet.dispatch, experiment, quiet=quiet) as display:
             chores = [recorder.flush, held.confirm, *crews]
-            _turn(loop, fleet, display, stop, chores, lambda: _serve(desk, agents))
+            _turn(loop, fleet, display, stop, chores, serve)
         if not loop.is_finished:
             recorder.flush()
             held.set_state("stopped")
@@ -165,11 +169,20 @@ def _pace(experiment: Experiment, deployment: Deployment) -> Pace | None:
     return Pace(deployment.speed, experiment.simulation.timestep_s)
 
 
-def _serve(desk: Desk, agents: Agents) -> None:
-    """Answer the operators that wrote; nobody can to a run without a network."""
-    if isinstance(agents, Network):
+def _servant(
+    desk: Desk, feed: Feed, loop: Loop, fleet: Fleet, agents: Agents
+) -> Callable[[], None]:
+    """Return what serves operators and viewers; a run without a network has none."""
+    if not isinstance(agents, Network):
+        return lambda: None
+    audience = Audience(feed, loop, fleet, agents)
+
+    def serve() -> None:
         for order in agents.orders():
             order.reply(desk.answer(order.data))
+        audience.serve(time.monotonic())
+
+    return serve
 
 
 def _turn(

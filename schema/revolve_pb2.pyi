@@ -527,3 +527,99 @@ class Live(_message.Message):
     shard: int
     advance: Advance
     def __init__(self, run: _Optional[str] = ..., shard: _Optional[int] = ..., advance: _Optional[_Union[Advance, _Mapping]] = ...) -> None: ...
+
+class Newborn(_message.Message):
+    __slots__ = ("birth", "parents", "rank", "births", "is_timed", "sim_time_s", "body")
+    BIRTH_FIELD_NUMBER: _ClassVar[int]
+    PARENTS_FIELD_NUMBER: _ClassVar[int]
+    RANK_FIELD_NUMBER: _ClassVar[int]
+    BIRTHS_FIELD_NUMBER: _ClassVar[int]
+    IS_TIMED_FIELD_NUMBER: _ClassVar[int]
+    SIM_TIME_S_FIELD_NUMBER: _ClassVar[int]
+    BODY_FIELD_NUMBER: _ClassVar[int]
+    birth: BirthName
+    parents: _containers.RepeatedCompositeFieldContainer[BirthName]
+    rank: int
+    births: int
+    is_timed: bool
+    sim_time_s: float
+    body: Robot
+    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., parents: _Optional[_Iterable[_Union[BirthName, _Mapping]]] = ..., rank: _Optional[int] = ..., births: _Optional[int] = ..., is_timed: _Optional[bool] = ..., sim_time_s: _Optional[float] = ..., body: _Optional[_Union[Robot, _Mapping]] = ...) -> None: ...
+
+class Departed(_message.Message):
+    __slots__ = ("island", "birth", "births", "sim_time_s", "reason")
+    ISLAND_FIELD_NUMBER: _ClassVar[int]
+    BIRTH_FIELD_NUMBER: _ClassVar[int]
+    BIRTHS_FIELD_NUMBER: _ClassVar[int]
+    SIM_TIME_S_FIELD_NUMBER: _ClassVar[int]
+    REASON_FIELD_NUMBER: _ClassVar[int]
+    island: int
+    birth: BirthName
+    births: int
+    sim_time_s: float
+    reason: str
+    def __init__(self, island: _Optional[int] = ..., birth: _Optional[_Union[BirthName, _Mapping]] = ..., births: _Optional[int] = ..., sim_time_s: _Optional[float] = ..., reason: _Optional[str] = ...) -> None: ...
+
+class Level(_message.Message):
+    __slots__ = ("island", "births", "size", "judged", "mean", "best", "members")
+    ISLAND_FIELD_NUMBER: _ClassVar[int]
+    BIRTHS_FIELD_NUMBER: _ClassVar[int]
+    SIZE_FIELD_NUMBER: _ClassVar[int]
+    JUDGED_FIELD_NUMBER: _ClassVar[int]
+    MEAN_FIELD_NUMBER: _ClassVar[int]
+    BEST_FIELD_NUMBER: _ClassVar[int]
+    MEMBERS_FIELD_NUMBER: _ClassVar[int]
+    island: int
+    births: int
+    size: int
+    judged: int
+    mean: float
+    best: float
+    members: _containers.RepeatedCompositeFieldContainer[BirthName]
+    def __init__(self, island: _Optional[int] = ..., births: _Optional[int] = ..., size: _Optional[int] = ..., judged: _Optional[int] = ..., mean: _Optional[float] = ..., best: _Optional[float] = ..., members: _Optional[_Iterable[_Union[BirthName, _Mapping]]] = ...) -> None: ...
+
+class Migrant(_message.Message):
+    __slots__ = ("birth", "island", "to", "epoch")
+    BIRTH_FIELD_NUMBER: _ClassVar[int]
+    ISLAND_FIELD_NUMBER: _ClassVar[int]
+    TO_FIELD_NUMBER: _ClassVar[int]
+    EPOCH_FIELD_NUMBER: _ClassVar[int]
+    birth: BirthName
+    island: int
+    to: int
+    epoch: int
+    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., island: _Optional[int] = ..., to: _Optional[int] = ..., epoch: _Optional[int] = ...) -> None: ...
+
+class Crewman(_message.Message):
+    __slots__ = ("name", "platform", "shards")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    PLATFORM_FIELD_NUMBER: _ClassVar[int]
+    SHARDS_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    platform: str
+    shards: _containers.RepeatedScalarFieldContainer[int]
+    def __init__(self, name: _Optional[str] = ..., platform: _Optional[str] = ..., shards: _Optional[_Iterable[int]] = ...) -> None: ...
+
+class News(_message.Message):
+    __slots__ = ("run", "epoch", "sequence", "is_whole", "experiment", "births", "deaths", "levels", "migrants", "workers")
+    RUN_FIELD_NUMBER: _ClassVar[int]
+    EPOCH_FIELD_NUMBER: _ClassVar[int]
+    SEQUENCE_FIELD_NUMBER: _ClassVar[int]
+    IS_WHOLE_FIELD_NUMBER: _ClassVar[int]
+    EXPERIMENT_FIELD_NUMBER: _ClassVar[int]
+    BIRTHS_FIELD_NUMBER: _ClassVar[int]
+    DEATHS_FIELD_NUMBER: _ClassVar[int]
+    LEVELS_FIELD_NUMBER: _ClassVar[int]
+    MIGRANTS_FIELD_NUMBER: _ClassVar[int]
+    WORKERS_FIELD_NUMBER: _ClassVar[int]
+    run: str
+    epoch: int
+    sequence: int
+    is_whole: bool
+    experiment: str
+    births: _containers.RepeatedCompositeFieldContainer[Newborn]
+    deaths: _containers.RepeatedCompositeFieldContainer[Departed]
+    levels: _containers.RepeatedCompositeFieldContainer[Level]
+    migrants: _containers.RepeatedCompositeFieldContainer[Migrant]
+    workers: _containers.RepeatedCompositeFieldContainer[Crewman]
+    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., sequence: _Optional[int] = ..., is_whole: _Optional[bool] = ..., experiment: _Optional[str] = ..., births: _Optional[_Iterable[_Union[Newborn, _Mapping]]] = ..., deaths: _Optional[_Iterable[_Union[Departed, _Mapping]]] = ..., levels: _Optional[_Iterable[_Union[Level, _Mapping]]] = ..., migrants: _Optional[_Iterable[_Union[Migrant, _Mapping]]] = ..., workers: _Optional[_Iterable[_Union[Crewman, _Mapping]]] = ...) -> None: ...

@@ -1,0 +1,79 @@
+"""Serves those who watch a run: news as they come, all of it for whoever asks.
+
+The run's thread condenses and encodes, at most so often; what may have to wait for
+a slow line is sent by a thread of its own.
+"""
+
+import threading
+from queue import SimpleQueue
+
+from coordinator.arena import Arena
+from coordinator.fleet import Fleet
+from coordinator.live import Feed
+from coordinator.loop import Loop
+from coordinator.service import Network, Order
+from schema.live import Crewman
+from schema.live_codec import encode_news
+
+_NEWS_S = 0.25
+_WHOLE_S = 1.0
+
+
+class Audience:
+    """All who watch one run."""
+
+    def __init__(self, feed: Feed, loop: Loop, fleet: Fleet, network: Network) -> None:
+        """Serve nobody yet.
+
+        Args:
+            feed: hears of the run's rows.
+            loop: the run.
+            fleet: knows who works.
+            network: where those who watch are.
+        """
+        self._feed = feed
+        self._loop = loop
+        self._fleet = fleet
+        self._network = network
+        self._told_s = self._whole_s = -1e9
+        self._waiting: list[Order] = []
+        self._replies: SimpleQueue[tuple[Order, bytes]] = SimpleQueue()
+        threading.Thread(target=self._reply, daemon=True).start()
+
+    def serve(self, now_s: float) -> None:
+        """Tell what is due to be told.
+
+        Args:
+            now_s: the time, of any clock that only goes forward [s].
+        """
+        self._waiting += self._network.onlookers()
+        is_whole_due = self._waiting and now_s - self._whole_s >= _WHOLE_S
+        if now_s - self._told_s < _NEWS_S and not is_whole_due:
+            return
+        self._told_s = now_s
+        news = self._feed.news(self._workers())
+        if news is not None and self._network.has_audience:
+            self._network.tell(encode_news(news))
+        if is_whole_due:
+            self._whole_s = now_s
+            data = encode_news(self._feed.whole())
+            for order in self._waiting:
+                self._replies.put((order, data))
+            self._waiting = []
+
+    def _workers(self) -> tuple[Crewman, ...]:
+        dispatch, advances = self._fleet.dispatch, self._loop.advances
+        shards: dict[str, list[int]] = {}
+        for number, island in sorted(self._loop.islands.items()):
+            if isinstance(island, Arena):
+                shards.setdefault(advances.holder(number), []).append(number)
+        return tuple(
+            Crewman(name, dispatch.platform(name), tuple(shards.get(name, ())))
+            for name in dispatch.names("worker")
+        )
+
+    def _reply(self) -> None:
+        """Reply for ever; one whose line is stuck holds up no run."""
+        while True:
+            order, data = self._replies.get()
+            order.reply(data)
