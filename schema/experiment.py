@@ -71,8 +71,42 @@ class Variation(Section, frozen=True):
     check_min_parts: bool = True
 
 
+class Culling(Section, frozen=True):
+    """The survivors' rule of an arena for an off-line population of varying size.
+
+    Every ``interval`` births after the founders, and whenever ``population_limit``
+    is reached, those go who are below a share of the mean fitness; in a full
+    population without any such, a share of the limit. ``population_floor`` stay.
+    Source: Hupkes 2016, sections 5.3.3 and 8.2; two births are what an arena's cull
+    interval comes to.
+    """
+
+    interval: AtLeastOne = 2
+    population_limit: AtLeastOne = 30
+    population_floor: AtLeastOne = 8
+    survive_share_of_mean: NotNegative = 0.7
+    full_cull_share: Probability = 0.7
+
+
+class Reevaluation(Section, frozen=True):
+    """A share of the living is judged anew every ``interval`` births.
+
+    Whose last judgement is the oldest comes first; of equals, the elder. The new
+    fitness replaces the old one, or ``mean`` of all of them counts. Source: Hupkes
+    2016, section 8.2.
+    """
+
+    interval: AtLeastOne = 15
+    share: Annotated[float, Meta(gt=0, le=1)] = 0.2
+    fitness: Literal["replace", "mean"] = "replace"
+
+
 class Selection(Section, frozen=True):
-    """Who mates and who lives on (thesis section 5.3)."""
+    """Who mates and who lives on (thesis section 5.3).
+
+    With ``culling`` the population varies in size, and ``population`` is the number
+    of founders; with ``reevaluation`` a fitness is not for life.
+    """
 
     population: AtLeastOne = 15
     children: AtLeastOne = 15
@@ -82,6 +116,8 @@ class Selection(Section, frozen=True):
     survivors: Literal["best", "random"] = "best"
     keep_parents: bool = True
     max_mating_attempts: AtLeastOne = 5
+    culling: Culling | None = None
+    reevaluation: Reevaluation | None = None
 
     @property
     def parents_needed(self) -> int:
@@ -104,6 +140,9 @@ class Simulation(Section, frozen=True):
     ``servo_stiffness`` [N m s/rad] and ``contact_time_s`` are what MuJoCo needs
     beyond the original's numbers; their effect is measured in docs/physics.md. A
     servo chatters above a stiffness of 2 servo_armature / timestep_s.
+
+    Off-line, ``evaluation_s`` [s] has every evaluation last a time of its own, drawn
+    uniformly between the two, warm-up included; the window is its last part.
     """
 
     timestep_s: Positive = 0.005
@@ -119,6 +158,7 @@ class Simulation(Section, frozen=True):
     servo_stiffness: Positive = 1.0
     contact_time_s: Positive = 0.01
     drop_m: NotNegative = 0.0
+    evaluation_s: tuple[Positive, Positive] | None = None
 
 
 class Fitness(Section, frozen=True):

@@ -3,6 +3,11 @@
 from collections.abc import Callable
 from math import isclose, lcm
 
+from schema.bridge_check import (
+    culling_problem,
+    duration_problem,
+    reevaluation_problem,
+)
 from schema.errors import ExperimentError
 from schema.experiment import Experiment, body_space, island_experiment, steps_of
 from schema.migration_check import migration_problem
@@ -14,13 +19,17 @@ def check_experiment(experiment: Experiment, where: str) -> None:
     Raises:
         ExperimentError: a restriction that no robot can meet, a selection that
             cannot draw its parents, a window that ends between two samples, an
-            arena too small or with clocks that do not meet, a plug-in that does
-            not exist, a migration that can never happen.
+            arena too small or with clocks that do not meet, rules that an arena
+            has no use for, a plug-in that does not exist, a migration that can
+            never happen.
     """
     checks: list[Callable[[Experiment], str]] = [
         _limits_problem,
         _selection_problem,
+        culling_problem,
+        reevaluation_problem,
         _clock_problem,
+        duration_problem,
         _arena_problem,
         _arena_clock_problem,
     ]

@@ -80,7 +80,8 @@ def _read_batches(path: Path, schema: pa.Schema) -> list[tuple[int, pa.RecordBat
                 "with that one"
             )
         for batch in iter(reader.read_next_batch, None):
-            batches.append((source.tell(), _whole(batch, schema)))
+            whole = _whole(batch, schema)
+            batches.append((source.tell(), whole))
     except StopIteration:
         pass
     except (pa.ArrowInvalid, OSError, MemoryError):
