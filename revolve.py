@@ -13,10 +13,16 @@ COMMANDS = {
     "worker": ("worker.__main__", "simulate robots for a coordinator"),
     "analyzer": ("analyzer.__main__", "vet bodies for a coordinator"),
     "robot": ("schema.__main__", "check, convert or show a robot file"),
+    "robot random": ("coordinator.robot_command", "make up a robot"),
+    "robot simulate": ("worker.robot_command", "judge the robot of a file"),
     "analyze": ("analysis.__main__", "draw what the tables say"),
     "bench": ("worker.bench", "measure this machine"),
 }
-"""Module whose ``main`` takes the words, the command first; and what it does."""
+"""Module whose ``main`` takes the words, the command first; and what it does.
+
+A command of two words goes before the command of the first one, which is another
+room's.
+"""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -43,7 +49,8 @@ def main(arguments: list[str] | None = None) -> int:
     import_module("schema.crew").one_thread_each()
     error_type = import_module("schema.errors").RevolveError
     try:
-        room = import_module(COMMANDS[words[0]][0])
+        pair = " ".join(words[:2])
+        room = import_module(COMMANDS.get(pair, COMMANDS[words[0]])[0])
         return int(room.main(words))
     except error_type as error:
         print(f"revolve: {error}", file=sys.stderr)

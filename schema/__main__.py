@@ -9,7 +9,7 @@ from schema.experiment import body_space
 from schema.experiment_file import read_experiment
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot import Robot
-from schema.robot_file import read_robot, write_robot
+from schema.robot_file import read_robot, settings_of, write_robot
 from schema.yaml_form import neuron_names
 
 
@@ -27,12 +27,13 @@ def main(argv: list[str] | None = None) -> int:
     """
     words = ["robot", *sys.argv[1:]] if argv is None else argv
     options = _parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
-    space = _space(options.experiment)
+    experiment = read_experiment(options.experiment) if options.experiment else None
+    space = body_space(experiment.space) if experiment else BUILT_IN
     robot = read_robot(options.file, space)
     if options.command == "check":
         print(f"{options.file}: well formed; {_summary(robot)}")
     elif options.command == "convert":
-        write_robot(robot, options.output, space)
+        write_robot(robot, options.output, space, settings_of(experiment))
         print(f"{options.output}: written")
     else:
         _show(robot, space, options.file.name)
@@ -42,13 +43,13 @@ def main(argv: list[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="revolve robot",
-        description="Check, convert or show a robot file (.yaml, .yml, .pb).",
+        description="Check, convert or show a robot file (.yaml, .yml, .pb, .xml).",
         epilog="example: revolve robot convert spider.yaml spider.pb",
     )
     commands = parser.add_subparsers(dest="command", required=True)
     for name, what in (
         ("check", "tell whether a file holds a well-formed robot"),
-        ("convert", "write a robot in another form"),
+        ("convert", "write a robot in another form (.urdf: its body only)"),
         ("show", "show a robot's body and brain as a tree"),
     ):
         command = commands.add_parser(name, help=what, description=what)
@@ -58,15 +59,10 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--experiment",
             metavar="NAME|FILE.toml",
-            help="take the part types of this experiment, not all built-in ones",
+            help="take this experiment's part types, and world where a form holds one, "
+            "not all built-in ones and the thesis's world",
         )
     return parser
-
-
-def _space(experiment: str | None) -> BodySpace:
-    if experiment is None:
-        return BUILT_IN
-    return body_space(read_experiment(experiment).space)
 
 
 def _summary(robot: Robot) -> str:

@@ -64,14 +64,14 @@ Scenery = Callable[[mujoco.MjSpec], None]
 """Adds what stands in a world, beside the ground."""
 
 
-def solo_model(
+def solo_spec(
     robot: Robot,
     space: BodySpace,
     simulation: Simulation,
     *,
     scenery: Scenery | None = None,
-) -> mujoco.MjModel:
-    """Return the model of one robot alone on the ground, lowest point touching it.
+) -> mujoco.MjSpec:
+    """Return the description of one robot alone, its lowest point on the ground.
 
     Args:
         robot: a checked robot.
@@ -87,7 +87,18 @@ def solo_model(
         scenery(spec)
     spec.memory = MEMORY_BYTES
     spec.body("root").pos = (0.0, 0.0, built.height + simulation.drop_m)
-    return spec.compile()
+    return spec
+
+
+def solo_model(
+    robot: Robot,
+    space: BodySpace,
+    simulation: Simulation,
+    *,
+    scenery: Scenery | None = None,
+) -> mujoco.MjModel:
+    """Return the compiled ``solo_spec``."""
+    return solo_spec(robot, space, simulation, scenery=scenery).compile()
 
 
 def shared_model(

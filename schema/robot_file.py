@@ -1,26 +1,53 @@
-"""Robot files: YAML for people (.yaml, .yml), Protobuf for machines (.pb).
+"""Robot files: the ending decides what is written and read.
 
-The ending decides. Both forms hold a whole robot, so one becomes the other and
-back without loss.
+YAML for people (.yaml, .yml), Protobuf for machines (.pb) and MJCF for MuJoCo (.xml)
+hold a whole robot, so one becomes the other and back without loss. URDF (.urdf)
+holds its body only and is written, not read.
 """
 
 from pathlib import Path
 
 from schema.codec import decode_robot, encode_robot
 from schema.errors import InvalidRobot, MalformedMessage
+from schema.experiment import Experiment, Fitness, Simulation, Space
+from schema.mjcf_file import read_mjcf, robot_to_mjcf
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot import Robot, check_robot
+from schema.settings import EvaluationSettings
+from schema.urdf import robot_to_urdf
 from schema.yaml_form import robot_from_yaml, robot_to_yaml
 
 YAML_ENDINGS = (".yaml", ".yml")
 PROTOBUF_ENDINGS = (".pb",)
+MJCF_ENDING = ".xml"
+URDF_ENDING = ".urdf"
+_READ = (*YAML_ENDINGS, *PROTOBUF_ENDINGS, MJCF_ENDING)
+_WRITTEN = (*_READ, URDF_ENDING)
+_ANY_BUILT_IN = Space(part_types=(*Space().part_types, "schema.parts:LIGHT_SENSOR"))
+
+
+def settings_of(experiment: Experiment | None) -> EvaluationSettings:
+    """Return how an experiment judges robots.
+
+    Args:
+        experiment: None for the thesis's values, with all built-in part types.
+    """
+    if experiment is None:
+        return EvaluationSettings(
+            space=_ANY_BUILT_IN, simulation=Simulation(), fitness=Fitness()
+        )
+    return EvaluationSettings(
+        space=experiment.space,
+        simulation=experiment.simulation,
+        fitness=experiment.fitness,
+    )
 
 
 def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
     """Return the robot of a file.
 
     Args:
-        path: ends in .yaml, .yml or .pb.
+        path: ends in .yaml, .yml, .pb or .xml.
         space: the part types that it may use.
 
     Raises:
@@ -28,7 +55,12 @@ def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
             robot, or a robot that is not well formed in this body space.
         MalformedMessage: bytes that are no robot.
     """
-    is_yaml = _is_yaml(path)
+    ending = _ending(path, _READ)
+    if ending == MJCF_ENDING:
+        robot, _ = read_mjcf(path)
+        _check(robot, space, path)
+        return robot
+    is_yaml = ending in YAML_ENDINGS
     try:
         data = path.read_bytes()
         text = data.decode() if is_yaml else ""
@@ -40,40 +72,57 @@ def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
         return robot_from_yaml(text, str(path), space)
     try:
         robot = decode_robot(data)
-        check_robot(robot, space)
     except MalformedMessage as error:
         raise MalformedMessage(f"{path}: {error}") from None
-    except InvalidRobot as error:
-        raise InvalidRobot(f"{path}: {error}") from None
+    _check(robot, space, path)
     return robot
 
 
-def write_robot(robot: Robot, path: Path, space: BodySpace = BUILT_IN) -> None:
+def write_robot(
+    robot: Robot,
+    path: Path,
+    space: BodySpace = BUILT_IN,
+    settings: EvaluationSettings | None = None,
+) -> None:
     """Write a robot to a file.
 
     Args:
         robot: the robot.
-        path: ends in .yaml, .yml or .pb.
+        path: ends in .yaml, .yml, .pb, .xml or .urdf.
         space: its part types.
+        settings: the world that goes with it into MJCF; the thesis's by default.
 
     Raises:
         InvalidRobot: another ending, a robot that is not well formed in this body
             space, or a file that cannot be written.
     """
-    if _is_yaml(path):
+    ending = _ending(path, _WRITTEN)
+    settings = settings or settings_of(None)
+    if ending in YAML_ENDINGS:
         data = robot_to_yaml(robot, space).encode()
-    else:
+    elif ending in PROTOBUF_ENDINGS:
         check_robot(robot, space)
         data = encode_robot(robot)
+    elif ending == MJCF_ENDING:
+        data = robot_to_mjcf(robot, settings).encode()
+    else:
+        data = robot_to_urdf(robot, space, settings.simulation).encode()
     try:
         path.write_bytes(data)
     except OSError as error:
         raise InvalidRobot(f"{path}: cannot be written: {error.strerror}") from None
 
 
-def _is_yaml(path: Path) -> bool:
+def _check(robot: Robot, space: BodySpace, path: Path) -> None:
+    try:
+        check_robot(robot, space)
+    except InvalidRobot as error:
+        raise InvalidRobot(f"{path}: {error}") from None
+
+
+def _ending(path: Path, endings: tuple[str, ...]) -> str:
     ending = path.suffix.lower()
-    if ending not in YAML_ENDINGS + PROTOBUF_ENDINGS:
-        allowed = ", ".join(YAML_ENDINGS + PROTOBUF_ENDINGS)
+    if ending not in endings:
+        allowed = ", ".join(endings)
         raise InvalidRobot(f"{path}: must end in one of {allowed}, got {ending!r}")
-    return ending in YAML_ENDINGS
+    return ending

@@ -1,0 +1,24 @@
+"""``revolve robot simulate``: from one MJCF file alone, the same result."""
+
+from pathlib import Path
+
+import pytest
+
+from schema.parts import BUILT_IN
+from schema.robot_file import settings_of, write_robot
+from worker.evaluation import evaluate
+from worker.robot_command import main
+from worker.spider import spider
+
+
+def test_a_file_is_judged_as_its_robot_is(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    expected = evaluate(spider(), settings_of(None))
+    for name in ("spider.xml", "spider.yaml", "spider.pb"):
+        write_robot(spider(), tmp_path / name, BUILT_IN)
+        assert main(["robot", "simulate", str(tmp_path / name)]) == 0
+        told = capsys.readouterr().out.splitlines()
+        assert told[0] == f"fitness:           {expected.fitness!r}"
+        assert told[1] == f"path velocity:     {expected.path_velocity!r} m/s"
+        assert told[3] == "simulated:         12.0 s"

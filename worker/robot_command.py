@@ -1,0 +1,73 @@
+"""``revolve robot simulate``: the robot of a file, judged as in a run."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from schema.experiment import body_space
+from schema.experiment_file import read_experiment
+from schema.mjcf_file import read_mjcf
+from schema.robot import Robot
+from schema.robot_file import MJCF_ENDING, read_robot, settings_of
+from schema.settings import EvaluationSettings
+from worker.evaluation import judge, simulate
+from worker.fitness import path_velocity, straight_velocity
+
+
+def main(arguments: list[str]) -> int:
+    """Simulate a robot, print what it came to, and return the exit code.
+
+    Args:
+        arguments: ``robot simulate`` and what follows.
+
+    Returns:
+        0 if it was judged.
+
+    Raises:
+        InvalidRobot: a file that holds no robot.
+        SimulationDiverged: the physics did.
+        FitnessUndefined: there is no number for what it did.
+        ExperimentError: an experiment that is none, or a sensor that it cannot feed.
+    """
+    options = _parser().parse_args(arguments[2:])
+    robot, settings = _read(options.file, options.experiment)
+    track = simulate(robot, settings.space, settings.simulation)
+    clock = settings.simulation
+    duration_s = (clock.warmup_steps + clock.window_steps) * clock.timestep_s
+    for name, value, unit in (
+        ("fitness", judge(track, settings.fitness), ""),
+        ("path velocity", path_velocity(track), " m/s"),
+        ("straight velocity", straight_velocity(track), " m/s"),
+        ("simulated", duration_s, " s"),
+    ):
+        # All digits: whoever compares two runs wants them.
+        print(f"{name + ':':19}{value!r}{unit}")
+    return 0
+
+
+def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings]:
+    """Return a file's robot and the settings to judge it by, the file's own first."""
+    if path.suffix.lower() == MJCF_ENDING and experiment is None:
+        return read_mjcf(path)
+    settings = settings_of(read_experiment(experiment) if experiment else None)
+    return read_robot(path, body_space(settings.space)), settings
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="revolve robot simulate",
+        description="Simulate a robot alone, and judge it as an experiment does.",
+        epilog="example: revolve robot simulate best.yaml --experiment scenario1",
+    )
+    parser.add_argument("file", type=Path, metavar="FILE")
+    parser.add_argument(
+        "--experiment",
+        metavar="NAME|FILE.toml",
+        help="judge as this experiment does; by default as an MJCF file says, and any "
+        "other as the thesis's off-line experiments do",
+    )
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main(["robot", "simulate", *sys.argv[1:]]))
