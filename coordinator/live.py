@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from coordinator.events import Append, Record
+from coordinator.folder import RunDetails
 from schema.birth import BirthId
 from schema.live import (
     Crewman,
@@ -60,15 +61,18 @@ class Overheard:
 class Feed:
     """What there is to tell of one run; a replay of its journal fills it, too."""
 
-    def __init__(self, run: str, epoch: int, experiment: str) -> None:
+    def __init__(self, run: str, epoch: int, details: RunDetails) -> None:
         """Know of nothing yet.
 
         Args:
             run: its name.
             epoch: of the coordinator.
-            experiment: its name.
+            details: of the run.
         """
-        self._past = News(run, epoch, 0, is_whole=True, experiment=experiment)
+        self._past = News(
+            run, epoch, 0, is_whole=True, experiment=details.name,
+            document=details.document,
+        )  # fmt: skip
         self._births: dict[BirthId, Newborn] = {}
         self._bodies: list[BirthId] = []
         self._dead: set[BirthId] = set()
@@ -112,6 +116,7 @@ class Feed:
         news = replace(
             self._past,
             is_whole=False,
+            document="",
             births=tuple(self._new_births),
             deaths=tuple(self._new_deaths),
             levels=tuple(fresh),

@@ -121,7 +121,7 @@ def _run(folder: Path, details: RunDetails | None, deployment: Deployment) -> in
         machine = Arena if experiment.arena else Island
         fleet = Fleet(agents)
         question = _question(held, experiment)
-        feed = Feed(question.run, held.epoch, held.details.name)
+        feed = Feed(question.run, held.epoch, held.details)
         loop = Loop(
             {0: machine(experiment, held.details.seed, held.details.run)},
             question=question,

@@ -107,6 +107,7 @@ class News:
         experiment: its name.
         births, deaths, levels, migrants: in the order of their tables.
         workers: all that are there now.
+        document: the experiment's JSON, if is_whole.
     """
 
     run: str
@@ -119,6 +120,7 @@ class News:
     levels: tuple[Level, ...] = ()
     migrants: tuple[Migrant, ...] = ()
     workers: tuple[Crewman, ...] = ()
+    document: str = ""
 
 
 def newborn(row: Mapping[str, Any], births: int) -> Newborn:

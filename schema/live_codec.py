@@ -15,6 +15,7 @@ def encode_news(news: News) -> bytes:
         sequence=news.sequence,
         is_whole=news.is_whole,
         experiment=news.experiment,
+        document=news.document,
     )
     for one in news.births:
         _write_newborn(one, message.births.add())
@@ -75,6 +76,7 @@ def _news(message: pb.News) -> News:
         sequence=message.sequence,
         is_whole=message.is_whole,
         experiment=message.experiment,
+        document=message.document,
         births=tuple(map(_newborn, message.births)),
         deaths=tuple(map(_departed, message.deaths)),
         levels=tuple(map(_level, message.levels)),

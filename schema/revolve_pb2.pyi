@@ -433,7 +433,7 @@ class AdvanceEntry(_message.Message):
     def __init__(self, number: _Optional[int] = ..., advance: _Optional[_Union[Advance, _Mapping]] = ..., pose_rows: _Optional[int] = ...) -> None: ...
 
 class Entry(_message.Message):
-    __slots__ = ("island", "birth", "attempt", "provenance", "vetted", "vetting_failed", "evaluated", "evaluation_failed", "advanced", "commanded", "audited", "trial")
+    __slots__ = ("island", "birth", "attempt", "provenance", "vetted", "vetting_failed", "evaluated", "evaluation_failed", "advanced", "commanded", "audited", "trial", "asker")
     ISLAND_FIELD_NUMBER: _ClassVar[int]
     BIRTH_FIELD_NUMBER: _ClassVar[int]
     ATTEMPT_FIELD_NUMBER: _ClassVar[int]
@@ -446,6 +446,7 @@ class Entry(_message.Message):
     COMMANDED_FIELD_NUMBER: _ClassVar[int]
     AUDITED_FIELD_NUMBER: _ClassVar[int]
     TRIAL_FIELD_NUMBER: _ClassVar[int]
+    ASKER_FIELD_NUMBER: _ClassVar[int]
     island: int
     birth: int
     attempt: int
@@ -458,7 +459,8 @@ class Entry(_message.Message):
     commanded: Command
     audited: AuditEntry
     trial: int
-    def __init__(self, island: _Optional[int] = ..., birth: _Optional[int] = ..., attempt: _Optional[int] = ..., provenance: _Optional[_Union[Provenance, _Mapping]] = ..., vetted: _Optional[_Union[Report, _Mapping]] = ..., vetting_failed: _Optional[str] = ..., evaluated: _Optional[_Union[Evaluation, _Mapping]] = ..., evaluation_failed: _Optional[str] = ..., advanced: _Optional[_Union[AdvanceEntry, _Mapping]] = ..., commanded: _Optional[_Union[Command, _Mapping]] = ..., audited: _Optional[_Union[AuditEntry, _Mapping]] = ..., trial: _Optional[int] = ...) -> None: ...
+    asker: int
+    def __init__(self, island: _Optional[int] = ..., birth: _Optional[int] = ..., attempt: _Optional[int] = ..., provenance: _Optional[_Union[Provenance, _Mapping]] = ..., vetted: _Optional[_Union[Report, _Mapping]] = ..., vetting_failed: _Optional[str] = ..., evaluated: _Optional[_Union[Evaluation, _Mapping]] = ..., evaluation_failed: _Optional[str] = ..., advanced: _Optional[_Union[AdvanceEntry, _Mapping]] = ..., commanded: _Optional[_Union[Command, _Mapping]] = ..., audited: _Optional[_Union[AuditEntry, _Mapping]] = ..., trial: _Optional[int] = ..., asker: _Optional[int] = ...) -> None: ...
 
 class AuditEntry(_message.Message):
     __slots__ = ("first", "second")
@@ -601,7 +603,7 @@ class Crewman(_message.Message):
     def __init__(self, name: _Optional[str] = ..., platform: _Optional[str] = ..., shards: _Optional[_Iterable[int]] = ...) -> None: ...
 
 class News(_message.Message):
-    __slots__ = ("run", "epoch", "sequence", "is_whole", "experiment", "births", "deaths", "levels", "migrants", "workers")
+    __slots__ = ("run", "epoch", "sequence", "is_whole", "experiment", "births", "deaths", "levels", "migrants", "workers", "document")
     RUN_FIELD_NUMBER: _ClassVar[int]
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     SEQUENCE_FIELD_NUMBER: _ClassVar[int]
@@ -612,6 +614,7 @@ class News(_message.Message):
     LEVELS_FIELD_NUMBER: _ClassVar[int]
     MIGRANTS_FIELD_NUMBER: _ClassVar[int]
     WORKERS_FIELD_NUMBER: _ClassVar[int]
+    DOCUMENT_FIELD_NUMBER: _ClassVar[int]
     run: str
     epoch: int
     sequence: int
@@ -622,4 +625,5 @@ class News(_message.Message):
     levels: _containers.RepeatedCompositeFieldContainer[Level]
     migrants: _containers.RepeatedCompositeFieldContainer[Migrant]
     workers: _containers.RepeatedCompositeFieldContainer[Crewman]
-    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., sequence: _Optional[int] = ..., is_whole: _Optional[bool] = ..., experiment: _Optional[str] = ..., births: _Optional[_Iterable[_Union[Newborn, _Mapping]]] = ..., deaths: _Optional[_Iterable[_Union[Departed, _Mapping]]] = ..., levels: _Optional[_Iterable[_Union[Level, _Mapping]]] = ..., migrants: _Optional[_Iterable[_Union[Migrant, _Mapping]]] = ..., workers: _Optional[_Iterable[_Union[Crewman, _Mapping]]] = ...) -> None: ...
+    document: str
+    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., sequence: _Optional[int] = ..., is_whole: _Optional[bool] = ..., experiment: _Optional[str] = ..., births: _Optional[_Iterable[_Union[Newborn, _Mapping]]] = ..., deaths: _Optional[_Iterable[_Union[Departed, _Mapping]]] = ..., levels: _Optional[_Iterable[_Union[Level, _Mapping]]] = ..., migrants: _Optional[_Iterable[_Union[Migrant, _Mapping]]] = ..., workers: _Optional[_Iterable[_Union[Crewman, _Mapping]]] = ..., document: _Optional[str] = ...) -> None: ...

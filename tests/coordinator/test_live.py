@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from coordinator.events import Record
+from coordinator.folder import RunDetails
 from coordinator.live import Feed
 from schema.birth import BirthId
 from schema.live import Crewman, Newborn, News
@@ -43,7 +44,7 @@ def _death(number: int) -> Record:
 
 
 def _feed(*records: Record) -> Feed:
-    feed = Feed("run", 1, "experiment")
+    feed = Feed("run", 1, RunDetails("experiment", 0, 1, "{}"))
     for record in records:
         feed.note(record)
     return feed

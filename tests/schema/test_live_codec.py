@@ -29,6 +29,7 @@ NEWS = News(
     levels=(Level(0, 2, 2, 1, 0.25, 0.25, (BirthId(0, 0), BirthId(0, 1))),),
     migrants=(Migrant(BirthId(0, 1), 0, 1, 9),),
     workers=(Crewman("w-1", "x86", (0, 2)), Crewman("w-2", "arm", ())),
+    document='{"name": "scenario3"}',
 )
 
 
