@@ -24,6 +24,7 @@ from schema.arena_codec import (
 )
 from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
 from schema.evaluation import Provenance
+from schema.plugin_source import plugins_of
 from schema.tables import read_columns
 
 
@@ -113,6 +114,10 @@ class Advances:
             for number, platform in self._fleet.shards.waiting.items()
             if number in self._islands
         }
+
+    def is_of(self, run: str, epoch: int) -> bool:
+        """Return whether the advances are those of a run's incarnation."""
+        return (run, epoch) == (self._terms.run, self._terms.epoch)
 
     def holder(self, shard: int) -> str:
         """Return which worker holds a shard; empty if none does."""
@@ -218,7 +223,8 @@ class Advances:
                 until=past.asked.until,
                 wants_snapshot=wants_snapshot,
                 rebuild=rebuild,
-            )
+            ),
+            plugins_of(self._terms.settings),
         )
 
     def understood(self, event: Returned) -> Came:

@@ -12,6 +12,7 @@ from typing import Protocol
 from coordinator.dispatch import Dispatch
 from coordinator.events import (
     Assign,
+    Cancel,
     Deliver,
     Died,
     DispatchCommand,
@@ -28,6 +29,7 @@ from coordinator.shards import (
     Came,
     GiveUp,
     Hand,
+    Killed,
     Placed,
     Released,
     ShardCommand,
@@ -42,6 +44,9 @@ class Agents(Protocol):
 
     def send(self, number: int, agent: str, payload: bytes) -> None:
         """Hand a job to an agent; its outcome comes by ``receive``."""
+
+    def cancel(self, _agent: str, _payload: bytes, /) -> None:
+        """Tell an agent that nobody waits for a job, by the job's own request."""
 
     def receive(self, timeout_s: float) -> Sequence[DispatchEvent]:
         """Return what happened, waiting at most ``timeout_s`` for the first."""
@@ -62,6 +67,9 @@ class Asker(Protocol):
 
 class Owner(Protocol):
     """One that has arenas advanced."""
+
+    def is_of(self, run: str, epoch: int) -> bool:
+        """Return whether the arenas are those of a run's incarnation."""
 
     def payload(self, command: Hand) -> bytes:
         """Return the request that a worker is handed."""
@@ -164,12 +172,18 @@ class Fleet:
             self._credits.pop(event.agent, None)
         if isinstance(event, Joined | Left | Ticked):
             self._move(event)
-        if isinstance(event, Died):
-            # Not of another coordinator's job of that number.
-            asker = self._askers.get(event.number)
-            if asker is None or not asker.is_of(event.run, event.epoch):
-                return
-        self._obey(self.dispatch.handle(event))
+        if not (isinstance(event, Died) and self._is_shards(event)):
+            self._obey(self.dispatch.handle(event))
+
+    def _is_shards(self, event: Died) -> bool:
+        """Pass on whom an advance killed; True also for another coordinator's job."""
+        shard = self.shards.shard_that_lost(event.number)
+        asker = self._askers.get(event.number) if shard is None else self._owners[shard]
+        if asker is None or not asker.is_of(event.run, event.epoch):
+            return True
+        if shard is not None:
+            self._move(Killed(event.number, event.agent, event.cause))
+        return shard is not None
 
     def _returned(self, event: Returned) -> None:
         if self.shards.has_out(event.number):
@@ -190,6 +204,8 @@ class Fleet:
                 if asker is not None:
                     asker.deliver(command)
                     self._news[asker] = None
+            elif isinstance(command, Cancel):
+                self._agents.cancel(command.agent, command.job.payload)
 
     def _move(self, event: ShardEvent) -> None:
         """Tell the machine that has the shards, and do what it says."""

@@ -27,6 +27,9 @@ class LocalAgents:
         """Hand a job to an agent; it is done at the next ``receive``."""
         self._asked.append((number, agent, payload))
 
+    def cancel(self, _agent: str, _payload: bytes) -> None:
+        """Do it all the same: of one worker's jobs there are no copies."""
+
     def receive(self, timeout_s: float) -> Sequence[DispatchEvent]:
         """Do the oldest job; the first call tells who is there."""
         news, self._news = self._news, []

@@ -20,7 +20,11 @@ from schema.birth import BirthId
 from schema.codec import Answer, decode_answer, encode_request, encode_robot
 from schema.errors import JobRefused, MalformedMessage
 from schema.evaluation import Evaluation, Provenance, Report
+from schema.plugin_source import plugins_of
 from schema.robot import Robot
+
+QUARANTINED = "quarantined: "
+"""How the reason begins why a robot that ends its processes has no evaluation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +87,7 @@ class Questions:
             number=number,
             settings=settings,
             robot=robot,
+            plugins=plugins_of(settings),
         )
         kind: JobKind = "vet" if isinstance(command, Vet) else "evaluate"
         self._open[number] = kind
@@ -102,6 +107,9 @@ class Questions:
         """Keep the end of a job until ``take``."""
         job = command.job
         del self._open[job.number]
+        if command.is_deadly:
+            self._came.append(_quarantined(command))
+            return
         if not command.reason:
             self._came.append(self._answered(command))
             return
@@ -161,3 +169,12 @@ class Questions:
         if isinstance(result, Evaluation):
             return Evaluated(job.birth, result, provenance)
         return EvaluationFailed(job.birth, str(result), provenance)
+
+
+def _quarantined(command: Deliver) -> VettingFailed | EvaluationFailed:
+    """Return what it comes to that a job ends whoever does it."""
+    job = command.job
+    if job.kind == "vet":
+        return VettingFailed(job.birth, job.attempt, f"the analyzer {command.reason}")
+    why = f"{QUARANTINED}{command.reason}"
+    return EvaluationFailed(job.birth, why, Provenance(command.agent))

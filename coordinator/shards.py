@@ -7,7 +7,7 @@ fewest shards, ties break on the name. Where none is there the shard waits.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from coordinator.events import Joined, Left, Ticked
@@ -56,7 +56,22 @@ class Released:
     shard: int
 
 
-ShardEvent = Joined | Left | Ticked | Placed | Wanted | Came | Released
+@dataclass(frozen=True, slots=True)
+class Killed:
+    """An advance that was handed out ended its worker, by its own doing.
+
+    Attributes:
+        number: of the ``Hand``.
+        agent: who died, once.
+        cause: of what.
+    """
+
+    number: int
+    agent: str
+    cause: str
+
+
+ShardEvent = Joined | Left | Ticked | Placed | Wanted | Came | Killed | Released
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +115,9 @@ ShardCommand = Hand | Accept | GiveUp
 class _Shard:
     """A shard; ``holder`` is bound to it and, if ``has_state``, fit to go on.
 
-    ``number`` is that of the job that is out, -1 if none is; ``avoid`` are those
-    who failed at the present advance.
+    ``number`` is that of the job that is out, -1 if none is. Of the present advance:
+    ``avoid`` are those who failed at it, ``lost`` the numbers of the jobs of which no
+    word came, ``killed`` whom it ended and by what.
     """
 
     platform: str = ""
@@ -113,6 +129,8 @@ class _Shard:
     errors: int = 0
     failures: int = 0
     avoid: tuple[str, ...] = ()
+    lost: tuple[int, ...] = ()
+    killed: dict[str, str] = field(default_factory=dict)
     rests_until_s: float | None = None
 
 
@@ -159,6 +177,13 @@ class ShardDispatch:
         """Return whose advance a job is that is out."""
         return self._out[number]
 
+    def shard_that_lost(self, number: int) -> int | None:
+        """Return whose present advance a job was of which no word came."""
+        for shard, state in self._shards.items():
+            if number in state.lost:
+                return shard
+        return None
+
     def handle(self, event: ShardEvent) -> list[ShardCommand]:
         """Take an event and return what is to be done, in this order.
 
@@ -179,12 +204,11 @@ class ShardDispatch:
             case Placed():
                 self._shard(event.shard).platform = event.platform
             case Wanted():
-                shard = self._shard(event.shard)
-                if shard.is_wanted:
-                    raise UnexpectedEvent(f"shard {event.shard}: is wanted already")
-                shard.is_wanted = True
+                self._want(event.shard)
             case Came():
                 return [*self._came(event), *self._hands()]
+            case Killed():
+                return [*self._killed(event), *self._hands()]
             case Released():
                 self._unbind(self._shard(event.shard))
                 del self._shards[event.shard]
@@ -193,6 +217,12 @@ class ShardDispatch:
     def _shard(self, number: int) -> _Shard:
         return self._shards.setdefault(number, _Shard())
 
+    def _want(self, number: int) -> None:
+        shard = self._shard(number)
+        if shard.is_wanted:
+            raise UnexpectedEvent(f"shard {number}: is wanted already")
+        shard.is_wanted = True
+
     def _leave(self, agent: str) -> None:
         self._workers.pop(agent, None)
         for shard in self._shards.values():
@@ -200,7 +230,8 @@ class ShardDispatch:
                 self._unbind(shard)
 
     def _unbind(self, shard: _Shard) -> None:
-        self._out.pop(shard.number, None)
+        if self._out.pop(shard.number, None) is not None:
+            shard.lost = (*shard.lost, shard.number)
         shard.holder, shard.has_state, shard.number = "", False, -1
 
     def _tick(self, now_s: float) -> None:
@@ -218,12 +249,15 @@ class ShardDispatch:
         if event.outcome == "done":
             shard.platform = self._workers[agent].platform
             shard.has_state, shard.is_wanted = True, False
-            shard.errors, shard.failures, shard.avoid = 0, 0, ()
+            self._forgive(shard)
+            shard.failures = 0
             return [Accept(number, agent)]
         if event.outcome == "stateless" and not shard.is_whole:
             shard.has_state = False
             return []
         self._unbind(shard)
+        if event.outcome == "lost":
+            shard.lost = (*shard.lost, event.number)
         shard.avoid = (*shard.avoid, agent)
         shard.rests_until_s = self._now_s + min(
             REST_S * 2**shard.failures, LONGEST_REST_S
@@ -232,9 +266,32 @@ class ShardDispatch:
         shard.errors += event.outcome != "lost"
         if shard.errors < MAX_ERRORS:
             return []
-        shard.is_wanted, shard.errors, shard.avoid = False, 0, ()
         reason = event.reason or "asks for a state that it was given"
+        return self._give_up(number, agent, reason)
+
+    def _killed(self, event: Killed) -> list[ShardCommand]:
+        number = self.shard_that_lost(event.number)
+        if number is None:
+            return []
+        killed = self._shards[number].killed
+        killed[event.agent] = event.cause
+        if len(killed) < MAX_ERRORS:
+            return []
+        causes = ", ".join(sorted(set(killed.values())))
+        reason = f"ended its own process {MAX_ERRORS} times, by {causes}"
+        self._unbind(self._shards[number])
+        return self._give_up(number, event.agent, reason)
+
+    def _give_up(self, number: int, agent: str, reason: str) -> list[ShardCommand]:
+        """Try a shard's advance no more."""
+        shard = self._shards[number]
+        shard.is_wanted = False
+        self._forgive(shard)
         return [GiveUp(number, agent, reason)]
+
+    def _forgive(self, shard: _Shard) -> None:
+        """Forget who failed at an advance that is over."""
+        shard.errors, shard.avoid, shard.lost, shard.killed = 0, (), (), {}
 
     def _hands(self) -> Iterator[ShardCommand]:
         """Hand out what waits and may go to somebody."""

@@ -104,8 +104,11 @@ class Live:
     advance: Advance
 
 
-def encode_advance_request(request: AdvanceRequest) -> bytes:
-    """Return the bytes of a request."""
+def encode_advance_request(request: AdvanceRequest, plugins: str = "") -> bytes:
+    """Return the bytes of a request.
+
+    ``plugins`` is what ``schema.plugin_source.plugins_of`` says of its settings.
+    """
     message = pb.AdvanceRequest(
         run=request.run,
         epoch=request.epoch,
@@ -117,6 +120,7 @@ def encode_advance_request(request: AdvanceRequest) -> bytes:
         changes=changes_to_message(request.changes),
         until=request.until,
         wants_snapshot=request.wants_snapshot,
+        plugins=plugins,
     )
     if request.rebuild is not None:
         message.is_rebuild = True

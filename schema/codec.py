@@ -99,9 +99,19 @@ def decode_genome(data: bytes) -> Genome:
 
 
 def encode_request(
-    *, run: str, epoch: int, number: int, settings: bytes, robot: bytes, steps: int = 0
+    *,
+    run: str,
+    epoch: int,
+    number: int,
+    settings: bytes,
+    robot: bytes,
+    steps: int = 0,
+    plugins: str = "",
 ) -> bytes:
-    """Return the bytes of a request; ``robot`` is already encoded."""
+    """Return the bytes of a request; ``robot`` is already encoded.
+
+    ``plugins`` is what ``schema.plugin_source.plugins_of`` says of the settings.
+    """
     message = pb.Request(
         run=run,
         epoch=epoch,
@@ -109,6 +119,7 @@ def encode_request(
         settings=settings,
         robot=robot,
         steps=steps,
+        plugins=plugins,
     )
     return message.SerializeToString(deterministic=True)
 

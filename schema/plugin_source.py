@@ -5,19 +5,15 @@ rooms of this project are no plug-ins; their version stands for them.
 """
 
 import re
-from collections.abc import Iterator
 from functools import lru_cache
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
-
-import msgspec
 
 from schema.errors import PluginDiffers
 
 _ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis")
-_PATH = re.compile(r"([A-Za-z_]\w*)(\.[A-Za-z_]\w*)*:[A-Za-z_]\w*")
+_PATH = re.compile(r'"([A-Za-z_]\w*)(?:\.[A-Za-z_]\w*)*:[A-Za-z_]\w*"')
 _DIGITS = 12
 
 
@@ -26,13 +22,14 @@ def plugins_of(settings: bytes) -> str:
     """Return the plug-ins that settings name, with what they are here.
 
     Args:
-        settings: JSON; every text ``module:attribute`` in it is a plug-in's.
+        settings: JSON; every text in it like ``module:attribute`` names a plug-in.
 
     Returns:
         ``module=digest`` for each top-level module, by name, with a space between.
     """
-    modules = set(_modules(msgspec.json.decode(settings)))
-    return " ".join(f"{name}={_digest(name)}" for name in sorted(modules))
+    named = set(_PATH.findall(settings.decode(errors="replace")))
+    modules = sorted(named.difference(_ROOMS))
+    return " ".join(f"{name}={_digest(name)}" for name in modules)
 
 
 @lru_cache(maxsize=64)
@@ -55,20 +52,6 @@ def check_plugins(wanted: str) -> None:
                 f"its plug-in {name!r} is another than the coordinator's: source "
                 f"{found}, wanted {digest}"
             )
-
-
-def _modules(value: Any) -> Iterator[str]:  # noqa: ANN401 - any JSON
-    """Yield the top-level modules of all dotted paths in a value, rooms left out."""
-    if isinstance(value, str):
-        match = _PATH.fullmatch(value)
-        if match and match[1] not in _ROOMS:
-            yield match[1]
-    elif isinstance(value, dict):
-        for each in value.values():
-            yield from _modules(each)
-    elif isinstance(value, list):
-        for each in value:
-            yield from _modules(each)
 
 
 @lru_cache(maxsize=64)

@@ -6,6 +6,7 @@ import pytest
 
 from coordinator.events import (
     Answered,
+    Died,
     DispatchEvent,
     Evaluate,
     Evaluated,
@@ -19,11 +20,12 @@ from coordinator.events import (
     VettingFailed,
 )
 from coordinator.fleet import Fleet
-from coordinator.questions import Question, Questions
+from coordinator.questions import QUARANTINED, Question, Questions
+from schema import revolve_pb2 as pb
 from schema.birth import BirthId
 from schema.codec import Answer, decode_request, encode_answer
 from schema.errors import JobRefused
-from schema.evaluation import Evaluation, Report
+from schema.evaluation import Evaluation, Provenance, Report
 from schema.robot import Part, Robot
 
 EPOCH = 3
@@ -36,10 +38,11 @@ VIABLE = Report(True, "", (), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.1, 1)
 class Desk:
     """Questions whose jobs are caught, with two workers and an analyzer."""
 
-    def __init__(self) -> None:
+    def __init__(self, evaluation: bytes = b"evaluation") -> None:
         self.sent: list[tuple[int, str, bytes]] = []
+        self.cancelled: list[tuple[int, str]] = []
         self.fleet = Fleet(self)
-        question = Question("run", EPOCH, b"vetting", b"evaluation")
+        question = Question("run", EPOCH, b"vetting", evaluation)
         self.questions = Questions(question, self.fleet)
         for name in ("one", "two"):
             self.tell(Joined(name, "worker", 1, f"platform-{name}"))
@@ -48,6 +51,9 @@ class Desk:
 
     def send(self, number: int, agent: str, payload: bytes) -> None:
         self.sent.append((number, agent, payload))
+
+    def cancel(self, agent: str, payload: bytes) -> None:
+        self.cancelled.append((decode_request(payload).number, agent))
 
     def receive(self, _timeout_s: float) -> list[DispatchEvent]:
         return []
@@ -89,6 +95,36 @@ def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:
     assert event.provenance.agent == "one"
     assert event.provenance.platform == "platform-one"
     assert event.provenance.wall_s == 0.5
+
+
+def test_a_request_names_its_plug_ins_by_what_they_are() -> None:
+    desk = Desk(
+        b'{"fitness":{"function":"plugged:speed"},"space":["schema.parts:CORE"]}'
+    )
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    sent = pb.Request.FromString(desk.sent[0][2])
+    assert sent.plugins == "plugged="  # it is not here
+
+
+@pytest.mark.parametrize("kind", ["evaluate", "vet"])
+def test_a_robot_that_ends_three_processes_is_told_apart(desk: Desk, kind: str) -> None:
+    ask = Vet(BIRTH, 2, ROBOT) if kind == "vet" else Evaluate(BIRTH, ROBOT)
+    desk.questions.ask(ask)
+    (number, agent, _) = desk.sent[0]
+    of_others = [Died("another", EPOCH, number, "x", "SIGBUS")]
+    of_others += [Died("run", EPOCH - 1, number, "x", "SIGBUS")]
+    own = [Died("run", EPOCH, number, each, "SIGSEGV") for each in ("a", "b", "c")]
+    told = [desk.tell(event) for event in (*of_others, *own)]
+    assert told[:-1] == [[]] * 4
+    ((event,),) = told[-1:]
+    why = "ended its own process 3 times, by SIGSEGV"
+    if kind == "vet":
+        assert event == VettingFailed(BIRTH, 2, f"the analyzer {why}")
+    else:
+        signed = Provenance("c")
+        assert event == EvaluationFailed(BIRTH, f"{QUARANTINED}{why}", signed)
+    assert desk.cancelled == [(number, agent)]
+    assert desk.tell(desk.reply(JUDGED)) == []
 
 
 def test_a_failed_simulation_is_a_result(desk: Desk) -> None:

@@ -11,6 +11,7 @@ from coordinator.shards import (
     Came,
     GiveUp,
     Hand,
+    Killed,
     Placed,
     ShardDispatch,
     Wanted,
@@ -91,6 +92,30 @@ def test_after_a_failure_another_one_has_its_turn(outcome: str) -> None:
     assert dispatch.handle(Came(1, outcome, "why")) == []  # type: ignore[arg-type]
     assert dispatch.handle(Ticked(10.01)) == []
     assert dispatch.handle(Ticked(10.05)) == [Hand(2, 0, "b", is_whole=True)]
+
+
+def test_an_advance_that_kills_three_is_given_up() -> None:
+    dispatch = fleet("a", "b", "c")
+    dispatch.handle(Wanted(0))
+    for number, name, following in ((1, "a", "b"), (2, "b", "c")):
+        hand = Hand(number + 1, 0, following, is_whole=True)
+        assert dispatch.handle(Left(name)) == [hand]
+        assert dispatch.shard_that_lost(number) == 0
+        assert dispatch.handle(Killed(number, name, "SIGSEGV")) == []
+    assert dispatch.handle(Left("c")) == []
+    reason = f"ended its own process {MAX_ERRORS} times, by SIGSEGV"
+    ended = dispatch.handle(Killed(3, "c", "SIGSEGV"))
+    assert ended == [GiveUp(0, "c", reason)]
+    assert dispatch.handle(joined("d")) == []
+
+
+def test_deaths_of_an_advance_that_is_done_are_forgotten() -> None:
+    dispatch = fleet("a", "b")
+    dispatch.handle(Wanted(0))
+    dispatch.handle(Left("a"))
+    assert dispatch.handle(Came(2, "done")) == [Accept(0, "b")]
+    assert dispatch.shard_that_lost(1) is None
+    assert dispatch.handle(Killed(1, "a", "SIGSEGV")) == []
 
 
 def test_errors_of_several_end_it_and_losses_never_do() -> None:
