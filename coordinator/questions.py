@@ -1,6 +1,8 @@
 """Single robots' questions, to analyzers and workers, and what comes of them."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 from coordinator.events import (
     Answered,
@@ -14,14 +16,17 @@ from coordinator.events import (
     Vet,
     Vetted,
     VettingFailed,
+    asker_of,
 )
 from coordinator.fleet import Fleet
 from schema.birth import BirthId
 from schema.codec import Answer, decode_answer, encode_request, encode_robot
 from schema.errors import JobRefused, MalformedMessage
 from schema.evaluation import Evaluation, Provenance, Report
+from schema.experiment import Experiment, island_count, island_experiment
 from schema.plugin_source import plugins_of
 from schema.robot import Robot
+from schema.settings import arena_settings, evaluation_settings, vetting_settings
 
 QUARANTINED = "quarantined: "
 """How the reason begins why a robot that ends its processes has no evaluation."""
@@ -33,14 +38,30 @@ class Question:
 
     Attributes:
         run, epoch: of the coordinator.
-        vetting, evaluation, arena: the settings of each kind, as JSON.
+        vetting: settings for analyzers, as JSON.
+        evaluation, arena: settings for workers, as JSON, by island.
     """
 
     run: str
     epoch: int
     vetting: bytes
-    evaluation: bytes
-    arena: bytes = b""
+    evaluation: Mapping[int, bytes]
+    arena: Mapping[int, bytes] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, run: str, epoch: int, experiment: Experiment) -> Self:
+        """Return what a run of an experiment asks with."""
+        owns = {
+            number: island_experiment(experiment, number)
+            for number in range(island_count(experiment))
+        }
+        return cls(
+            run,
+            epoch,
+            vetting_settings(experiment),
+            {number: evaluation_settings(own) for number, own in owns.items()},
+            {number: arena_settings(own) for number, own in owns.items() if own.arena},
+        )
 
 
 class Questions:
@@ -60,7 +81,7 @@ class Questions:
         self.malformed = 0
         self._question = question
         self._fleet = fleet
-        self._open: dict[int, JobKind] = {}
+        self._open: dict[int, Vet | Evaluate] = {}
         self._came: list[Answered] = []
         self._refusal: JobRefused | None = None
         self._answers: dict[int, Answer] = {}
@@ -77,9 +98,10 @@ class Questions:
         asks = self._question
         if isinstance(command, Vet):
             self._encoded[birth] = (command.robot, robot)
-            attempt, settings = command.attempt, asks.vetting
+            attempt, steps, settings = command.attempt, 0, asks.vetting
         else:
-            attempt, settings = 0, asks.evaluation
+            attempt, steps = command.trial, command.steps
+            settings = asks.evaluation[asker_of(command)]
             self._encoded.pop(birth, None)
         payload = encode_request(
             run=asks.run,
@@ -87,10 +109,11 @@ class Questions:
             number=number,
             settings=settings,
             robot=robot,
+            steps=steps,
             plugins=plugins_of(settings),
         )
         kind: JobKind = "vet" if isinstance(command, Vet) else "evaluate"
-        self._open[number] = kind
+        self._open[number] = command
         job = Job(number, kind, birth, attempt, payload)
         self._fleet.ask(job, self)
 
@@ -167,8 +190,8 @@ class Questions:
         platform = self._fleet.dispatch.platform(command.agent)
         provenance = Provenance(command.agent, platform, answer.wall_s)
         if isinstance(result, Evaluation):
-            return Evaluated(job.birth, result, provenance)
-        return EvaluationFailed(job.birth, str(result), provenance)
+            return Evaluated(job.birth, result, provenance, job.attempt)
+        return EvaluationFailed(job.birth, str(result), provenance, job.attempt)
 
 
 def _quarantined(command: Deliver) -> VettingFailed | EvaluationFailed:
@@ -177,4 +200,4 @@ def _quarantined(command: Deliver) -> VettingFailed | EvaluationFailed:
     if job.kind == "vet":
         return VettingFailed(job.birth, job.attempt, f"the analyzer {command.reason}")
     why = f"{QUARANTINED}{command.reason}"
-    return EvaluationFailed(job.birth, why, Provenance(command.agent))
+    return EvaluationFailed(job.birth, why, Provenance(command.agent), job.attempt)

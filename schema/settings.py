@@ -111,6 +111,27 @@ def _from_json(settings: bytes, kind: type[T]) -> T:
         raise ExperimentError(f"settings of a request: {error}") from None
 
 
+def lasting(settings: EvaluationSettings, steps: int) -> EvaluationSettings:
+    """Return settings by which an evaluation takes so many physics steps.
+
+    What is more than the window comes before it. With 0 steps nothing changes.
+
+    Raises:
+        ExperimentError: not even the window lasts so short.
+    """
+    if not steps:
+        return settings
+    clock = settings.simulation
+    if steps < clock.window_steps:
+        raise ExperimentError(
+            f"an evaluation must take >= simulation.window_steps = "
+            f"{clock.window_steps} steps, got {steps}"
+        )
+    warmup = steps - clock.window_steps
+    simulation = msgspec.structs.replace(clock, warmup_steps=warmup)
+    return msgspec.structs.replace(settings, simulation=simulation)
+
+
 def fitness_function(fitness: Fitness) -> Callable[..., float]:
     """Return the function that a document names.
 

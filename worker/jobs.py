@@ -9,7 +9,7 @@ from schema.errors import FitnessUndefined, SimulationDiverged
 from schema.evaluation import Evaluation
 from schema.experiment import body_space
 from schema.robot import check_robot
-from schema.settings import read_evaluation_settings
+from schema.settings import lasting, read_evaluation_settings
 from worker.evaluation import evaluate
 from worker.shards import Shards
 from worker.world import World
@@ -59,7 +59,7 @@ def answer(request: bytes) -> bytes:
     check_robot(job.robot, body_space(settings.space))
     result: Evaluation | str
     try:
-        result = evaluate(job.robot, settings)
+        result = evaluate(job.robot, lasting(settings, job.steps))
     except (SimulationDiverged, FitnessUndefined) as error:
         result = str(error)
     wall_s = time.perf_counter() - began
