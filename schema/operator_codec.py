@@ -9,11 +9,17 @@ from schema.codec import decoded
 from schema.errors import MalformedMessage
 from schema.messages import finite, robot_from_message, robot_to_message
 from schema.robot import Robot
+from schema.status import Status, status_from_message, status_to_message
 
 
 @dataclass(frozen=True, slots=True)
 class ListWish:
     """Tell who lives in the arena."""
+
+
+@dataclass(frozen=True, slots=True)
+class StatusWish:
+    """Tell how far all runs are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +62,7 @@ class BrainWish:
 
 Wish = (
     ListWish
+    | StatusWish
     | PauseWish
     | ResumeWish
     | SnapshotWish
@@ -67,6 +74,7 @@ Wish = (
 
 _PLAIN: dict[str | None, Wish] = {
     "list": ListWish(),
+    "status": StatusWish(),
     "pause": PauseWish(),
     "resume": ResumeWish(),
     "snapshot": SnapshotWish(),
@@ -81,27 +89,34 @@ class OperatorRequest:
         request_id: unique; a request that comes twice is carried out once.
         island: whose arena.
         wish: what is to be done.
+        run: whose; the end of its folder's path, if the coordinator has several.
     """
 
     request_id: str
     island: int
     wish: Wish
+    run: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class OperatorReply:
-    """What was done, or why not, in words."""
+    """What was done, or why not, in words; and the status that was wished for."""
 
     text: str
     is_refused: bool = False
+    status: Status | None = None
 
 
 def encode_operator_request(request: OperatorRequest) -> bytes:
     """Return the bytes of an operator's request."""
-    message = pb.OperatorRequest(request_id=request.request_id, island=request.island)
+    message = pb.OperatorRequest(
+        request_id=request.request_id, island=request.island, run=request.run
+    )
     match request.wish:
         case ListWish():
             message.list.SetInParent()
+        case StatusWish():
+            message.status.SetInParent()
         case PauseWish():
             message.pause.SetInParent()
         case ResumeWish():
@@ -134,6 +149,8 @@ def decode_operator_request(data: bytes) -> OperatorRequest:
 def encode_operator_reply(reply: OperatorReply) -> bytes:
     """Return the bytes of a reply."""
     message = pb.OperatorReply(text=reply.text, is_refused=reply.is_refused)
+    if reply.status is not None:
+        message.status.CopyFrom(status_to_message(reply.status))
     return message.SerializeToString(deterministic=True)
 
 
@@ -141,17 +158,24 @@ def decode_operator_reply(data: bytes) -> OperatorReply:
     """Return the reply of some bytes.
 
     Raises:
-        MalformedMessage: not a reply's bytes.
+        MalformedMessage: not a reply's bytes, or a number that is not finite.
     """
-    return decoded(
-        data, pb.OperatorReply(), lambda said: OperatorReply(said.text, said.is_refused)
-    )
+    return decoded(data, pb.OperatorReply(), _reply)
+
+
+def _reply(message: pb.OperatorReply) -> OperatorReply:
+    status = None
+    if message.HasField("status"):
+        status = status_from_message(message.status)
+    return OperatorReply(message.text, message.is_refused, status)
 
 
 def _request(message: pb.OperatorRequest) -> OperatorRequest:
     if not message.request_id:
         raise MalformedMessage("OperatorRequest: has no request_id")
-    return OperatorRequest(message.request_id, message.island, _wish(message))
+    return OperatorRequest(
+        message.request_id, message.island, _wish(message), message.run
+    )
 
 
 def _wish(message: pb.OperatorRequest) -> Wish:

@@ -491,7 +491,7 @@ class Transplant(_message.Message):
     def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., robot: _Optional[_Union[Robot, _Mapping]] = ...) -> None: ...
 
 class OperatorRequest(_message.Message):
-    __slots__ = ("request_id", "island", "list", "pause", "resume", "insert", "remove", "replace_brain", "snapshot")
+    __slots__ = ("request_id", "island", "list", "pause", "resume", "insert", "remove", "replace_brain", "snapshot", "status", "run")
     REQUEST_ID_FIELD_NUMBER: _ClassVar[int]
     ISLAND_FIELD_NUMBER: _ClassVar[int]
     LIST_FIELD_NUMBER: _ClassVar[int]
@@ -501,6 +501,8 @@ class OperatorRequest(_message.Message):
     REMOVE_FIELD_NUMBER: _ClassVar[int]
     REPLACE_BRAIN_FIELD_NUMBER: _ClassVar[int]
     SNAPSHOT_FIELD_NUMBER: _ClassVar[int]
+    STATUS_FIELD_NUMBER: _ClassVar[int]
+    RUN_FIELD_NUMBER: _ClassVar[int]
     request_id: str
     island: int
     list: Nothing
@@ -510,15 +512,67 @@ class OperatorRequest(_message.Message):
     remove: BirthName
     replace_brain: Transplant
     snapshot: Nothing
-    def __init__(self, request_id: _Optional[str] = ..., island: _Optional[int] = ..., list: _Optional[_Union[Nothing, _Mapping]] = ..., pause: _Optional[_Union[Nothing, _Mapping]] = ..., resume: _Optional[_Union[Nothing, _Mapping]] = ..., insert: _Optional[_Union[PlacedRobot, _Mapping]] = ..., remove: _Optional[_Union[BirthName, _Mapping]] = ..., replace_brain: _Optional[_Union[Transplant, _Mapping]] = ..., snapshot: _Optional[_Union[Nothing, _Mapping]] = ...) -> None: ...
+    status: Nothing
+    run: str
+    def __init__(self, request_id: _Optional[str] = ..., island: _Optional[int] = ..., list: _Optional[_Union[Nothing, _Mapping]] = ..., pause: _Optional[_Union[Nothing, _Mapping]] = ..., resume: _Optional[_Union[Nothing, _Mapping]] = ..., insert: _Optional[_Union[PlacedRobot, _Mapping]] = ..., remove: _Optional[_Union[BirthName, _Mapping]] = ..., replace_brain: _Optional[_Union[Transplant, _Mapping]] = ..., snapshot: _Optional[_Union[Nothing, _Mapping]] = ..., status: _Optional[_Union[Nothing, _Mapping]] = ..., run: _Optional[str] = ...) -> None: ...
+
+class IslandStatus(_message.Message):
+    __slots__ = ("births", "wanted", "has_best", "best", "alive", "is_arena", "simulated_s", "is_paused")
+    BIRTHS_FIELD_NUMBER: _ClassVar[int]
+    WANTED_FIELD_NUMBER: _ClassVar[int]
+    HAS_BEST_FIELD_NUMBER: _ClassVar[int]
+    BEST_FIELD_NUMBER: _ClassVar[int]
+    ALIVE_FIELD_NUMBER: _ClassVar[int]
+    IS_ARENA_FIELD_NUMBER: _ClassVar[int]
+    SIMULATED_S_FIELD_NUMBER: _ClassVar[int]
+    IS_PAUSED_FIELD_NUMBER: _ClassVar[int]
+    births: int
+    wanted: int
+    has_best: bool
+    best: float
+    alive: int
+    is_arena: bool
+    simulated_s: float
+    is_paused: bool
+    def __init__(self, births: _Optional[int] = ..., wanted: _Optional[int] = ..., has_best: _Optional[bool] = ..., best: _Optional[float] = ..., alive: _Optional[int] = ..., is_arena: _Optional[bool] = ..., simulated_s: _Optional[float] = ..., is_paused: _Optional[bool] = ...) -> None: ...
+
+class RunStatus(_message.Message):
+    __slots__ = ("folder", "name", "run", "state", "births_per_s", "islands")
+    FOLDER_FIELD_NUMBER: _ClassVar[int]
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    RUN_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    BIRTHS_PER_S_FIELD_NUMBER: _ClassVar[int]
+    ISLANDS_FIELD_NUMBER: _ClassVar[int]
+    folder: str
+    name: str
+    run: int
+    state: str
+    births_per_s: float
+    islands: _containers.RepeatedCompositeFieldContainer[IslandStatus]
+    def __init__(self, folder: _Optional[str] = ..., name: _Optional[str] = ..., run: _Optional[int] = ..., state: _Optional[str] = ..., births_per_s: _Optional[float] = ..., islands: _Optional[_Iterable[_Union[IslandStatus, _Mapping]]] = ...) -> None: ...
+
+class Status(_message.Message):
+    __slots__ = ("runs", "workers", "analyzers", "births_per_s")
+    RUNS_FIELD_NUMBER: _ClassVar[int]
+    WORKERS_FIELD_NUMBER: _ClassVar[int]
+    ANALYZERS_FIELD_NUMBER: _ClassVar[int]
+    BIRTHS_PER_S_FIELD_NUMBER: _ClassVar[int]
+    runs: _containers.RepeatedCompositeFieldContainer[RunStatus]
+    workers: int
+    analyzers: int
+    births_per_s: float
+    def __init__(self, runs: _Optional[_Iterable[_Union[RunStatus, _Mapping]]] = ..., workers: _Optional[int] = ..., analyzers: _Optional[int] = ..., births_per_s: _Optional[float] = ...) -> None: ...
 
 class OperatorReply(_message.Message):
-    __slots__ = ("is_refused", "text")
+    __slots__ = ("is_refused", "text", "status")
     IS_REFUSED_FIELD_NUMBER: _ClassVar[int]
     TEXT_FIELD_NUMBER: _ClassVar[int]
+    STATUS_FIELD_NUMBER: _ClassVar[int]
     is_refused: bool
     text: str
-    def __init__(self, is_refused: _Optional[bool] = ..., text: _Optional[str] = ...) -> None: ...
+    status: Status
+    def __init__(self, is_refused: _Optional[bool] = ..., text: _Optional[str] = ..., status: _Optional[_Union[Status, _Mapping]] = ...) -> None: ...
 
 class Live(_message.Message):
     __slots__ = ("run", "shard", "advance")

@@ -20,6 +20,7 @@ from schema.operator_codec import (
     RemoveWish,
     ResumeWish,
     SnapshotWish,
+    StatusWish,
     Wish,
     decode_operator_reply,
     decode_operator_request,
@@ -27,6 +28,7 @@ from schema.operator_codec import (
     encode_operator_request,
 )
 from schema.parts import BUILT_IN
+from schema.status import IslandStatus, RunStatus, Status
 
 CORE = develop(Node("Core", -1, 0, (0.5, 0.5, 0.5)), BUILT_IN)
 
@@ -38,6 +40,7 @@ CORE = develop(Node("Core", -1, 0, (0.5, 0.5, 0.5)), BUILT_IN)
         PauseWish(),
         ResumeWish(),
         SnapshotWish(),
+        StatusWish(),
         InsertWish(CORE),
         InsertWish(CORE, (0.0, -1.5)),
         RemoveWish(BirthId(1, 12)),
@@ -45,7 +48,7 @@ CORE = develop(Node("Core", -1, 0, (0.5, 0.5, 0.5)), BUILT_IN)
     ],
 )
 def test_requests_come_back(wish: Wish) -> None:
-    request = OperatorRequest("id", 2, wish)
+    request = OperatorRequest("id", 2, wish, "a/run")
     assert decode_operator_request(encode_operator_request(request)) == request
 
 
@@ -53,6 +56,25 @@ def test_requests_come_back(wish: Wish) -> None:
 def test_replies_come_back(is_refused: bool) -> None:  # noqa: FBT001 - a case
     reply = OperatorReply("at 5 s", is_refused=is_refused)
     assert decode_operator_reply(encode_operator_reply(reply)) == reply
+
+
+def test_a_status_comes_back() -> None:
+    arena = IslandStatus(7, 50, None, 12, 33.5, is_paused=True)
+    island = IslandStatus(15, 15, 0.25, 15)
+    runs = (
+        RunStatus("/a/b-0", "b", 0, "running", 1.5, (arena, island)),
+        RunStatus("/a/b-1", "b", 1, "waiting"),
+    )
+    reply = OperatorReply("", status=Status(runs, 2, 1, 1.5))
+    assert decode_operator_reply(encode_operator_reply(reply)) == reply
+
+
+def test_time_left_counts_what_is_still_to_be_born() -> None:
+    done = RunStatus("c", "c", 0, "finished", 0.0, (IslandStatus(9, 50, 0.1, 3),))
+    half = RunStatus("d", "d", 0, "running", 2.0, (IslandStatus(30, 50, 0.1, 3),))
+    assert Status((done, half), 1, 1, 2.0).left_s == 10.0
+    assert Status((done, half), 0, 1, 0.0).left_s is None
+    assert Status((done,), 0, 1, 0.0).left_s == 0.0
 
 
 def test_a_request_needs_a_name_and_a_wish() -> None:
