@@ -2,7 +2,8 @@
 
 YAML for people (.yaml, .yml), Protobuf for machines (.pb) and MJCF for MuJoCo (.xml)
 hold a whole robot, so one becomes the other and back without loss. URDF (.urdf)
-holds its body only and is written, not read.
+holds its body only and is written, not read. RoboGen's text (.txt) and JSON (.json)
+are read, not written.
 """
 
 from pathlib import Path
@@ -10,19 +11,25 @@ from pathlib import Path
 from schema.codec import decode_robot, encode_robot
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment import Experiment, Fitness, Simulation, Space
-from schema.mjcf_file import read_mjcf, robot_to_mjcf
 from schema.parts import BUILT_IN, BodySpace
+from schema.robogen_json import robot_from_robogen_json
+from schema.robogen_text import robot_from_robogen_text
 from schema.robot import Robot, check_robot
 from schema.settings import EvaluationSettings
-from schema.urdf import robot_to_urdf
 from schema.yaml_form import robot_from_yaml, robot_to_yaml
 
 YAML_ENDINGS = (".yaml", ".yml")
 PROTOBUF_ENDINGS = (".pb",)
 MJCF_ENDING = ".xml"
 URDF_ENDING = ".urdf"
-_READ = (*YAML_ENDINGS, *PROTOBUF_ENDINGS, MJCF_ENDING)
-_WRITTEN = (*_READ, URDF_ENDING)
+_TEXTS = {
+    ".yaml": robot_from_yaml,
+    ".yml": robot_from_yaml,
+    ".txt": robot_from_robogen_text,
+    ".json": robot_from_robogen_json,
+}
+_READ = (*_TEXTS, *PROTOBUF_ENDINGS, MJCF_ENDING)
+_WRITTEN = (*YAML_ENDINGS, *PROTOBUF_ENDINGS, MJCF_ENDING, URDF_ENDING)
 _ANY_BUILT_IN = Space(part_types=(*Space().part_types, "schema.parts:LIGHT_SENSOR"))
 
 
@@ -47,7 +54,7 @@ def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
     """Return the robot of a file.
 
     Args:
-        path: ends in .yaml, .yml, .pb or .xml.
+        path: ends in .yaml, .yml, .pb, .xml, .txt or .json.
         space: the part types that it may use.
 
     Raises:
@@ -57,19 +64,21 @@ def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
     """
     ending = _ending(path, _READ)
     if ending == MJCF_ENDING:
+        # The engine is loaded for its own forms only: a coordinator has no other use.
+        from schema.mjcf_file import read_mjcf  # noqa: PLC0415
+
         robot, _ = read_mjcf(path)
         _check(robot, space, path)
         return robot
-    is_yaml = ending in YAML_ENDINGS
     try:
         data = path.read_bytes()
-        text = data.decode() if is_yaml else ""
+        text = data.decode() if ending in _TEXTS else ""
     except OSError as error:
         raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
-        raise InvalidRobot(f"{path}: not YAML: byte {error.start} is no text") from None
-    if is_yaml:
-        return robot_from_yaml(text, str(path), space)
+        raise InvalidRobot(f"{path}: byte {error.start} is no text") from None
+    if ending in _TEXTS:
+        return _TEXTS[ending](text, str(path), space)
     try:
         robot = decode_robot(data)
     except MalformedMessage as error:
@@ -104,8 +113,12 @@ def write_robot(
         check_robot(robot, space)
         data = encode_robot(robot)
     elif ending == MJCF_ENDING:
+        from schema.mjcf_file import robot_to_mjcf  # noqa: PLC0415
+
         data = robot_to_mjcf(robot, settings).encode()
     else:
+        from schema.urdf import robot_to_urdf  # noqa: PLC0415
+
         data = robot_to_urdf(robot, space, settings.simulation).encode()
     try:
         path.write_bytes(data)

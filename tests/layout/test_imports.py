@@ -19,17 +19,22 @@ ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis")
 # Library -> the files, as patterns from the root, that may import it.
 HOMES = {
     "zenoh": ("*/service.py", "analysis/view.py"),
-    "mujoco": ("schema/mjcf.py", "worker/**/*.py", "analysis/render.py"),
-    "rerun": ("analysis/view.py",),
-    "plotnine": ("analysis/figures.py",),
-    "matplotlib": ("analysis/figures.py",),
+    "mujoco": (
+        "schema/mjcf*.py",
+        "schema/urdf.py",
+        "worker/**/*.py",
+        "analysis/render*.py",
+    ),
+    "rerun": ("analysis/view*.py",),
+    "plotnine": ("analysis/figure*.py",),
+    "matplotlib": ("analysis/figure*.py",),
+    "networkx": ("coordinator/topology.py",),
 }
 # Second opinions for tests and tools for developers: no room leans on them.
 NEVER = {
     "duckdb",
     "grpc_tools",
     "hypothesis",
-    "networkx",
     "pandas",
     "pickle",
     "polars",

@@ -199,7 +199,7 @@ def test_file_round_trip(tmp_path: Path, ending: str) -> None:
     assert is_text == (ending != ".pb")
 
 
-@pytest.mark.parametrize("name", ["robot", "robot.json", "robot.pb.gz"])
+@pytest.mark.parametrize("name", ["robot", "robot.toml", "robot.pb.gz"])
 def test_another_ending_is_refused(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     with pytest.raises(InvalidRobot, match=r"must end in one of \.yaml, \.yml, \.pb"):
@@ -225,7 +225,7 @@ def test_broken_bytes(tmp_path: Path) -> None:
         read_robot(path)
     path = tmp_path / "robot.yaml"
     path.write_bytes(b"body: \xff")
-    with pytest.raises(InvalidRobot, match=r"robot\.yaml: not YAML: byte 6"):
+    with pytest.raises(InvalidRobot, match=r"robot\.yaml: byte 6 is no text"):
         read_robot(path)
 
 
