@@ -19,6 +19,7 @@ from schema.live import (
     News,
     departed,
     levels,
+    migrant,
     newborn,
 )
 from schema.tables import Row
@@ -101,10 +102,7 @@ class Feed:
             case "deaths":
                 self._new_deaths.append(departed(row))
             case "migrations":
-                birth = BirthId(row["island"], row["birth"])
-                self._new_migrants.append(
-                    Migrant(birth, row["island"], row["to"], row["epoch"])
-                )
+                self._new_migrants.append(migrant(row))
 
     def news(self, workers: tuple[Crewman, ...]) -> News | None:
         """Return what is new since the last call; None if nothing is."""

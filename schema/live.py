@@ -78,12 +78,22 @@ class Level:
 
 @dataclass(frozen=True, slots=True)
 class Migrant:
-    """An individual went, or was copied, from one island to another."""
+    """An individual went, or was copied, from one island to another.
+
+    Attributes:
+        birth: who.
+        island, to: from where, and where to.
+        epoch: of the exchange.
+        births: on the island that it left, so far.
+        sim_time_s: when, in an arena [s]; None off-line.
+    """
 
     birth: BirthId
     island: int
     to: int
     epoch: int
+    births: int
+    sim_time_s: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,11 +150,17 @@ def newborn(row: Mapping[str, Any], births: int) -> Newborn:
     )
 
 
+def individual(row: Mapping[str, Any]) -> BirthId:
+    """Return whom a row is about: one born where it is, unless it says otherwise."""
+    island = row.get("birth_island")
+    return BirthId(row["island"] if island is None else island, row["birth"])
+
+
 def departed(row: Mapping[str, Any]) -> Departed:
     """Return what a row of the deaths table tells."""
     return Departed(
         row["island"],
-        BirthId(row["island"], row["birth"]),
+        individual(row),
         row["births"],
         row["sim_time_s"],
         row["reason"],
@@ -170,7 +186,19 @@ def _level(island: int, births: int, rows: Sequence[Mapping[str, Any]]) -> Level
         judged=len(fitness),
         mean=fsum(fitness) / len(fitness) if fitness else 0.0,
         best=max(fitness, default=0.0),
-        members=tuple(sorted(BirthId(island, row["birth"]) for row in rows)),
+        members=tuple(sorted(map(individual, rows))),
+    )
+
+
+def migrant(row: Mapping[str, Any]) -> Migrant:
+    """Return what a row of the migrations table tells."""
+    return Migrant(
+        individual(row),
+        row["island"],
+        row["to"],
+        row["epoch"],
+        row["births"],
+        row["sim_time_s"],
     )
 
 

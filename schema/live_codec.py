@@ -43,6 +43,9 @@ def encode_news(news: News) -> bytes:
             island=each.island,
             to=each.to,
             epoch=each.epoch,
+            births=each.births,
+            is_timed=each.sim_time_s is not None,
+            sim_time_s=each.sim_time_s or 0.0,
         )
     for man in news.workers:
         message.workers.add(name=man.name, platform=man.platform, shards=man.shards)
@@ -123,6 +126,12 @@ def _level(message: pb.Level) -> Level:
 
 
 def _migrant(message: pb.Migrant) -> Migrant:
+    time_s = finite(message.sim_time_s, "migrant.sim_time_s")
     return Migrant(
-        birth_from_message(message.birth), message.island, message.to, message.epoch
+        birth_from_message(message.birth),
+        message.island,
+        message.to,
+        message.epoch,
+        message.births,
+        time_s if message.is_timed else None,
     )

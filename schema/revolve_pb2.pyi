@@ -635,16 +635,22 @@ class Level(_message.Message):
     def __init__(self, island: _Optional[int] = ..., births: _Optional[int] = ..., size: _Optional[int] = ..., judged: _Optional[int] = ..., mean: _Optional[float] = ..., best: _Optional[float] = ..., members: _Optional[_Iterable[_Union[BirthName, _Mapping]]] = ...) -> None: ...
 
 class Migrant(_message.Message):
-    __slots__ = ("birth", "island", "to", "epoch")
+    __slots__ = ("birth", "island", "to", "epoch", "births", "is_timed", "sim_time_s")
     BIRTH_FIELD_NUMBER: _ClassVar[int]
     ISLAND_FIELD_NUMBER: _ClassVar[int]
     TO_FIELD_NUMBER: _ClassVar[int]
     EPOCH_FIELD_NUMBER: _ClassVar[int]
+    BIRTHS_FIELD_NUMBER: _ClassVar[int]
+    IS_TIMED_FIELD_NUMBER: _ClassVar[int]
+    SIM_TIME_S_FIELD_NUMBER: _ClassVar[int]
     birth: BirthName
     island: int
     to: int
     epoch: int
-    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., island: _Optional[int] = ..., to: _Optional[int] = ..., epoch: _Optional[int] = ...) -> None: ...
+    births: int
+    is_timed: bool
+    sim_time_s: float
+    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., island: _Optional[int] = ..., to: _Optional[int] = ..., epoch: _Optional[int] = ..., births: _Optional[int] = ..., is_timed: _Optional[bool] = ..., sim_time_s: _Optional[float] = ...) -> None: ...
 
 class Crewman(_message.Message):
     __slots__ = ("name", "platform", "shards")

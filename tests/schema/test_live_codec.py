@@ -27,7 +27,10 @@ NEWS = News(
     ),
     deaths=(Departed(0, BirthId(0, 0), 2, 30.0, "cull"),),
     levels=(Level(0, 2, 2, 1, 0.25, 0.25, (BirthId(0, 0), BirthId(0, 1))),),
-    migrants=(Migrant(BirthId(0, 1), 0, 1, 9),),
+    migrants=(
+        Migrant(BirthId(0, 1), 0, 1, 9, 30, 60.5),
+        Migrant(BirthId(0, 0), 1, 0, 2, 15, None),
+    ),
     workers=(Crewman("w-1", "x86", (0, 2)), Crewman("w-2", "arm", ())),
     document='{"name": "scenario3"}',
 )
