@@ -97,8 +97,8 @@ class Trials:
             asked.append(self.timed(Evaluate(one.birth, robot, len(past.fitness))))
         return asked
 
-    def take(self, outcome: Outcome) -> bool:
-        """Keep how somebody did anew; return False if that was known.
+    def take(self, outcome: Outcome) -> None:
+        """Keep how somebody did anew, unless that is known.
 
         Raises:
             UnexpectedEvent: nobody asked, or the fitness is no number.
@@ -106,7 +106,7 @@ class Trials:
         birth, past = outcome.birth, self._past.get(outcome.birth)
         trials = len(past.fitness) if past else 0
         if outcome.trial < trials:
-            return False
+            return
         if birth not in self._asked or outcome.trial > trials:
             raise UnexpectedEvent(
                 f"island {self._number}: {sorted(self._asked)} are judged anew, of "
@@ -114,10 +114,8 @@ class Trials:
             )
         if isinstance(outcome, Evaluated) and not isfinite(outcome.evaluation.fitness):
             raise UnexpectedEvent(f"fitness must be finite, got {outcome}")
-        if self._asked[birth] is not None:
-            return False
-        self._asked[birth] = outcome
-        return True
+        if self._asked[birth] is None:
+            self._asked[birth] = outcome
 
     def conclude(
         self, population: Sequence[Individual]

@@ -1,41 +1,69 @@
-"""Who lives on in an off-line population that varies in size.
+"""Who lives on after a brood off-line, and how large the next one may be.
 
-The survivors' rule of an arena, with births for a clock: where an arena waits for
-room, here the next birth would never come, so a full population is culled at once.
-Source: Hupkes 2016, sections 5.3.3 and 8.2.
+Where ``selection.culling`` says so, the population varies in size by the survivors'
+rule of an arena, with births for a clock. Where a full arena waits for a cull, here
+the next birth would never come, so a full population is culled at once.
+Source: Hupkes 2016, sections 5.3 and 8.2.
 """
 
 from collections.abc import Sequence
 
+from coordinator.breeding import Breeder
 from coordinator.culling import select_doomed
 from coordinator.rhythm import Rhythm
 from coordinator.selection import Individual
-from schema.experiment import Culling
+from schema.birth import BirthId
+from schema.experiment import Culling, Experiment
 
 
 class Turnover:
-    """One island's survivors by ``selection.culling``."""
+    """Broods come and survivors stay, on one island."""
 
-    def __init__(self, rules: Culling, founders: int) -> None:
-        """Count the births after so many founders."""
-        self._rules = rules
-        self._rhythm = Rhythm(rules.interval, founders)
-
-    def survivors(self, living: Sequence[Individual], births: int) -> list[Individual]:
-        """Return who lives on, in birth order.
+    def __init__(self, experiment: Experiment, breeder: Breeder) -> None:
+        """Have seen no birth.
 
         Args:
-            living: parents and children; all of them have been judged.
-            births: how many have been.
+            experiment: the island's.
+            breeder: picks the survivors of a population of one size.
         """
-        is_due = self._rhythm.comes_round(births)
-        ordered = sorted(living, key=lambda one: one.birth)
-        if not is_due and len(ordered) < self._rules.population_limit:
-            return ordered
-        _, doomed = select_doomed(ordered, self._rules)
-        gone = {one.birth for one in doomed}
-        return [one for one in ordered if one.birth not in gone]
+        selection = experiment.selection
+        self._births, self._children = experiment.births, selection.children
+        self._rules = selection.culling
+        self._breeder = breeder
+        interval = self._rules.interval if self._rules else experiment.births
+        self._rhythm = Rhythm(interval, selection.population)
 
-    def room(self, living: int) -> int:
-        """Return how many may be born before the next look at who lives on."""
-        return max(1, self._rules.population_limit - living)
+    def brood_end(self, births: int, living: int) -> int:
+        """Return how many will have been born after the next brood.
+
+        Args:
+            births: that have been.
+            living: how many there are; no brood takes them beyond the limit, but
+                one child is always born.
+        """
+        end = min(births + self._children, self._births)
+        if self._rules is None:
+            return end
+        return min(end, births + max(1, self._rules.population_limit - living))
+
+    def survivors(
+        self,
+        parents: Sequence[Individual],
+        children: Sequence[Individual],
+        last: BirthId,
+    ) -> tuple[Individual, ...]:
+        """Return the population after a brood whose last birth is ``last``."""
+        if self._rules is None:
+            return self._breeder.survivors(parents, children, last)
+        living = sorted([*parents, *children], key=lambda one: one.birth)
+        return tuple(self._fit_enough(living, self._rules, last.number + 1))
+
+    def _fit_enough(
+        self, living: list[Individual], rules: Culling, births: int
+    ) -> list[Individual]:
+        is_due = self._rhythm.comes_round(births)
+        if not is_due and len(living) < rules.population_limit:
+            return living
+        _, doomed = select_doomed(living, rules)
+        gone = {one.birth for one in doomed}
+        return [one for one in living if one.birth not in gone]

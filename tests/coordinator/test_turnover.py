@@ -1,9 +1,10 @@
 """Who lives on in an off-line population that varies in size: worked by hand."""
 
+from coordinator.breeding import Breeder
 from coordinator.selection import Individual
 from coordinator.turnover import Turnover
 from schema.birth import BirthId
-from schema.experiment import Culling
+from schema.experiment import Culling, Experiment, Selection
 from schema.genome import Node
 
 CORE = Node("Core", -1, 0, ())
@@ -20,41 +21,65 @@ def numbers(found: list[Individual]) -> list[int]:
     return [one.birth.number for one in found]
 
 
+def turnover(rules: Culling | None, founders: int = 15, children: int = 1) -> Turnover:
+    selection = Selection(population=founders, children=children, culling=rules)
+    experiment = Experiment(name="test", births=40, selection=selection)
+    return Turnover(experiment, Breeder(experiment, 1, 0))
+
+
+def survivors(
+    made: Turnover, parents: list[Individual], *children: Individual, births: int
+) -> list[int]:
+    found = made.survivors(parents, children, BirthId(0, births - 1))
+    return [one.birth.number for one in found]
+
+
 def test_between_two_culls_everybody_lives() -> None:
-    turnover = Turnover(Culling(), 15)
+    made = turnover(Culling())
     living = individuals(*([1.0] * 15), 0.0)
-    assert numbers(turnover.survivors(living, 16)) == list(range(16))
+    assert survivors(made, living, births=16) == list(range(16))
     # The second birth after the founders: 0.0 < 0.7 * 16 / 17.
-    living += individuals(1.0, first=16)
-    assert numbers(turnover.survivors(living, 17)) == [*range(15), 16]
+    (child,) = individuals(1.0, first=16)
+    assert survivors(made, living, child, births=17) == [*range(15), 16]
 
 
 def test_so_many_always_stay() -> None:
-    turnover = Turnover(Culling(interval=1), 10)
     living = individuals(*([0.0] * 5), *([1.0] * 6))
     # Five are below 0.7 * 6 / 11; eight stay; of equals the youngest go.
-    assert numbers(turnover.survivors(living, 11)) == [0, 1, *range(5, 11)]
+    kept = survivors(turnover(Culling(interval=1), 10), living, births=11)
+    assert kept == [0, 1, *range(5, 11)]
 
 
 def test_a_full_population_of_equals_is_culled_at_once() -> None:
-    turnover = Turnover(Culling(interval=100), 15)
-    assert len(turnover.survivors(individuals(*([1.0] * 29)), 29)) == 29
-    found = turnover.survivors(individuals(*([1.0] * 30)), 30)
-    assert numbers(found) == list(range(9))  # 21 of 30 go, the youngest
+    made = turnover(Culling(interval=100))
+    assert len(survivors(made, individuals(*([1.0] * 29)), births=29)) == 29
+    living = individuals(*([1.0] * 30))
+    # 21 of 30 go, the youngest.
+    assert survivors(made, living, births=30) == list(range(9))
 
 
 def test_one_weak_robot_spares_a_full_population() -> None:
-    turnover = Turnover(Culling(interval=100), 15)
-    found = turnover.survivors(individuals(*([1.0] * 29), 0.1), 30)
-    assert numbers(found) == list(range(29))
+    living = individuals(*([1.0] * 29), 0.1)
+    made = turnover(Culling(interval=100))
+    assert survivors(made, living, births=30) == list(range(29))
 
 
-def test_nobody_is_born_beyond_the_limit() -> None:
-    turnover = Turnover(Culling(population_limit=10), 5)
-    assert [turnover.room(living) for living in (5, 9, 10, 12)] == [5, 1, 1, 1]
+def test_no_brood_is_born_beyond_the_limit_or_the_end() -> None:
+    made = turnover(Culling(population_limit=10), 5, children=4)
+    assert [made.brood_end(20, living) for living in (5, 8, 9, 10, 12)] == [
+        *(24, 22, 21, 21, 21)
+    ]
+    assert made.brood_end(38, 5) == 40
+    assert turnover(None, children=4).brood_end(20, 15) == 24
 
 
 def test_survivors_stand_in_birth_order() -> None:
-    turnover = Turnover(Culling(), 3)
-    living = individuals(0.9, 0.8, first=7) + individuals(0.7, 0.6)
-    assert numbers(turnover.survivors(living, 4)) == [0, 1, 7, 8]
+    parents, children = individuals(0.9, 0.8, first=7), individuals(0.7, 0.6)
+    found = survivors(turnover(Culling(), 3), parents, *children, births=4)
+    assert found == [0, 1, 7, 8]
+
+
+def test_without_the_rule_the_best_stay() -> None:
+    parents, children = individuals(0.9, 0.1, 0.5), individuals(0.6, first=3)
+    found = survivors(turnover(None, 3), parents, *children, births=4)
+    assert found == [0, 2, 3]
