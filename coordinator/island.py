@@ -25,6 +25,8 @@ from coordinator.events import (
 )
 from coordinator.rows import birth_record, evaluation_record, population_records
 from coordinator.selection import Couple, Individual
+from coordinator.trials import Trials
+from coordinator.turnover import Turnover
 from schema.birth import BirthId
 from schema.errors import UnexpectedEvent
 from schema.experiment import Experiment, body_space
@@ -64,6 +66,8 @@ class Island:
         self._number = number
         self._space = body_space(experiment.space)
         self._breeder = Breeder(experiment, seed, run)
+        self._turnover = Turnover(experiment, self._breeder)
+        self._trials = Trials(experiment, seed, run, number)
         self._has_started = False
         self._generation = 0
         self._begun = 0
@@ -75,7 +79,7 @@ class Island:
     @property
     def is_finished(self) -> bool:
         """All births of the experiment have been recorded."""
-        return self.births == self._experiment.births
+        return self.births == self._experiment.births and not self._trials.is_open
 
     def handle(self, event: IslandEvent) -> list[IslandCommand]:
         """Take an event and return what follows from it.
@@ -92,6 +96,9 @@ class Island:
                 raise self._unexpected(event, "it has started before")
             self._has_started = True
             return self._proceed()
+        if isinstance(event, Evaluated | EvaluationFailed) and event.trial:
+            self._trials.take(event)
+            return self._proceed()
         unborn = self._asked(event)
         if unborn is None:
             return []
@@ -99,7 +106,7 @@ class Island:
             case Vetted(report=report) if report.is_viable:
                 unborn.is_viable = True
                 candidate = unborn.candidate
-                return [Evaluate(candidate.birth, candidate.robot)]
+                return [self._trials.timed(Evaluate(candidate.birth, candidate.robot))]
             case Vetted(report=report):
                 return [self._retry(unborn.candidate, report.reason)]
             case VettingFailed(reason=reason):
@@ -144,8 +151,10 @@ class Island:
         commands: list[IslandCommand] = []
         while (first := self._unborn.get(self.births)) and first.outcome:
             commands += self._commit(first.candidate, first.outcome)
-        if self.births == self._brood_end:
-            commands += self._close_brood()
+        if self.births == self._brood_end and self._brood:
+            commands += self._trials.ask_anew(self.births, self.population)
+            if not self._trials.is_open:
+                commands += self._close_brood()
         while self._begun < min(self._brood_end, self.births + self._window):
             birth = BirthId(self._number, self._begun)
             candidate = self._conceived(birth, 0, None, "")
@@ -199,15 +208,15 @@ class Island:
 
     def _close_brood(self) -> list[IslandCommand]:
         """Let the survivors be the population, and set out the next brood."""
+        parents, rows = self._trials.conclude(self.population)
         last = BirthId(self._number, self.births - 1)
-        self.population = self._breeder.survivors(self.population, self._brood, last)
+        self.population = self._turnover.survivors(parents, self._brood, last)
         self._brood = []
-        commands: list[IslandCommand] = []
+        commands: list[IslandCommand] = [*rows]
         commands += population_records(self._number, self.births, self.population)
         if self.is_finished:
             return [*commands, Finish(self._number)]
         self._generation += 1
         self._window = self._experiment.window
-        children = self._experiment.selection.children
-        self._brood_end = min(self.births + children, self._experiment.births)
+        self._brood_end = self._turnover.brood_end(self.births, len(self.population))
         return commands
