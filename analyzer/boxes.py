@@ -54,9 +54,10 @@ def place_boxes(robot: Robot, space: BodySpace) -> Boxes:
     local = np.array([box.position for box in boxes])
     rotation = rotations[part]
     centre = positions[part] + (rotation @ local[:, :, None])[:, :, 0]
-    for index, box in enumerate(boxes):
-        if box.rotation is not IDENTITY:
-            rotation[index] = rotation[index] @ np.array(box.rotation)
+    tilted = [i for i, box in enumerate(boxes) if box.rotation is not IDENTITY]
+    if tilted:
+        tilts = np.array([boxes[index].rotation for index in tilted])
+        rotation[tilted] = rotation[tilted] @ tilts
     reach = (np.abs(rotation) @ half[:, :, None])[:, :, 0]
     mass = math.fsum(box.mass for box in boxes)
     return Boxes(part, rotation, centre, half, reach, mass)

@@ -5,7 +5,7 @@ import time
 from analyzer.report import analyze
 from schema.codec import Answer, decode_request, encode_answer
 from schema.experiment import body_space
-from schema.robot import check_robot
+from schema.robot import check_types
 from schema.settings import read_vetting_settings
 
 
@@ -28,7 +28,7 @@ def answer(request: bytes) -> bytes:
     asked = decode_request(request)
     settings = read_vetting_settings(asked.settings)
     space = body_space(settings.space)
-    check_robot(asked.robot, space)
+    check_types(asked.robot, space)
     report = analyze(asked.robot, space, settings.vetting)
     wall_s = time.perf_counter() - start
     return encode_answer(Answer(asked.epoch, asked.number, wall_s, report))

@@ -6,8 +6,9 @@ hidden neuron re-wires nothing.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 from decimal import Decimal
+
+from msgspec.structs import replace
 
 from coordinator.branch import Branch, follow
 from coordinator.draws import Draws
@@ -37,8 +38,9 @@ def delete_hidden_neurons(
     if not moved:
         return
     for branch in branches:
-        renamed = (_renamed(gene, branch, moved) for gene in branch.connections)
-        branch.connections = tuple(gene for gene in renamed if gene is not None)
+        if branch.connections:
+            renamed = [_renamed(gene, branch, moved) for gene in branch.connections]
+            branch.connections = tuple([gene for gene in renamed if gene is not None])
     for branch, offsets_after in moved.items():
         branch.hidden = tuple(
             neuron
@@ -51,6 +53,8 @@ def _renamed(
     gene: ConnectionGene, owner: Branch, moved: dict[Branch, list[int | None]]
 ) -> ConnectionGene | None:
     """Return a connection under its neurons' new offsets; None if one is gone."""
+    if "hidden" not in (gene.source[0], gene.target[0]):
+        return gene
     offsets = {"source": gene.source[1], "target": gene.target[1]}
     end = follow(owner, gene.path)
     for name, branch, layer in (
@@ -82,7 +86,7 @@ def delete_connections(
     for branch in branches:
         if branch.connections:
             branch.connections = tuple(
-                gene for gene in branch.connections if draws.number() >= probability
+                [gene for gene in branch.connections if draws.number() >= probability]
             )
 
 

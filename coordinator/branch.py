@@ -55,12 +55,15 @@ class Branch:
 
     def neurons(self, *layers: Layer) -> list[tuple[Layer, int]]:
         """Return (layer, offset) of its own neurons of some layers, in turn."""
-        counts = {
-            "input": self.kind.inputs,
-            "output": len(self.outputs),
-            "hidden": len(self.hidden),
-        }
-        return [(layer, k) for layer in layers for k in range(counts[layer])]
+        found: list[tuple[Layer, int]] = []
+        for layer in layers:
+            if layer == "input":
+                count = self.kind.inputs
+            else:
+                count = len(self.outputs if layer == "output" else self.hidden)
+            if count:
+                found += [(layer, k) for k in range(count)]
+        return found
 
 
 def gene_ids(birth: BirthId) -> Iterator[int]:

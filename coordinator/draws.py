@@ -4,6 +4,7 @@ A scalar call to numpy costs more than most of what variation does with it.
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from statistics import NormalDist
 from typing import TypeVar
 
@@ -27,7 +28,8 @@ class Draws:
     __slots__ = ("number",)
 
     def __init__(self, rng: np.random.Generator) -> None:
-        self.number = _numbers(rng).__next__
+        blocks: Iterator[list[float]] = iter(lambda: rng.random(_BLOCK).tolist(), None)
+        self.number = chain.from_iterable(blocks).__next__
 
     def chance(self, probability: float) -> bool:
         """Return true with a probability; never for 0, always for 1."""
@@ -68,11 +70,12 @@ class Draws:
             epsilon: 0 leaves them, 1 draws them anew.
         """
         moved: list[float] = []
+        number, rest = self.number, 1.0 - epsilon
         for p, v in zip(parameters, values, strict=True):
             if not p.is_mutable:
                 moved.append(v)
                 continue
-            near = (1.0 - epsilon) * v + epsilon * self.value(p)
+            near = rest * v + epsilon * (p.low + (p.high - p.low) * number())
             # Rounding must not carry a value out of its range.
             moved.append(p.low if near < p.low else min(near, p.high))
         return tuple(moved)
@@ -86,8 +89,3 @@ class Draws:
         """Return a neighbouring integer whose mean is ``expected``, >= 0."""
         whole = int(expected)
         return whole + self.chance(expected - whole)
-
-
-def _numbers(rng: np.random.Generator) -> Iterator[float]:
-    while True:
-        yield from rng.random(_BLOCK).tolist()

@@ -6,12 +6,13 @@ falls on the parent's. Source: facts of the original, section 2.
 """
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
 from schema.evaluation import Floats
-from schema.parts import BodySpace, Slot
+from schema.parts import BodySpace, Slot, Vector
 from schema.robot import Robot
 
 
@@ -57,21 +58,25 @@ def attach(parent: Slot, child: Slot, orientation: int) -> tuple[Floats, Floats]
         origin [m]. Both are shared: do not write to them.
     """
     # The parent's tangent and normal seen by the child, then their frames' quotient.
-    normal = np.asarray(child.normal)
-    tangent = np.asarray(child.tangent)
     angle = math.radians(orientation)
-    turned = tangent * _exact(math.cos(angle)) + np.cross(normal, tangent) * _exact(
-        math.sin(angle)
-    )
-    child_frame = np.column_stack((normal, turned, np.cross(normal, turned)))
-    against = -np.asarray(parent.normal)
-    along = np.asarray(parent.tangent)
-    parent_frame = np.column_stack((against, along, np.cross(against, along)))
-    rotation = parent_frame @ child_frame.T
-    position = np.asarray(parent.position) - rotation @ np.asarray(child.position)
+    cosine, sine = _exact(math.cos(angle)), _exact(math.sin(angle))
+    across = _cross(child.normal, child.tangent)
+    turned = [t * cosine + a * sine for t, a in zip(child.tangent, across, strict=True)]
+    rows = np.array((child.normal, turned, _cross(child.normal, turned)))
+    nx, ny, nz = parent.normal
+    against = (-nx, -ny, -nz)
+    parent_rows = (against, parent.tangent, _cross(against, parent.tangent))
+    rotation = np.array(parent_rows).T @ rows
+    position = np.array(parent.position) - rotation @ np.array(child.position)
     rotation.flags.writeable = False
     position.flags.writeable = False
     return rotation, position
+
+
+def _cross(first: Sequence[float], second: Sequence[float]) -> Vector:
+    """Return the cross product of two vectors."""
+    (ax, ay, az), (bx, by, bz) = first, second
+    return (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
 
 
 def _exact(value: float) -> float:

@@ -13,6 +13,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from msgspec import Struct
+
 from schema.errors import InvalidRobot
 from schema.parts import Parameter
 
@@ -38,10 +40,10 @@ NEURON_TYPES: dict[str, tuple[Parameter, ...]] = {
 
 INPUT = "Input"
 """Type of every input neuron; it has no parameters."""
+_INPUT_TYPES: dict[str, tuple[Parameter, ...]] = {INPUT: ()}
 
 
-@dataclass(frozen=True, slots=True)
-class Neuron:
+class Neuron(Struct, frozen=True, gc=False):
     """A neuron: ``part`` is the index of the part that owns it."""
 
     layer: Layer
@@ -50,8 +52,7 @@ class Neuron:
     parameters: tuple[float, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Connection:
+class Connection(Struct, frozen=True, gc=False):
     """A weighted edge between two neurons, by their indices in the brain."""
 
     source: int
@@ -94,11 +95,14 @@ def check_brain(brain: Brain, part_count: int) -> None:
             "brain.neurons: must be inputs, outputs, hidden in turn, "
             "each by ascending part"
         )
+    # Texts only where they are needed: this runs in every process, every birth.
     for index, neuron in enumerate(brain.neurons):
-        _check_neuron(neuron, f"brain.neurons[{index}]", part_count)
+        if problem := _neuron_problem(neuron, part_count):
+            raise InvalidRobot(f"brain.neurons[{index}]{problem}")
     seen: set[tuple[int, int]] = set()
     for index, edge in enumerate(brain.connections):
-        _check_connection(edge, f"brain.connections[{index}]", brain)
+        if problem := _connection_problem(edge, brain):
+            raise InvalidRobot(f"brain.connections[{index}]{problem}")
         if (edge.source, edge.target) in seen:
             raise InvalidRobot(
                 f"brain.connections[{index}]: second connection "
@@ -107,36 +111,33 @@ def check_brain(brain: Brain, part_count: int) -> None:
         seen.add((edge.source, edge.target))
 
 
-def _check_neuron(neuron: Neuron, where: str, part_count: int) -> None:
+def _neuron_problem(neuron: Neuron, part_count: int) -> str:
+    """Return what is wrong with a neuron by itself, nothing if it is sound."""
     if not 0 <= neuron.part < part_count:
-        raise InvalidRobot(
-            f"{where}.part: must be 0..{part_count - 1}, got {neuron.part}"
-        )
-    if neuron.layer == "input":
-        allowed: tuple[str, ...] = (INPUT,)
-        expected = 0
-    else:
-        allowed = tuple(NEURON_TYPES)
-        expected = len(NEURON_TYPES.get(neuron.kind, ()))
-    if neuron.kind not in allowed:
-        raise InvalidRobot(
-            f"{where}.kind: must be one of {', '.join(allowed)}, got {neuron.kind!r}"
-        )
-    if len(neuron.parameters) != expected:
-        raise InvalidRobot(
-            f"{where}.parameters: {neuron.kind} takes {expected}, "
+        return f".part: must be 0..{part_count - 1}, got {neuron.part}"
+    types = _INPUT_TYPES if neuron.layer == "input" else NEURON_TYPES
+    parameters = types.get(neuron.kind)
+    if parameters is None:
+        return f".kind: must be one of {', '.join(types)}, got {neuron.kind!r}"
+    if len(neuron.parameters) != len(parameters):
+        return (
+            f".parameters: {neuron.kind} takes {len(parameters)}, "
             f"got {len(neuron.parameters)}"
         )
     if not all(map(math.isfinite, neuron.parameters)):
-        raise InvalidRobot(f"{where}.parameters: must be finite")
+        return ".parameters: must be finite"
+    return ""
 
 
-def _check_connection(edge: Connection, where: str, brain: Brain) -> None:
+def _connection_problem(edge: Connection, brain: Brain) -> str:
+    """Return what is wrong with a connection by itself, nothing if it is sound."""
     count = len(brain.neurons)
-    for name, index in (("source", edge.source), ("target", edge.target)):
-        if not 0 <= index < count:
-            raise InvalidRobot(f"{where}.{name}: must be 0..{count - 1}, got {index}")
+    if not 0 <= edge.source < count:
+        return f".source: must be 0..{count - 1}, got {edge.source}"
+    if not 0 <= edge.target < count:
+        return f".target: must be 0..{count - 1}, got {edge.target}"
     if brain.neurons[edge.target].layer == "input":
-        raise InvalidRobot(f"{where}.target: neuron {edge.target} is an input")
+        return f".target: neuron {edge.target} is an input"
     if not math.isfinite(edge.weight):
-        raise InvalidRobot(f"{where}.weight: must be finite, got {edge.weight}")
+        return f".weight: must be finite, got {edge.weight}"
+    return ""

@@ -7,23 +7,21 @@ therefore move between genomes and keep their wiring; a path that leads nowhere
 in the new place is kept, and ignored in the robot.
 """
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from schema.brain import INPUT, Brain, Connection, Layer, Neuron
 from schema.parts import BodySpace
 from schema.robot import Part, Robot
 
 
-@dataclass(frozen=True, slots=True)
-class NeuronGene:
+class NeuronGene(Struct, frozen=True, gc=False):
     """An output or hidden neuron: its type and that type's parameters."""
 
     kind: str
     parameters: tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class ConnectionGene:
+class ConnectionGene(Struct, frozen=True, gc=False):
     """A connection that leaves a neuron of the node that owns it.
 
     Attributes:
@@ -39,8 +37,7 @@ class ConnectionGene:
     weight: float
 
 
-@dataclass(frozen=True, slots=True)
-class Node:
+class Node(Struct, frozen=True, gc=False):
     """One gene of a genome: a part with its share of the brain.
 
     Attributes:
@@ -82,7 +79,10 @@ def walk(genome: Genome) -> list[tuple[Node, int, int]]:
         entry = stack.pop()
         index = len(entries)
         entries.append(entry)
-        stack += [(child, index, slot) for slot, child in reversed(entry[0].children)]
+        if entry[0].children:
+            stack += [
+                (child, index, slot) for slot, child in reversed(entry[0].children)
+            ]
     return entries
 
 
@@ -142,30 +142,36 @@ def _edges(
             each node; how many there are, at the end.
     """
     inputs, outputs, _ = starts[-1]
+    # Of each layer: its place in ``starts``, and where it begins in the brain.
     layers: dict[Layer, tuple[int, int]] = {
         "input": (0, 0),
         "output": (1, inputs),
         "hidden": (2, inputs + outputs),
     }
-
-    def find(index: int, neuron: tuple[Layer, int]) -> int | None:
-        layer, begin = layers[neuron[0]]
-        place = starts[index][layer] + neuron[1]
-        return begin + place if place < starts[index + 1][layer] else None
-
     neighbours = _neighbours(entries)
     edges: dict[tuple[int, int], Connection] = {}
     for index, (node, _, _) in enumerate(entries):
         for gene in node.connections:
-            end: int | None = index
+            end = index
             for slot in gene.path:
-                end = None if end is None else neighbours[end].get(slot)
-            if end is None or gene.target[0] == "input":
+                end = neighbours[end].get(slot, -1)
+                if end < 0:
+                    break
+            kind, offset = gene.target
+            if end < 0 or kind == "input":
                 continue
-            source, target = find(index, gene.source), find(end, gene.target)
-            if source is not None and target is not None:
-                edge = Connection(source, target, gene.weight)
-                edges.setdefault((source, target), edge)
+            layer, begin = layers[kind]
+            target = starts[end][layer] + offset
+            if target >= starts[end + 1][layer]:
+                continue
+            ends = begin + target
+            kind, offset = gene.source
+            layer, begin = layers[kind]
+            source = starts[index][layer] + offset
+            if source < starts[index + 1][layer]:
+                key = (begin + source, ends)
+                if key not in edges:
+                    edges[key] = Connection(*key, gene.weight)
     return tuple(edges.values())
 
 

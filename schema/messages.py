@@ -66,7 +66,7 @@ def read_brain(message: pb.Robot | pb.BrainChange, part_count: int) -> Brain:
     """
     brain = Brain(
         neurons=tuple(
-            Neuron(_layer(item.layer), item.kind, item.part, tuple(item.parameters))
+            Neuron(_layer(item.layer), item.kind, item.part, tuple(item.parameters[:]))
             for item in message.neurons
         ),
         connections=tuple(
@@ -84,20 +84,31 @@ def genome_to_message(genome: Genome) -> pb.Genome:
     for node, parent, parent_slot in walk(genome):
         entry = message.nodes.add()
         _write_part(node, parent, parent_slot, entry.part)
+        # What is empty is not even asked for: that alone takes time.
         for gene in node.outputs:
-            entry.outputs.add(kind=gene.kind, parameters=gene.parameters)
+            neuron = entry.outputs.add()
+            neuron.kind = gene.kind
+            neuron.parameters.extend(gene.parameters)
         for gene in node.hidden:
-            entry.hidden.add(kind=gene.kind, parameters=gene.parameters)
-        for edge in node.connections:
-            entry.connections.add(
-                source_layer=_LAYER_CODES[edge.source[0]],
-                source_offset=edge.source[1],
-                path=edge.path,
-                target_layer=_LAYER_CODES[edge.target[0]],
-                target_offset=edge.target[1],
-                weight=edge.weight,
-            )
+            neuron = entry.hidden.add()
+            neuron.kind = gene.kind
+            neuron.parameters.extend(gene.parameters)
+        if node.connections:
+            _write_connections(node.connections, entry)
     return message
+
+
+def _write_connections(connections: tuple[ConnectionGene, ...], node: pb.Node) -> None:
+    add = node.connections.add
+    for edge in connections:
+        entry = add()
+        layer, offset = edge.source
+        entry.source_layer, entry.source_offset = _LAYER_CODES[layer], offset
+        if edge.path:
+            entry.path.extend(edge.path)
+        layer, offset = edge.target
+        entry.target_layer, entry.target_offset = _LAYER_CODES[layer], offset
+        entry.weight = edge.weight
 
 
 def genome_from_message(message: pb.Genome) -> Genome:
@@ -151,7 +162,7 @@ def _part_from_message(message: pb.Part) -> Part:
         message.parent_slot,
         message.slot,
         message.orientation,
-        tuple(message.parameters),
+        tuple(message.parameters[:]),
         message.gene,
     )
 
@@ -161,7 +172,7 @@ def _neuron_gene(message: pb.NeuronGene) -> NeuronGene:
         raise MalformedMessage(
             f"neuron: must be one of {', '.join(NEURON_TYPES)}, got {message.kind!r}"
         )
-    parameters = tuple(message.parameters)
+    parameters = tuple(message.parameters[:])
     expected = len(NEURON_TYPES[message.kind])
     if len(parameters) != expected or not all(map(math.isfinite, parameters)):
         raise MalformedMessage(

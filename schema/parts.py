@@ -12,6 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from msgspec import Struct
+
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
 
@@ -20,8 +22,7 @@ BAR_KG_PER_M = 0.02
 """Mass of a bar per metre: 0.2 g/cm as coded; the author meant 2 g/cm."""
 
 
-@dataclass(frozen=True, slots=True)
-class Box:
+class Box(Struct, frozen=True):
     """One box of a part, of uniform density; it collides and it weighs.
 
     Attributes:
@@ -41,8 +42,7 @@ class Box:
     rotation: Matrix = IDENTITY
 
 
-@dataclass(frozen=True, slots=True)
-class Slot:
+class Slot(Struct, frozen=True):
     """A place where two parts meet: position [m], outward normal, tangent."""
 
     position: Vector
@@ -51,8 +51,7 @@ class Slot:
     segment: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Joint:
+class Joint(Struct, frozen=True):
     """A revolute joint between a part's two segments.
 
     Attributes:
@@ -111,8 +110,7 @@ class Parameter:
     is_mutable: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
+class Shape(Struct, frozen=True):
     """Geometry of a part for given parameters; ``joint`` is None if rigid."""
 
     boxes: tuple[Box, ...]

@@ -8,6 +8,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from msgspec import Struct
+
 from schema.brain import Brain, Layer, check_brain
 from schema.errors import InvalidRobot
 from schema.parts import BodySpace, PartType
@@ -18,8 +20,7 @@ GENES = 2**64
 NO_BRAIN = Brain()
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(Struct, frozen=True, gc=False):
     """One part of a body.
 
     Attributes:
@@ -65,39 +66,45 @@ def check_tree(parts: Sequence[Part]) -> None:
         raise InvalidRobot("body: a robot needs at least its core")
     taken: set[tuple[int, int]] = set()
     for index, part in enumerate(parts):
-        where = f"body.parts[{index}]"
-        _check_place(part, index, where)
-        if part.orientation not in ORIENTATIONS:
-            raise InvalidRobot(
-                f"{where}.orientation: must be one of {ORIENTATIONS}, "
-                f"got {part.orientation}"
-            )
-        if not all(map(math.isfinite, part.parameters)):
-            raise InvalidRobot(f"{where}.parameters: must be finite")
-        if not 0 <= part.gene < GENES:
-            raise InvalidRobot(f"{where}.gene: must be 0..2^64-1, got {part.gene}")
+        # Texts only where they are needed: this runs in every process, every birth.
+        if problem := _place_problem(part, index) or _value_problem(part):
+            raise InvalidRobot(f"body.parts[{index}]{problem}")
         if index == 0:
             continue
         for end in ((part.parent, part.parent_slot), (index, part.slot)):
             if end in taken:
-                raise InvalidRobot(f"{where}: slot {end[1]} of part {end[0]} is taken")
+                raise InvalidRobot(
+                    f"body.parts[{index}]: slot {end[1]} of part {end[0]} is taken"
+                )
             taken.add(end)
     _check_order(parts)
 
 
-def _check_place(part: Part, index: int, where: str) -> None:
+def _place_problem(part: Part, index: int) -> str:
+    """Return what is wrong with where a part sits; nothing if it may sit there."""
     if index == 0:
-        if (part.parent, part.parent_slot, part.slot) != (-1, -1, -1):
-            raise InvalidRobot(
-                f"{where}: the core's parent, parent_slot and slot must be -1, "
-                f"got {part.parent}, {part.parent_slot}, {part.slot}"
-            )
-        return
+        if (part.parent, part.parent_slot, part.slot) == (-1, -1, -1):
+            return ""
+        return (
+            ": the core's parent, parent_slot and slot must be -1, "
+            f"got {part.parent}, {part.parent_slot}, {part.slot}"
+        )
     if not 0 <= part.parent < index:
-        raise InvalidRobot(f"{where}.parent: must be 0..{index - 1}, got {part.parent}")
-    for name, slot in (("parent_slot", part.parent_slot), ("slot", part.slot)):
-        if slot < 0:
-            raise InvalidRobot(f"{where}.{name}: must be >= 0, got {slot}")
+        return f".parent: must be 0..{index - 1}, got {part.parent}"
+    if part.parent_slot < 0:
+        return f".parent_slot: must be >= 0, got {part.parent_slot}"
+    return f".slot: must be >= 0, got {part.slot}" if part.slot < 0 else ""
+
+
+def _value_problem(part: Part) -> str:
+    """Return what is wrong with a part's numbers whatever its type is."""
+    if part.orientation not in ORIENTATIONS:
+        return f".orientation: must be one of {ORIENTATIONS}, got {part.orientation}"
+    if not all(map(math.isfinite, part.parameters)):
+        return ".parameters: must be finite"
+    if not 0 <= part.gene < GENES:
+        return f".gene: must be 0..2^64-1, got {part.gene}"
+    return ""
 
 
 def check_robot(robot: Robot, space: BodySpace) -> None:
@@ -116,41 +123,57 @@ def check_robot(robot: Robot, space: BodySpace) -> None:
             does not fit the sensors and motors of the body.
     """
     check_tree(robot.parts)
+    check_brain(robot.brain, len(robot.parts))
+    check_types(robot, space)
+
+
+def check_types(robot: Robot, space: BodySpace) -> None:
+    """Raise unless a robot keeps the rules of a body space.
+
+    Args:
+        robot: a tree of parts and a sound brain, as every decoded robot is.
+        space: the part types that it may use.
+
+    Raises:
+        InvalidRobot: as ``check_robot``, as far as part types decide about it.
+    """
     for index, part in enumerate(robot.parts):
         _check_part(part, index, space)
         if index == 0:
             continue
         parent = robot.parts[part.parent]
-        for name, owner, slot in (
-            ("parent_slot", parent, part.parent_slot),
-            ("slot", part, part.slot),
-        ):
-            arity = space[owner.kind].arity
-            if slot >= arity:
-                raise InvalidRobot(
-                    f"body.parts[{index}].{name}: {owner.kind} has slots "
-                    f"0..{arity - 1}, got {slot}"
-                )
-    check_brain(robot.brain, len(robot.parts))
+        if part.parent_slot >= space[parent.kind].arity:
+            raise _no_slot(index, "parent_slot", parent, part.parent_slot, space)
+        if part.slot >= space[part.kind].arity:
+            raise _no_slot(index, "slot", part, part.slot, space)
     _check_wiring(robot, space)
 
 
+def _no_slot(
+    index: int, name: str, owner: Part, slot: int, space: BodySpace
+) -> InvalidRobot:
+    return InvalidRobot(
+        f"body.parts[{index}].{name}: {owner.kind} has slots "
+        f"0..{space[owner.kind].arity - 1}, got {slot}"
+    )
+
+
 def _check_part(part: Part, index: int, space: BodySpace) -> None:
-    where = f"body.parts[{index}]"
-    kind = part_type(part.kind, space, where)
+    kind = space.get(part.kind) or part_type(part.kind, space, f"body.parts[{index}]")
     if kind.is_root != (index == 0):
         raise InvalidRobot(
-            f"{where}: exactly the first part must be a core, got {part.kind}"
+            f"body.parts[{index}]: exactly the first part must be a core, "
+            f"got {part.kind}"
         )
     if len(part.parameters) != len(kind.parameters):
         raise InvalidRobot(
-            f"{where}.parameters: {part.kind} takes {len(kind.parameters)}, "
-            f"got {len(part.parameters)}"
+            f"body.parts[{index}].parameters: {part.kind} takes "
+            f"{len(kind.parameters)}, got {len(part.parameters)}"
         )
     for parameter, value in zip(kind.parameters, part.parameters, strict=True):
         if not parameter.low <= value <= parameter.high:
             raise InvalidRobot(
-                f"{where}.{parameter.name}: must be in "
+                f"body.parts[{index}].{parameter.name}: must be in "
                 f"[{parameter.low}, {parameter.high}], got {value}"
             )
 

@@ -8,7 +8,7 @@ from schema.codec import Answer, decode_request, encode_answer
 from schema.errors import FitnessUndefined, SimulationDiverged
 from schema.evaluation import Evaluation
 from schema.experiment import body_space
-from schema.robot import check_robot
+from schema.robot import check_types
 from schema.settings import lasting, read_evaluation_settings
 from worker.evaluation import evaluate
 from worker.shards import Shards
@@ -56,7 +56,7 @@ def answer(request: bytes) -> bytes:
     began = time.perf_counter()
     job = decode_request(request)
     settings = read_evaluation_settings(job.settings)
-    check_robot(job.robot, body_space(settings.space))
+    check_types(job.robot, body_space(settings.space))
     result: Evaluation | str
     try:
         result = evaluate(job.robot, lasting(settings, job.steps))

@@ -1,12 +1,13 @@
 """Random genomes and robots of the built-in body space, for property tests."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import pytest
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
+from msgspec.structs import replace
 
 from schema.brain import NEURON_TYPES, Layer
 from schema.genome import ConnectionGene, Genome, NeuronGene, Node, develop

@@ -1,12 +1,12 @@
 """Development, by hand: what each connection of a small genome comes to."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
+from msgspec.structs import replace
 
 from schema.brain import Layer
 from schema.genome import ConnectionGene, Genome, NeuronGene, Node, develop, walk

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from msgspec import structs
 
 from schema.brain import Brain, Connection, Neuron, check_brain
 from schema.errors import InvalidRobot
@@ -28,13 +29,13 @@ def robot(node: NodeMaker) -> Robot:
 
 def with_part(robot: Robot, index: int, **changes: Any) -> Robot:  # noqa: ANN401
     parts = list(robot.parts)
-    parts[index] = replace(parts[index], **changes)
+    parts[index] = structs.replace(parts[index], **changes)
     return replace(robot, parts=tuple(parts))
 
 
 def with_neuron(robot: Robot, index: int, **changes: Any) -> Robot:  # noqa: ANN401
     neurons = list(robot.brain.neurons)
-    neurons[index] = replace(neurons[index], **changes)
+    neurons[index] = structs.replace(neurons[index], **changes)
     return replace(robot, brain=replace(robot.brain, neurons=tuple(neurons)))
 
 
@@ -160,7 +161,9 @@ def test_one_connection_per_ordered_pair(robot: Robot) -> None:
     with pytest.raises(
         InvalidRobot, match=r"connections\[2\]: second connection 8 -> 9"
     ):
-        check_robot(wired(robot, there, back, replace(there, weight=0.1)), BUILT_IN)
+        check_robot(
+            wired(robot, there, back, structs.replace(there, weight=0.1)), BUILT_IN
+        )
 
 
 def test_a_brain_is_checked_without_a_body() -> None:
