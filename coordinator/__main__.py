@@ -1,35 +1,31 @@
 """Commands of the coordinator: ``run``, ``coordinator``, ``resume``, ``compare``."""
 
 import argparse
-import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from msgspec.structs import replace
 
+from coordinator.campaign import (
+    Campaign,
+    is_campaign,
+    read_campaign,
+    read_experiments,
+    shipped_campaigns,
+)
+from coordinator.command_line import LISTEN, parser
 from coordinator.compare import compare
 from coordinator.events import AgentKind
 from coordinator.folder import read_details
-from coordinator.running import Deployment, resume, start
-from schema.agent_command import Flags, add_network_flags, tls_of
+from coordinator.running import Deployment, resume, start, start_campaign
+from schema.agent_command import tls_of
 from schema.crew import cores
-from schema.errors import RunFolderError
-from schema.experiment import Experiment
+from schema.errors import NetworkError, RunFolderError
+from schema.experiment import Experiment, island_count, island_experiment
 from schema.experiment_check import check_experiment
-from schema.experiment_file import (
-    experiment_from_text,
-    read_experiment,
-    shipped_experiments,
-)
+from schema.experiment_file import experiment_from_text
 from schema.settings import fitness_function
-
-_EXAMPLES = {
-    "run": "revolve run scenario1 --seed 1 --births 600",
-    "coordinator": "revolve coordinator scenario1 --listen tcp/127.0.0.1:7447",
-    "resume": "revolve resume runs/scenario1-seed1",
-    "compare": "revolve compare runs/a runs/b",
-}
 
 
 def main(arguments: list[str]) -> int:
@@ -39,48 +35,83 @@ def main(arguments: list[str]) -> int:
         arguments: the command's name first.
 
     Returns:
-        0 if done; 1 if ``compare`` found a difference; 130 after Ctrl-C.
+        0 if done; 1 if ``compare`` found a difference, or a run of a campaign
+        failed; 130 after Ctrl-C.
     """
     command, words = arguments[0], arguments[1:]
-    options = _parser(command).parse_args(words)
+    options = parser(command).parse_args(words)
     if command == "compare":
         return _compare(options)
     if command == "resume":
         folder = Path(options.folder)
-        document = read_details(folder).document
-        experiment = experiment_from_text(document)
-        return resume(folder, _deployment(options, experiment))
-    experiment = read_experiment(options.experiment)
+        return resume(folder, _deployment(options, _experiments_of(folder)))
+    experiments = _experiments(options)
+    deployment = _deployment(options, experiments)
+    is_campaign_wanted = len(experiments) > 1 or options.repeats is not None
+    name = "+".join(
+        options.experiments
+        if is_campaign_wanted and options.experiments[0] in shipped_campaigns()
+        else [experiment.name for experiment in experiments]
+    )
+    folder = Path(options.out or Path("runs") / f"{name}-seed{options.seed}")
+    if not is_campaign_wanted:
+        return start(folder, experiments[0], options.seed, deployment)
+    campaign = Campaign(experiments, options.repeats or 1, options.seed)
+    return start_campaign(folder, campaign, deployment)
+
+
+def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
+    """Return what is to be run, checked as far as that goes without running it."""
+    experiments = read_experiments(options.experiments)
     if options.births is not None:
-        experiment = replace(experiment, births=options.births)
-        check_experiment(experiment, "--births")
-    fitness_function(experiment.fitness)
-    default = Path("runs") / f"{experiment.name}-seed{options.seed}"
-    folder = Path(options.out) if options.out else default
-    return start(folder, experiment, options.seed, _deployment(options, experiment))
+        experiments = tuple(
+            replace(experiment, births=options.births) for experiment in experiments
+        )
+    for experiment in experiments:
+        check_experiment(experiment, "--births" if options.births else experiment.name)
+        for number in range(island_count(experiment)):
+            fitness_function(island_experiment(experiment, number).fitness)
+    return experiments
 
 
-def _deployment(options: argparse.Namespace, experiment: Experiment) -> Deployment:
+def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
+    """Return what is run in a folder."""
+    if is_campaign(folder):
+        return read_campaign(folder).experiments
+    return (experiment_from_text(read_details(folder).document),)
+
+
+def _deployment(
+    options: argparse.Namespace, experiments: tuple[Experiment, ...]
+) -> Deployment:
     """Return who does the work; the one place that names the other rooms."""
     import analyzer.jobs
     import analyzer.service
     import worker.jobs
     import worker.service
 
-    # One arena is one process's; single robots spread over processes.
-    threads = options.threads or (cores() if experiment.arena else 1)
+    if options.connect and options.listen:
+        raise NetworkError("--listen and --connect: a hub is here or elsewhere")
+    is_for_others = options.command == "coordinator" and not options.connect
+    workers: int | None = options.workers
+    if workers is None:
+        workers = 0 if options.connect else cores()
+    # One arena is one process's; many arenas, or single robots, spread over them.
+    is_one_arena = len(experiments) == 1 and _has_one_arena(experiments[0], options)
+    threads = options.threads or (cores() if is_one_arena else 1)
     answers: dict[AgentKind, Callable[[bytes], bytes]] = {
         "analyzer": analyzer.jobs.answer,
         "worker": worker.jobs.Jobs(threads=threads).answer,
     }
     return Deployment(
-        workers=options.workers,
+        workers=workers,
         bodies={
             "analyzer": analyzer.service.process,
             "worker": worker.service.process,
         },
         answers=answers if options.in_process else None,
-        listen=options.listen,
+        listen=options.listen or (LISTEN if is_for_others else None),
+        connect=options.connect,
         fleet=options.fleet,
         tls=tls_of(options),
         quiet=options.quiet,
@@ -90,96 +121,10 @@ def _deployment(options: argparse.Namespace, experiment: Experiment) -> Deployme
     )
 
 
-def _parser(command: str) -> argparse.ArgumentParser:
-    parser = Flags(
-        prog=f"revolve {command}",
-        description=_DESCRIPTIONS[command],
-        epilog=f"for example: {_EXAMPLES[command]}",
-        allow_abbrev=False,
-    )
-    if command == "compare":
-        parser.add_argument("first", help="run folder")
-        parser.add_argument("second", help="run folder")
-        return parser
-    if command == "resume":
-        parser.add_argument("folder", help="folder of the run")
-    else:
-        names = ", ".join(shipped_experiments())
-        parser.add_argument("experiment", help=f"a .toml file, or one of {names}")
-        parser.add_argument("--seed", type=_whole, default=0, help="default: 0")
-        parser.add_argument(
-            "--births", type=_count, help="instead of the experiment's number"
-        )
-        parser.add_argument(
-            "--out", help="run folder; default: runs/EXPERIMENT-seedSEED"
-        )
-    if command == "coordinator":
-        parser.set_defaults(workers=0, in_process=False, threads=1)
-    else:
-        parser.add_argument(
-            "--workers",
-            type=_whole,
-            default=cores(),
-            help="worker processes to start here; default: one per core",
-        )
-        parser.add_argument(
-            "--threads",
-            type=_count,
-            help="threads of each worker that advance one arena together; default: "
-            "one per core for an arena, else 1",
-        )
-        parser.add_argument(
-            "--in-process",
-            action="store_true",
-            help="no network and no other process: slower, for debugging",
-        )
-    parser.add_argument(
-        "--listen",
-        default="tcp/127.0.0.1:7447" if command == "coordinator" else None,
-        metavar="ADDRESS",
-        help="where others may connect, as tcp/127.0.0.1:7447",
-    )
-    add_network_flags(parser)
-    parser.add_argument(
-        "--speed",
-        type=_speed,
-        metavar="X",
-        help="for watching an arena: at most X simulated seconds per second",
-    )
-    parser.add_argument("--quiet", action="store_true", help="show no progress")
-    parser.add_argument(
-        "--fsync", action="store_true", help="survive power loss too; slower"
-    )
-    return parser
-
-
-_DESCRIPTIONS = {
-    "run": "Evolve an experiment with coordinator, analyzer and workers of its own.",
-    "coordinator": "Run an experiment for workers and analyzers that connect.",
-    "resume": "Go on with a run that was stopped or killed; nothing is lost.",
-    "compare": "Tell whether two runs are equal, row by row, where they should be.",
-}
-
-
-def _whole(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"must be >= 0, got {value}")
-    return value
-
-
-def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"must be >= 1, got {value}")
-    return value
-
-
-def _speed(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"must be > 0 and finite, got {value}")
-    return value
+def _has_one_arena(experiment: Experiment, options: argparse.Namespace) -> bool:
+    is_repeated = getattr(options, "repeats", None) is not None
+    is_alone = island_count(experiment) == 1 and not is_repeated
+    return is_alone and island_experiment(experiment, 0).arena is not None
 
 
 def _compare(options: argparse.Namespace) -> int:

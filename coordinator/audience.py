@@ -37,7 +37,7 @@ class Audience:
         self._network = network
         self._told_s = self._whole_s = -1e9
         self._waiting: list[Order] = []
-        self._replies: SimpleQueue[tuple[Order, bytes]] = SimpleQueue()
+        self._replies: SimpleQueue[tuple[Order, bytes] | None] = SimpleQueue()
         threading.Thread(target=self._reply, daemon=True).start()
 
     def serve(self, now_s: float) -> None:
@@ -61,6 +61,10 @@ class Audience:
                 self._replies.put((order, data))
             self._waiting = []
 
+    def close(self) -> None:
+        """Serve no more; who still waits will ask anew."""
+        self._replies.put(None)
+
     def _workers(self) -> tuple[Crewman, ...]:
         dispatch, advances = self._fleet.dispatch, self._loop.advances
         shards: dict[str, list[int]] = {}
@@ -73,7 +77,7 @@ class Audience:
         )
 
     def _reply(self) -> None:
-        """Reply for ever; one whose line is stuck holds up no run."""
-        while True:
-            order, data = self._replies.get()
+        """Reply until closed; one whose line is stuck holds up no run."""
+        while (reply := self._replies.get()) is not None:
+            order, data = reply
             order.reply(data)

@@ -100,16 +100,17 @@ class Fleet:
         self._owners: dict[int, Owner] = {}
         self._credits: dict[str, int] = {}
         self._news: dict[Asker | Owner, None] = {}
+        self._advancing: set[int] = set()
+
+    @property
+    def open(self) -> int:
+        """How many jobs and advances are asked for and not done."""
+        return len(self._askers) + len(self._advancing)
 
     @property
     def credits(self) -> int:
         """How many jobs all workers together may have at a time."""
         return sum(self._credits.values())
-
-    @property
-    def is_waiting_for_verdicts(self) -> bool:
-        """More bodies are to be vetted than the analyzers have taken."""
-        return self.dispatch.waiting("analyzer") > 0
 
     def new_number(self) -> int:
         """Return a number for a job."""
@@ -132,11 +133,13 @@ class Fleet:
 
     def advance(self, shard: int) -> None:
         """Have a shard advanced; its owner knows how far."""
+        self._advancing.add(shard)
         self._move(Wanted(shard))
 
     def release(self, shard: int) -> None:
         """Forget a shard that needs nothing more."""
         self._owners.pop(shard, None)
+        self._advancing.discard(shard)
         self._move(Released(shard))
 
     def leave(self, asker: Asker) -> None:
@@ -216,5 +219,6 @@ class Fleet:
                 payload = owner.payload(command)
                 self._agents.send(command.number, command.agent, payload)
             else:
+                self._advancing.discard(command.shard)
                 owner.settle(command)
                 self._news[owner] = None

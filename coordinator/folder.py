@@ -70,7 +70,7 @@ class RunFolder:
         try:
             if details is not None:
                 path.mkdir(parents=True, exist_ok=True)
-            self._lock = _locked(path)
+            self._lock = lock_folder(path)
         except OSError as error:
             raise storage_error(path, error) from None
         try:
@@ -110,9 +110,7 @@ class RunFolder:
         """Let go of the folder."""
         lock, self._lock = self._lock, -1
         if lock >= 0:
-            # Closing alone would wait for a child that is just being started.
-            fcntl.flock(lock, fcntl.LOCK_UN)
-            os.close(lock)
+            unlock_folder(lock)
 
     def __enter__(self) -> Self:
         return self
@@ -185,8 +183,12 @@ def read_holder(path: Path) -> str:
     return ""
 
 
-def _locked(path: Path) -> int:
-    """Return the descriptor of the folder's lock file, locked and signed."""
+def lock_folder(path: Path) -> int:
+    """Return the descriptor of a folder's lock file, locked and signed.
+
+    Raises:
+        RunFolderError: another process holds it (named).
+    """
     descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -202,6 +204,13 @@ def _locked(path: Path) -> int:
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, signature, 0)
     return descriptor
+
+
+def unlock_folder(descriptor: int) -> None:
+    """Let go of a folder."""
+    # Closing alone would wait for a child that is just being started.
+    fcntl.flock(descriptor, fcntl.LOCK_UN)
+    os.close(descriptor)
 
 
 def _holder(descriptor: int) -> str:

@@ -29,6 +29,7 @@ from schema.operator_codec import (
     RemoveWish,
     ResumeWish,
     SnapshotWish,
+    StatusWish,
     decode_operator_request,
     encode_operator_reply,
 )
@@ -60,6 +61,7 @@ class Desk:
             request = decode_operator_request(data)
             arena = self._arena(request.island)
             wish = request.wish
+            assert not isinstance(wish, StatusWish)  # the reception's
             if isinstance(wish, ListWish):
                 text = self._list(arena)
             elif isinstance(wish, SnapshotWish):

@@ -1,7 +1,6 @@
-"""What a run shows while it lives: one line per island on the terminal."""
+"""What this process shows while it lives: bars of runs and islands on the terminal."""
 
-from collections import deque
-from time import monotonic
+import math
 from types import TracebackType
 from typing import Self
 
@@ -12,61 +11,40 @@ from rich.progress import (
     Progress,
     TaskID,
     TextColumn,
-    TimeRemainingColumn,
 )
 
-from coordinator.arena import Arena
-from coordinator.dispatch import Dispatch
-from coordinator.island import Island
-from coordinator.loop import Loop
-from schema.experiment import Experiment
+from coordinator.conductor import Conductor
+from coordinator.tempo import SPAN_S
+from coordinator.wording import about_arenas, best_of, duration
+from schema.status import IslandStatus, RunStatus, Status
 
-_RATE_SPAN_S = 10.0
+MOST_BARS = 16
+"""Bars of single runs or islands: more would not fit on a screen."""
 
 
 class Display:
-    """Progress bars of a run; a line every so often where there is no terminal."""
+    """Progress bars; a line every so often where there is no terminal."""
 
-    def __init__(
-        self, loop: Loop, dispatch: Dispatch, experiment: Experiment, *, quiet: bool
-    ) -> None:
-        """Show ``loop``, each of whose islands is run as ``experiment`` says."""
-        self._loop = loop
-        self._dispatch = dispatch
-        self._births = experiment.births
-        self._step_s = experiment.simulation.timestep_s
+    def __init__(self, conductor: Conductor, *, quiet: bool) -> None:
+        """Show all runs that somebody conducts."""
+        self._conductor = conductor
         self._console = Console(stderr=True)
         self._quiet = quiet
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
             MofNCompleteColumn(),
-            TextColumn("births"),
-            TextColumn("{task.fields[rate]:5.1f}/s"),
-            TextColumn("{task.fields[workers]} workers"),
-            TextColumn("best {task.fields[best]}{task.fields[arena]}"),
-            TimeRemainingColumn(),
+            TextColumn("births {task.fields[about]}"),
             console=self._console,
             disable=quiet or not self._console.is_terminal,
         )
-        self._tasks: dict[int, TaskID] = {}
-        self._seen: deque[tuple[float, int, int]] = deque()
-        self._next_line_s = 0.0
+        self._tasks: dict[str, TaskID] = {}
+        self._next_line_s = -math.inf
         self._waits_since: float | None = None
-        self._said_waiting: dict[int, str] = {}
+        self._said_waiting: dict[str, str] = {}
 
     def __enter__(self) -> Self:
         """Start drawing."""
-        for number, island in sorted(self._loop.islands.items()):
-            self._tasks[number] = self._progress.add_task(
-                f"island {number}",
-                total=self._births,
-                completed=island.births,
-                rate=0.0,
-                workers=0,
-                best="-",
-                arena="",
-            )
         self._progress.start()
         return self
 
@@ -77,74 +55,96 @@ class Display:
         trace: TracebackType | None,
     ) -> None:
         """Leave the last state on the screen."""
-        self.update()
         self._progress.stop()
 
-    def update(self) -> None:
-        """Show the present state."""
+    def update(self, now_s: float) -> None:
+        """Show the present state.
+
+        Args:
+            now_s: the time, of any clock that only goes forward [s].
+        """
         if self._quiet:
             return
-        now_s = monotonic()
-        islands = self._loop.islands.values()
-        born = sum(island.births for island in islands)
-        steps = sum(island.step for island in islands if isinstance(island, Arena))
-        self._seen.append((now_s, born, steps))
-        while now_s - self._seen[0][0] > _RATE_SPAN_S:
-            self._seen.popleft()
-        first_s, first_born, first_steps = self._seen[0]
-        span_s = now_s - first_s
-        rate = (born - first_born) / span_s if span_s > 0 else 0.0
-        # Simulated seconds per second, of all arenas together.
-        speed = (steps - first_steps) * self._step_s / span_s if span_s > 0 else 0.0
-        arenas = ""
-        workers = self._dispatch.agents("worker")
-        for number, island in self._loop.islands.items():
-            best = max((one.fitness for one in island.population), default=None)
-            arena = self._about(island, speed)
-            arenas += arena
+        status = self._conductor.status(now_s)
+        if self._console.is_terminal:
+            self._draw(status)
+        elif now_s >= self._next_line_s:
+            self._next_line_s = now_s + SPAN_S
+            self._console.print(_line(status), soft_wrap=True)
+        self._say_who_is_missing(status, now_s)
+
+    def _draw(self, status: Status) -> None:
+        rows: dict[str, tuple[IslandStatus | RunStatus | Status, str]] = {}
+        about = f"{_pace(status)}, {_crew(status)}"
+        if len(status.runs) > 1:
+            done = sum(run.state == "finished" for run in status.runs)
+            name = f"{done} of {len(status.runs)} runs"
+            rows[""] = (status, about)
+            shown = [run for run in status.runs if run.state == "running"]
+            for run in shown[:MOST_BARS]:
+                what = f"{best_of(run)}{about_arenas(run)}"
+                rows[f"{run.name}-{run.run}"] = (run, what)
+        else:
+            (run,) = status.runs
+            name = run.name
+            what = f"{about}, {best_of(run)}{about_arenas(run)}"
+            rows[""] = (run, what)
+            islands = run.islands if 1 < len(run.islands) <= MOST_BARS else ()
+            for number, island in enumerate(islands):
+                rows[f"  island {number}"] = (island, best_of(island))
+        for gone in [key for key in self._tasks if key not in rows]:
+            self._progress.remove_task(self._tasks.pop(gone))
+        for key, (counted, what) in rows.items():
+            if key not in self._tasks:
+                self._tasks[key] = self._progress.add_task(key, about="")
             self._progress.update(
-                self._tasks[number],
-                completed=island.births,
-                rate=rate,
-                workers=workers,
-                best="-" if best is None else f"{best:.3f}",
-                arena=arena,
-            )
-        self._say_who_is_missing(now_s)
-        if not self._console.is_terminal and now_s >= self._next_line_s:
-            self._next_line_s = now_s + _RATE_SPAN_S
-            self._console.print(
-                f"{born} of {self._births * len(self._tasks)} births, "
-                f"{rate:.1f}/s, {workers} workers{arenas}"
+                self._tasks[key],
+                description=key or name,
+                completed=counted.births,
+                total=counted.wanted,
+                about=what,
             )
 
-    def _about(self, island: Island | Arena, speed: float) -> str:
-        """Return what there is to say of an arena beside its births."""
-        if not isinstance(island, Arena):
-            return ""
-        pace = "paused" if island.is_paused else f"{speed:.1f} x real time"
-        return (
-            f", {island.step * self._step_s:.0f} s simulated, "
-            f"{len(island.population)} alive, {pace}"
-        )
-
-    def _say_who_is_missing(self, now_s: float) -> None:
+    def _say_who_is_missing(self, status: Status, now_s: float) -> None:
         """Say once, after a while, that nobody is there to do the work."""
-        missing = [
-            kind for kind in ("worker", "analyzer") if not self._dispatch.agents(kind)
-        ]
+        there = {"worker": status.workers, "analyzer": status.analyzers}
+        missing = [kind for kind, count in there.items() if not count]
         if not missing:
             self._waits_since = None
         elif self._waits_since is None:
             self._waits_since = now_s
-        elif now_s - self._waits_since > _RATE_SPAN_S:
-            self._waits_since = now_s + 6 * _RATE_SPAN_S
+        elif now_s - self._waits_since > SPAN_S:
+            self._waits_since = now_s + 6 * SPAN_S
             self._console.print(f"waiting: no {' and no '.join(missing)} has joined")
-        waiting = self._loop.advances.waiting
+        waiting = {
+            f"arena {shard} of {run.held.path.name}": platform
+            for run in self._conductor.active
+            for shard, platform in run.loop.advances.waiting.items()
+        }
         if "worker" not in missing and waiting != self._said_waiting:
-            self._said_waiting = dict(waiting)
+            self._said_waiting = waiting
             for shard, platform in waiting.items():
                 self._console.print(
                     f"waiting: no worker of platform {platform} is there to go on "
-                    f"with arena {shard}; others would come to other results"
+                    f"with {shard}; others would come to other results",
+                    soft_wrap=True,
                 )
+
+
+def _line(status: Status) -> str:
+    """Return the state in a line, for a log."""
+    about = f"{status.births} of {status.wanted} births, {_pace(status)}"
+    if len(status.runs) == 1:
+        about += f"{about_arenas(status.runs[0])}"
+    else:
+        done = sum(run.state == "finished" for run in status.runs)
+        about = f"{done} of {len(status.runs)} runs, {about}"
+    return f"{about}, {_crew(status)}"
+
+
+def _pace(status: Status) -> str:
+    return f"{status.births_per_s:.1f}/s, {duration(status.left_s)} left"
+
+
+def _crew(status: Status) -> str:
+    return f"{status.workers} workers"

@@ -1,51 +1,53 @@
-"""One run from its first birth to its last, or to the next resume."""
+"""Runs from their first birth to their last, or to the next resume."""
 
-import json
 import math
-import socket
+import resource
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from importlib import metadata
+from functools import partial
 from pathlib import Path
-from threading import Event
 
-from coordinator.arena import Arena
+from coordinator.active import ActiveRun
 from coordinator.audience import Audience
+from coordinator.campaign import (
+    Campaign,
+    CampaignFolder,
+    adopted,
+    is_campaign,
+    read_campaign,
+    write_campaign,
+)
+from coordinator.conductor import Conductor, Planned
 from coordinator.disk import replace_durably
-from coordinator.events import AgentKind, Record
+from coordinator.events import AgentKind
 from coordinator.fleet import Agents, Fleet
 from coordinator.folder import DETAILS, RunDetails, RunFolder, read_state
-from coordinator.island import Island
-from coordinator.journal import Journal
-from coordinator.live import Feed, Overheard
+from coordinator.folder_status import folder_status, unbegun_status
 from coordinator.local import LocalAgents
-from coordinator.loop import Loop
-from coordinator.operator import Desk
-from coordinator.pacing import Pace
 from coordinator.progress import Display
-from coordinator.questions import Question
-from coordinator.record import Recorder
+from coordinator.reception import Reception
 from coordinator.service import Network
-from coordinator.snapshots import Snapshots
-from coordinator.summary import tell_result
+from coordinator.summary import conclude
 from schema.crew import Crew, stop_on_signals
+from schema.errors import RevolveError
 from schema.experiment import Experiment
-from schema.experiment_file import experiment_from_text, experiment_text
+from schema.experiment_file import experiment_text
 from schema.network import THIS_MACHINE, Agent, Tls
-from schema.platform_tag import cpu_flags, our_version, platform_tag
+from schema.platform_tag import platform_tag
 from schema.service import tell_user
-from schema.settings import arena_settings, evaluation_settings, vetting_settings
+from schema.supervision import Post
 from schema.topics import unique_name
 
 ADDRESS = "address"
-"""File of a run folder that says where its coordinator listens, while it does."""
+"""File of a run's or campaign's folder that says where its hub is, while it lives."""
 
 _LOOK_S = 0.2
 _CHORES_S = 1.0
-_LIBRARIES = ("mujoco-core", "eclipse-zenoh", "numpy", "pyarrow", "protobuf")
+# Journal, lock and the segments of a run; and what the process itself needs.
+_FILES_OF_A_RUN = 24
+_OTHER_FILES = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,9 +56,10 @@ class Deployment:
 
     Attributes:
         workers: worker processes to start here; an analyzer comes with them.
-        bodies: what a process of each kind runs (agent, index).
+        bodies: what a process of each kind runs (agent, post).
         answers: functions in place of processes and network, or None.
         listen: address of the hub; any free port of this machine if None.
+        connect: address of a hub that is there already; None: be one.
         fleet: whose agents to use.
         tls: files for a ``tls/`` address.
         quiet: show nothing but the end.
@@ -66,9 +69,10 @@ class Deployment:
     """
 
     workers: int
-    bodies: Mapping[AgentKind, Callable[[Agent, int], None]]
+    bodies: Mapping[AgentKind, Callable[[Agent, Post], None]]
     answers: Mapping[AgentKind, Callable[[bytes], bytes]] | None
     listen: str | None
+    connect: str | None
     fleet: str
     tls: Tls | None
     quiet: bool
@@ -84,135 +88,200 @@ def start(
 
     Raises:
         RunFolderError: the folder is used or held, or the disk fails.
-        NetworkError: the address cannot be listened on.
+        NetworkError: the address cannot be listened on, or no hub is there.
         ExperimentError: no robot meets its restrictions.
     """
     details = RunDetails(experiment.name, 0, seed, experiment_text(experiment))
-    return _run(folder, details, deployment)
+    return _alone(folder, RunFolder(folder, details), deployment)
+
+
+def start_campaign(folder: Path, campaign: Campaign, deployment: Deployment) -> int:
+    """Run a campaign in a folder; return the exit code.
+
+    Runs of it that are in the folder already are taken as they are.
+
+    Raises:
+        RunFolderError: the folder is used or held, or the disk fails.
+        NetworkError: the address cannot be listened on, or no hub is there.
+    """
+    with CampaignFolder(folder):
+        planned = _plan(folder, campaign)
+        write_campaign(folder, campaign)
+        return _together(folder, planned, deployment)
 
 
 def resume(folder: Path, deployment: Deployment) -> int:
-    """Go on with the run of a folder; return the exit code.
+    """Go on with the run or the campaign of a folder; return the exit code.
 
     Raises:
-        RunFolderError: no run is there, it is held by another coordinator, its
+        RunFolderError: neither is there, it is held by another coordinator, its
             journal is damaged, or the disk fails.
-        NetworkError: the address cannot be listened on.
+        NetworkError: the address cannot be listened on, or no hub is there.
+        ExperimentError: no robot meets a run's restrictions.
     """
+    if is_campaign(folder):
+        with CampaignFolder(folder):
+            planned = _plan(folder, read_campaign(folder))
+            return _together(folder, planned, deployment)
     if read_state(folder) == "finished":
         tell_user(f"{folder}: is finished; nothing is left to do")
         return 0
-    return _run(folder, None, deployment)
+    return _alone(folder, RunFolder(folder), deployment)
 
 
-def _run(folder: Path, details: RunDetails | None, deployment: Deployment) -> int:
-    stop = stop_on_signals()
-    with ExitStack() as stack:
-        held = stack.enter_context(RunFolder(folder, details))
-        journal = stack.enter_context(Journal.open(folder, fsync=deployment.fsync))
-        if journal.dropped:
-            tell_user(
-                f"journal: dropped a cut record of {journal.dropped} bytes at its end"
-            )
-        recorder = Recorder(folder, held.details, fsync=deployment.fsync)
-        stack.callback(recorder.close)
-        experiment = experiment_from_text(held.details.document)
-        agents, crews = stack.enter_context(_agents(held, deployment))
-        machine = Arena if experiment.arena else Island
-        fleet = Fleet(agents)
-        question = _question(held, experiment)
-        feed = Feed(question.run, held.epoch, held.details)
-        loop = Loop(
-            {0: machine(experiment, held.details.seed, held.details.run)},
-            question=question,
-            fleet=fleet,
-            log=journal,
-            rows=Overheard(recorder, feed),
-            vault=Snapshots(folder),
-            pace=_pace(experiment, deployment),
+def _alone(folder: Path, held: RunFolder, deployment: Deployment) -> int:
+    """Do the run of a folder that is held, and tell what came of it."""
+    with held:
+        status = unbegun_status(folder, held.details)
+        said: list[str] = []
+        conductor = _conduct(
+            folder,
+            [Planned(held.details, status, lambda: held)],
+            deployment,
+            lambda run: said.append(_conclusion(run)),
         )
-        loop.start(journal.replay())
-        held.set_state("running")
-        serve = _servant(Desk(loop, experiment), feed, loop, fleet, agents)
-        quiet = deployment.quiet
-        with Display(loop, fleet.dispatch, experiment, quiet=quiet) as display:
-            chores = [recorder.flush, held.confirm, *crews]
-            _turn(loop, fleet, display, stop, chores, serve)
-        if not loop.is_finished:
-            recorder.flush()
-            held.set_state("stopped")
-            tell_user(f"stopped; to go on: revolve resume {folder}")
-            return 130
-        held.confirm()
-        recorder.write(_runs_row(held))
-        recorder.finish()
-        held.set_state("finished")
-    tell_result(folder, experiment, loop.islands[0])
+    for _, error in conductor.failed:
+        raise error
+    if not conductor.is_finished:
+        tell_user(f"stopped; to go on: revolve resume {folder}")
+        return 130
+    print(said[0])  # noqa: T201 - the result of the command
     return 0
 
 
-def _question(held: RunFolder, experiment: Experiment) -> Question:
-    """Return what all requests of a run have in common."""
-    return Question(
-        run=f"{socket.gethostname()}:{held.path.resolve()}",
-        epoch=held.epoch,
-        vetting=vetting_settings(experiment),
-        evaluation=evaluation_settings(experiment),
-        arena=arena_settings(experiment) if experiment.arena else b"",
+def _plan(folder: Path, campaign: Campaign) -> list[Planned]:
+    """Return all runs of a campaign, with what is there of them.
+
+    Raises:
+        RunFolderError: a run that is there is another one.
+    """
+    planned = []
+    for path, details in campaign.runs(folder):
+        if not (path / DETAILS).exists():
+            status = unbegun_status(path, details)
+            planned.append(Planned(details, status, partial(RunFolder, path, details)))
+            continue
+        found = adopted(path, details)
+        if found.document != details.document:
+            tell_user(f"{path}: is taken as it is, with its own number of births")
+        planned.append(Planned(found, folder_status(path), partial(RunFolder, path)))
+    return planned
+
+
+def _together(folder: Path, planned: Sequence[Planned], deployment: Deployment) -> int:
+    """Do all runs of a campaign, and tell what came of them."""
+    there = sum(one.status.state == "finished" for one in planned)
+    if there:
+        tell_user(f"{there} of {len(planned)} runs are finished already")
+    conductor = _conduct(folder, planned, deployment, _conclusion)
+    if not conductor.is_finished:
+        tell_user(f"stopped; to go on: revolve resume {folder}")
+        return 130
+    if conductor.failed:
+        tell_user(
+            f"{len(conductor.failed)} of {len(planned)} runs failed; when that is "
+            f"mended: revolve resume {folder}"
+        )
+        return 1
+    print(  # noqa: T201 - the result of the command
+        f"{len(planned)} runs are finished\ntry next:\n  revolve analyze {folder}"
     )
+    return 0
 
 
-def _pace(experiment: Experiment, deployment: Deployment) -> Pace | None:
-    """Return what holds arenas back, None if nothing shall."""
-    if deployment.speed is None:
-        return None
-    return Pace(deployment.speed, experiment.simulation.timestep_s)
+def _conclusion(run: ActiveRun) -> str:
+    return conclude(run.held.path, run.experiment, run.loop.islands)
 
 
-def _servant(
-    desk: Desk, feed: Feed, loop: Loop, fleet: Fleet, agents: Agents
-) -> Callable[[], None]:
+def _conduct(
+    place: Path,
+    planned: Sequence[Planned],
+    deployment: Deployment,
+    conclude_run: Callable[[ActiveRun], object],
+) -> Conductor:
+    """Do runs until all are done or somebody says stop.
+
+    Args:
+        place: folder that shall tell where the coordinator listens.
+        planned: the runs.
+        deployment: where and by whom.
+        conclude_run: told of each run that is finished.
+    """
+    stop = stop_on_signals()
+    with ExitStack() as stack:
+        agents, crews = stack.enter_context(_agents(place, deployment))
+        is_campaign_run = len(planned) > 1
+        conductor = Conductor(
+            planned,
+            Fleet(agents),
+            open_run=lambda held, is_watched: ActiveRun(
+                held,
+                conductor.fleet,
+                fsync=deployment.fsync,
+                speed=deployment.speed,
+                is_watched=is_watched and isinstance(agents, Network),
+            ),
+            most=_most_at_once(),
+            conclude=conclude_run,
+            report=_report if is_campaign_run else lambda _details, _error: None,
+        )
+        stack.callback(conductor.close)
+        serve = _servant(conductor, agents)
+        with Display(conductor, quiet=deployment.quiet) as display:
+            shown_s = done_s = -math.inf
+            while not (conductor.is_finished or stop.is_set()):
+                conductor.turn(_LOOK_S, time.monotonic)
+                serve()
+                now_s = time.monotonic()
+                if now_s - shown_s >= _LOOK_S:
+                    shown_s = now_s
+                    display.update(now_s)
+                if now_s - done_s >= _CHORES_S:
+                    done_s = now_s
+                    conductor.do_chores()
+                    for look_after in crews:
+                        look_after()
+        conductor.stop()
+    return conductor
+
+
+def _report(details: RunDetails, error: RevolveError) -> None:
+    tell_user(f"{details.name}-{details.run} failed: {error}")
+
+
+def _most_at_once() -> int:
+    """Return how many runs may have their files open, as many as this system lets."""
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    return max(1, (hard - _OTHER_FILES) // _FILES_OF_A_RUN)
+
+
+def _servant(conductor: Conductor, agents: Agents) -> Callable[[], None]:
     """Return what serves operators and viewers; a run without a network has none."""
     if not isinstance(agents, Network):
         return lambda: None
-    audience = Audience(feed, loop, fleet, agents)
+    reception = Reception(conductor)
+    audience: list[tuple[ActiveRun, Audience]] = []
 
     def serve() -> None:
+        now_s = time.monotonic()
         for order in agents.orders():
-            order.reply(desk.answer(order.data))
-        audience.serve(time.monotonic())
+            order.reply(reception.answer(order.data, now_s))
+        run = conductor.watched
+        if audience and audience[0][0] is not run:
+            audience.pop()[1].close()
+        if run is not None and run.feed is not None:
+            if not audience:
+                shown = Audience(run.feed, run.loop, conductor.fleet, agents)
+                audience.append((run, shown))
+            audience[0][1].serve(now_s)
 
     return serve
 
 
-def _turn(
-    loop: Loop,
-    fleet: Fleet,
-    display: Display,
-    stop: Event,
-    chores: list[Callable[[], None]],
-    serve: Callable[[], None],
-) -> None:
-    """Step until all is done or somebody says stop; do the chores once a second."""
-    shown_s = done_s = -math.inf
-    while not (loop.is_finished or stop.is_set()):
-        now_s = time.monotonic()
-        fleet.listen(min(_LOOK_S, max(0.0, loop.wake_s - now_s)), now_s)
-        loop.act(time.monotonic())
-        serve()
-        now_s = time.monotonic()
-        if now_s - shown_s >= _LOOK_S:
-            shown_s = now_s
-            display.update()
-        if now_s - done_s >= _CHORES_S:
-            done_s = now_s
-            for chore in chores:
-                chore()
-
-
 @contextmanager
 def _agents(
-    held: RunFolder, deployment: Deployment
+    place: Path, deployment: Deployment
 ) -> Iterator[tuple[Agents, list[Callable[[], None]]]]:
     """Give whoever does the work, and what looks after them from time to time."""
     if deployment.answers is not None:
@@ -224,10 +293,11 @@ def _agents(
                 name=unique_name("coordinator"),
                 fleet=deployment.fleet,
                 listen=(deployment.listen or THIS_MACHINE,),
+                connect=deployment.connect or "",
                 tls=deployment.tls,
             )
         )
-        note = held.path / ADDRESS
+        note = place / ADDRESS
         # Whoever waits for the file shall find the address in it.
         text = f"{network.address}\n"
         replace_durably(note, lambda file: file.write_text(text, encoding="utf-8"))
@@ -244,24 +314,3 @@ def _agents(
         if deployment.listen is not None:
             tell_user(f"listening on {network.address}")
         yield network, crews
-
-
-def _runs_row(held: RunFolder) -> Record:
-    """Return the one row of the runs table."""
-    details = held.details
-    began = (held.path / DETAILS).stat().st_mtime
-    versions = {name: metadata.version(name) for name in _LIBRARIES}
-    versions["revolve-islands"] = our_version()
-    row = {
-        "name": details.name,
-        "run": details.run,
-        "seed": details.seed,
-        "document": details.document,
-        "state": "finished",
-        "versions": json.dumps(versions),
-        "platform": platform_tag(),
-        "cpu_flags": " ".join(sorted(cpu_flags(Path("/proc/cpuinfo")))),
-        "start": datetime.fromtimestamp(began, UTC),
-        "end": datetime.now(UTC),
-    }
-    return Record("runs", row)

@@ -1,6 +1,6 @@
-"""What a finished run tells on the terminal: the best robot, and where all is."""
+"""What a finished run comes to: the best robot, and where all is."""
 
-import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 from coordinator.arena import Arena
@@ -12,38 +12,53 @@ from schema.robot_file import write_robot
 BEST = "best.yaml"
 
 
-def tell_result(folder: Path, experiment: Experiment, island: Island | Arena) -> None:
-    """Write the best robot of an island to a file; say what there is to see.
+def conclude(
+    folder: Path, experiment: Experiment, islands: Mapping[int, Island | Arena]
+) -> str:
+    """Write the best robot of all islands to a file; return what there is to see.
 
     Args:
         folder: of the run.
         experiment: what was run.
-        island: finished.
+        islands: finished, by their numbers.
     """
-    if isinstance(island, Arena) and island.is_extinct:
-        sys.stdout.write(
-            f"after {island.births} of {experiment.births} births too few are left "
-            f"to mate\ntables:     {folder / 'tables'}\n"
-        )
-        return
-    best = max(island.population, key=lambda one: (one.fitness, -one.birth.number))
-    mean = sum(one.fitness for one in island.population) / len(island.population)
+    births = sum(island.births for island in islands.values())
+    extinct = [
+        number
+        for number, island in sorted(islands.items())
+        if isinstance(island, Arena) and island.is_extinct
+    ]
+    tables = f"tables:     {folder / 'tables'}"
+    if len(extinct) == len(islands):
+        return f"after {births} births too few are left to mate\n{tables}"
+    living = [
+        one
+        for number, island in sorted(islands.items())
+        if number not in extinct
+        for one in island.population
+    ]
+    # The eldest of the best, of the first island among equals.
+    best = min(living, key=lambda one: (-one.fitness, one.birth.number))
+    mean = sum(one.fitness for one in living) / len(living)
     space = body_space(experiment.space)
     robot = develop(best.genome, space)
     write_robot(robot, folder / BEST, space)
     motors = sum(space[part.kind].outputs for part in robot.parts)
+    where = f" of island {best.birth.island}" if len(islands) > 1 else ""
+    has_arena = any(isinstance(island, Arena) for island in islands.values())
     lines = [
-        f"{island.births} births; mean fitness of the last population {mean:.4f}",
+        f"{births} births; mean fitness of the last population {mean:.4f}",
         (
-            f"best robot: birth {best.birth.number}, fitness {best.fitness:.4f}, "
-            f"rank {best.rank}, {len(robot.parts)} parts, {motors} motors"
+            f"best robot: birth {best.birth.number}{where}, fitness "
+            f"{best.fitness:.4f}, rank {best.rank}, {len(robot.parts)} parts, "
+            f"{motors} motors"
         ),
         f"its file:   {folder / BEST}",
-        f"tables:     {folder / 'tables'}",
+        tables,
         "try next:",
         f"  revolve robot show {folder / BEST}",
         f"  revolve analyze {folder}"
-        if isinstance(island, Arena)
+        if has_arena
         else "  revolve run no-selection --seed 1 --births 600",
     ]
-    sys.stdout.write("\n".join(lines) + "\n")
+    return "\n".join(lines)

@@ -537,20 +537,22 @@ class IslandStatus(_message.Message):
     def __init__(self, births: _Optional[int] = ..., wanted: _Optional[int] = ..., has_best: _Optional[bool] = ..., best: _Optional[float] = ..., alive: _Optional[int] = ..., is_arena: _Optional[bool] = ..., simulated_s: _Optional[float] = ..., is_paused: _Optional[bool] = ...) -> None: ...
 
 class RunStatus(_message.Message):
-    __slots__ = ("folder", "name", "run", "state", "births_per_s", "islands")
+    __slots__ = ("folder", "name", "run", "state", "births_per_s", "islands", "simulated_per_s")
     FOLDER_FIELD_NUMBER: _ClassVar[int]
     NAME_FIELD_NUMBER: _ClassVar[int]
     RUN_FIELD_NUMBER: _ClassVar[int]
     STATE_FIELD_NUMBER: _ClassVar[int]
     BIRTHS_PER_S_FIELD_NUMBER: _ClassVar[int]
     ISLANDS_FIELD_NUMBER: _ClassVar[int]
+    SIMULATED_PER_S_FIELD_NUMBER: _ClassVar[int]
     folder: str
     name: str
     run: int
     state: str
     births_per_s: float
     islands: _containers.RepeatedCompositeFieldContainer[IslandStatus]
-    def __init__(self, folder: _Optional[str] = ..., name: _Optional[str] = ..., run: _Optional[int] = ..., state: _Optional[str] = ..., births_per_s: _Optional[float] = ..., islands: _Optional[_Iterable[_Union[IslandStatus, _Mapping]]] = ...) -> None: ...
+    simulated_per_s: float
+    def __init__(self, folder: _Optional[str] = ..., name: _Optional[str] = ..., run: _Optional[int] = ..., state: _Optional[str] = ..., births_per_s: _Optional[float] = ..., islands: _Optional[_Iterable[_Union[IslandStatus, _Mapping]]] = ..., simulated_per_s: _Optional[float] = ...) -> None: ...
 
 class Status(_message.Message):
     __slots__ = ("runs", "workers", "analyzers", "births_per_s")

@@ -38,6 +38,7 @@ class RunStatus:
         state: "waiting", "running", "stopped", "finished" or "failed".
         births_per_s: lately [1/s].
         islands: by their numbers; none if nothing is known of them yet.
+        simulated_per_s: simulated seconds per second, of all arenas, lately.
     """
 
     folder: str
@@ -46,6 +47,7 @@ class RunStatus:
     state: str
     births_per_s: float = 0.0
     islands: tuple[IslandStatus, ...] = ()
+    simulated_per_s: float = 0.0
 
     @property
     def births(self) -> int:
@@ -124,6 +126,7 @@ def _run_to_message(run: RunStatus) -> pb.RunStatus:
         run=run.run,
         state=run.state,
         births_per_s=run.births_per_s,
+        simulated_per_s=run.simulated_per_s,
         islands=[
             pb.IslandStatus(
                 births=island.births,
@@ -155,7 +158,12 @@ def _run_from_message(message: pb.RunStatus) -> RunStatus:
                 is_paused=island.is_paused,
             )
         )
-    rate = finite(message.births_per_s, "status.births_per_s")
     return RunStatus(
-        message.folder, message.name, message.run, message.state, rate, tuple(islands)
+        folder=message.folder,
+        name=message.name,
+        run=message.run,
+        state=message.state,
+        births_per_s=finite(message.births_per_s, "status.births_per_s"),
+        islands=tuple(islands),
+        simulated_per_s=finite(message.simulated_per_s, "status.simulated_per_s"),
     )

@@ -7,6 +7,7 @@ from schema.codec import Answer, decode_request, encode_answer
 from schema.evaluation import Evaluation
 from schema.network import Agent
 from schema.service import serve_as_process
+from schema.supervision import Post
 
 
 def answer(request: bytes) -> bytes:
@@ -20,6 +21,6 @@ def answer(request: bytes) -> bytes:
     return encode_answer(Answer(job.epoch, job.number, 0.0, nothing))
 
 
-def process(agent: Agent, index: int) -> None:
+def process(agent: Agent, post: Post) -> None:
     """Be one process of a crew of such workers; returns when asked to end."""
-    serve_as_process(answer, agent, index)
+    serve_as_process(answer, agent, post)

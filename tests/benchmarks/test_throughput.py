@@ -41,14 +41,14 @@ from schema.experiment_file import experiment_text, read_experiment
 from schema.genome import develop
 from schema.network import Agent
 from schema.robot import Robot
-from schema.settings import evaluation_settings, vetting_settings
+from schema.supervision import Post
 from schema.topics import unique_name
 
 one_thread_each()  # as the command does, before anybody opens a session
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
 
-Body = Callable[[Agent, int], None]
+Body = Callable[[Agent, Post], None]
 CPU_PER_BIRTH_S = 1.5e-3
 NULL_PER_S = 1000
 SECOND_WORKER = 1.85
@@ -146,12 +146,7 @@ def started(
         fleet = Fleet(network)
         loop = Loop(
             {0: island},
-            question=Question(
-                str(folder),
-                held.epoch,
-                vetting_settings(experiment),
-                evaluation_settings(experiment),
-            ),
+            question=Question.of(str(folder), held.epoch, experiment),
             fleet=fleet,
             log=journal,
             rows=recorder,

@@ -1,0 +1,140 @@
+"""What may be said on the command line of the coordinator's commands."""
+
+import argparse
+import math
+
+from coordinator.campaign import shipped_campaigns
+from schema.agent_command import Flags, add_network_flags
+from schema.experiment_file import shipped_experiments
+
+LISTEN = "tcp/127.0.0.1:7447"
+"""Where ``revolve coordinator`` listens unless it is told."""
+
+_EXAMPLES = {
+    "run": "revolve run scenario1 --seed 1 --births 600",
+    "coordinator": "revolve coordinator scenario1 --listen tcp/127.0.0.1:7447",
+    "resume": "revolve resume runs/scenario1-seed1",
+    "compare": "revolve compare runs/a runs/b",
+}
+
+_DESCRIPTIONS = {
+    "run": "Evolve experiments with coordinator, analyzer and workers of its own.",
+    "coordinator": "Run experiments for workers and analyzers that connect.",
+    "resume": "Go on with a run or campaign that was stopped or killed.",
+    "compare": "Tell whether two runs are equal, row by row, where they should be.",
+}
+
+
+def parser(command: str) -> argparse.ArgumentParser:
+    """Return what understands the words after a command."""
+    flags = Flags(
+        prog=f"revolve {command}",
+        description=_DESCRIPTIONS[command],
+        epilog=f"for example: {_EXAMPLES[command]}",
+        allow_abbrev=False,
+    )
+    if command == "compare":
+        flags.add_argument("first", help="run folder")
+        flags.add_argument("second", help="run folder")
+        return flags
+    if command == "resume":
+        flags.add_argument("folder", help="folder of the run or campaign")
+    else:
+        _add_science(flags)
+    flags.set_defaults(command=command)
+    _add_deployment(flags, command)
+    return flags
+
+
+def _add_science(flags: argparse.ArgumentParser) -> None:
+    """Add what decides which births there are."""
+    names = ", ".join([*shipped_experiments(), *shipped_campaigns()])
+    flags.add_argument(
+        "experiments",
+        nargs="+",
+        metavar="experiment",
+        help=f"a .toml file, or one of {names}; several are a campaign",
+    )
+    flags.add_argument("--seed", type=_whole, default=0, help="default: 0")
+    flags.add_argument(
+        "--repeats",
+        type=_count,
+        metavar="N",
+        help="do each experiment so often, all in one campaign",
+    )
+    flags.add_argument(
+        "--births", type=_count, help="instead of each experiment's number"
+    )
+    flags.add_argument(
+        "--out",
+        metavar="FOLDER",
+        help="of the run or campaign; default: runs/NAME-seedSEED",
+    )
+
+
+def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
+    """Add where and by whom, which decides about no birth."""
+    if command == "coordinator":
+        flags.set_defaults(workers=0, in_process=False, threads=1)
+    else:
+        flags.add_argument(
+            "--workers",
+            type=_whole,
+            help="worker processes to start here; default: one per core, none with "
+            "--connect",
+        )
+        flags.add_argument(
+            "--threads",
+            type=_count,
+            help="threads of each worker that advance one arena together; default: "
+            "one per core for an arena, else 1",
+        )
+        flags.add_argument(
+            "--in-process",
+            action="store_true",
+            help="no network and no other process: slower, for debugging",
+        )
+    flags.add_argument(
+        "--listen",
+        metavar="ADDRESS",
+        help="where others may connect; default: "
+        + (LISTEN if command == "coordinator" else "a free port of this machine"),
+    )
+    flags.add_argument(
+        "--connect",
+        metavar="ADDRESS",
+        help="share the workers of a hub that is there already: of another "
+        "coordinator, or of a Zenoh router",
+    )
+    add_network_flags(flags)
+    flags.add_argument(
+        "--speed",
+        type=_speed,
+        metavar="X",
+        help="for watching an arena: at most X simulated seconds per second",
+    )
+    flags.add_argument("--quiet", action="store_true", help="show no progress")
+    flags.add_argument(
+        "--fsync", action="store_true", help="survive power loss too; slower"
+    )
+
+
+def _whole(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"must be >= 0, got {value}")
+    return value
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"must be >= 1, got {value}")
+    return value
+
+
+def _speed(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"must be > 0 and finite, got {value}")
+    return value
