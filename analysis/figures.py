@@ -10,16 +10,15 @@ DPI = 150
 
 
 def progression_figure(table: pa.Table) -> p9.ggplot:
-    """Return mean fitness over births, with the spread of runs.
+    """Return mean fitness over births, with its interval over runs.
 
     Args:
-        table: as ``analysis.measures.progression`` returns it.
+        table: rows of fitness of ``analysis.progression.progression``.
 
     Source: Hupkes 2016, figure 6.3.
     """
-    return (
+    figure = (
         p9.ggplot(table.to_pandas(), p9.aes("births", "mean"))
-        + p9.geom_ribbon(p9.aes(ymin="low", ymax="high", fill="experiment"), alpha=0.25)
         + p9.geom_line(p9.aes(colour="experiment"), size=0.8)
         + p9.labs(
             x="births",
@@ -30,6 +29,11 @@ def progression_figure(table: pa.Table) -> p9.ggplot:
         + p9.theme_gray()
         + p9.theme(figure_size=(WIDTH_IN, HEIGHT_IN), legend_position="top")
     )
+    sure = table.filter(table["low"].is_valid())
+    if not sure.num_rows:
+        return figure
+    ends = p9.aes(ymin="low", ymax="high", fill="experiment")
+    return figure + p9.geom_ribbon(ends, data=sure.to_pandas(), alpha=0.25)
 
 
 def save(figure: p9.ggplot, path: Path) -> None:

@@ -1,59 +1,216 @@
-"""Reads what runs left behind, finished or not."""
+"""Reads what runs left behind: finished, unfinished, damaged or of another version.
+
+What can be read is read. What cannot is named, with its folder and the reason.
+"""
 
 import json
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
+from pyarrow.parquet import read_schema
 
 from schema.errors import RunFolderError
-from schema.run_tables import read_table
+from schema.run_tables import FINISHED, read_table
+from schema.tables import TABLES, VERSION
 
 _DETAILS = "run.json"
+_STATE = "state"
+_NEEDED = (
+    "births", "evaluations", "population", "fitness", "deaths", "touches", "migrations"
+)  # fmt: skip
 
 
-def run_folders(roots: list[Path]) -> list[Path]:
-    """Return the run folders at or below some folders, in order of their paths.
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """What could not be read or measured: whose, what, why."""
+
+    folder: str
+    what: str
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What an analysis asks of an island's settings."""
+
+    births: int
+    is_online: bool
+    records_touches: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A run that was found.
+
+    Attributes:
+        folder: where.
+        experiment: its name.
+        number: of the repeat.
+        seed: of the run.
+        state: finished, stopped or running; who runs may have died since.
+        document: the experiment, as JSON.
+        islands: settings of each island.
+    """
+
+    folder: Path
+    experiment: str
+    number: int
+    seed: int
+    state: str
+    document: str
+    islands: tuple[Settings, ...]
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether all its births are there."""
+        return self.state == "finished"
+
+
+def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
+    """Return the runs at or below some folders, by path, and what is no run.
+
+    Two folders that hold the same run (experiment, repeat, seed, settings) count as
+    one: the finished of them, or else the first.
 
     Raises:
-        RunFolderError: there is none.
+        RunFolderError: a folder that is not there, or no run in any of them.
     """
-    found = sorted(
-        {path.parent for root in roots for path in root.glob(f"**/{_DETAILS}")}
-    )
-    if not found:
+    folders: set[Path] = set()
+    for root in roots:
+        if not root.is_dir():
+            raise RunFolderError(f"{root}: no such folder")
+        folders |= {path.parent for path in root.glob(f"**/{_DETAILS}")}
+        finished = root.glob(f"**/{FINISHED}/experiment=*/run=*")
+        folders |= {path.parents[2] for path in finished}
+    if not folders:
         names = ", ".join(map(str, roots))
         raise RunFolderError(f"{names}: no run is there or below")
-    return found
+    runs: list[Run] = []
+    left_out: list[LeftOut] = []
+    for folder in sorted(folders):
+        try:
+            runs.append(_read_run(folder))
+        except RunFolderError as error:
+            left_out.append(LeftOut(str(folder), "run", str(error)))
+    return _different(runs, left_out), left_out
 
 
-def load_table(folders: list[Path], name: str) -> pa.Table:
-    """Return one table of several runs, with whose rows they are.
+def _different(runs: list[Run], left_out: list[LeftOut]) -> list[Run]:
+    """Return runs, each once; add to ``left_out`` the others."""
+    kept: dict[tuple[str, int, int, str], Run] = {}
+    for run in sorted(runs, key=lambda run: (not run.is_finished, run.folder)):
+        name = (run.experiment, run.number, run.seed, run.document)
+        known = kept.setdefault(name, run)
+        if known is not run:
+            why = f"the same run as {known.folder}"
+            left_out.append(LeftOut(str(run.folder), "run", why))
+    return sorted(kept.values(), key=lambda run: run.folder)
+
+
+def _read_run(folder: Path) -> Run:
+    details = _details(folder)
+    try:
+        document = json.loads(details["document"])
+        islands = tuple(_settings(document))
+        name, number, seed = details["name"], details["run"], details["seed"]
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        story = f"{type(error).__name__}: {error}"
+        raise RunFolderError(f"{_DETAILS}: cannot be understood: {story}") from None
+    return Run(
+        folder=folder,
+        experiment=str(name),
+        number=int(number),
+        seed=int(seed),
+        state=_state(folder, details),
+        document=str(details["document"]),
+        islands=islands,
+    )
+
+
+def _details(folder: Path) -> dict[str, Any]:
+    """Return what is run in a folder: from its own file, or else from its tables."""
+    try:
+        entries = json.loads((folder / _DETAILS).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        try:
+            rows = read_table(folder, "runs").to_pylist()
+        except RunFolderError:
+            rows = []
+        if not rows:
+            raise RunFolderError(f"{_DETAILS}: cannot be read: {error}") from None
+        return dict(rows[0])
+    if not isinstance(entries, dict):
+        raise RunFolderError(f"{_DETAILS}: must be an object")
+    return entries
+
+
+def _state(folder: Path, details: dict[str, Any]) -> str:
+    try:
+        return (folder / _STATE).read_text(encoding="utf-8").strip()
+    except (OSError, ValueError):
+        return str(details.get("state", "running"))
+
+
+def _settings(document: dict[str, Any]) -> Iterable[Settings]:
+    """Yield each island's settings; older documents do not know of islands."""
+    for entry in document.get("islands") or [{}]:
+        arena = entry.get("arena") or document.get("arena")
+        births = int(entry.get("births") or document["births"])
+        touches = bool(arena and arena.get("record_touches"))
+        for _ in range(int(entry.get("count", 1))):
+            yield Settings(births, arena is not None, touches)
+
+
+def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:
+    """Return the tables of a run that its measures are made of.
 
     Args:
-        folders: run folders.
-        name: of the table.
+        run: which.
 
     Returns:
-        The table's columns, ``experiment`` (its name), ``folder`` (the run's) and
-        ``is_online`` (the run is an arena).
-
-    Raises:
-        RunFolderError: a folder whose run cannot be told, or a table that cannot
-            be read.
+        Tables by name; one that cannot be read is empty, and named in the list. An
+        older run lacks tables that were added since: they are empty, too.
+        ``birth_island`` says of everybody where it was born, and ``is_online`` in
+        ``population`` whether it lives in an arena.
     """
-    return pa.concat_tables([_owned(folder, name) for folder in folders])
+    tables: dict[str, pa.Table] = {}
+    left_out: list[LeftOut] = []
+    for name in _NEEDED:
+        try:
+            _check_version(run.folder, name)
+            tables[name] = _named(read_table(run.folder, name))
+        except (RunFolderError, pa.ArrowException, OSError) as error:
+            tables[name] = _named(TABLES[name].empty_table())
+            left_out.append(LeftOut(str(run.folder), f"table {name}", str(error)))
+    online = np.array([island.is_online for island in run.islands], np.bool_)
+    islands = np.asarray(tables["population"]["island"], np.int64)
+    # An island that the document does not know of is like the last that it does.
+    here = online[np.minimum(islands, len(online) - 1)]
+    tables["population"] = tables["population"].append_column("is_online", [here])
+    return tables, left_out
 
 
-def _owned(folder: Path, name: str) -> pa.Table:
-    try:
-        details = json.loads((folder / _DETAILS).read_text(encoding="utf-8"))
-        experiment = str(details["name"])
-        is_online = json.loads(details["document"])["arena"] is not None
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise RunFolderError(f"{folder / _DETAILS}: cannot be read: {error}") from None
-    table = read_table(folder, name)
-    owned = {"experiment": experiment, "folder": str(folder), "is_online": is_online}
-    for column, value in owned.items():
-        filled = pa.repeat(pa.scalar(value), table.num_rows)
-        table = table.append_column(column, filled)
-    return table
+def _named(table: pa.Table) -> pa.Table:
+    """Return a table that names everybody by where it was born, natives too."""
+    if "birth_island" not in table.column_names:
+        return table
+    index = table.schema.get_field_index("birth_island")
+    full = pc.coalesce(table["birth_island"], table["island"])
+    return table.set_column(index, "birth_island", full)
+
+
+def _check_version(folder: Path, name: str) -> None:
+    """Raise if a finished table is of another version than ours."""
+    for path in (folder / FINISHED).glob(f"*/*/{name}.parquet"):
+        metadata = read_schema(path).metadata or {}
+        version = metadata.get(b"revolve.schema_version", b"none").decode()
+        if version != str(VERSION):
+            raise RunFolderError(
+                f"is of version {version}, and this program reads {VERSION}: read it "
+                "with the one that wrote it"
+            )

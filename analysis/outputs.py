@@ -14,15 +14,16 @@ _KINDS = {
     "state": pa.string(),
     "island": pa.int32(),
     "births": pa.int64(),
-    "home": pa.int32(),
+    "birth_island": pa.int32(),
     "birth": pa.int64(),
+    "is_last": pa.bool_(),
 }
 _RUN = {
     "experiment": "name of the experiment",
     "folder": "of the run, as it was found",
 }
 _ISLAND = {**_RUN, "island": "number of the island", "births": "born there by then"}
-_ROBOT = {"home": "island of birth", "birth": "number of the birth there"}
+_ROBOT = {"birth_island": "island of birth", "birth": "number of the birth there"}
 
 BODY = {
     "parts": "nodes of the body tree",
@@ -67,15 +68,15 @@ POPULATION = {
 """What is measured of a population at a number of births."""
 
 OUTCOME = {
+    "births": "compared at: the greatest that all runs of both experiments reach",
     **POPULATION,
-    "births": "compared at: the greatest births that both experiments reach",
-    "retention_mean": "retention, mean over the run's births",
+    "retention": "mean over the run's births",
     "late_gain": "share of the fitness gained that the second half of births brought",
     "early_drop": "share of the diversity lost that the first tenth of births took",
-    "parts_change": "parts, last population less founders",
     "diversity_change": "diversity, last population less founders",
-    "touch_sensors_change": "touch sensors, last population less founders",
-    "hidden_change": "hidden neurons, last population less founders",
+    "parts_change": "parts, last population less random robots",
+    "touch_sensors_change": "touch sensors, last population less random robots",
+    "hidden_change": "hidden neurons, last population less random robots",
     "extremities_fitness": "rank correlation of fitness and extremities, all judged",
     "extremities_per_part_fitness": "the same of extremities per part",
     "variability": "median of the robots' variability (on-line)",
@@ -85,7 +86,7 @@ OUTCOME = {
 """One number of each run: what experiments are compared by."""
 
 _SPREAD = {
-    "low": "lower end of the mean's 95 % interval (bootstrap over runs)",
+    "low": "lower end of the mean's 95 % interval (Student's t over runs)",
     "high": "upper end",
     "least": "least run",
     "greatest": "greatest run",
@@ -99,13 +100,13 @@ _TWO_SAMPLES = {
     "median_a": "median over runs of a",
     "median_b": "median over runs of b; of one experiment alone: the reference",
     "difference": "mean_a - mean_b",
-    "difference_low": "lower end of its 95 % interval (bootstrap over runs)",
+    "difference_low": "lower end of its 95 % interval (Welch's t over runs)",
     "difference_high": "upper end",
-    "effect": "Cliff's delta, -1..1: P(a > b) - P(a < b) of two runs",
-    "effect_low": "lower end of its 95 % interval",
+    "effect": "-1..1; Cliff's delta of a and b, or rank-biserial correlation of a",
+    "effect_low": "lower end of delta's 95 % interval (Newcombe's score)",
     "effect_high": "upper end",
-    "p": "exact, two-sided",
-    "p_holm": "the same, corrected for all tests of the table",
+    "p": "two-sided, exact",
+    "q": "the same, corrected for all tests of the table (Benjamini-Hochberg)",
 }
 
 OUTPUTS: dict[str, dict[str, str]] = {
@@ -116,14 +117,14 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "state": "finished, stopped or running",
         "births": "recorded, of all islands",
         "planned": "births of the experiment, of all islands",
-        "islands": "that have births",
-        "version": "of the run's tables",
+        "islands": "of the experiment",
     },
     "populations": {**_ISLAND, **POPULATION},
     "robots": {
-        **_ISLAND,
+        **_RUN,
         **_ROBOT,
-        "fitness": "at the end [m/s]",
+        "is_last": "among the judged of an island's last population",
+        "fitness": "as last judged; off-line 0 if that failed [m/s]",
         "rank": "thesis eq. 6.1",
         "ancestors": "different ones",
         **BODY,
@@ -139,6 +140,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
     },
     "variability": {
         **_RUN,
+        "island": "where it lived",
         **_ROBOT,
         "samples": "recorded while mature",
         "fitness_range": "greatest less least of its fitness [m/s]",
@@ -148,9 +150,9 @@ OUTPUTS: dict[str, dict[str, str]] = {
     "interactions": {
         **_RUN,
         "island": "number of the island",
-        "robots": "that lived",
+        "robots": "that lived there",
         "lived_s": "by all of them together [s]",
-        "pairs": "that ever touched",
+        "pairs": "that ever touched there",
         "touched": "share of robots that ever touched another",
         "touching": "time of touch, counted for both, by time lived",
     },
@@ -208,7 +210,7 @@ _INTEGERS = {"size", "judged", "ancestors", "planned", "islands", "robots", "sam
              "pairs", "epoch", "to", "descendants", "living", "reached", "runs",
              "runs_a", "runs_b", "finding"}  # fmt: skip
 _TEXTS = {"population", "by", "measure", "a", "b", "figure", "claim", "expected",
-          "verdict", "why", "what", "version"}  # fmt: skip
+          "verdict", "why", "what"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 

@@ -151,7 +151,7 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
     )
     flags.add_argument(
         "--processes",
-        type=_at_least_one,
+        type=at_least_one,
         default=processes,
         metavar="N",
         help=f"how many at a time (default: {processes})",
@@ -169,7 +169,7 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
     if role == "worker":
         flags.add_argument(
             "--threads",
-            type=_at_least_one,
+            type=at_least_one,
             metavar="N",
             help="of each process, to advance one arena together (default: 1)",
         )
@@ -177,7 +177,8 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
     return flags
 
 
-def _at_least_one(text: str) -> int:
+def at_least_one(text: str) -> int:
+    """Return a flag's value as a whole number >= 1."""
     if not (text.isascii() and text.isdigit() and int(text) >= 1):
         raise argparse.ArgumentTypeError(f"must be a whole number >= 1, got {text!r}")
     return int(text)
