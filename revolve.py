@@ -14,6 +14,7 @@ COMMANDS = {
     "analyzer": ("analyzer.__main__", "vet bodies for a coordinator"),
     "robot": ("schema.__main__", "check, convert or show a robot file"),
     "robot random": ("coordinator.robot_command", "make up a robot"),
+    "robot render": ("analysis.__main__", "draw the robot of a file"),
     "robot simulate": ("worker.robot_command", "judge the robot of a file"),
     "analyze": ("analysis.__main__", "draw what the tables say"),
     "bench": ("worker.bench", "measure this machine"),
