@@ -39,6 +39,8 @@ def main(arguments: list[str]) -> int:
         RunFolderError: no run.
         MissingExtra: a library for measures or figures is not there.
     """
+    if arguments[:2] == ["robot", "render"]:
+        return _render(arguments)
     options = _flags().parse_args(arguments[1:])
     runs, left_out = read_runs(options.runs)
     try:
@@ -155,6 +157,22 @@ def _last_populations(populations: pa.Table) -> Table:
             *fitness,
         )
     return table
+
+
+def _render(arguments: list[str]) -> int:
+    """Draw a robot, by the worker's simulation if it is to move."""
+    try:
+        from analysis.render import choose_engine
+        from analysis.render_command import main as render
+    except ImportError as error:
+        raise MissingExtra(
+            f"pictures need {error.name}: pip install 'revolve-islands[view]'"
+        ) from None
+    # Before anything loads the engine.
+    choose_engine()
+    from worker.evaluation import simulate
+
+    return render(arguments, simulate)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
+
 from analysis.render import (
     NoPictures,
     Picture,
@@ -90,15 +92,19 @@ def _draw_motion(
         return
     # From the middle of the life on, when the first fall is over.
     chosen = poses[len(poses) // 2 :][:gait]
-    save_picture(gait_strip(_drawn(studio, chosen)), out)
+    # A camera that stands still: the robot is seen to go.
+    middle = np.mean([pose[:3] for pose in chosen], axis=0)
+    save_picture(gait_strip(_drawn(studio, chosen, middle)), out)
 
 
-def _drawn(studio: Studio, poses: list[Floats]) -> list[Picture]:
+def _drawn(
+    studio: Studio, poses: list[Floats], look_at: Floats | None = None
+) -> list[Picture]:
     """Draw poses, and show that it goes on."""
     from rich.progress import track
 
     shown = track(poses, description="drawing", transient=True)
-    return [studio.picture(pose) for pose in shown]
+    return [studio.picture(pose, look_at=look_at) for pose in shown]
 
 
 def _parser() -> argparse.ArgumentParser:
