@@ -7,6 +7,8 @@ import pyarrow as pa
 import pyarrow.compute
 
 from coordinator.folder import read_details
+from schema.errors import ExperimentError
+from schema.experiment_file import experiment_from_text, experiment_text
 from schema.run_tables import read_table
 from schema.tables import TABLES, repeatable
 
@@ -33,9 +35,9 @@ def compare(first: Path, second: Path) -> list[str]:
     for folder in (first, second):
         read_details(folder)
     lines: list[str] = []
-    platforms: list[list[str]] = []
+    platforms: list[set[str]] = [set(), set()]
     for name, schema in TABLES.items():
-        tables = [read_table(folder, name) for folder in (first, second)]
+        tables = [_read(folder, name) for folder in (first, second)]
         lines += _differences(name, tables, repeatable(schema))
         if name == "births":
             lines += [
@@ -43,10 +45,11 @@ def compare(first: Path, second: Path) -> list[str]:
                 for folder, table in zip((first, second), tables, strict=True)
                 if not table.num_rows
             ]
-        if name == "evaluations":
-            platforms = [_platforms(table) for table in tables]
+        if "platform" in schema.names:
+            for found, table in zip(platforms, tables, strict=True):
+                found.update(pa.compute.unique(table["platform"]).to_pylist())
     if lines and platforms[0] != platforms[1]:
-        ours, theirs = (", ".join(each) or "none" for each in platforms)
+        ours, theirs = (", ".join(sorted(each)) or "none" for each in platforms)
         lines.append(
             f"platforms differ: {ours} against {theirs}; equality is only promised "
             "on equal ones"
@@ -54,8 +57,28 @@ def compare(first: Path, second: Path) -> list[str]:
     return lines
 
 
-def _platforms(evaluations: pa.Table) -> list[str]:
-    return sorted(pa.compute.unique(evaluations["platform"]).to_pylist())
+def _read(folder: Path, name: str) -> pa.Table:
+    """Return a table; documents of older versions say all that they left unsaid.
+
+    Raises:
+        RunFolderError: it cannot be read.
+    """
+    table = read_table(folder, name)
+    if name != "runs":
+        return table
+    index = table.schema.get_field_index("document")
+    whole = [_whole(text) for text in table["document"].to_pylist()]
+    return table.set_column(
+        index, table.schema.field(index), pa.array(whole, pa.string())
+    )
+
+
+def _whole(document: str) -> str:
+    """Return a document with the defaults of keys that it is older than."""
+    try:
+        return experiment_text(experiment_from_text(document))
+    except ExperimentError:
+        return document
 
 
 def _differences(name: str, tables: list[pa.Table], columns: list[str]) -> list[str]:
