@@ -5,9 +5,10 @@ from importlib import import_module
 
 _COORDINATOR = "coordinator.__main__"
 COMMANDS = {
-    "run": (_COORDINATOR, "evolve an experiment on this machine"),
-    "resume": (_COORDINATOR, "go on with a run after any crash"),
-    "coordinator": (_COORDINATOR, "run an experiment for remote workers"),
+    "run": (_COORDINATOR, "evolve experiments on this machine"),
+    "resume": (_COORDINATOR, "go on with a run or campaign after any crash"),
+    "coordinator": (_COORDINATOR, "run experiments for remote workers"),
+    "status": ("coordinator.status_command", "tell how far runs are"),
     "arena": ("coordinator.arena_command", "give orders to a running arena"),
     "compare": (_COORDINATOR, "tell whether two runs are equal"),
     "worker": ("worker.__main__", "simulate robots for a coordinator"),

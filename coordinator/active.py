@@ -9,6 +9,7 @@ from pathlib import Path
 
 from coordinator.archipelago import archipelago
 from coordinator.arena import Arena
+from coordinator.audits import CARELESS, Caution
 from coordinator.events import Record
 from coordinator.fleet import Fleet
 from coordinator.folder import DETAILS, RunFolder
@@ -50,6 +51,7 @@ class ActiveRun:
         fsync: bool = False,
         speed: float | None = None,
         is_watched: bool = False,
+        caution: Caution = CARELESS,
     ) -> None:
         """Open all of a run; nothing happens before ``start``.
 
@@ -59,6 +61,7 @@ class ActiveRun:
             fsync: survive power loss, too.
             speed: simulated seconds per second at most, of arenas; None: no limit.
             is_watched: have a feed.
+            caution: what to look out for.
 
         Raises:
             RunFolderError: a damaged journal, or a disk that fails.
@@ -87,6 +90,8 @@ class ActiveRun:
                 rows=rows,
                 vault=Snapshots(held.path),
                 pace=_pace(self.experiment, speed),
+                caution=caution,
+                confirm=held.confirm,
             )
             self.desk = Desk(self.loop, self.experiment)
             self._births, self._simulated = Tempo(), Tempo()
@@ -106,13 +111,13 @@ class ActiveRun:
         self.held.set_state("running")
 
     def do_chores(self) -> None:
-        """Bring rows to disk; find out whether the folder is still ours.
+        """Find out whether the folder is still ours; bring rows to disk.
 
         Raises:
             RunFolderError: it is not, or the disk is full or failed.
         """
-        self._recorder.flush()
         self.held.confirm()
+        self._recorder.flush()
 
     def finish(self) -> None:
         """Write the last row, and turn all tables into their final form.
@@ -129,8 +134,9 @@ class ActiveRun:
         """Leave all as it is, to go on another day.
 
         Raises:
-            RunFolderError: the disk is full or failed.
+            RunFolderError: the folder is not ours, or the disk is full or failed.
         """
+        self.held.confirm()
         self._recorder.flush()
         self.held.set_state("stopped")
 
@@ -154,7 +160,7 @@ class ActiveRun:
         self._simulated.note(now_s, simulated_s)
         details = self.held.details
         return RunStatus(
-            folder=str(self.held.path),
+            folder=str(self.held.path.resolve()),
             name=details.name,
             run=details.run,
             state="finished" if self.loop.is_finished else "running",

@@ -5,10 +5,11 @@ import sys
 from pathlib import Path
 from uuid import uuid4
 
-from coordinator.service import ask_coordinator
+from coordinator.service import ask_coordinators
+from coordinator.status_command import ask_status
 from schema.agent_command import Flags, add_network_flags, tls_of
 from schema.birth import BirthId
-from schema.errors import InvalidRobot
+from schema.errors import InvalidRobot, NetworkError
 from schema.operator_codec import (
     BrainWish,
     InsertWish,
@@ -56,17 +57,40 @@ def main(arguments: list[str]) -> int:
         InvalidRobot: a file that holds no robot.
     """
     options = _parser().parse_args(arguments[1:])
-    request = OperatorRequest(uuid4().hex, options.island, _wish(options))
-    data = ask_coordinator(
+    wish = _wish(options)
+    coordinator = _coordinator(options)
+    request = OperatorRequest(uuid4().hex, options.island, wish, options.run)
+    data = ask_coordinators(
         encode_operator_request(request),
         connect=options.connect,
         fleet=options.fleet,
         tls=tls_of(options),
-    )
+        only=coordinator,
+    )[coordinator]
     reply = decode_operator_reply(data)
     stream = sys.stderr if reply.is_refused else sys.stdout
     stream.write(f"{reply.text}\n")
     return 1 if reply.is_refused else 0
+
+
+def _coordinator(options: argparse.Namespace) -> str:
+    """Return whose run is meant.
+
+    Raises:
+        NetworkError: not exactly one coordinator has such a run.
+    """
+    told = ask_status(options)
+    names = [
+        name
+        for name, status in told.items()
+        if any(Path(run.folder).name.endswith(options.run) for run in status.runs)
+    ]
+    if len(names) == 1:
+        return names[0]
+    raise NetworkError(
+        f"{options.connect}: there must be one coordinator with a run "
+        f"{options.run or 'at all'}, got {len(names)} of {len(told)}; name one by --run"
+    )
 
 
 def _wish(options: argparse.Namespace) -> Wish:
@@ -112,6 +136,10 @@ def _parser() -> argparse.ArgumentParser:
         action.add_argument(
             "--connect", required=True, metavar="ADDRESS",
             help="the coordinator's address, as in the run folder's file 'address'",
+        )  # fmt: skip
+        action.add_argument(
+            "--run", default="", metavar="NAME",
+            help="end of its folder's name, where there are several",
         )  # fmt: skip
         action.add_argument("--island", type=int, default=0, help="default: 0")
         add_network_flags(action)

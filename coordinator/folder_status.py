@@ -50,5 +50,5 @@ def unbegun_status(
             IslandStatus(births, births if state == "finished" else wanted, None, 0)
         )
     return RunStatus(
-        str(folder), details.name, details.run, state, islands=tuple(islands)
+        str(folder.resolve()), details.name, details.run, state, islands=tuple(islands)
     )

@@ -334,19 +334,25 @@ class Network:
         return Returned(number, agent, "error", reason=reason or "no reason given")
 
 
-def ask_coordinator(
-    data: bytes, *, connect: str, fleet: str = DEFAULT_FLEET, tls: Tls | None = None
-) -> bytes:
-    """Return what the coordinator at an address replies to an operator.
+def ask_coordinators(
+    data: bytes,
+    *,
+    connect: str,
+    fleet: str = DEFAULT_FLEET,
+    tls: Tls | None = None,
+    only: str = "",
+) -> dict[str, bytes]:
+    """Return what the coordinators at an address reply, by their names.
 
     Args:
         data: an encoded ``OperatorRequest``.
         connect: address of the hub.
         fleet: name of the fleet.
         tls: files, for a ``tls/`` address.
+        only: name of the one to ask; empty asks all.
 
     Raises:
-        NetworkError: no hub, not exactly one coordinator, or none that answers.
+        NetworkError: no hub, or no coordinator that answers.
     """
     config = client_config(connect, tls)
     check_name(fleet, "fleet")
@@ -355,21 +361,24 @@ def ask_coordinator(
         session = zenoh.open(zenoh.Config.from_json5(config))
     except zenoh.ZError:
         raise NetworkError(f"no coordinator at {connect}") from None
+    told: dict[str, bytes] = {}
     with session:
         tokens = session.liveliness().get(agents_alive(fleet, "coordinator"))
-        keys = [str(token.ok.key_expr) for token in tokens if token.ok is not None]
-        if len(keys) != 1:
-            raise NetworkError(
-                f"{connect}: there must be one coordinator of fleet {fleet}, "
-                f"got {len(keys)}"
+        there = [member_of(str(each.ok.key_expr)) for each in tokens if each.ok]
+        for member in sorted(there, key=lambda each: each.name):
+            if only not in ("", member.name):
+                continue
+            replies = session.get(
+                member.command,
+                payload=data,
+                timeout=ASK_TIMEOUT_S,
+                consolidation=_NOW,
             )
-        replies = session.get(
-            member_of(keys[0]).command,
-            payload=data,
-            timeout=ASK_TIMEOUT_S,
-            consolidation=_NOW,
+            for reply in replies:
+                if reply.ok is not None:
+                    told[member.name] = reply.ok.payload.to_bytes()
+    if not told:
+        raise NetworkError(
+            f"{connect}: of {len(there)} coordinators of fleet {fleet} none answers"
         )
-        for reply in replies:
-            if reply.ok is not None:
-                return bytes(reply.ok.payload.to_bytes())
-    raise NetworkError(f"{connect}: the coordinator does not answer")
+    return told
