@@ -7,6 +7,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from coordinator.audits import Caution
 from coordinator.campaign import (
     Campaign,
     is_campaign,
@@ -118,6 +119,8 @@ def _deployment(
         fsync=options.fsync,
         threads=threads,
         speed=options.speed,
+        cpu_limit_s=options.cpu_limit,
+        caution=Caution(options.audit, options.on_quarantine == "pause"),
     )
 
 

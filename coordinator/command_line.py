@@ -4,7 +4,7 @@ import argparse
 import math
 
 from coordinator.campaign import shipped_campaigns
-from schema.agent_command import Flags, add_network_flags
+from schema.agent_command import Flags, add_cpu_limit, add_network_flags
 from schema.experiment_file import shipped_experiments
 
 LISTEN = "tcp/127.0.0.1:7447"
@@ -113,6 +113,22 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         metavar="X",
         help="for watching an arena: at most X simulated seconds per second",
     )
+    add_cpu_limit(flags)
+    flags.add_argument(
+        "--audit",
+        type=_share,
+        default=0.0,
+        metavar="SHARE",
+        help="have this share of evaluations, from 0 to 1, done by two workers; the "
+        "run stops if they do not agree (default: 0)",
+    )
+    flags.add_argument(
+        "--on-quarantine",
+        choices=("go-on", "pause"),
+        default="go-on",
+        help="what a run does when a robot's evaluation has ended its own process "
+        "three times: it counts as failed either way (default: go-on)",
+    )
     flags.add_argument("--quiet", action="store_true", help="show no progress")
     flags.add_argument(
         "--fsync", action="store_true", help="survive power loss too; slower"
@@ -137,4 +153,11 @@ def _speed(text: str) -> float:
     value = float(text)
     if not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"must be > 0 and finite, got {value}")
+    return value
+
+
+def _share(text: str) -> float:
+    value = float(text)
+    if not 0.0 <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"must be from 0 to 1, got {text!r}")
     return value

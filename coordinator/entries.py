@@ -2,9 +2,11 @@
 
 from coordinator.events import (
     Advanced,
+    Audited,
     Commanded,
     Evaluated,
     EvaluationFailed,
+    Heard,
     Insert,
     Journalled,
     Order,
@@ -51,6 +53,9 @@ def encode_entry(event: Journalled) -> bytes:
             entry.commanded.command_id = event.command_id
             entry.commanded.step = event.step
             _write_order(event.order, entry.commanded)
+        case Audited():
+            entry.audited.first.ParseFromString(encode_entry(event.first))
+            entry.audited.second.ParseFromString(encode_entry(event.second))
         case _:
             entry.island, entry.birth = event.birth
             _write_answer(event, entry)
@@ -63,7 +68,12 @@ def decode_entry(data: bytes) -> Journalled:
     Raises:
         MalformedMessage: not an entry's bytes, or no event in it.
     """
-    return decoded(data, pb.Entry(), _event)
+    return decoded(data, pb.Entry(), _journalled)
+
+
+def _journalled(entry: pb.Entry) -> Journalled:
+    is_audit = entry.WhichOneof("event") == "audited"
+    return _audited(entry.audited) if is_audit else _event(entry)
 
 
 def _write_answer(
@@ -78,10 +88,12 @@ def _write_answer(
             entry.vetting_failed = event.reason
         case Evaluated():
             entry.trial = event.trial
+            _address(entry, event.asker)
             entry.evaluated.CopyFrom(evaluation_to_message(event.evaluation))
             _sign(entry, event.provenance)
         case EvaluationFailed():
             entry.trial = event.trial
+            _address(entry, event.asker)
             entry.evaluation_failed = event.reason
             _sign(entry, event.provenance)
 
@@ -111,11 +123,12 @@ def _write_order(order: Order, command: pb.Command) -> None:
             write_brain_change(change, command.replace_brain)
 
 
-def _event(entry: pb.Entry) -> Journalled:
+def _event(entry: pb.Entry) -> Heard:
     birth = BirthId(entry.island, entry.birth)
     signed = Provenance(
         entry.provenance.agent, entry.provenance.platform, entry.provenance.wall_s
     )
+    asker = entry.asker if entry.HasField("asker") else None
     match entry.WhichOneof("event"):
         case "vetted":
             return Vetted(birth, entry.attempt, report_from_message(entry.vetted))
@@ -123,10 +136,10 @@ def _event(entry: pb.Entry) -> Journalled:
             return VettingFailed(birth, entry.attempt, entry.vetting_failed)
         case "evaluated":
             evaluation = evaluation_from_message(entry.evaluated)
-            return Evaluated(birth, evaluation, signed, entry.trial)
+            return Evaluated(birth, evaluation, signed, entry.trial, asker)
         case "evaluation_failed":
             reason = entry.evaluation_failed
-            return EvaluationFailed(birth, reason, signed, entry.trial)
+            return EvaluationFailed(birth, reason, signed, entry.trial, asker)
         case "advanced":
             told = entry.advanced
             advance = advance_from_message(told.advance)
@@ -136,6 +149,14 @@ def _event(entry: pb.Entry) -> Journalled:
             order = _order(given)
             return Commanded(entry.island, given.command_id, given.step, order)
     raise MalformedMessage("entry: holds no event")
+
+
+def _audited(told: pb.AuditEntry) -> Audited:
+    first, second = _event(told.first), _event(told.second)
+    kinds = Evaluated | EvaluationFailed
+    if not (isinstance(first, kinds) and isinstance(second, kinds)):
+        raise MalformedMessage("entry: an audit must hold two evaluations")
+    return Audited(first, second)
 
 
 def _order(command: pb.Command) -> Order:
@@ -157,6 +178,11 @@ def _order(command: pb.Command) -> Order:
             change = read_brain_change(command.replace_brain)
             return ReplaceBrain(change.birth, change.brain)
     raise MalformedMessage("command: holds no order")
+
+
+def _address(entry: pb.Entry, asker: int | None) -> None:
+    if asker is not None:
+        entry.asker = asker
 
 
 def _sign(entry: pb.Entry, provenance: Provenance) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from coordinator.selection import Individual
 from schema.arena import Advance, Changes
 from schema.birth import BirthId
 from schema.brain import Brain
@@ -49,12 +50,14 @@ class Evaluated:
         evaluation: what it came to.
         provenance: who did it.
         trial: which evaluation of the robot it is; 0 is the one at its birth.
+        asker: the island that wanted it; None is the one of its birth.
     """
 
     birth: BirthId
     evaluation: Evaluation
     provenance: Provenance
     trial: int = 0
+    asker: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,13 +68,14 @@ class EvaluationFailed:
         birth: whose robot.
         reason: why.
         provenance: who found out.
-        trial: as of ``Evaluated``.
+        trial, asker: as of ``Evaluated``.
     """
 
     birth: BirthId
     reason: str
     provenance: Provenance
     trial: int = 0
+    asker: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,15 +157,70 @@ class Commanded:
     order: Order
 
 
+@dataclass(frozen=True, slots=True)
+class Immigrated:
+    """A neighbour's migrants of an epoch came, be they none.
+
+    Attributes:
+        island: to whom.
+        source: from which island.
+        epoch: that ended there, from 0.
+        migrants: who came, each with its fitness there.
+    """
+
+    island: int
+    source: int
+    epoch: int
+    migrants: tuple[Individual, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NeighbourClosed:
+    """A neighbour has finished: nobody comes from there any more.
+
+    Attributes:
+        island: whose neighbour.
+        neighbour: which.
+    """
+
+    island: int
+    neighbour: int
+
+
+Travelled = Immigrated | NeighbourClosed
+"""Events that come of other islands' commands; no journal holds them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Audited:
+    """Two workers, if there are two, did the same evaluation."""
+
+    first: Evaluated | EvaluationFailed
+    second: Evaluated | EvaluationFailed
+
+    @property
+    def agrees(self) -> bool:
+        """They came to the same, to the last bit."""
+        match self.first, self.second:
+            case Evaluated(evaluation=one), Evaluated(evaluation=other):
+                return one == other
+            case EvaluationFailed(reason=one), EvaluationFailed(reason=other):
+                return one == other
+        return False
+
+
 Answered = Vetted | VettingFailed | Evaluated | EvaluationFailed
 """Events that answer a question of an off-line island."""
 
-Journalled = Answered | Advanced | Commanded
+Heard = Answered | Advanced | Commanded
+"""Events of a journal that an island or an arena is told."""
+
+Journalled = Heard | Audited
 """Events that are no function of others: what the journal keeps."""
 
-IslandEvent = Started | Answered
+IslandEvent = Started | Answered | Travelled
 
-ArenaEvent = Started | Vetted | VettingFailed | Advanced | Commanded
+ArenaEvent = Started | Vetted | VettingFailed | Advanced | Commanded | Travelled
 
 # --- Islands: commands ------------------------------------------------------
 
@@ -184,12 +243,14 @@ class Evaluate:
         robot: itself.
         trial: which evaluation of the robot it is, from 0.
         steps: of physics to simulate; 0: as the experiment says for all.
+        asker: as of ``Evaluated``.
     """
 
     birth: BirthId
     robot: Robot
     trial: int = 0
     steps: int = 0
+    asker: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,15 +297,41 @@ class AdvanceShard:
 
 
 @dataclass(frozen=True, slots=True)
-class Finish:
-    """The island is done."""
+class Emigrate:
+    """Send a neighbour the migrants of an epoch, be they none.
+
+    Attributes:
+        island: from where.
+        to: the neighbour.
+        epoch: that ended, from 0.
+        migrants: who goes, or whose copies do.
+    """
 
     island: int
+    to: int
+    epoch: int
+    migrants: tuple[Individual, ...]
 
 
-IslandCommand = Vet | Evaluate | Record | Finish
+@dataclass(frozen=True, slots=True)
+class Finish:
+    """The island is done; its neighbours shall know."""
 
-ArenaCommand = Vet | AdvanceShard | Record | Append | Finish
+    island: int
+    neighbours: tuple[int, ...] = ()
+
+
+IslandCommand = Vet | Evaluate | Record | Emigrate | Finish
+
+ArenaCommand = Vet | AdvanceShard | Record | Append | Emigrate | Finish
+
+
+def asker_of(about: Vet | Evaluate | Answered) -> int:
+    """Return which island asks, or is answered."""
+    if isinstance(about, Vet | Vetted | VettingFailed) or about.asker is None:
+        return about.birth.island
+    return about.asker
+
 
 # --- Dispatch ---------------------------------------------------------------
 

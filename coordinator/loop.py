@@ -5,42 +5,57 @@ acted on before the journal has it, so a coordinator that is killed at any point
 comes back to the same decisions by replaying its journal.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+import logging
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 from typing import Protocol
 
 from coordinator.advances import Advances, Terms, Vault
 from coordinator.arena import Arena
+from coordinator.audits import CARELESS, Caution, audit_records, describe
 from coordinator.events import (
     Advanced,
     AdvanceShard,
     Append,
     ArenaCommand,
+    Audited,
     Commanded,
+    Emigrate,
     Evaluate,
     Evaluated,
     EvaluationFailed,
     Finish,
+    Heard,
+    Immigrated,
     IslandCommand,
     Journalled,
+    NeighbourClosed,
     Record,
     Started,
+    Travelled,
     Vet,
     Vetted,
     VettingFailed,
+    asker_of,
 )
 from coordinator.fleet import Asker, Fleet, Owner
 from coordinator.island import Island
 from coordinator.pacing import Pace
-from coordinator.questions import Question, Questions
+from coordinator.questions import Question, Questions, is_quarantined
 from schema.birth import BirthId
-from schema.errors import UnexpectedEvent
+from schema.errors import RunPaused, UnexpectedEvent
 
-Key = tuple[str, BirthId, int]
-"""What an open question is known by: kind, birth, attempt or trial."""
+_LOG = logging.getLogger(__name__)
+
+Key = tuple[str, int, BirthId, int]
+"""What an open question is known by: kind, asker, birth, attempt or trial."""
 
 Asked = Vet | Evaluate | AdvanceShard
 """What islands and arenas have others do."""
+
+Told = Started | Heard | Travelled
+"""What islands and arenas are told."""
 
 
 class Log(Protocol):
@@ -81,15 +96,22 @@ class Loop:
         rows: Rows,
         vault: Vault,
         pace: Pace | None = None,
+        caution: Caution = CARELESS,
+        confirm: Callable[[], None] = lambda: None,
     ) -> None:
-        """Connect machines; nothing happens before ``start``."""
+        """Connect machines; nothing happens before ``start``.
+
+        ``confirm`` raises if this process may not write to the run any more.
+        """
         self.islands = dict(islands)
         self.advances = Advances(
             Terms(question.run, question.epoch, question.arena),
             vault,
             fleet,
         )
-        self._questions = Questions(question, fleet)
+        self._questions = Questions(question, fleet, caution.audit)
+        self._caution = caution
+        self._confirm = confirm
         self._fleet = fleet
         self._log = log
         self._rows = rows
@@ -103,9 +125,9 @@ class Loop:
         return all(island.is_finished for island in self.islands.values())
 
     @property
-    def open(self) -> int:
-        """How many questions and advances others are at."""
-        return self._questions.open + self.advances.open
+    def is_paced(self) -> bool:
+        """Arenas may be held back."""
+        return self._pace is not None
 
     @property
     def askers(self) -> tuple[Asker, Owner]:
@@ -143,6 +165,9 @@ class Loop:
         for number in sorted(self.islands):
             note(self._tell(number, Started()))
         for event in history:
+            if isinstance(event, Audited):
+                self._note_audit(event)
+                continue
             if not isinstance(event, Advanced | Commanded):
                 unanswered.pop(_key(event), None)
             note(self._tell(_island(event), event))
@@ -160,7 +185,9 @@ class Loop:
         Raises:
             JobRefused: nobody can do a job; the run stops as it is.
             ExperimentError: restrictions that no robot meets.
-            RunFolderError: the disk is full or failed.
+            RunFolderError: the disk is full or failed, or another coordinator has
+                taken the run over.
+            RunPaused: something is to be seen by the user first.
         """
         self._now_s = now_s
         for shard, due_s in sorted(self._held_back.items()):
@@ -188,17 +215,45 @@ class Loop:
         """Keep events, then act on them."""
         if not events:
             return
+        # One that slept through its replacement must not write a byte.
+        self._confirm()
         for event in events:
             if isinstance(event, Advanced) and event.pose_rows:
                 poses = event.advance.poses
                 self._rows.store(Append("poses", event.pose_rows, poses))
         self._log.append(events)
         for event in events:
+            if isinstance(event, Audited):
+                self._note_audit(event)
+                continue
             for command in self._tell(_island(event), event):
                 if isinstance(command, AdvanceShard):
                     self._advance(command)
                 else:
                     self._questions.ask(command)
+
+        self._take_care(events)
+
+    def _note_audit(self, event: Audited) -> None:
+        for record in audit_records(event):
+            self._rows.write(record)
+
+    def _take_care(self, events: Sequence[Journalled]) -> None:
+        """Tell the user what is not as it should be.
+
+        Raises:
+            RunPaused: two workers do not agree, or a robot is quarantined and the
+                user wanted to know of that first.
+        """
+        for event in events:
+            if isinstance(event, Audited) and not event.agrees:
+                raise RunPaused(describe(event))
+            if isinstance(event, EvaluationFailed) and is_quarantined(event):
+                birth = event.birth
+                line = f"birth {birth.number} of island {birth.island}: {event.reason}"
+                if self._caution.pauses:
+                    raise RunPaused(f"{line}; resume to go on without it")
+                _LOG.warning("%s", line)
 
     def _advance(self, command: AdvanceShard) -> None:
         """Ask for an advance, now or when it is due."""
@@ -212,8 +267,33 @@ class Loop:
                 return
         self.advances.request(shard)
 
-    def _tell(self, number: int, event: Started | Journalled) -> list[Asked]:
-        """Give an island its event; return what it asks next.
+    def _tell(self, number: int, event: Started | Heard) -> list[Asked]:
+        """Give an island its event, and others what comes of it; return the questions.
+
+        Raises:
+            UnexpectedEvent: nobody here takes such an event.
+        """
+        asked: list[Asked] = []
+        told: deque[tuple[int, Told]] = deque([(number, event)])
+        while told:
+            for command in self._handled(*told.popleft()):
+                match command:
+                    case Record():
+                        self._rows.write(command)
+                    case Append():
+                        self._rows.append(command)
+                    case Vet() | Evaluate() | AdvanceShard():
+                        asked.append(command)
+                    case Emigrate(island, to, epoch, migrants):
+                        told.append((to, Immigrated(to, island, epoch, migrants)))
+                    case Finish(island, neighbours):
+                        told += [(to, NeighbourClosed(to, island)) for to in neighbours]
+        return asked
+
+    def _handled(
+        self, number: int, event: Told
+    ) -> Iterable[IslandCommand | ArenaCommand]:
+        """Return what an island answers to an event.
 
         Raises:
             UnexpectedEvent: nobody here takes such an event.
@@ -223,32 +303,17 @@ class Loop:
             if isinstance(event, Advanced):
                 self.advances.take(event)
             if not isinstance(event, Evaluated | EvaluationFailed):
-                return self._obey(machine.handle(event))
+                return machine.handle(event)
         elif machine is not None and not isinstance(event, Advanced | Commanded):
-            return self._obey(machine.handle(event))
+            return machine.handle(event)
         raise UnexpectedEvent(f"no island here takes {event}")
 
-    def _obey(self, commands: Iterable[IslandCommand | ArenaCommand]) -> list[Asked]:
-        """Write the rows; return the questions."""
-        asked: list[Asked] = []
-        for command in commands:
-            match command:
-                case Record():
-                    self._rows.write(command)
-                case Append():
-                    self._rows.append(command)
-                case Vet() | Evaluate() | AdvanceShard():
-                    asked.append(command)
-                case Finish():
-                    pass
-        return asked
 
-
-def _island(event: Journalled) -> int:
+def _island(event: Heard) -> int:
     """Return whose event it is."""
     if isinstance(event, Advanced | Commanded):
         return event.island
-    return event.birth.island
+    return asker_of(event)
 
 
 def _key(
@@ -256,5 +321,5 @@ def _key(
 ) -> Key:
     """Return what a question and its answer have in common."""
     if isinstance(about, Vet | Vetted | VettingFailed):
-        return ("vet", about.birth, about.attempt)
-    return ("evaluate", about.birth, about.trial)
+        return ("vet", about.birth.island, about.birth, about.attempt)
+    return ("evaluate", asker_of(about), about.birth, about.trial)

@@ -4,8 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Self
 
+from coordinator.audits import Audits
 from coordinator.events import (
     Answered,
+    Audited,
     Deliver,
     Evaluate,
     Evaluated,
@@ -71,25 +73,27 @@ class Questions:
         malformed: answers that did not decode or did not fit their question.
     """
 
-    def __init__(self, question: Question, fleet: Fleet) -> None:
+    def __init__(self, question: Question, fleet: Fleet, audit: float = 0.0) -> None:
         """Have nothing to ask yet.
 
         Args:
             question: what all of them have in common.
             fleet: whom to ask.
+            audit: share of evaluations that are done twice.
         """
         self.malformed = 0
+        self._audits = Audits(audit)
         self._question = question
         self._fleet = fleet
         self._open: dict[int, Vet | Evaluate] = {}
-        self._came: list[Answered] = []
+        self._came: list[Answered | Audited] = []
         self._refusal: JobRefused | None = None
         self._answers: dict[int, Answer] = {}
         self._encoded: dict[BirthId, tuple[Robot, bytes]] = {}
 
     def ask(self, command: Vet | Evaluate) -> None:
         """Have a robot vetted or evaluated."""
-        number, birth = self._fleet.new_number(), command.birth
+        birth = command.birth
         cached = self._encoded.get(birth)
         if cached is not None and cached[0] is command.robot:
             robot = cached[1]
@@ -103,24 +107,28 @@ class Questions:
             attempt, steps = command.trial, command.steps
             settings = asks.evaluation[asker_of(command)]
             self._encoded.pop(birth, None)
-        payload = encode_request(
-            run=asks.run,
-            epoch=asks.epoch,
-            number=number,
-            settings=settings,
-            robot=robot,
-            steps=steps,
-            plugins=plugins_of(settings),
-        )
         kind: JobKind = "vet" if isinstance(command, Vet) else "evaluate"
-        self._open[number] = command
-        job = Job(number, kind, birth, attempt, payload)
-        self._fleet.ask(job, self)
+        for number, twin in self._numbers(command):
+            payload = encode_request(
+                run=asks.run,
+                epoch=asks.epoch,
+                number=number,
+                settings=settings,
+                robot=robot,
+                steps=steps,
+                plugins=plugins_of(settings),
+            )
+            self._open[number] = command
+            self._fleet.ask(Job(number, kind, birth, attempt, payload, twin), self)
 
-    @property
-    def open(self) -> int:
-        """How many questions have no answer yet."""
-        return len(self._open)
+    def _numbers(self, command: Vet | Evaluate) -> list[tuple[int, int]]:
+        """Return the number of each job for a question, and of its twin or -1."""
+        first = self._fleet.new_number()
+        if isinstance(command, Vet) or not self._audits.chooses(command):
+            return [(first, -1)]
+        second = self._fleet.new_number()
+        self._audits.pair(first, second)
+        return [(first, second), (second, first)]
 
     def is_of(self, run: str, epoch: int) -> bool:
         """Return whether the questions are those of a run's incarnation."""
@@ -129,19 +137,22 @@ class Questions:
     def deliver(self, command: Deliver) -> None:
         """Keep the end of a job until ``take``."""
         job = command.job
-        del self._open[job.number]
+        asked = self._open.pop(job.number)
+        asker = asked.asker if isinstance(asked, Evaluate) else None
         if command.is_deadly:
-            self._came.append(_quarantined(command))
+            self._came += self._audits.settle(job.number, _quarantined(command, asker))
             return
         if not command.reason:
-            self._came.append(self._answered(command))
+            self._came += self._audits.settle(
+                job.number, self._answered(command, asker)
+            )
             return
         self._refusal = JobRefused(
             f"birth {job.birth.number}: several agents cannot {job.kind} it, the last "
             f"of them {command.agent}: {command.reason}; mend that and resume"
         )
 
-    def take(self) -> list[Answered]:
+    def take(self) -> list[Answered | Audited]:
         """Return the answers that came since the last call.
 
         Raises:
@@ -167,7 +178,8 @@ class Questions:
                 f"answer must be to (epoch, job) {expected}, "
                 f"got {(answer.epoch, answer.number)}",
             )
-        unfit = Evaluation if self._open[event.number] == "vet" else Report
+        is_vet = isinstance(self._open[event.number], Vet)
+        unfit = Evaluation if is_vet else Report
         if isinstance(answer.result, unfit):
             return self._dropped(event, f"the answer is of type {unfit.__name__}")
         self._answers[event.number] = answer
@@ -178,7 +190,7 @@ class Questions:
         self.malformed += 1
         return replace(event, outcome="error", answer=b"", reason=reason)
 
-    def _answered(self, command: Deliver) -> Answered:
+    def _answered(self, command: Deliver, asker: int | None) -> Answered:
         """Return the island's event that a finished job comes to."""
         job = command.job
         answer = self._answers.pop(job.number)
@@ -190,14 +202,23 @@ class Questions:
         platform = self._fleet.dispatch.platform(command.agent)
         provenance = Provenance(command.agent, platform, answer.wall_s)
         if isinstance(result, Evaluation):
-            return Evaluated(job.birth, result, provenance, job.attempt)
-        return EvaluationFailed(job.birth, str(result), provenance, job.attempt)
+            return Evaluated(job.birth, result, provenance, job.attempt, asker)
+        reason = str(result)
+        return EvaluationFailed(job.birth, reason, provenance, job.attempt, asker)
 
 
-def _quarantined(command: Deliver) -> VettingFailed | EvaluationFailed:
+def is_quarantined(event: EvaluationFailed) -> bool:
+    """Return whether a robot has no evaluation because it ends its processes."""
+    return event.reason.startswith(QUARANTINED)
+
+
+def _quarantined(
+    command: Deliver, asker: int | None
+) -> VettingFailed | EvaluationFailed:
     """Return what it comes to that a job ends whoever does it."""
     job = command.job
     if job.kind == "vet":
         return VettingFailed(job.birth, job.attempt, f"the analyzer {command.reason}")
     why = f"{QUARANTINED}{command.reason}"
-    return EvaluationFailed(job.birth, why, Provenance(command.agent), job.attempt)
+    signed = Provenance(command.agent)
+    return EvaluationFailed(job.birth, why, signed, job.attempt, asker)

@@ -1,5 +1,6 @@
 """Runs from their first birth to their last, or to the next resume."""
 
+import contextlib
 import math
 import resource
 import time
@@ -11,6 +12,7 @@ from pathlib import Path
 
 from coordinator.active import ActiveRun
 from coordinator.audience import Audience
+from coordinator.audits import CARELESS, Caution
 from coordinator.campaign import (
     Campaign,
     CampaignFolder,
@@ -37,7 +39,7 @@ from schema.experiment_file import experiment_text
 from schema.network import THIS_MACHINE, Agent, Tls
 from schema.platform_tag import platform_tag
 from schema.service import tell_user
-from schema.supervision import Post
+from schema.supervision import CPU_LIMIT_S, Post
 from schema.topics import unique_name
 
 ADDRESS = "address"
@@ -66,6 +68,8 @@ class Deployment:
         fsync: survive power loss, too.
         threads: that advance one arena together in a process here.
         speed: simulated seconds per second at most, of arenas; None: no limit.
+        cpu_limit_s: CPU time of a job after which its process here is ended [s].
+        caution: what to look out for.
     """
 
     workers: int
@@ -79,6 +83,8 @@ class Deployment:
     fsync: bool
     threads: int = 1
     speed: float | None = None
+    cpu_limit_s: float = CPU_LIMIT_S
+    caution: Caution = CARELESS
 
 
 def start(
@@ -220,6 +226,7 @@ def _conduct(
                 fsync=deployment.fsync,
                 speed=deployment.speed,
                 is_watched=is_watched and isinstance(agents, Network),
+                caution=deployment.caution,
             ),
             most=_most_at_once(),
             conclude=conclude_run,
@@ -301,16 +308,24 @@ def _agents(
         # Whoever waits for the file shall find the address in it.
         text = f"{network.address}\n"
         replace_durably(note, lambda file: file.write_text(text, encoding="utf-8"))
-        stack.callback(note.unlink, missing_ok=True)
+        stack.callback(_take_away, note, text)
         crews: list[Callable[[], None]] = []
         sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
         for kind, size in sizes.items() if deployment.workers else ():
             agent = Agent(
                 kind, f"own-{kind}", network.address, deployment.fleet,
                 tls=deployment.tls, threads=deployment.threads,
+                cpu_limit_s=deployment.cpu_limit_s,
             )  # fmt: skip
             crew = Crew(deployment.bodies[kind], (agent,), size=size)
             crews.append(stack.enter_context(crew).look_after)
         if deployment.listen is not None:
             tell_user(f"listening on {network.address}")
         yield network, crews
+
+
+def _take_away(note: Path, text: str) -> None:
+    """Remove a file, unless whoever came after us has written another."""
+    with contextlib.suppress(OSError):
+        if note.read_text(encoding="utf-8") == text:
+            note.unlink()

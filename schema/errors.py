@@ -48,6 +48,10 @@ class JobRefused(RevolveError):  # noqa: N818 - reads as what it says
     """Several agents cannot do a job: the machines' fault, never a result."""
 
 
+class RunPaused(RevolveError):  # noqa: N818 - reads as what it says
+    """A run stops for its user to look at something; ``revolve resume`` goes on."""
+
+
 class SimulationDiverged(RevolveError):  # noqa: N818 - reads as what it says
     """The physics left the realm of numbers: nobody's fault, a result."""
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import pyarrow as pa
 
-from schema.brain import Layer
 from schema.errors import MalformedMessage
 from schema.genome import Genome, walk
 from schema.parts import BodySpace
@@ -37,9 +36,10 @@ def _column(
     return pa.field(name, kind, nullable=is_nullable, metadata=metadata)
 
 
-def _table(name: str, *columns: pa.Field) -> pa.Schema:
+def _table(name: str, *columns: pa.Field, is_repeatable: bool = True) -> pa.Schema:
     metadata = {"revolve.schema": name, "revolve.schema_version": str(VERSION)}
-    return pa.schema([_column("record", pa.int64()), *columns], metadata=metadata)
+    record = _column("record", pa.int64(), is_repeatable=is_repeatable)
+    return pa.schema([record, *columns], metadata=metadata)
 
 
 def _inner(name: str, kind: pa.DataType) -> pa.Field:
@@ -62,6 +62,13 @@ PART = pa.struct(
     ]
 )
 """A part of a body, in the order and with the meaning of ``schema.robot.Part``."""
+
+_BIRTH_ISLAND = _column("birth_island", pa.int32(), is_nullable=True)
+"""Where an immigrant was born; null of those who live where they were born.
+
+``island`` is where something happened. An individual's name is its island of birth
+and its ``birth`` there: ``coalesce(birth_island, island), birth``.
+"""
 
 BIRTHS = _table(
     "births",
@@ -93,6 +100,7 @@ When and where it was born is null off-line, its generation on-line.
 EVALUATIONS = _table(
     "evaluations",
     _column("island", pa.int32()),
+    _BIRTH_ISLAND,
     _column("birth", pa.int64()),
     _column("trial", pa.int32(), absent=0),
     _column("status", pa.string()),
@@ -114,6 +122,7 @@ POPULATION = _table(
     "population",
     _column("island", pa.int32()),
     _column("births", pa.int64()),
+    _BIRTH_ISLAND,
     _column("birth", pa.int64()),
     _column("fitness", pa.float64(), is_nullable=True),
 )
@@ -126,6 +135,7 @@ null of those who are not mature.
 FITNESS = _table(
     "fitness",
     _column("island", pa.int32()),
+    _BIRTH_ISLAND,
     _column("birth", pa.int64()),
     _column("sim_time_s", pa.float64(), "s"),
     _column("births", pa.int64()),
@@ -142,6 +152,7 @@ _COORDINATE = pa.float32()
 POSES = _table(
     "poses",
     _column("island", pa.int32()),
+    _BIRTH_ISLAND,
     _column("birth", pa.int64()),
     _column("sim_time_s", pa.float64(), "s"),
     *(_column(axis, _COORDINATE, "m") for axis in "xyz"),
@@ -157,6 +168,7 @@ every joint, driven or not, by ascending part.
 DEATHS = _table(
     "deaths",
     _column("island", pa.int32()),
+    _BIRTH_ISLAND,
     _column("birth", pa.int64()),
     _column("sim_time_s", pa.float64(), "s"),
     _column("births", pa.int64()),
@@ -169,13 +181,15 @@ DEATHS = _table(
 """One row per robot that left an arena, and where its core was.
 
 Reason is "selection" (less fit than the survivors' rule asks), "cull" (an arena
-full of the mature made room), "diverged" (its physics did; ``detail`` says how) or
-"removed" (by an operator; z is null if it had not lived yet).
+full of the mature made room), "diverged" (its physics did; ``detail`` says how),
+"removed" (by an operator), "migrated" (it was moved to another island) or
+"replaced" (it made room for an immigrant); z is null if it had not lived yet.
 """
 
 TOUCHES = _table(
     "touches",
     _column("island", pa.int32()),
+    _BIRTH_ISLAND,
     _column("birth", pa.int64()),
     _column("other_island", pa.int32()),
     _column("other_birth", pa.int64()),
@@ -184,6 +198,47 @@ TOUCHES = _table(
     _column("duration_s", pa.float64(), "s"),
 )
 """One row per pair that touched: for how long of the time ``over_s`` that ended."""
+
+MIGRATIONS = _table(
+    "migrations",
+    _column("island", pa.int32()),
+    _column("to", pa.int32()),
+    _column("epoch", pa.int64()),
+    _column("births", pa.int64()),
+    _column("sim_time_s", pa.float64(), "s", is_nullable=True),
+    _column("birth_island", pa.int32()),
+    _column("birth", pa.int64()),
+    _column("fitness", pa.float64(), is_nullable=True),
+)
+"""One row per migrant that was sent, when ``births`` had been born on its island.
+
+Fitness is what it was judged there, null if that failed; when is null off-line.
+"""
+
+AUDITS = _table(
+    "audits",
+    *(
+        _column(name, kind, unit, is_repeatable=False, is_nullable=is_nullable)
+        for name, kind, unit, is_nullable in (
+            ("island", pa.int32(), "", False),
+            ("birth", pa.int64(), "", False),
+            ("trial", pa.int32(), "", False),
+            ("agrees", pa.bool_(), "", False),
+            ("worker", pa.string(), "", False),
+            ("platform", pa.string(), "", False),
+            ("reason", pa.string(), "", False),
+            ("fitness", pa.float64(), "", True),
+            ("path_velocity", pa.float64(), "m/s", True),
+            ("straight_velocity", pa.float64(), "m/s", True),
+            ("simulated_s", pa.float64(), "s", True),
+        )
+    ),
+    is_repeatable=False,
+)
+"""Two rows per evaluation that two workers did: what each of them came to.
+
+Which evaluations are audited is a flag, so nothing here repeats.
+"""
 
 _INSTANT = pa.timestamp("ms", tz="UTC")
 
@@ -214,6 +269,8 @@ TABLES: dict[str, pa.Schema] = {
     "poses": POSES,
     "deaths": DEATHS,
     "touches": TOUCHES,
+    "migrations": MIGRATIONS,
+    "audits": AUDITS,
     "runs": RUNS,
 }
 """Schemas by table name."""
@@ -317,12 +374,8 @@ def sizes(robot: Robot, genome: Genome, space: BodySpace) -> dict[str, int]:
     Source: thesis section 6.3; facts of the original, section 8.
     """
     kinds = [space[part.kind] for part in robot.parts]
-    layers: tuple[tuple[str, Layer], ...] = (
-        ("inputs", "input"),
-        ("outputs", "output"),
-        ("hidden", "hidden"),
-    )
-    counts = {name: robot.brain.count(layer) for name, layer in layers}
+    layers = [neuron.layer for neuron in robot.brain.neurons]
+    # The core's parent, -1, is among them.
     parents = {part.parent for part in robot.parts}
     return {
         "parts": len(robot.parts),
@@ -331,7 +384,9 @@ def sizes(robot: Robot, genome: Genome, space: BodySpace) -> dict[str, int]:
             for kind, part in zip(kinds, robot.parts, strict=True)
         ),
         "motors": sum(kind.outputs for kind in kinds),
-        "extremities": sum(index not in parents for index in range(len(robot.parts))),
-        **counts,
+        "extremities": len(robot.parts) + 1 - len(parents),
+        "inputs": layers.count("input"),
+        "outputs": layers.count("output"),
+        "hidden": layers.count("hidden"),
         "connections": sum(len(node.connections) for node, _, _ in walk(genome)),
     }
