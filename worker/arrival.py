@@ -9,10 +9,10 @@ from schema.codec import encode_robot
 from schema.errors import UnexpectedEvent
 from schema.experiment import body_space
 from schema.robot import Robot, check_robot
-from worker.cluster import Body
 from worker.company import Company
 from worker.controller import Widths, pack
 from worker.inhabitant import Inhabitant, put
+from worker.shop import Body
 from worker.window import Window
 
 

@@ -1,99 +1,56 @@
 """Robots that share a model because they may touch: a cluster, of one or of many.
 
 A robot alone has its own small model for life; those within each other's reach
-share one that is made when they meet. A robot sits in a cluster with views of its
-part of the state, and takes its whole state along when it moves to another.
+share one that is made when they meet. Clusters know nothing of each other, so each
+goes through a stretch of time at its own pace and keeps its state at the moments
+at which somebody will want to know it.
 """
 
-from collections import OrderedDict
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from msgspec.structs import replace
 
 from schema.birth import BirthId
 from schema.evaluation import Floats
-from schema.experiment import body_space
-from schema.mjcf import Scenery, add_ring_wall, robot_spec, shared_model, solo_model
 from schema.robot import Robot
-from schema.settings import ArenaSettings
-from worker.controller import widths
-from worker.reach import Indices, Reach, reach_of
-from worker.sensors import Senses, Servos, find, free_joint
+from worker.reach import Indices
+from worker.seat import Rules, Seat
 
-CACHE_SIZE = 64
-"""Models of clusters that are kept in case their members meet again."""
+NEVER = 1 << 62
+"""A moment that does not come."""
 
 
-class Seat:
-    """One robot's place in a cluster: live views, its senses and its motors.
+class Track:
+    """A cluster's states at K moments of a stretch of time, one row each.
 
     Attributes:
-        model, data: of the cluster.
-        qpos, qvel, ctrl: its part of the state.
-        xpos, xmat: frames of its bodies as of the last step, (N, 3) and (N, 9).
-        joints: where its part of qpos starts in the cluster's.
-        geoms: first and last + 1 of its geoms.
+        qpos, qvel: (K, Q) and (K, V).
+        xpos, xmat: frames of all bodies, (K, N, 3) and (K, N, 9).
+        warnings: how often the engine had given each of its own.
+        touching: the pairs of members in contact, if they are kept.
     """
 
-    def __init__(
-        self, robot: Robot, solo: mujoco.MjModel, shop: "Shop", cluster: "Cluster"
-    ) -> None:
-        """Find a robot in a cluster by the prefix of its names.
+    def __init__(self, data: mujoco.MjData, count: int) -> None:
+        """Make room for moments of a state."""
+        live = (data.qpos, data.qvel, data.xpos, data.xmat)
+        rows = [np.zeros((count, *array.shape)) for array in live]
+        self.qpos, self.qvel, self.xpos, self.xmat = rows
+        self._complaints: Indices = data.warning.number
+        self.warnings = np.zeros((count, len(self._complaints)), dtype=np.intp)
+        self.touching: list[list[tuple[int, int]]] = [[] for _ in range(count)]
+        # Views of bytes: what is copied many times a second is copied by them.
+        self._live = [_bytes(array) for array in live]
+        self._rows = [[_bytes(array[k]) for array in rows] for k in range(count)]
 
-        Args:
-            robot: the robot.
-            solo: the model in which it is alone: tells its sizes.
-            shop: the arena's settings.
-            cluster: whose model and data have just been made.
-        """
-        self.model, self.data = cluster.model, cluster.data
-        model, data = self.model, self.data
-        prefix = cluster.prefixes[len(cluster.seats)]
-        free = free_joint(model, prefix)
-        first = find(model, mujoco.mjtObj.mjOBJ_BODY, f"{prefix}root")
-        root = int(solo.jnt_bodyid[0])
-        bodies = slice(first, first + solo.nbody - root)
-        self.joints = int(model.jnt_qposadr[free])
-        self.dofs = int(model.jnt_dofadr[free])
-        geom = int(model.body_geomadr[first])
-        self.geoms = (geom, geom + solo.ngeom - int(solo.body_geomadr[root]))
-        types = body_space(shop.settings.space)
-        self.senses = Senses(
-            robot,
-            types,
-            model,
-            width=shop.width.inputs,
-            prefix=prefix,
-            has_light=shop.settings.arena.light is not None,
-        )
-        self.servos = Servos(robot, types, model, prefix=prefix)
-        self.qpos: Floats = data.qpos[self.joints : self.joints + solo.nq]
-        self.qvel: Floats = data.qvel[self.dofs : self.dofs + solo.nv]
-        self.ctrl: Floats = data.ctrl[self.servos.slots]
-        self.xpos: Floats = data.xpos[bodies]
-        self.xmat: Floats = data.xmat[bodies]
+    def __len__(self) -> int:
+        return len(self._rows)
 
-    def start(self) -> None:
-        """Feel for the first time."""
-        self.senses.start(self.model, self.data)
-
-    def feel(self, interval_s: float) -> None:
-        """Read all sensors; ``interval_s`` has passed since the last reading."""
-        self.senses.read(self.model, self.data, interval_s)
-
-    def drive(self, outputs: Floats) -> None:
-        """Command the motors; (O,) outputs of the network."""
-        self.servos.drive(self.data, outputs)
-
-    def take(self, other: "Seat") -> None:
-        """Take over a robot's whole state from the seat that it leaves."""
-        self.qpos[:], self.qvel[:] = other.qpos, other.qvel
-        self.ctrl[:] = other.ctrl
-        self.senses.readings[:] = other.senses.readings
-        self.senses.velocities = list(other.senses.velocities)
+    def keep(self, moment: int) -> None:
+        """Take the present state for that of a moment."""
+        qpos, qvel, xpos, xmat = self._rows[moment]
+        qpos[:], qvel[:], xpos[:], xmat[:] = self._live
+        self.warnings[moment] = self._complaints
 
 
 class Cluster:
@@ -102,10 +59,12 @@ class Cluster:
     Attributes:
         members: whose seats they are, ascending.
         seats: in that order.
-        warnings: how often the engine gave each of its warnings, a live view.
+        track: states at the moments of the last stretch of time.
         cost: of a step, in arbitrary units; decides who is dealt first.
         is_shared: by several robots.
         failure: why the engine gave up on it; empty if it did not.
+        failed_at: moment of the stretch at which it did.
+        touched: geoms in contact in the last step; kept only if a member has pads.
     """
 
     def __init__(
@@ -113,31 +72,73 @@ class Cluster:
         members: tuple[BirthId, ...],
         prefixes: tuple[str, ...],
         model: mujoco.MjModel,
+        *,
+        tells_touches: bool = False,
     ) -> None:
-        """Make the state of a model; seats come later."""
+        """Make the state of a model; seats come later.
+
+        Args:
+            members: by birth.
+            prefixes: of their names in the model.
+            model: that holds them.
+            tells_touches: its track is to know who touched whom.
+        """
         self.members, self.prefixes = members, prefixes
         self.model, self.data = model, mujoco.MjData(model)
         self.seats: tuple[Seat, ...] = ()
         self._owners = np.full(model.ngeom, -1, dtype=np.intp)
         self.qpos: Floats = self.data.qpos
         self.qvel: Floats = self.data.qvel
-        self.warnings: Indices = self.data.warning.number
+        self.track = Track(self.data, 0)
         self.cost = int(model.nv + 4 * model.ngeom)
-        self.failure = ""
+        self.failure, self.failed_at = "", NEVER
+        self.touched: frozenset[int] = frozenset()
+        self._has_pads = False
         self.is_shared = len(members) > 1
+        self._tells_touches = tells_touches and self.is_shared
 
-    def seat(self, robot: Robot, solo: mujoco.MjModel, shop: "Shop") -> None:
+    def seat(self, robot: Robot, solo: mujoco.MjModel, rules: Rules) -> None:
         """Find the next member's place."""
-        seat = Seat(robot, solo, shop, self)
+        prefix = self.prefixes[len(self.seats)]
+        seat = Seat(robot, solo, rules, (self.model, self.data, prefix))
         self._owners[slice(*seat.geoms)] = len(self.seats)
         self.seats = (*self.seats, seat)
+        self._has_pads |= bool(seat.senses.pads)
 
-    def step(self, count: int) -> None:
-        """Let physics go on for some steps; the commands are held."""
-        try:
-            mujoco.mj_step(self.model, self.data, nstep=count)
-        except mujoco.FatalError as error:
-            self.failure = str(error)
+    def run(self, plan: Sequence[int], first: int = 0) -> None:
+        """Let physics go on from moment to moment; the commands are held.
+
+        Args:
+            plan: steps to each moment from the one before.
+            first: moment to begin with; those before are kept as they are.
+        """
+        if len(self.track) < len(plan):
+            self.track = Track(self.data, len(plan))
+        model, data, keep = self.model, self.data, self.track.keep
+        for moment in range(first, len(plan)):
+            try:
+                mujoco.mj_step(model, data, nstep=plan[moment])
+            except mujoco.FatalError as error:
+                self.failure, self.failed_at = str(error), moment
+                self.keep(range(moment, len(plan)))
+                return
+            keep(moment)
+            if self._tells_touches:
+                self.track.touching[moment] = self.touching()
+        self._feel()
+
+    def keep(self, moments: range) -> None:
+        """Take the present state for that of some moments."""
+        if len(self.track) < moments.stop:
+            self.track = Track(self.data, moments.stop)
+        for moment in moments:
+            self.track.keep(moment)
+            self.track.touching[moment] = self.touching()
+        self._feel()
+
+    def rewind(self, moment: int) -> None:
+        """Go back to the state of a moment, from which its robots are to leave."""
+        self.qpos[:], self.qvel[:] = self.track.qpos[moment], self.track.qvel[moment]
 
     def touching(self) -> list[tuple[int, int]]:
         """Return the pairs of members in contact in the last step, ascending."""
@@ -148,101 +149,17 @@ class Cluster:
         pairs = {(a, b) for a, b in owners.tolist() if a != b}
         return sorted(pairs)
 
+    def _feel(self) -> None:
+        """Note what pads may feel while the engine's contacts are at hand."""
+        if self._has_pads:
+            geoms: list[int] = self.data.contact.geom.ravel().tolist()
+            self.touched = frozenset(geoms)
 
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A robot as the engine knows it, whoever it lives with.
-
-    Attributes:
-        robot: the robot; its brain is another's business.
-        reach: what bounds it.
-        home: the cluster in which it is alone.
-    """
-
-    robot: Robot
-    reach: Reach
-    home: Cluster
+    def reset(self) -> None:
+        """Be as new, in an undefined place."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.failure, self.failed_at = "", NEVER
 
 
-class Shop:
-    """Makes models of one arena, and keeps a few that may be wanted again."""
-
-    def __init__(self, settings: ArenaSettings) -> None:
-        """Start with an empty store.
-
-        Args:
-            settings: of the arena.
-        """
-        self.settings = settings
-        self._simulation = replace(settings.simulation, drop_m=settings.arena.drop_m)
-        self.width = widths(settings.space)
-        self._store: OrderedDict[tuple[BirthId, ...], Cluster] = OrderedDict()
-        self._specs: dict[BirthId, mujoco.MjSpec] = {}
-
-    def body(self, birth: BirthId, robot: Robot) -> Body:
-        """Return a robot at the origin, as high as the arena drops it.
-
-        Raises:
-            ValueError: the engine cannot build it.
-            ExperimentError: a sensor that the arena has nothing for.
-        """
-        types = body_space(self.settings.space)
-        model = solo_model(robot, types, self._simulation, scenery=self._scenery)
-        home = Cluster((birth,), ("",), model)
-        home.seat(robot, model, self)
-        return Body(robot, reach_of(model), home)
-
-    def cluster(self, births: Sequence[BirthId], bodies: Sequence[Body]) -> Cluster:
-        """Return a cluster for robots, in an undefined state.
-
-        Args:
-            births: who, ascending.
-            bodies: theirs.
-        """
-        members = tuple(births)
-        if len(members) == 1:
-            found = bodies[0].home
-        elif members in self._store:
-            self._store.move_to_end(members)
-            found = self._store[members]
-        else:
-            found = self._shared(members, bodies)
-            self._store[members] = found
-            if len(self._store) > CACHE_SIZE:
-                self._store.popitem(last=False)
-        mujoco.mj_resetData(found.model, found.data)
-        found.failure = ""
-        return found
-
-    def forget(self, birth: BirthId) -> None:
-        """Drop all that was kept for a robot that is gone."""
-        self._specs.pop(birth, None)
-        for members in [key for key in self._store if birth in key]:
-            del self._store[members]
-
-    def _shared(self, members: tuple[BirthId, ...], bodies: Sequence[Body]) -> Cluster:
-        prefixes = tuple(f"{birth.island}.{birth.number}/" for birth in members)
-        specs = [
-            self._spec(birth, body.robot)
-            for birth, body in zip(members, bodies, strict=True)
-        ]
-        model = shared_model(
-            list(zip(prefixes, specs, strict=True)),
-            self._simulation,
-            scenery=self._scenery,
-        )
-        made = Cluster(members, prefixes, model)
-        for body in bodies:
-            made.seat(body.robot, body.home.model, self)
-        return made
-
-    def _spec(self, birth: BirthId, robot: Robot) -> mujoco.MjSpec:
-        if birth not in self._specs:
-            types = body_space(self.settings.space)
-            self._specs[birth] = robot_spec(robot, types, self._simulation).spec
-        return self._specs[birth]
-
-    @property
-    def _scenery(self) -> Scenery:
-        arena, simulation = self.settings.arena, self._simulation
-        return lambda spec: add_ring_wall(spec, arena, simulation)
+def _bytes(array: Floats) -> memoryview:
+    return array.data.cast("B")

@@ -13,22 +13,23 @@ import numpy as np
 from schema.birth import BirthId
 from schema.evaluation import Floats
 from schema.settings import ArenaSettings
-from worker.cluster import Cluster, Shop
+from worker.cluster import Cluster
+from worker.groups import Group, across, components
 from worker.inhabitant import Inhabitant
-from worker.layout import Layout
+from worker.layout import Layout, Roster
 from worker.proximity import Proximity
-
-Group = tuple[BirthId, ...]
+from worker.shop import Shop
+from worker.stride import Stride
 
 
 class Company:
     """The living, by birth, and their clusters, by first member.
 
     Attributes:
-        everybody: all inhabitants, by birth.
         clusters: of all of them.
         by_cost: the same clusters, dearest first.
         layout: where their numbers stand.
+        stride: the stretch of time that is being looked at; nothing between two.
         merges, splits: how often clusters were joined and parted.
     """
 
@@ -36,20 +37,26 @@ class Company:
         """Start with nobody."""
         self.shop = Shop(settings)
         self.proximity = Proximity(settings)
-        self.everybody: tuple[Inhabitant, ...] = ()
+        self.roster = Roster(())
         self.clusters: tuple[Cluster, ...] = ()
-        self.merges = self.splits = 0
-        self._rows: dict[BirthId, int] = {}
-        self._cluster_of: dict[BirthId, Cluster] = {}
         self.by_cost: list[Cluster] = []
-        self.layout = Layout((), ())
+        self.layout = Layout((), self.roster)
+        self.stride: Stride | None = None
+        self.merges = self.splits = 0
+        self._cluster_of: dict[BirthId, Cluster] = {}
+        self._new: list[Cluster] = []
+
+    @property
+    def everybody(self) -> tuple[Inhabitant, ...]:
+        """All inhabitants, by birth."""
+        return self.roster.everybody
 
     def __contains__(self, birth: BirthId) -> bool:
-        return birth in self._rows
+        return birth in self.roster.rows
 
     def find(self, birth: BirthId) -> Inhabitant:
         """Return who has a name."""
-        return self.everybody[self._rows[birth]]
+        return self.roster.everybody[self.roster.rows[birth]]
 
     def cluster_of(self, birth: BirthId) -> Cluster:
         """Return where somebody lives."""
@@ -59,9 +66,10 @@ class Company:
         """Take robots in, each in its own home."""
         added = sorted(newcomers, key=lambda one: one.birth)
         self._anchor()
-        self._number(sorted((*self.everybody, *added), key=lambda one: one.birth))
+        everybody = sorted((*self.everybody, *added), key=lambda one: one.birth)
+        self.roster = Roster(everybody)
         for one in added:
-            self.proximity.insert(self._rows[one.birth])
+            self.proximity.insert(self.roster.rows[one.birth])
         homes = [one.body.home for one in added]
         self._settle([*self.clusters, *homes])
 
@@ -71,14 +79,14 @@ class Company:
         if not gone:
             return
         self._anchor()
-        self.proximity.remove([self._rows[birth] for birth in gone])
+        self.proximity.remove([self.roster.rows[birth] for birth in gone])
         homes: dict[Group, Cluster] = {}
         for birth in gone:
             cluster = self._cluster_of[birth]
             homes[cluster.members] = cluster
         left = [one for one in self.everybody if one.birth not in gone]
         kept = [cluster for cluster in self.clusters if cluster.members not in homes]
-        self._number(left)
+        self.roster = Roster(left)
         for members in homes:
             rest = tuple(birth for birth in members if birth not in gone)
             if rest:
@@ -87,20 +95,49 @@ class Company:
             self.shop.forget(birth)
         self._settle(kept)
 
-    def look(self, state: Floats, differences: Floats) -> None:
-        """Join those who may touch before the next look.
+    def begin(self, plan: Sequence[int]) -> Stride:
+        """Look, from now on, at a stretch that all clusters have gone through."""
+        self.stride = Stride(tuple(plan))
+        self.stride.read(self.layout)
+        self.stride.measure(self.layout, self.proximity.anchor, 0)
+        return self.stride
 
-        Args:
-            state: of all clusters, as the layout reads it.
-            differences: from the anchor of ``proximity``, absolute.
-        """
-        pairs = self.proximity.look(self.layout, state, differences, self._balls)
-        if not pairs:
+    def catch_up(self) -> None:
+        """Let clusters that are new at this moment go through the rest, too."""
+        stride = self.stride
+        if stride is None or not self._new:
             return
-        births = [one.birth for one in self.everybody]
-        links = [(births[first], births[second]) for first, second in pairs]
-        old = [cluster.members for cluster in self.clusters]
-        self.regroup(_components(old, links))
+        for cluster in self._new:
+            cluster.run(stride.plan, stride.moment + 1)
+        self._new = []
+        stride.read(self.layout)
+        stride.measure(self.layout, self.proximity.anchor, stride.moment + 1)
+
+    def end(self) -> None:
+        """Have looked at all of the stretch: now is its last moment."""
+        self.stride, self._new = None, []
+
+    def look(self) -> None:
+        """Join those who may touch before the next look."""
+        stride, layout, proximity = self.stride, self.layout, self.proximity
+        if stride is None:
+            state = layout.read()
+            differences = np.abs(state - proximity.anchor)
+            bounds = (
+                layout.moved(differences[: layout.size]),
+                layout.speeds(differences[layout.size :]),
+            )
+        else:
+            state = stride.state
+            bounds = stride.moved[stride.moment], stride.speeds[stride.moment]
+        is_anchored, pairs = proximity.look(layout, state, bounds, self._balls)
+        if is_anchored and stride is not None:
+            stride.measure(layout, proximity.anchor, stride.moment)
+        if pairs:
+            births = [one.birth for one in self.everybody]
+            links = [(births[first], births[second]) for first, second in pairs]
+            old = [cluster.members for cluster in self.clusters]
+            self.regroup(components(old, links))
 
     def part(self) -> None:
         """Let clusters fall into those parts that have drifted apart."""
@@ -127,16 +164,12 @@ class Company:
             before = sorted({self._cluster_of[birth].members for birth in members})
             self.merges += len(before) - 1
             torn += before if len(before) == 1 else ()
-            rows = [self._rows[birth] for birth in members]
+            rows = [self.roster.rows[birth] for birth in members]
             self.proximity.join(rows)
             settled.append(self._move(members))
         self.splits += len(torn) - len(set(torn))
         if changed:
             self._settle(settled)
-
-    def differences(self, state: Floats) -> Floats:
-        """Return how a state differs from what distances were measured in."""
-        return np.abs(state - self.proximity.anchor)
 
     def kinematics(self) -> None:
         """Bring the frames of all bodies up to the present state."""
@@ -146,6 +179,9 @@ class Company:
     def _move(self, members: Group) -> Cluster:
         """Return a cluster into which robots have moved with their states."""
         people = [self.find(birth) for birth in members]
+        if self.stride is not None:
+            for birth in members:
+                self._cluster_of[birth].rewind(self.stride.moment)
         cluster = self.shop.cluster(members, [one.body for one in people])
         for one, seat in zip(people, cluster.seats, strict=True):
             seat.take(one.seat)
@@ -153,23 +189,34 @@ class Company:
         return cluster
 
     def _settle(self, clusters: Sequence[Cluster]) -> None:
-        self.clusters = tuple(sorted(clusters, key=lambda cluster: cluster.members))
+        known = {id(cluster) for cluster in self.clusters}
+        rows = self.roster.rows
+        self.clusters = tuple(sorted(clusters, key=lambda c: rows[c.members[0]]))
         self._cluster_of = {
             birth: cluster for cluster in self.clusters for birth in cluster.members
         }
-        self.layout = Layout(self.clusters, self.everybody)
+        self.layout = Layout(self.clusters, self.roster)
         self.by_cost = sorted(self.clusters, key=lambda cluster: -cluster.cost)
-        reaches = [one.body.reach for one in self.everybody]
-        self.proximity.gather(reaches, self.layout)
+        if self.stride is None:
+            self.proximity.gather(self.layout, self.layout.read())
+            return
+        moment, count = self.stride.moment, len(self.stride.plan)
+        for cluster in self.clusters:
+            if id(cluster) not in known:
+                cluster.keep(range(moment, count))
+                self._new.append(cluster)
+        self.stride.read(self.layout)
+        self.proximity.gather(self.layout, self.stride.state.copy())
+        self.stride.measure(self.layout, self.proximity.anchor, moment)
 
     def _anchor(self) -> None:
         """Note how far all have moved, before they stand elsewhere in the layout."""
-        moved, _ = self.layout.bounds(self.differences(self.layout.read()))
-        self.proximity.settle(moved)
-
-    def _number(self, everybody: Sequence[Inhabitant]) -> None:
-        self.everybody = tuple(everybody)
-        self._rows = {one.birth: row for row, one in enumerate(everybody)}
+        if self.stride is not None:
+            self.proximity.settle(self.stride.moved[self.stride.moment])
+            return
+        size = self.layout.size
+        positions = (self.layout.read() - self.proximity.anchor)[:size]
+        self.proximity.settle(self.layout.moved(np.abs(positions)))
 
     def _parts(self, cluster: Cluster) -> list[Group]:
         """Return the parts of a cluster, one if it holds together."""
@@ -177,56 +224,29 @@ class Company:
         touching = [
             (cluster.members[a], cluster.members[b]) for a, b in cluster.touching()
         ]
-        groups = _components(alone, touching)
+        groups = components(alone, touching)
         if len(groups) == 1:
             return groups
-        pairs = _across([[self._rows[b] for b in group] for group in groups])
+        pairs = across([[self.roster.rows[b] for b in group] for group in groups])
         births = [one.birth for one in self.everybody]
         near = self.proximity.near(pairs, self._balls)
         links = [(births[first], births[second]) for first, second in near]
-        groups = _components(groups, links)
+        groups = components(groups, links)
         for group in groups:
-            self.proximity.join([self._rows[birth] for birth in group])
+            self.proximity.join([self.roster.rows[birth] for birth in group])
         return groups
 
     def _balls(self, row: int) -> Floats:
         """Return the spheres that cover a robot, (3, B), world frame [m]."""
         one = self.everybody[row]
         reach, seat = one.body.reach, one.seat
-        turned = seat.xmat[reach.bodies] * reach.centres
+        xpos, xmat = seat.xpos, seat.xmat
+        if self.stride is not None:
+            track, moment = self._cluster_of[one.birth].track, self.stride.moment
+            xpos, xmat = (
+                track.xpos[moment, seat.bodies],
+                track.xmat[moment, seat.bodies],
+            )
+        turned = xmat[reach.bodies] * reach.centres
         moved = turned[:, 0::3] + turned[:, 1::3] + turned[:, 2::3]
-        return np.asarray((moved + seat.xpos[reach.bodies]).T)
-
-
-def _across(groups: Sequence[Sequence[int]]) -> list[tuple[int, int]]:
-    """Return the pairs of rows whose ends are in two groups, lesser row first."""
-    return sorted(
-        (min(a, b), max(a, b))
-        for number, group in enumerate(groups)
-        for other in groups[number + 1 :]
-        for a in group
-        for b in other
-    )
-
-
-def _components(
-    groups: Iterable[Group], links: Iterable[tuple[BirthId, BirthId]]
-) -> list[Group]:
-    """Return groups joined along links, each and all ascending."""
-    parent: dict[BirthId, BirthId] = {}
-    for group in groups:
-        for birth in group:
-            parent[birth] = group[0]
-
-    def root(birth: BirthId) -> BirthId:
-        while parent[birth] != birth:
-            birth = parent[birth]
-        return birth
-
-    for first, second in links:
-        ends = sorted((root(first), root(second)))
-        parent[ends[1]] = ends[0]
-    found: dict[BirthId, list[BirthId]] = {}
-    for birth in sorted(parent):
-        found.setdefault(root(birth), []).append(birth)
-    return [tuple(found[first]) for first in sorted(found)]
+        return np.asarray((moved + xpos[reach.bodies]).T)

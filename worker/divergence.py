@@ -8,8 +8,9 @@ import numpy as np
 from schema.arena import Casualty
 from schema.birth import BirthId
 from schema.evaluation import Floats
-from worker.cluster import Cluster, Seat
+from worker.cluster import Cluster
 from worker.company import Company
+from worker.stride import Stride
 
 FASTEST_CORE = 20.0
 """A core faster than this has broken the physics [m/s]; a fall from the thesis's
@@ -19,7 +20,7 @@ _PLAUSIBLE = 1e6
 
 
 def diverged(
-    company: Company, velocities: Floats, step: int, *, looks_closely: bool
+    company: Company, stride: Stride, step: int, *, looks_closely: bool
 ) -> list[Casualty]:
     """Return those whose physics diverged, by birth.
 
@@ -28,19 +29,23 @@ def diverged(
 
     Args:
         company: the living.
-        velocities: all clusters' in a row, absolute.
+        stride: what they did, and which moment of it is looked at.
         step: the arena's.
         looks_closely: the engine's warnings are read in any case.
     """
-    # A sum is finite only if all its terms are, and small if all of them are.
-    loud = float(velocities.max(initial=0.0))
-    is_quiet = math.isfinite(loud) and loud <= FASTEST_CORE
-    if is_quiet and not looks_closely:
-        return _failed(company, step)
+    is_quiet = _is_quiet(stride.loudest)
+    if not is_quiet:
+        velocities = np.abs(stride.state[company.layout.size :])
+        is_quiet = _is_quiet(float(velocities.max(initial=0.0)))
+    moment = stride.moment
     found: list[Casualty] = []
     for cluster in company.clusters:
-        reasons = {} if is_quiet else _reasons(cluster)
-        complaint = cluster.failure or _warnings(cluster)
+        reasons, complaint = {}, ""
+        if cluster.failed_at <= moment:
+            complaint = cluster.failure
+        if looks_closely or not is_quiet:
+            reasons = {} if is_quiet else _reasons(cluster, moment)
+            complaint = complaint or _warnings(cluster, moment)
         if complaint and not reasons:
             reasons = dict.fromkeys(cluster.members, f"physics diverged: {complaint}")
         found += [
@@ -50,42 +55,36 @@ def diverged(
     return found
 
 
-def _failed(company: Company, step: int) -> list[Casualty]:
-    return [
-        Casualty(
-            birth,
-            step,
-            f"physics diverged: {cluster.failure}",
-            company.find(birth).place,
-        )
-        for cluster in company.clusters
-        if cluster.failure
-        for birth in cluster.members
-    ]
+def _is_quiet(loudest: float) -> bool:
+    """Return whether the greatest of all velocities tells that nobody diverged."""
+    return math.isfinite(loudest) and loudest <= FASTEST_CORE
 
 
-def _reasons(cluster: Cluster) -> dict[BirthId, str]:
+def _reasons(cluster: Cluster, moment: int) -> dict[BirthId, str]:
     reasons = {}
+    track = cluster.track
     for birth, seat in zip(cluster.members, cluster.seats, strict=True):
-        if reason := _reason(seat):
+        positions = track.qpos[moment, seat.joints : seat.joints + len(seat.qpos)]
+        velocities = track.qvel[moment, seat.dofs : seat.dofs + len(seat.qvel)]
+        if reason := _reason(positions, velocities):
             reasons[birth] = f"physics diverged: {reason}"
     return reasons
 
 
-def _reason(seat: Seat) -> str:
-    if not (np.isfinite(seat.qvel).all() and np.isfinite(seat.qpos).all()):
+def _reason(positions: Floats, velocities: Floats) -> str:
+    if not (np.isfinite(velocities).all() and np.isfinite(positions).all()):
         return "state not finite"
-    largest = max(float(np.abs(seat.qvel).max()), float(np.abs(seat.qpos).max()))
+    largest = max(float(np.abs(velocities).max()), float(np.abs(positions).max()))
     if largest > _PLAUSIBLE:
         return f"state as large as {largest:.3g}"
-    speed = math.hypot(*seat.qvel[:3].tolist())
+    speed = math.hypot(*velocities[:3].tolist())
     if speed > FASTEST_CORE:
         return f"core at {speed:.3g} m/s, more than {FASTEST_CORE:g} m/s"
     return ""
 
 
-def _warnings(cluster: Cluster) -> str:
-    counts = cluster.warnings
+def _warnings(cluster: Cluster, moment: int) -> str:
+    counts = cluster.track.warnings[moment]
     if not counts.any():
         return ""
     return ", ".join(

@@ -8,8 +8,9 @@ from schema.birth import BirthId
 from schema.evaluation import Floats
 from schema.parts import Vector
 from schema.robot import Robot
-from worker.cluster import Body, Seat
 from worker.controller import Network
+from worker.seat import Seat
+from worker.shop import Body
 from worker.window import Window
 
 

@@ -11,90 +11,127 @@ import numpy as np
 from schema.evaluation import Floats
 from worker.cluster import Cluster
 from worker.inhabitant import Inhabitant
+from worker.reach import Indices
 
-_FREE = 7
-"""Numbers of a free joint's position: place and quaternion."""
+_FREE, _FREE_DOFS = 7, 6
+"""Numbers of a free joint's position, place and quaternion; and of its velocity."""
+
+
+class Roster:
+    """What stays of R robots until somebody is born or dies, wherever they are.
+
+    Attributes:
+        everybody: by birth.
+        rows: of each birth.
+        islands, numbers: (R,) names.
+        sizes: (R,) numbers of each one's position.
+        joint_counts: (R,) how many joint angles each has.
+    """
+
+    def __init__(self, everybody: Sequence[Inhabitant]) -> None:
+        """Number robots that are ordered by birth."""
+        self.everybody = tuple(everybody)
+        births = [one.birth for one in everybody]
+        self.rows = {birth: row for row, birth in enumerate(births)}
+        self.islands = np.array([birth.island for birth in births], dtype=np.int32)
+        self.numbers = np.array([birth.number for birth in births], dtype=np.int64)
+        reaches = [one.body.reach for one in everybody]
+        self.shifts = [reach.shifts for reach in reaches]
+        self.weights = [reach.weights for reach in reaches]
+        self.sizes = np.array([len(shifts) for shifts in self.shifts], dtype=np.intp)
+        self.joint_counts = (self.sizes - _FREE).astype(np.int32)
 
 
 class Layout:
     """Indices into the states of R robots in their clusters.
 
     Attributes:
-        islands, numbers: (R,) names of the robots, ascending.
-        roots: (R, 7) where place and quaternion stand in all positions.
+        roster: the robots; its ``islands``, ``numbers`` and ``joint_counts``.
+        clusters: in the order of the row.
+        size: number of all positions; velocities stand after them.
+        starts, dofs: (R,) where each one's position and velocity begin.
+        roots: (R, 7) where place and quaternion stand.
+        motions: (R, 6) where velocity and turning of the core stand.
         joints: where the joint angles stand, robot by robot.
-        joint_counts: (R,) how many each has.
-        size: number of all positions.
     """
 
-    def __init__(
-        self, clusters: Sequence[Cluster], everybody: Sequence[Inhabitant]
-    ) -> None:
+    def __init__(self, clusters: Sequence[Cluster], roster: Roster) -> None:
         """Find everybody.
 
         Args:
             clusters: all of an arena, in any order that lasts.
-            everybody: all robots, by birth.
+            roster: all robots.
         """
-        self._views = [cluster.qpos for cluster in clusters]
-        self._views += [cluster.qvel for cluster in clusters]
-        row_of = {one.birth: row for row, one in enumerate(everybody)}
-        starts = np.zeros(len(everybody), dtype=np.intp)
-        seated: list[int] = []
-        dofs: list[int] = []
+        self.roster = roster
+        self.islands, self.numbers = roster.islands, roster.numbers
+        self.joint_counts = roster.joint_counts
+        self.clusters = tuple(clusters)
+        order, joints, dofs = [], [], []
         joint = dof = 0
         for cluster in clusters:
             for birth, seat in zip(cluster.members, cluster.seats, strict=True):
-                row = row_of[birth]
-                starts[row] = joint + seat.joints
+                order.append(roster.rows[birth])
+                joints.append(joint + seat.joints)
                 dofs.append(dof + seat.dofs)
-                seated.append(row)
             joint += len(cluster.qpos)
             dof += len(cluster.qvel)
         self.size = joint
-        births = [one.birth for one in everybody]
-        self.islands = np.array([birth.island for birth in births], dtype=np.int32)
-        self.numbers = np.array([birth.number for birth in births], dtype=np.int64)
-        self.roots = starts[:, None] + np.arange(_FREE)
-        sizes = [len(one.seat.qpos) - _FREE for one in everybody]
-        self.joint_counts = np.array(sizes, dtype=np.int32)
-        self.joints = np.concatenate(
-            [
-                np.arange(start + _FREE, start + _FREE + size)
-                for start, size in zip(starts.tolist(), sizes, strict=True)
-            ]
-            or [np.zeros(0, dtype=np.intp)]
-        )
-        reaches = [everybody[row].body.reach for row in seated]
-        self._weights = np.concatenate(
-            [r.shifts for r in reaches] + [r.weights for r in reaches] or [np.zeros(0)]
-        )
-        own = starts[np.array(seated, dtype=np.intp)]
-        self._starts = np.concatenate([own, np.array(dofs, dtype=np.intp) + joint])
         # Rows by birth, of what comes in the order of the clusters.
-        rows = np.argsort(np.array(seated, dtype=np.intp))
-        self._seated = np.concatenate([rows, rows + len(rows)])
+        self._seated = np.argsort(np.array(order, dtype=np.intp))
+        self._first = np.array(joints, dtype=np.intp)
+        self._first_dof = np.array(dofs, dtype=np.intp)
+        self.starts: Indices = self._first[self._seated]
+        self.dofs: Indices = self._first_dof[self._seated] + joint
+        self.roots = self.starts[:, None] + np.arange(_FREE)
+        self.motions = self.dofs[:, None] + np.arange(_FREE_DOFS)
+        counts = roster.sizes - _FREE
+        ends = np.cumsum(counts)
+        own = np.repeat(self.starts + (_FREE - ends + counts), counts)
+        self.joints = own + np.arange(len(own))
+        self._shifts = _joined([roster.shifts[row] for row in order])
+        self._weights = _joined([roster.weights[row] for row in order])
 
     def read(self) -> Floats:
-        """Return all clusters' positions in a row, then their velocities: a copy."""
-        return np.concatenate(self._views) if self._views else np.zeros(0)
+        """Return all positions in a row, then all velocities: a copy."""
+        parts = [cluster.qpos for cluster in self.clusters]
+        return _joined(parts + [cluster.qvel for cluster in self.clusters])
 
-    def bounds(self, differences: Floats) -> Floats:
-        """Return how far robots moved and how fast they are at most, (2, R).
+    def history(self, count: int) -> Floats:
+        """Return the same at the moments of a stretch, (count, N)."""
+        if not self.clusters:
+            return np.zeros((count, 0))
+        tracks = [cluster.track for cluster in self.clusters]
+        parts = [track.qpos[:count] for track in tracks]
+        return np.concatenate([*parts, *(t.qvel[:count] for t in tracks)], axis=1)
 
-        The first row bounds how far any point of a robot is from where it was [m],
-        the second the speed of its fastest point [m/s].
+    def moved(self, differences: Floats) -> Floats:
+        """Return how far any point of each robot is at most from where it was [m].
 
         Args:
-            differences: of positions from what they were, then velocities, all
-                absolute, in the order of ``read``.
+            differences: (..., N) of positions from what they were, absolute.
         """
-        if not len(self._starts):
-            return np.zeros((2, 0))
-        sums = np.add.reduceat(differences * self._weights, self._starts)
-        return np.asarray(sums[self._seated].reshape(2, -1))
+        return self._summed(differences * self._shifts, self._first)
+
+    def speeds(self, velocities: Floats) -> Floats:
+        """Return a bound on the speed of each robot's fastest point [m/s].
+
+        Args:
+            velocities: (..., V) absolute.
+        """
+        return self._summed(velocities * self._weights, self._first_dof)
 
     def part(self, row: int) -> slice:
-        """Return where a robot's configuration stands in all positions."""
-        start = int(self.roots[row, 0])
-        return slice(start, start + _FREE + int(self.joint_counts[row]))
+        """Return where a robot's configuration stands."""
+        start = int(self.starts[row])
+        return slice(start, start + int(self.roster.sizes[row]))
+
+    def _summed(self, terms: Floats, starts: Indices) -> Floats:
+        """Return the sums of each robot's terms, (..., R), by birth."""
+        if not len(starts):
+            return np.zeros((*terms.shape[:-1], 0))
+        sums = np.add.reduceat(terms, starts, axis=-1)
+        return np.asarray(sums[..., self._seated])
+
+
+def _joined(parts: Sequence[Floats]) -> Floats:
+    return np.concatenate(parts) if parts else np.zeros(0)

@@ -14,9 +14,10 @@ import mujoco
 import numpy as np
 
 from schema.parts import Vector
-from worker.cluster import Cluster, Seat
+from worker.cluster import Cluster
 from worker.company import Company
 from worker.inhabitant import Inhabitant
+from worker.seat import Seat
 
 FULL_WITHIN_M = 1.0
 """Within this distance the light is as bright as it gets."""

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from schema.evaluation import Floats
 from schema.experiment import Simulation
 from worker.controller import Bank, Widths
 from worker.inhabitant import Inhabitant
@@ -26,13 +27,11 @@ class Minds:
         self._width = width
         self._tick_steps = simulation.brain_steps
         self._tick_s = simulation.brain_steps * simulation.timestep_s
-        self._everybody: tuple[Inhabitant, ...] = ()
         self._ages = np.zeros((0, 1))
         self._bank: Bank | None = None
 
     def gather(self, everybody: Sequence[Inhabitant]) -> None:
         """Make the bank anew; each keeps its states, now a row of the bank."""
-        self._everybody = tuple(everybody)
         if not everybody:
             self._bank = None
             return
@@ -44,17 +43,20 @@ class Minds:
         since = [inhabitant.thinks_since for inhabitant in everybody]
         self._ages = np.array(since, dtype=np.float64)[:, None]
 
-    def tick(self, step: int) -> None:
-        """Let all think of what they last felt, and command their motors."""
+    def tick(self, step: int, readings: Floats) -> Floats:
+        """Let all think of what they last felt.
+
+        Args:
+            step: the arena's.
+            readings: (R, I) by birth.
+
+        Returns:
+            (R, O) outputs of their networks, a view that the next tick overwrites.
+        """
         if self._bank is None:
-            return
-        readings = np.concatenate(
-            [inhabitant.seat.senses.readings for inhabitant in self._everybody]
-        )
+            return np.zeros((0, self._width.outputs))
         ages = (step - self._ages) // self._tick_steps
-        outputs = self._bank.step(readings, ages)
-        for inhabitant, output in zip(self._everybody, outputs, strict=True):
-            inhabitant.seat.drive(output)
+        return self._bank.step(readings, ages)
 
     def first_tick(self, inhabitant: Inhabitant) -> None:
         """Let a newborn think alone, before it joins the bank."""

@@ -8,14 +8,13 @@ look: that grows with their speed, so that the falling meet in time.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from schema.evaluation import Floats
 from schema.settings import ArenaSettings
 from worker.layout import Layout
-from worker.reach import Reach
 
 FASTEST = 10.0
 """What is faster has broken the physics, and does not gather others [m/s]."""
@@ -56,63 +55,103 @@ class Proximity:
         self.slack = np.zeros((0, 0))
         self.anchor = np.zeros(0)
         self._margins = np.zeros(0)
-        self.gather((), Layout((), ()))
+        self._nearest = np.zeros(0)
+        self._radius: list[float] = []
+        self._radii: list[Floats] = []
 
     def insert(self, row: int) -> None:
         """Make room for a newcomer, whose distance to nobody is known."""
         self.travel = np.insert(self.travel, row, 0.0)
-        slack = np.insert(self.slack, row, -np.inf, axis=0)
-        slack = np.insert(slack, row, -np.inf, axis=1)
-        slack[np.tril_indices(len(slack))] = np.inf
+        count = len(self.travel)
+        slack = np.full((count, count), np.inf)
+        slack[:row, :row] = self.slack[:row, :row]
+        slack[:row, row + 1 :] = self.slack[:row, row:]
+        slack[row + 1 :, row + 1 :] = self.slack[row:, row:]
+        slack[:row, row] = slack[row, row + 1 :] = -np.inf
         self.slack = slack
 
     def remove(self, rows: Sequence[int]) -> None:
         """Forget robots."""
-        self.travel = np.delete(self.travel, rows)
-        self.slack = np.delete(np.delete(self.slack, rows, axis=0), rows, axis=1)
+        kept = np.ones(len(self.travel), dtype=np.bool_)
+        kept[list(rows)] = False
+        self.travel = self.travel[kept]
+        self.slack = self.slack[kept][:, kept]
 
-    def gather(self, reaches: Sequence[Reach], layout: Layout) -> None:
-        """Take the bounds of all robots and anchor them where they are now."""
+    def gather(self, layout: Layout, state: Floats) -> None:
+        """Anchor all robots where they are now.
+
+        Args:
+            layout: where they stand.
+            state: of all clusters in a row, not used otherwise.
+        """
+        reaches = [one.body.reach for one in layout.roster.everybody]
         self._radius = [reach.radius for reach in reaches]
         self._radii = [reach.radii[:, None] for reach in reaches]
-        self.anchor = layout.read()
+        self.anchor = state
         self.anchor[layout.size :] = 0.0
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Find for each robot the pair that says least, after pairs were changed."""
+        self._nearest = self.slack.min(axis=1, initial=np.inf)
 
     def look(
-        self, layout: Layout, state: Floats, differences: Floats, balls: Balls
-    ) -> list[tuple[int, int]]:
-        """Return the pairs of rows that are to live together from now on.
+        self,
+        layout: Layout,
+        state: Floats,
+        bounds: tuple[Floats, Floats],
+        balls: Balls,
+    ) -> tuple[bool, list[tuple[int, int]]]:
+        """Return whether anybody was measured, and who is to live with whom now.
 
         Args:
             layout: where robots stand in the state.
             state: of all clusters in a row.
-            differences: of the state from the anchor, absolute.
+            bounds: how far each robot moved from its anchor, and how fast it is.
             balls: gives spheres, those that are needed.
+
+        Returns:
+            If anybody was anchored anew; and pairs of rows.
         """
-        moved, speeds = layout.bounds(differences)
+        moved, speeds = bounds
         margins = np.minimum(speeds, FASTEST) * self._ahead_s
         self._margins = margins
         bound = self.travel + moved + (margins + 0.5 * self._merge_m)
-        first, second = np.nonzero(self.slack < bound[:, None] + bound)
+        # Of few robots only may a pair be due, and few pairs are.
+        rows = (self._nearest < bound + bound.max(initial=0.0)).nonzero()[0]
+        if not len(rows):
+            return False, []
+        first, second = np.nonzero(self.slack[rows] < bound[rows, None] + bound)
         # Few, as a rule: plain numbers are faster than arrays.
-        due = list(zip(first.tolist(), second.tolist(), strict=True))
+        due = list(zip(rows[first].tolist(), second.tolist(), strict=True))
         if not due:
-            return []
-        for row in sorted({row for pair in due for row in pair}):
+            return False, []
+        ends = sorted({row for pair in due for row in pair})
+        for row in ends:
             self.travel[row] += moved[row]
             part = layout.part(row)
             self.anchor[part] = state[part]
+        roots = state[layout.roots[ends, :3]].tolist()
+        found = self._measured(due, dict(zip(ends, roots, strict=True)), balls)
+        for row in sorted({a for a, _ in due}):
+            self._nearest[row] = self.slack[row].min()
+        return True, found
+
+    def _measured(
+        self,
+        due: Sequence[tuple[int, int]],
+        places: Mapping[int, Sequence[float]],
+        balls: Balls,
+    ) -> list[tuple[int, int]]:
+        """Measure pairs; return those that may touch before the next look."""
         found, cache = [], dict[int, Floats]()
-        places: dict[int, list[float]] = {}
+        margins, travel = self._margins.tolist(), self.travel.tolist()
         for a, b in due:
-            for row in (a, b):
-                if row not in places:
-                    places[row] = state[layout.roots[row, :3]].tolist()
-            meet = float(margins[a] + margins[b]) + self._merge_m
+            meet = margins[a] + margins[b] + self._merge_m
             apart = math.dist(places[a], places[b]) - self._radius[a] - self._radius[b]
             if apart < meet + _FAR_M:
                 apart = self._distance(a, b, balls, cache)
-            self.slack[a, b] = apart + self.travel[a] + self.travel[b]
+            self.slack[a, b] = apart + travel[a] + travel[b]
             if apart < meet:
                 found.append((a, b))
         return found
@@ -134,6 +173,7 @@ class Proximity:
             if self._distance(a, b, balls, cache) < moves + self._split_m:
                 found.append((a, b))
             self.slack[a, b] = -np.inf
+        self.refresh()
         return found
 
     def join(self, rows: Sequence[int]) -> None:
@@ -141,6 +181,7 @@ class Proximity:
         ordered = sorted(rows)
         for number, row in enumerate(ordered):
             self.slack[row, ordered[number + 1 :]] = np.inf
+        self.refresh()
 
     def _distance(
         self, here: int, there: int, balls: Balls, cache: dict[int, Floats]

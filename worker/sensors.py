@@ -39,6 +39,8 @@ class Senses:
         velocities: of each imu at the last reading, world frame [m/s]; part of
             what a snapshot must keep.
         lights: (geom, place in the readings) of each light sensor.
+        pads: the same of each touch sensor.
+        core_imu: place in the readings of the imu at the core's centre, or -1.
     """
 
     def __init__(
@@ -69,8 +71,8 @@ class Senses:
         self._row = self.readings[0]
         self._cells = _cells(self._row)
         self._data: mujoco.MjData | None = None
-        self._pads: list[tuple[int, int]] = []
-        self._core_imu = -1
+        self.pads: list[tuple[int, int]] = []
+        self.core_imu = -1
         self._imus: list[tuple[int, int]] = []
         self.lights: list[tuple[int, int]] = []
         start = free_joint(model, prefix)
@@ -90,7 +92,7 @@ class Senses:
                     self.lights.append((find(model, _GEOM, name), place))
                 elif sensor.kind == "touch":
                     name = f"{prefix}{index}/{sensor.box}"
-                    self._pads.append((find(model, _GEOM, name), place))
+                    self.pads.append((find(model, _GEOM, name), place))
                 else:
                     site = find(model, _SITE, f"{prefix}{index}/imu")
                     self._add_imu(model, site, root, place)
@@ -102,10 +104,21 @@ class Senses:
             and not model.site_pos[site].any()
             and model.site_quat[site].tolist() == [1.0, 0.0, 0.0, 0.0]
         )
-        if at_origin and self._core_imu < 0:
-            self._core_imu = place
+        if at_origin and self.core_imu < 0:
+            self.core_imu = place
         else:
             self._imus.append((site, place))
+
+    @property
+    def is_simple(self) -> bool:
+        """Whether the free joint's state and contacts tell all it feels."""
+        return self.core_imu >= 0 and not self._imus
+
+    def show(self, readings: Floats) -> None:
+        """Have the readings stand elsewhere from now on, (1, I)."""
+        readings[:] = self.readings
+        self.readings, self._row = readings, readings[0]
+        self._cells = _cells(self._row)
 
     def start(self, model: mujoco.MjModel, data: mujoco.MjData) -> Floats:
         """Return the first readings: no motion before, so no acceleration."""
@@ -128,15 +141,15 @@ class Senses:
         Returns:
             ``readings``, new values.
         """
-        if self._core_imu >= 0:
+        if self.core_imu >= 0:
             if data is not self._data:
                 self._bind(data)
             self._read_core(interval_s)
         if self._imus:
             self._read_sites(model, data, interval_s)
-        if self._pads:
+        if self.pads:
             touching = set(data.contact.geom.ravel().tolist())
-            for geom, place in self._pads:
+            for geom, place in self.pads:
                 self._cells[place] = float(geom in touching)
         return self.readings
 
@@ -159,7 +172,7 @@ class Senses:
         ax = (vx - ux) / interval_s
         ay = (vy - uy) / interval_s
         az = (vz - uz) / interval_s + self._gravity
-        row, place = self._cells, self._core_imu
+        row, place = self._cells, self.core_imu
         # These three are the columns of the core's rotation: world into core frame.
         row[place] = (
             (1 - 2 * (y * y + z * z)) * ax
@@ -200,6 +213,8 @@ class Servos:
 
     Attributes:
         slots: indices of its actuators in the model, contiguous, in part order.
+        motors: of each, address of its joint's angle in the model, lowest target,
+            span of the targets, gain and greatest velocity.
     """
 
     def __init__(
@@ -213,7 +228,7 @@ class Servos:
             model: a compiled model that holds it.
             prefix: of the robot's names in the model.
         """
-        self._joints: list[tuple[int, float, float, float, float]] = []
+        self.motors: list[tuple[int, float, float, float, float]] = []
         actuators: list[int] = []
         for index, part in enumerate(robot.parts):
             motor = space[part.kind].motor
@@ -223,7 +238,7 @@ class Servos:
             actuators.append(find(model, _ACTUATOR, name))
             joint = find(model, _JOINT, name)
             low, high = model.jnt_range[joint].tolist()
-            self._joints.append(
+            self.motors.append(
                 (
                     int(model.jnt_qposadr[joint]),
                     low,
@@ -250,7 +265,7 @@ class Servos:
             self._commands = _cells(data.ctrl[self.slots])
         angles, commands = self._angles, self._commands
         for index, ((address, low, span, gain, fastest), output) in enumerate(
-            zip(self._joints, outputs.tolist(), strict=False)
+            zip(self.motors, outputs.tolist(), strict=False)
         ):
             # Bounds by comparison: twice as fast as min and max.
             share = output

@@ -85,6 +85,7 @@ def read(
         state.slack, count * (count - 1) // 2
     )
     proximity.anchor = unpack_floats(state.anchor, *proximity.anchor.shape)
+    proximity.refresh()
     return state.step, tuple(
         Casualty(BirthId(*c.birth), c.step, c.reason, c.place) for c in state.casualties
     )

@@ -18,12 +18,12 @@ class Touches:
         self._look_s = steps * settings.simulation.timestep_s
         self._counts: dict[tuple[BirthId, BirthId], int] = {}
 
-    def count(self, clusters: Sequence[Cluster]) -> None:
-        """Count those who touch now."""
+    def count(self, clusters: Sequence[Cluster], moment: int) -> None:
+        """Count those who touch at a moment of the clusters' tracks."""
         if not self._is_wanted:
             return
         for cluster in clusters:
-            for first, second in cluster.touching() if cluster.is_shared else ():
+            for first, second in cluster.track.touching[moment]:
                 pair = (cluster.members[first], cluster.members[second])
                 self._counts[pair] = self._counts.get(pair, 0) + 1
 

@@ -8,6 +8,7 @@ depend on how many advances it took.
 """
 
 import hashlib
+import itertools
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Self
@@ -25,12 +26,13 @@ from worker.evaluation import silence_engine
 from worker.inhabitant import Inhabitant
 from worker.judging import judge_all
 from worker.minds import Minds
+from worker.nerves import Nerves
 from worker.pool import Pool
 from worker.poses import Poses
+from worker.schedule import Schedule
+from worker.stride import Stride
 from worker.touches import Touches
 
-LOOKS_PER_PARTING = 25
-"""Clusters are looked at for parts that drifted apart every so many looks."""
 _FEW = 5
 """Clusters that one thread steps faster than several."""
 
@@ -54,7 +56,7 @@ class World:
         silence_engine()
         self._settings = settings
         self._clock = settings.simulation
-        self._look_steps = settings.arena.proximity_steps
+        self._schedule = Schedule(settings)
         self._pool = Pool(threads)
         self.reset()
 
@@ -63,6 +65,7 @@ class World:
         self.step = 0
         self.company = Company(self._settings)
         self._minds = Minds(self.company.shop.width, self._clock)
+        self._nerves = Nerves(self.company.shop.width, self._clock)
         self._casualties: list[Casualty] = []
         self._touches = Touches(self._settings)
         self._poses = Poses(self._clock.timestep_s)
@@ -102,7 +105,7 @@ class World:
             self._insert(changes.insertions)
         for change in changes.brains:
             one = self.company.find(change.birth)
-            since = self._next(self._clock.brain_steps)
+            since = self._schedule.next_tick(self.step)
             equip(one, change.brain, self.company.shop.width, since)
         if changes.removals or changes.insertions or changes.brains:
             self._minds.gather(self.company.everybody)
@@ -124,10 +127,7 @@ class World:
                 f"advance: until must be > step = {self.step}, got {until}"
             )
         while self.step < until:
-            stop = min(until, *map(self._next, self._intervals()))
-            self._move(stop - self.step)
-            self.step = stop
-            self._arrive(watch)
+            self._go(self._schedule.moments(self.step, until), watch)
         return self._report()
 
     def snapshot(self) -> bytes:
@@ -160,62 +160,65 @@ class World:
 
     # --- time -------------------------------------------------------------------
 
-    def _intervals(self) -> tuple[int, int, int]:
-        return self._clock.brain_steps, self._clock.pose_steps, self._look_steps
+    def _go(
+        self, moments: Sequence[int], watch: Callable[[bytes], None] | None
+    ) -> None:
+        """Let all clusters go through a stretch of time, then look at its moments."""
+        plan = [b - a for a, b in itertools.pairwise((self.step, *moments))]
+        self._run(plan)
+        stride = self.company.begin(plan)
+        for moment, step in enumerate(moments):
+            self.step, stride.moment = step, moment
+            self._arrive(stride, watch)
+            self.company.catch_up()
+        self.company.end()
+        if self._schedule.is_parting(self.step):
+            self.company.part()
 
-    def _next(self, interval: int) -> int:
-        return self.step - self.step % interval + interval
-
-    def _move(self, steps: int) -> None:
+    def _run(self, plan: Sequence[int]) -> None:
         clusters = self.company.by_cost
         if len(clusters) < _FEW or self._pool.threads == 1:
             for cluster in clusters:
-                cluster.step(steps)
+                cluster.run(plan)
             return
-        self._pool.run([partial(cluster.step, steps) for cluster in clusters])
+        self._pool.run([partial(cluster.run, plan) for cluster in clusters])
 
-    def _arrive(self, watch: Callable[[bytes], None] | None) -> None:
+    def _arrive(self, stride: Stride, watch: Callable[[bytes], None] | None) -> None:
+        step, on = self.step, self._schedule
         is_tick, is_sample, is_look = (
-            self.step % interval == 0 for interval in self._intervals()
+            on.is_tick(step),
+            on.is_sample(step),
+            on.is_look(step),
         )
         if not (is_tick or is_sample or is_look):
             return
-        is_parting = self.step % (LOOKS_PER_PARTING * self._look_steps) == 0
-        company, numbers, differences = self._read()
-        if self._drop_diverged(differences, looks_closely=is_parting):
-            company, numbers, differences = self._read()
+        self._drop_diverged(stride)
         if is_tick:
-            self._tick()
+            self._tick(stride.state)
         if is_sample:
-            self._sample(numbers)
-            if watch is not None:
-                watch(self.poses())
+            self._sample(stride.state, watch)
         if is_look:
-            self._touches.count(company.clusters)
-            company.look(numbers, differences)
-        if is_parting:
-            company.part()
+            self._touches.count(self.company.clusters, stride.moment)
+            self.company.look()
 
-    def _read(self) -> tuple[Company, Floats, Floats]:
-        """Return the living, their state in a row, and its change since measured."""
-        numbers = self.company.layout.read()
-        return self.company, numbers, self.company.differences(numbers)
+    def _tick(self, state: Floats) -> None:
+        nerves = self._nerves
+        nerves.settle(self.company.layout)
+        nerves.feel(state)
+        light.shine(self.company, self.company.everybody)
+        nerves.drive(state, self._minds.tick(self.step, nerves.readings))
 
-    def _tick(self) -> None:
-        everybody = self.company.everybody
-        tick_s = self._clock.brain_steps * self._clock.timestep_s
-        for one in everybody:
-            one.seat.feel(tick_s)
-        light.shine(self.company, everybody)
-        self._minds.tick(self.step)
-
-    def _sample(self, positions: Floats) -> None:
+    def _sample(self, state: Floats, watch: Callable[[bytes], None] | None) -> None:
         layout = self.company.layout
-        places = positions[layout.roots[:, :3]].tolist()
+        places = state[layout.roots[:, :3]].tolist()
         for one, (x, y, z) in zip(self.company.everybody, places, strict=True):
             one.place = (x, y, z)
             one.window.add(self.step, one.place)
-        self._poses.add(self.step, layout, positions)
+        self._poses.add(self.step, layout, state)
+        if watch is not None:
+            now = Poses(self._clock.timestep_s)
+            now.add(self.step, layout, state)
+            watch(now.columns())
 
     # --- births and deaths ------------------------------------------------------
 
@@ -234,19 +237,15 @@ class World:
         for one in newcomers:
             self._minds.first_tick(one)
         self.company.kinematics()
-        company, numbers, differences = self._read()
-        company.look(numbers, differences)
+        self.company.look()
 
-    def _drop_diverged(self, differences: Floats, *, looks_closely: bool) -> bool:
-        """Let the diverged go; return whether there were any."""
-        velocities = differences[self.company.layout.size :]
-        fallen = diverged(
-            self.company, velocities, self.step, looks_closely=looks_closely
-        )
+    def _drop_diverged(self, stride: Stride) -> None:
+        """Let the diverged go."""
+        is_parting = self._schedule.is_parting(self.step)
+        fallen = diverged(self.company, stride, self.step, looks_closely=is_parting)
         self._casualties += fallen
         if fallen:
             self._dismiss([casualty.birth for casualty in fallen])
-        return bool(fallen)
 
     def _dismiss(self, births: Sequence[BirthId]) -> None:
         self.company.remove(births)

@@ -1,11 +1,15 @@
 """A joint model of all robots of an arena: what the clusters must not overlook."""
 
+from collections.abc import Callable
+
 import mujoco
 import numpy as np
 
 from schema.birth import BirthId
+from schema.evaluation import Floats
 from schema.experiment import body_space
 from schema.mjcf import robot_spec, shared_model
+from worker.stride import Stride
 from worker.world import World
 
 
@@ -24,22 +28,29 @@ class Oracle:
         self.missed: list[tuple[int, BirthId, BirthId]] = []
         self._births: tuple[BirthId, ...] = ()
         self._model: mujoco.MjModel | None = None
-        self._move = world._move
-        world._move = self._watched_move  # type: ignore[method-assign]
+        schedule = world._schedule
+        self._moments, self._arrive = schedule.moments, world._arrive
+        schedule.moments = self._every_step  # type: ignore[method-assign]
+        world._arrive = self._watched_arrival  # type: ignore[method-assign]
 
-    def _watched_move(self, steps: int) -> None:
-        for number in range(steps):
-            self._look(self.world.step + number)
-            self._move(1)
+    def _every_step(self, step: int, until: int) -> tuple[int, ...]:
+        return tuple(range(step + 1, self._moments(step, until)[-1] + 1))
 
-    def _look(self, step: int) -> None:
+    def _watched_arrival(
+        self, stride: Stride, watch: Callable[[bytes], None] | None
+    ) -> None:
+        self._arrive(stride, watch)
+        self._look(self.world.step, stride.state)
+
+    def _look(self, step: int, state: Floats) -> None:
         company = self.world.company
         if self.world.births != self._births:
             self._build()
         if self._model is None or self._data is None:
             return
-        data = self._data
-        data.qpos[:] = np.concatenate([one.seat.qpos for one in company.everybody])
+        data, layout = self._data, company.layout
+        rows = range(len(self._births))
+        data.qpos[:] = np.concatenate([state[layout.part(row)] for row in rows])
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_comPos(self._model, data)
         mujoco.mj_collision(self._model, data)

@@ -1,0 +1,173 @@
+"""What all robots of an arena feel, and what all their motors are told, in batches.
+
+The same arithmetic, number by number, as ``worker.sensors`` does for one robot
+(tests/worker/test_nerves.py); a robot with sensors that only the engine can tell,
+other than pads, is felt alone.
+"""
+
+import numpy as np
+
+from schema.evaluation import Floats
+from schema.experiment import Simulation
+from worker.cluster import Cluster
+from worker.controller import Widths
+from worker.layout import Layout, Roster
+from worker.reach import Indices
+from worker.seat import Seat
+from worker.sensors import HIGHEST_OUTPUT, LOWEST_OUTPUT
+
+_Pads = tuple[int, list[tuple[int, int]]]
+"""Row of a robot, and its pads' geoms and places in the readings."""
+
+
+class Nerves:
+    """Readings of all robots, by birth, and the way to their motors.
+
+    Attributes:
+        readings: (R, I) what all last felt; each robot's seat looks at its row.
+    """
+
+    def __init__(self, width: Widths, simulation: Simulation) -> None:
+        """Start with nobody.
+
+        Args:
+            width: of every network.
+            simulation: its clocks.
+        """
+        self._width = width
+        self._tick_s = simulation.brain_steps * simulation.timestep_s
+        self._gravity = simulation.gravity
+        self.readings = np.zeros((0, width.inputs))
+        self._layout = Layout((), Roster(()))
+        self._seats: list[Seat] = []
+        self._gather(self._layout.roster)
+
+    def settle(self, layout: Layout) -> None:
+        """Go on with robots that may sit elsewhere, or be others, since last time.
+
+        Args:
+            layout: where they are.
+        """
+        if layout is self._layout:
+            return
+        if layout.roster is not self._layout.roster:
+            self._gather(layout.roster)
+        self._layout = layout
+        seats = [one.seat for one in layout.roster.everybody]
+        for row, seat in enumerate(seats):
+            if seat is not self._seats[row]:
+                seat.senses.show(self.readings[row : row + 1])
+        self._seats = seats
+        self._controls = [seat.ctrl for seat in seats]
+        self._alone = [seat for seat in seats if not seat.senses.is_simple]
+        self._turns = layout.roots[self._simple, 3:]
+        self._motions = layout.motions[self._simple]
+        self._angles = layout.starts[self._motor_rows] + self._motor_offsets
+        self._pads = self._padded(layout)
+
+    def feel(self, state: Floats) -> None:
+        """Read all sensors but those of light.
+
+        Args:
+            state: of all clusters in a row, as the engine has it just now.
+        """
+        self._feel_cores(state)
+        for seat in self._alone:
+            seat.feel(self._tick_s)
+        for cluster, pads in self._pads:
+            touched = cluster.touched
+            for row, own in pads:
+                for geom, place in own:
+                    self.readings[row, place] = geom in touched
+
+    def drive(self, state: Floats, outputs: Floats) -> None:
+        """Command all motors, until the next tick.
+
+        Args:
+            state: of all clusters in a row.
+            outputs: (R, O) of all networks, unclipped.
+        """
+        share = outputs[self._motor_rows, self._motor_outputs]
+        np.maximum(share, LOWEST_OUTPUT, out=share)
+        np.minimum(share, HIGHEST_OUTPUT, out=share)
+        low, span, gain, fastest = self._motors
+        target = low + share * span
+        command = gain * (target - state[self._angles])
+        np.maximum(command, -fastest, out=command)
+        np.minimum(command, fastest, out=command)
+        start = 0
+        for controls in self._controls:
+            end = start + len(controls)
+            controls[:] = command[start:end]
+            start = end
+
+    def _gather(self, roster: Roster) -> None:
+        """Take over robots, some of whom may be new."""
+        seats = [one.seat for one in roster.everybody]
+        readings = [seat.senses.readings for seat in seats]
+        self.readings = np.concatenate([np.zeros((0, self._width.inputs)), *readings])
+        for row, seat in enumerate(seats):
+            seat.senses.show(self.readings[row : row + 1])
+        self._seats = seats
+        simple = [row for row, seat in enumerate(seats) if seat.senses.is_simple]
+        self._simple = np.array(simple, dtype=np.intp)
+        self._memories = [seats[row].senses for row in simple]
+        cores = [seats[row].senses.core_imu for row in simple]
+        self._places = self._simple * self._width.inputs + np.array(cores, np.intp)
+        counts = [len(seat.ctrl) for seat in seats]
+        self._motor_rows = np.repeat(np.arange(len(seats)), counts)
+        ends = np.cumsum(counts, dtype=np.intp)
+        first = np.repeat(ends - counts, counts)
+        self._motor_outputs: Indices = np.arange(len(first)) - first
+        motors = [motor for seat in seats for motor in seat.servos.motors]
+        columns = np.array(motors, dtype=np.float64).reshape(-1, 5).T
+        addresses = [
+            motor[0] - seat.joints for seat in seats for motor in seat.servos.motors
+        ]
+        self._motor_offsets = np.array(addresses, dtype=np.intp)
+        self._motors = columns[1:]
+
+    def _feel_cores(self, state: Floats) -> None:
+        """Read the imus at cores' centres from the free joints' states."""
+        simple = [self._seats[row].senses for row in self._simple.tolist()]
+        if not simple:
+            return
+        w, x, y, z = state[self._turns].T
+        motions = state[self._motions]
+        before = np.array([senses.velocities[0] for senses in simple])
+        ax, ay, az = ((motions[:, :3] - before) / self._tick_s).T
+        az = az + self._gravity
+        cells, places = self.readings.reshape(-1), self._places
+        # These three are the columns of the core's rotation: world into core frame.
+        cells[places] = (
+            (1 - 2 * (y * y + z * z)) * ax
+            + 2 * (x * y + w * z) * ay
+            + 2 * (x * z - w * y) * az
+        )
+        cells[places + 1] = (
+            2 * (x * y - w * z) * ax
+            + (1 - 2 * (x * x + z * z)) * ay
+            + 2 * (y * z + w * x) * az
+        )
+        cells[places + 2] = (
+            2 * (x * z + w * y) * ax
+            + 2 * (y * z - w * x) * ay
+            + (1 - 2 * (x * x + y * y)) * az
+        )
+        for axis in range(3):
+            cells[places + 3 + axis] = motions[:, 3 + axis]
+        for senses, (vx, vy, vz) in zip(simple, motions[:, :3].tolist(), strict=True):
+            senses.velocities[0] = (vx, vy, vz)
+
+    def _padded(self, layout: Layout) -> list[tuple[Cluster, list[_Pads]]]:
+        """Return the clusters in which somebody has pads, with those pads."""
+        found = []
+        for cluster in layout.clusters:
+            pads = [
+                (layout.roster.rows[birth], seat.senses.pads)
+                for birth, seat in zip(cluster.members, cluster.seats, strict=True)
+                if seat.senses.is_simple and seat.senses.pads
+            ]
+            if pads:
+                found.append((cluster, pads))
+        return found
