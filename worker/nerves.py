@@ -114,9 +114,9 @@ class Nerves:
         self._memories = [seats[row].senses for row in simple]
         cores = [seats[row].senses.core_imu for row in simple]
         self._places = self._simple * self._width.inputs + np.array(cores, np.intp)
-        counts = [len(seat.ctrl) for seat in seats]
+        counts = np.array([len(seat.ctrl) for seat in seats], dtype=np.intp)
         self._motor_rows = np.repeat(np.arange(len(seats)), counts)
-        ends = np.cumsum(counts, dtype=np.intp)
+        ends = np.cumsum(counts)
         first = np.repeat(ends - counts, counts)
         self._motor_outputs: Indices = np.arange(len(first)) - first
         motors = [motor for seat in seats for motor in seat.servos.motors]
