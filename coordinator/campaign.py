@@ -138,11 +138,11 @@ def read_experiments(sources: Sequence[str]) -> tuple[Experiment, ...]:
     return experiments
 
 
-def write_campaign(folder: Path, campaign: Campaign) -> None:
-    """Write down what is run in a folder.
+def refuse_used(folder: Path) -> None:
+    """Raise if a folder holds a campaign already, or a single run.
 
     Raises:
-        RunFolderError: the folder is used for something else, or the disk fails.
+        RunFolderError: it does.
     """
     if is_campaign(folder):
         raise RunFolderError(
@@ -153,6 +153,14 @@ def write_campaign(folder: Path, campaign: Campaign) -> None:
         raise RunFolderError(
             f"{folder}: already holds a run; choose another folder for a campaign"
         )
+
+
+def write_campaign(folder: Path, campaign: Campaign) -> None:
+    """Write down what is run in a folder.
+
+    Raises:
+        RunFolderError: the disk is full or failed.
+    """
     lines = [
         f"# Go on with it:  revolve resume {folder}",
         f"seed = {campaign.seed}",

@@ -83,11 +83,12 @@ class Conductor:
         self._places: dict[ActiveRun, int] = {}
         self._run_of: dict[Asker | Owner, ActiveRun] = {}
         self._tempo = Tempo()
+        self._is_stopped = False
 
     @property
     def is_finished(self) -> bool:
         """Nothing is left to do."""
-        return not (self.active or self._planned)
+        return not (self.active or self._planned or self._is_stopped)
 
     @property
     def watched(self) -> ActiveRun | None:
@@ -168,6 +169,7 @@ class Conductor:
 
     def stop(self) -> None:
         """Leave all runs as they are, to go on another day."""
+        self._is_stopped = not self.is_finished
         for run in list(self.active):
             self.guard(run, run.stop)
             if run in self._places:

@@ -1,8 +1,10 @@
 """How far a run is by its folder alone, whoever has it in hand."""
 
+from dataclasses import replace
 from pathlib import Path
 
-import pyarrow.compute
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from coordinator.folder import RunDetails, read_details, read_holder, read_state
 from schema.experiment import island_count, island_experiment
@@ -21,34 +23,50 @@ def folder_status(folder: Path) -> RunStatus:
     state: str = read_state(folder)
     if state == "running" and not read_holder(folder):
         state = "stopped"
-    counted = pyarrow.compute.value_counts(read_table(folder, "births")["island"])
-    born = {item["values"].as_py(): item["counts"].as_py() for item in counted}
-    return unbegun_status(folder, details, state=state, born=born)
+    status = unbegun_status(folder, details)
+    births = _by_island(read_table(folder, "births").select(["island"]), "count")
+    population = read_table(folder, "population").select(
+        ["island", "births", "fitness"]
+    )
+    newest = _by_island(population.select(["island", "births"]), "max")
+    islands = []
+    for number, island in enumerate(status.islands):
+        born = births.get(number, 0)
+        is_now = pc.and_(
+            pc.equal(population["island"], number),
+            pc.equal(population["births"], newest.get(number, -1)),
+        )
+        living = population.filter(is_now)
+        islands.append(
+            IslandStatus(
+                births=born,
+                wanted=born if state == "finished" else island.wanted,
+                best=pc.max(living["fitness"]).as_py(),
+                alive=living.num_rows,
+            )
+        )
+    return replace(status, state=state, islands=tuple(islands))
 
 
-def unbegun_status(
-    folder: Path,
-    details: RunDetails,
-    *,
-    state: str = "waiting",
-    born: dict[int, int] | None = None,
-) -> RunStatus:
-    """Return how far a run is that nobody need have begun.
+def _by_island(table: pa.Table, what: str) -> dict[int, int]:
+    """Return, of each island, the count or the maximum of a table's last column."""
+    column = table.schema.names[-1]
+    grouped = table.group_by("island").aggregate([(column, what)])
+    found = grouped[f"{column}_{what}"].to_pylist()
+    return dict(zip(grouped["island"].to_pylist(), found, strict=True))
+
+
+def unbegun_status(folder: Path, details: RunDetails) -> RunStatus:
+    """Return how far a run is that nobody has begun.
 
     Args:
-        folder: where it is, or will be, kept.
+        folder: where it will be kept.
         details: what it is.
-        state: what it is doing.
-        born: births so far by island; none if not given.
     """
     experiment = experiment_from_text(details.document)
-    islands = []
-    for number in range(island_count(experiment)):
-        births = (born or {}).get(number, 0)
-        wanted = island_experiment(experiment, number).births
-        islands.append(
-            IslandStatus(births, births if state == "finished" else wanted, None, 0)
-        )
-    return RunStatus(
-        str(folder.resolve()), details.name, details.run, state, islands=tuple(islands)
+    islands = tuple(
+        IslandStatus(0, island_experiment(experiment, number).births, None, 0)
+        for number in range(island_count(experiment))
     )
+    where = str(folder.resolve())
+    return RunStatus(where, details.name, details.run, "waiting", islands=islands)

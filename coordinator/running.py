@@ -19,6 +19,7 @@ from coordinator.campaign import (
     adopted,
     is_campaign,
     read_campaign,
+    refuse_used,
     write_campaign,
 )
 from coordinator.conductor import Conductor, Planned
@@ -111,6 +112,7 @@ def start_campaign(folder: Path, campaign: Campaign, deployment: Deployment) -> 
         NetworkError: the address cannot be listened on, or no hub is there.
     """
     with CampaignFolder(folder):
+        refuse_used(folder)
         planned = _plan(folder, campaign)
         write_campaign(folder, campaign)
         return _together(folder, planned, deployment)
