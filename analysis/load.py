@@ -18,6 +18,9 @@ from schema.errors import RunFolderError
 from schema.run_tables import FINISHED, read_table
 from schema.tables import TABLES, VERSION
 
+TABLE = "table "
+"""How what was left out starts if it is a table, before its name."""
+
 _DETAILS = "run.json"
 _STATE = "state"
 _NEEDED = (
@@ -186,7 +189,7 @@ def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:
             tables[name] = _named(read_table(run.folder, name))
         except (RunFolderError, pa.ArrowException, OSError) as error:
             tables[name] = _named(TABLES[name].empty_table())
-            left_out.append(LeftOut(str(run.folder), f"table {name}", str(error)))
+            left_out.append(LeftOut(str(run.folder), TABLE + name, str(error)))
     online = np.array([island.is_online for island in run.islands], np.bool_)
     islands = np.asarray(tables["population"]["island"], np.int64)
     # An island that the document does not know of is like the last that it does.

@@ -18,28 +18,42 @@ from analysis.robots import robots
 from analysis.variability import variability
 from schema.errors import RevolveError
 
-_OTHERS: dict[str, Callable[[Material], pa.Table]] = {
-    "robots": robots,
-    "extremities": lambda run: extremity_bins(robots(run)),
-    "variability": lambda run: variability(run.tables["fitness"]),
-    "interactions": lambda run: interactions(
-        run.births, *(run.tables[name] for name in ("fitness", "deaths", "touches"))
+_OTHERS: dict[str, tuple[Callable[[Material], pa.Table], tuple[str, ...]]] = {
+    "robots": (robots, ("births", "population", "evaluations", "fitness")),
+    "extremities": (
+        lambda run: extremity_bins(robots(run)),
+        ("births", "population", "evaluations", "fitness"),
     ),
-    "between": lambda run: mean_distances(run.census, run.trees),
-    "migrants": lambda run: migrants(
-        run.tables["migrations"], run.births, run.census, run.lines
+    "variability": (lambda run: variability(run.tables["fitness"]), ("fitness",)),
+    "interactions": (
+        lambda run: interactions(
+            run.births, *(run.tables[name] for name in ("fitness", "deaths", "touches"))
+        ),
+        ("births", "fitness", "deaths", "touches"),
+    ),
+    "between": (
+        lambda run: mean_distances(run.census, run.trees),
+        ("births", "population"),
+    ),
+    "migrants": (
+        lambda run: migrants(
+            run.tables["migrations"], run.births, run.census, run.lines
+        ),
+        ("births", "population", "migrations"),
     ),
 }
+"""Measures and the tables that they need, beside those of populations."""
 
 
 def measure(
-    run: Material, wanted: frozenset[str]
+    run: Material, wanted: frozenset[str], unread: frozenset[str] = frozenset()
 ) -> tuple[dict[str, pa.Table], Refusals]:
     """Return all measures of a run.
 
     Args:
         run: its tables.
         wanted: which of variability, interactions, between and migrants have sense.
+        unread: tables that could not be read: nothing is made of half a run's rows.
 
     Returns:
         Tables by name, each with the columns of ``analysis.outputs.schema`` less the
@@ -47,10 +61,15 @@ def measure(
     """
     found = {}
     found["populations"], refusals = populations(run)
-    for name, function in _OTHERS.items():
-        if name in {"robots", "extremities"} | wanted:
-            try:
-                found[name] = function(run)
-            except RevolveError as error:
-                refusals[name] = str(error)
+    for name, (function, needed) in _OTHERS.items():
+        if name not in {"robots", "extremities"} | wanted:
+            continue
+        missing = [table for table in needed if table in unread]
+        if missing:
+            refusals[name] = f"needs table {missing[0]}"
+            continue
+        try:
+            found[name] = function(run)
+        except RevolveError as error:
+            refusals[name] = str(error)
     return found, refusals

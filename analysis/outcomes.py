@@ -37,12 +37,8 @@ def outcome(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
     found = {"births": float(births)}
     for name in each[0] if each else ():
         found[name] = _mean(np.array([one[name] for one in each]))
-    robots = tables["robots"]
-    is_born = np.asarray(robots["birth"], np.int64) < births
-    found |= _changes(robots, found, is_born)
-    for name in ("extremities", "extremities_per_part"):
-        values, fitness = (_column(robots, key)[is_born] for key in (name, "fitness"))
-        found[f"{name}_fitness"] = _correlation(values, fitness)
+    if "robots" in tables:
+        found |= _of_robots(tables["robots"], found, births)
     return found | _of_arena(tables, births)
 
 
@@ -75,6 +71,17 @@ def _share(values: Numbers, counts: Numbers, middle: float, *, is_late: bool) ->
         return math.nan
     part = values[-1] - values[until] if is_late else values[until] - values[0]
     return float(part / change)
+
+
+def _of_robots(
+    robots: pa.Table, last: dict[str, float], births: int
+) -> dict[str, float]:
+    is_born = np.asarray(robots["birth"], np.int64) < births
+    found = _changes(robots, last, is_born)
+    for name in ("extremities", "extremities_per_part"):
+        values, fitness = (_column(robots, key)[is_born] for key in (name, "fitness"))
+        found[f"{name}_fitness"] = _correlation(values, fitness)
+    return found
 
 
 def _changes(

@@ -8,7 +8,7 @@ from multiprocessing import get_context
 import numpy as np
 import pyarrow as pa
 
-from analysis.load import LeftOut, Run, read_tables
+from analysis.load import TABLE, LeftOut, Run, read_tables
 from analysis.material import Material
 from analysis.measures import measure
 from analysis.outputs import schema
@@ -71,7 +71,8 @@ def measure_run(run: Run, slots: SlotRule) -> Measured:
     tables, left_out = read_tables(run)
     folder = str(run.folder)
     material = Material(tables, slots)
-    found, refusals = measure(material, _wanted(run))
+    unread = frozenset(one.what.removeprefix(TABLE) for one in left_out)
+    found, refusals = measure(material, _wanted(run), unread)
     if material.census.lacking:
         why = f"{material.census.lacking} name somebody whose birth is not recorded"
         left_out.append(LeftOut(folder, "populations", why))
