@@ -4,6 +4,7 @@ What a shard was told since its newest snapshot is kept, so that another worker 
 rebuild its state. Nothing here decides what happens in an arena.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
@@ -13,6 +14,7 @@ from coordinator.events import (
     Returned,
 )
 from coordinator.fleet import Fleet
+from coordinator.pose_columns import place_poses
 from coordinator.shards import Accept, Came, GiveUp, Hand
 from schema.arena_codec import (
     AdvanceAnswer,
@@ -25,7 +27,6 @@ from schema.arena_codec import (
 from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
 from schema.evaluation import Provenance
 from schema.plugin_source import plugins_of
-from schema.tables import read_columns
 
 
 class Vault(Protocol):
@@ -50,12 +51,12 @@ class Terms:
 
     Attributes:
         run, epoch: of the coordinator.
-        settings: JSON of ``ArenaSettings``.
+        settings: JSON of ``ArenaSettings`` of each arena, by its island.
     """
 
     run: str
     epoch: int
-    settings: bytes
+    settings: Mapping[int, bytes]
 
 
 @dataclass(slots=True)
@@ -100,11 +101,6 @@ class Advances:
         self._answers: dict[int, tuple[AdvanceAnswer, int]] = {}
         self._came: list[Advanced] = []
         self._refusal: JobRefused | None = None
-
-    @property
-    def open(self) -> int:
-        """How many advances are asked for and not done."""
-        return sum(past.asked is not None for past in self._pasts.values())
 
     @property
     def waiting(self) -> dict[int, str]:
@@ -215,7 +211,7 @@ class Advances:
                 run=self._terms.run,
                 epoch=self._terms.epoch,
                 number=command.number,
-                settings=self._terms.settings,
+                settings=self._terms.settings[shard],
                 shard=shard,
                 from_step=past.step,
                 from_digest=past.digest,
@@ -224,7 +220,7 @@ class Advances:
                 wants_snapshot=wants_snapshot,
                 rebuild=rebuild,
             ),
-            plugins_of(self._terms.settings),
+            plugins_of(self._terms.settings[shard]),
         )
 
     def understood(self, event: Returned) -> Came:
@@ -237,11 +233,13 @@ class Advances:
             advance = answer.advance
             if advance is None:
                 return Came(event.number, "stateless")
-            rows = read_columns("poses", advance.poses).num_rows
+            island = self._island(event)
+            poses, rows = place_poses(advance.poses, island)
+            answer = replace(answer, advance=replace(advance, poses=poses))
         except MalformedMessage as error:
             self.malformed += 1
             return Came(event.number, "error", str(error))
-        self._answers[self._island(event)] = (answer, rows)
+        self._answers[island] = (answer, rows)
         return Came(event.number, "done")
 
     def _check(self, answer: AdvanceAnswer, event: Returned) -> None:

@@ -29,7 +29,9 @@ from coordinator.events import (
     ArenaEvent,
     Commanded,
     Finish,
+    Immigrated,
     Insert,
+    NeighbourClosed,
     Order,
     Pause,
     Record,
@@ -41,15 +43,19 @@ from coordinator.events import (
     Vetted,
     VettingFailed,
 )
+from coordinator.exchange import Exchange
+from coordinator.landing import Landing
 from coordinator.nursery import Nursery
 from coordinator.orders import check_order, guest, rewired
 from coordinator.pending import Pending
 from coordinator.residents import Resident, Residents
-from coordinator.rows import birth_record
+from coordinator.rows import birth_record, migration_records
 from coordinator.seeding import Purpose, stream
 from coordinator.selection import Couple, Individual
+from schema.birth import BirthId
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment import Experiment, body_space
+from schema.genome import develop
 from schema.robot import Robot
 
 
@@ -65,7 +71,13 @@ class Arena:
     """
 
     def __init__(
-        self, experiment: Experiment, seed: int, run: int, number: int = 0
+        self,
+        experiment: Experiment,
+        seed: int,
+        run: int,
+        number: int = 0,
+        *,
+        exchange: Exchange | None = None,
     ) -> None:
         """Make an arena in which nothing has happened.
 
@@ -74,6 +86,7 @@ class Arena:
             seed: of the experiment's execution.
             run: number of the repeat, from 0.
             number: of this island.
+            exchange: its side of migration; None if it has no neighbours.
 
         Raises:
             ExperimentError: the experiment is off-line.
@@ -98,7 +111,8 @@ class Arena:
         self._order_ids: set[str] = set()
         self._advances = 0
         self._awaited: AdvanceShard | None = None
-        self._has_started = self._is_held = False
+        self._has_started = self._is_held = self._is_starving = False
+        self._landing = None if exchange is None else Landing(exchange)
 
     @property
     def population(self) -> tuple[Individual, ...]:
@@ -134,6 +148,8 @@ class Arena:
                 return self._arrive(event) if self._is_awaited(event) else []
             case Commanded():
                 return self._obey(event)
+            case Immigrated() | NeighbourClosed():
+                return self._hear(event)
 
     def _judge(self, event: Vetted | VettingFailed) -> list[ArenaCommand]:
         was_busy = self._nursery.is_busy
@@ -180,11 +196,13 @@ class Arena:
         commands: list[ArenaCommand] = []
         if event.pose_rows:
             commands.append(Append("poses", event.pose_rows, advance.poses))
-        commands += touch_records(advance.touches, now_s, over_s)
+        commands += touch_records(advance.touches, self._number, now_s, over_s)
         for casualty in advance.casualties:
             self._residents.remove(casualty.birth)
             fell_s = self._clock.seconds(casualty.step)
-            commands.append(casualty_record(casualty, self.births, fell_s))
+            commands.append(
+                casualty_record(casualty, self._number, self.births, fell_s)
+            )
         self._residents.judge(advance.judgements)
         return commands + self._decide()
 
@@ -196,14 +214,18 @@ class Arena:
         commands: list[ArenaCommand] = []
         if self.step % self._clock.sample == 0:
             now_s = self._clock.seconds(self.step)
-            commands += sample_records(self._residents, self.births, now_s)
+            commands += sample_records(
+                self._residents, self._number, self.births, now_s
+            )
         if self.step % self._clock.birth == 0:
-            self.is_extinct = not self._guests and (
+            landing = self._landing
+            is_few = not self._guests and (
                 len(self._residents) < self._experiment.selection.parents_needed
             )
+            self._is_starving = is_few and landing is not None and landing.is_hopeful
+            self.is_extinct = is_few and not self._is_starving
             if self.is_extinct or self.births >= self._experiment.births:
-                self.is_finished = True
-                return [*commands, Finish(self._number)]
+                return [*commands, self._finish()]
             commands += self._mate()
         if self.step % self._clock.cull == 0:
             reason, doomed = select_doomed(self._residents.mature(), self._rules)
@@ -232,9 +254,68 @@ class Arena:
             order = self._guests.pop(0)
             individual, robot = guest(order, self._nursery.take_number(), self._space)
             commands += self._insert(individual, robot, (), 1, order.place)
+        if self._landing is not None and not self._founders:
+            commands += self._trade(self._landing)
+            if self._landing.is_waiting or self.is_finished:
+                return commands
         self._is_held = self.is_paused
         if not self.is_paused:
             commands.append(self._advance())
+        return commands
+
+    def _finish(self) -> Finish:
+        self.is_finished = True
+        neighbours = () if self._landing is None else self._landing.neighbours
+        return Finish(self._number, neighbours)
+
+    def _hear(self, event: Immigrated | NeighbourClosed) -> list[ArenaCommand]:
+        """Take news of a neighbour, which may be the last that time stands for."""
+        if self._landing is None:
+            raise self._unexpected(event, "it has no neighbours")
+        if self.is_finished:
+            return []
+        self._landing.take(event)
+        return self._conclude() if self._landing.is_complete else []
+
+    def _trade(self, landing: Landing) -> list[ArenaCommand]:
+        """Send migrants if they are due; let those in who came, as room allows."""
+        commands: list[ArenaCommand] = []
+        now_s = self._clock.seconds(self.step)
+        is_due = self._is_starving or landing.is_due(self.births, now_s)
+        if is_due and not landing.is_waiting and self.births < self._experiment.births:
+            mature = self._residents.mature()
+            floor = self._rules.population_floor
+            sent, gone = landing.depart(mature, len(self._residents), floor)
+            commands += [*migration_records(sent, self.births, now_s), *sent]
+            for one in gone:
+                resident = self._residents.remove(one.birth)
+                commands.append(self._gone(resident, "migrated"))
+        if landing.is_complete:
+            landing.arrive(self.births, now_s)
+            self.is_extinct = self._is_starving and not landing.queue
+            self._is_starving = False
+            if self.is_extinct:
+                return [*commands, self._finish()]
+        return commands if landing.is_waiting else commands + self._admit(landing)
+
+    def _admit(self, landing: Landing) -> list[ArenaCommand]:
+        """Let immigrants in, each at a place of chance; no copies of the living."""
+        commands: list[ArenaCommand] = []
+        landing.queue = [
+            one for one in landing.queue if not self._residents.get(one.birth)
+        ]
+        while found := landing.next_in(
+            self._residents.mature(), has_room=self._has_room()
+        ):
+            immigrant, replaced = found
+            if replaced is not None:
+                resident = self._residents.remove(replaced.birth)
+                commands.append(self._gone(resident, "replaced"))
+            name = BirthId(self._number, landing.settled)
+            place = self._draw_place(name, Purpose.IMMIGRANT_PLACE)
+            robot = develop(immigrant.genome, self._space)
+            self._residents.add(Resident(immigrant, robot, place))
+            self._pending.insert(immigrant.birth, robot, place)
         return commands
 
     def _advance(self) -> AdvanceShard:
@@ -294,9 +375,7 @@ class Arena:
         """Let somebody live from this step on."""
         birth = individual.birth
         if place is None:
-            rng = stream(self._seed, self._run, birth, 0, Purpose.PLACE)
-            others = [one.last_place for one in self._residents]
-            place = draw_place(Draws(rng), others, self._rules)
+            place = self._draw_place(birth, Purpose.PLACE)
         self.births += 1
         self._residents.add(Resident(individual, robot, place))
         self._pending.insert(birth, robot, place)
@@ -309,8 +388,19 @@ class Arena:
     def _gone(self, resident: Resident, reason: str) -> Record:
         """Have the world let go of somebody who has left the living."""
         self._pending.remove(resident.birth)
-        now_s = self._clock.seconds(self.step)
-        return death_record(resident, reason, self.births, now_s)
+        return death_record(
+            resident,
+            reason,
+            island=self._number,
+            births=self.births,
+            sim_time_s=self._clock.seconds(self.step),
+        )
+
+    def _draw_place(self, name: BirthId, purpose: Purpose) -> Place:
+        """Return a place of chance, away from the living."""
+        rng = stream(self._seed, self._run, name, 0, purpose)
+        others = [one.last_place for one in self._residents]
+        return draw_place(Draws(rng), others, self._rules)
 
     def _has_room(self) -> bool:
         return len(self._residents) < self._rules.population_limit

@@ -4,19 +4,19 @@ from collections.abc import Iterable
 
 from coordinator.events import Record
 from coordinator.residents import Resident
+from coordinator.rows import named
 from schema.arena import Casualty, Touch
 
 
 def sample_records(
-    residents: Iterable[Resident], births: int, sim_time_s: float
+    residents: Iterable[Resident], island: int, births: int, sim_time_s: float
 ) -> list[Record]:
     """Return the fitness rows of a sample: all living who were ever judged."""
     return [
         Record(
             "fitness",
             {
-                "island": one.birth.island,
-                "birth": one.birth.number,
+                **named(one.birth, island),
                 "sim_time_s": sim_time_s,
                 "births": births,
                 "age_s": one.judgement.age_s,
@@ -41,7 +41,7 @@ def living_records(
             {
                 "island": island,
                 "births": births,
-                "birth": one.birth.number,
+                **named(one.birth, island),
                 "fitness": one.individual.fitness if one.is_mature else None,
             },
         )
@@ -49,12 +49,13 @@ def living_records(
     ]
 
 
-def casualty_record(casualty: Casualty, births: int, sim_time_s: float) -> Record:
+def casualty_record(
+    casualty: Casualty, island: int, births: int, sim_time_s: float
+) -> Record:
     """Return the deaths row of a robot whose physics diverged."""
     x, y, z = casualty.place
     row = {
-        "island": casualty.birth.island,
-        "birth": casualty.birth.number,
+        **named(casualty.birth, island),
         "sim_time_s": sim_time_s,
         "births": births,
         "reason": "diverged",
@@ -67,13 +68,12 @@ def casualty_record(casualty: Casualty, births: int, sim_time_s: float) -> Recor
 
 
 def death_record(
-    resident: Resident, reason: str, births: int, sim_time_s: float
+    resident: Resident, reason: str, *, island: int, births: int, sim_time_s: float
 ) -> Record:
     """Return the deaths row of a robot that is taken out where it stands."""
     x, y = resident.last_place
     row = {
-        "island": resident.birth.island,
-        "birth": resident.birth.number,
+        **named(resident.birth, island),
         "sim_time_s": sim_time_s,
         "births": births,
         "reason": reason,
@@ -86,15 +86,14 @@ def death_record(
 
 
 def touch_records(
-    touches: Iterable[Touch], sim_time_s: float, over_s: float
+    touches: Iterable[Touch], island: int, sim_time_s: float, over_s: float
 ) -> list[Record]:
     """Return the touches rows of an advance that took ``over_s``."""
     return [
         Record(
             "touches",
             {
-                "island": touch.first.island,
-                "birth": touch.first.number,
+                **named(touch.first, island),
                 "other_island": touch.second.island,
                 "other_birth": touch.second.number,
                 "sim_time_s": sim_time_s,

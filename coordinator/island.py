@@ -16,13 +16,18 @@ from coordinator.events import (
     Evaluated,
     EvaluationFailed,
     Finish,
+    Immigrated,
     IslandCommand,
     IslandEvent,
+    NeighbourClosed,
     Started,
+    Travelled,
     Vet,
     Vetted,
     VettingFailed,
 )
+from coordinator.exchange import Exchange
+from coordinator.harbour import Harbour
 from coordinator.rows import birth_record, evaluation_record, population_records
 from coordinator.selection import Couple, Individual
 from coordinator.trials import Trials
@@ -50,7 +55,13 @@ class Island:
     """
 
     def __init__(
-        self, experiment: Experiment, seed: int, run: int, number: int = 0
+        self,
+        experiment: Experiment,
+        seed: int,
+        run: int,
+        number: int = 0,
+        *,
+        exchange: Exchange | None = None,
     ) -> None:
         """Make an island to which nothing has happened.
 
@@ -59,6 +70,7 @@ class Island:
             seed: of the experiment's execution.
             run: number of the repeat, from 0.
             number: of this island.
+            exchange: its side of migration; None if it has no neighbours.
         """
         self.births = 0
         self.population: tuple[Individual, ...] = ()
@@ -75,6 +87,9 @@ class Island:
         self._window = self._brood_end = experiment.selection.population
         self._unborn: dict[int, _Unborn] = {}
         self._brood: list[Individual] = []
+        self._harbour = (
+            None if exchange is None else Harbour(experiment, number, exchange)
+        )
 
     @property
     def is_finished(self) -> bool:
@@ -96,9 +111,11 @@ class Island:
                 raise self._unexpected(event, "it has started before")
             self._has_started = True
             return self._proceed()
-        if isinstance(event, Evaluated | EvaluationFailed) and event.trial:
-            self._trials.take(event)
-            return self._proceed()
+        if isinstance(event, Immigrated | NeighbourClosed) or (
+            isinstance(event, Evaluated | EvaluationFailed) and event.trial
+        ):
+            self._hear(event)
+            return [*self._land(), *self._proceed()]
         unborn = self._asked(event)
         if unborn is None:
             return []
@@ -107,10 +124,9 @@ class Island:
                 unborn.is_viable = True
                 candidate = unborn.candidate
                 return [self._trials.timed(Evaluate(candidate.birth, candidate.robot))]
-            case Vetted(report=report):
-                return [self._retry(unborn.candidate, report.reason)]
-            case VettingFailed(reason=reason):
-                return [self._retry(unborn.candidate, reason)]
+            case Vetted() | VettingFailed():
+                why = event.report if isinstance(event, Vetted) else event
+                return [self._retry(unborn.candidate, why.reason)]
             case Evaluated() | EvaluationFailed():
                 unborn.outcome = event
                 return self._proceed()
@@ -207,15 +223,51 @@ class Island:
         ]
 
     def _close_brood(self) -> list[IslandCommand]:
-        """Let the survivors be the population, and set out the next brood."""
+        """Let the survivors be the population, and end the epoch if it is over."""
         parents, rows = self._trials.conclude(self.population)
         last = BirthId(self._number, self.births - 1)
         self.population = self._turnover.survivors(parents, self._brood, last)
         self._brood = []
-        commands: list[IslandCommand] = [*rows]
+        harbour = self._harbour
+        if harbour is None or self.is_finished or not harbour.is_due(self.births):
+            return [*rows, *self._open_brood()]
+        commands, self.population = harbour.depart(self.population, self.births)
+        return [*rows, *commands, *self._land()]
+
+    def _hear(self, event: Travelled | Evaluated | EvaluationFailed) -> None:
+        """Take news of neighbours, of immigrants, and of who is judged anew.
+
+        For neighbours and immigrants nobody waits at the end.
+        """
+        if isinstance(event, Evaluated | EvaluationFailed) and event.asker is None:
+            self._trials.take(event)
+            return
+        if self._harbour is None:
+            raise self._unexpected(event, "it has no neighbours")
+        if not self.is_finished:
+            self._harbour.take(event)
+
+    def _land(self) -> list[IslandCommand]:
+        """Let immigrants live here, once all are there that were waited for."""
+        if self._harbour is None:
+            return []
+        commands, population = self._harbour.land(self.population, self.births)
+        timed = [
+            self._trials.timed(each) if isinstance(each, Evaluate) else each
+            for each in commands
+        ]
+        if population is None:
+            return [*timed]
+        self.population = population
+        return [*timed, *self._open_brood()]
+
+    def _open_brood(self) -> list[IslandCommand]:
+        """Set out the next brood of the population that stands, or finish."""
+        commands: list[IslandCommand] = []
         commands += population_records(self._number, self.births, self.population)
         if self.is_finished:
-            return [*commands, Finish(self._number)]
+            neighbours = () if self._harbour is None else self._harbour.neighbours
+            return [*commands, Finish(self._number, neighbours)]
         self._generation += 1
         self._window = self._experiment.window
         self._brood_end = self._turnover.brood_end(self.births, len(self.population))

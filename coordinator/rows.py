@@ -2,12 +2,22 @@
 
 from collections.abc import Sequence
 
-from coordinator.events import Evaluated, EvaluationFailed, Record
+from coordinator.events import Emigrate, Evaluated, EvaluationFailed, Record
 from coordinator.selection import Individual
+from schema.birth import BirthId
 from schema.codec import encode_genome
 from schema.parts import BodySpace
 from schema.robot import Robot
 from schema.tables import body_rows, sizes
+
+
+def named(birth: BirthId, island: int) -> dict[str, int | None]:
+    """Return the columns that name an individual in a row of some island."""
+    return {
+        "island": island,
+        "birth_island": None if birth.island == island else birth.island,
+        "birth": birth.number,
+    }
 
 
 def birth_record(
@@ -55,9 +65,9 @@ def evaluation_record(outcome: Evaluated | EvaluationFailed) -> Record:
     """Return the evaluations row of an outcome; a failure has no numbers."""
     provenance = outcome.provenance
     judged = outcome.evaluation if isinstance(outcome, Evaluated) else None
+    island = outcome.birth.island if outcome.asker is None else outcome.asker
     row = {
-        "island": outcome.birth.island,
-        "birth": outcome.birth.number,
+        **named(outcome.birth, island),
         "trial": outcome.trial,
         "status": "ok" if isinstance(outcome, Evaluated) else "failed",
         "reason": "" if isinstance(outcome, Evaluated) else outcome.reason,
@@ -82,9 +92,32 @@ def population_records(
             {
                 "island": island,
                 "births": births,
-                "birth": individual.birth.number,
+                **named(individual.birth, island),
                 "fitness": None if individual.has_failed else individual.fitness,
             },
         )
         for individual in population
+    ]
+
+
+def migration_records(
+    sent: Sequence[Emigrate], births: int, sim_time_s: float | None = None
+) -> list[Record]:
+    """Return the migrations rows of all who were sent."""
+    return [
+        Record(
+            "migrations",
+            {
+                "island": command.island,
+                "to": command.to,
+                "epoch": command.epoch,
+                "births": births,
+                "sim_time_s": sim_time_s,
+                "birth_island": one.birth.island,
+                "birth": one.birth.number,
+                "fitness": None if one.has_failed else one.fitness,
+            },
+        )
+        for command in sent
+        for one in command.migrants
     ]

@@ -12,7 +12,11 @@ from schema.birth import BirthId
 
 
 class Purpose(IntEnum):
-    """What a stream is for; the numbers are part of what a seed means."""
+    """What a stream is for; the numbers are part of what a seed means.
+
+    Of migration, the birth that names a stream is (island, epoch), of a place of
+    arrival (island, how many arrived before).
+    """
 
     GENERATE = 1
     PARENTS = 2
@@ -20,6 +24,10 @@ class Purpose(IntEnum):
     SURVIVORS = 4
     PLACE = 5
     DURATION = 6
+    TOPOLOGY = 7
+    EMIGRANTS = 8
+    REPLACED = 9
+    IMMIGRANT_PLACE = 10
 
 
 def stream(

@@ -31,16 +31,22 @@ class Poses:
             self._samples.append((step, layout, positions))
 
     def columns(self) -> bytes:
-        """Return all samples as an Arrow IPC stream; no bytes for no samples."""
+        """Return all samples as an Arrow IPC stream; no bytes for no samples.
+
+        Robots stand there by their names, as if each lived where it was born:
+        whoever asked for the advance knows which arena this is.
+        """
         if not self._samples:
             return b""
         layouts = [layout for _, layout, _ in self._samples]
         roots = np.concatenate([q[layout.roots] for _, layout, q in self._samples])
         angles = np.concatenate([q[layout.joints] for _, layout, q in self._samples])
-        times = [
-            np.full(len(layout.numbers), step * self._timestep_s)
-            for step, layout, _ in self._samples
-        ]
+        times = np.concatenate(
+            [
+                np.full(len(layout.numbers), step * self._timestep_s)
+                for step, layout, _ in self._samples
+            ]
+        )
         counts = np.concatenate([layout.joint_counts for layout in layouts])
         ends = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
         numbers = roots.astype(np.float32)
@@ -48,8 +54,9 @@ class Poses:
         batch = pa.record_batch(
             [
                 np.concatenate([layout.islands for layout in layouts]),
+                pa.nulls(len(times), pa.int32()),
                 np.concatenate([layout.numbers for layout in layouts]),
-                np.concatenate(times),
+                times,
                 *(numbers[:, axis] for axis in range(len(_AXES))),
                 pa.ListArray.from_arrays(
                     pa.array(ends), pa.array(angles.astype(np.float32)), type=listed

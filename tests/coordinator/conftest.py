@@ -55,6 +55,7 @@ def evaluation_row(number: int, worker: str, platform: str) -> dict[str, Any]:
     value = None if is_failed else number / 3
     return {
         "island": 0,
+        "birth_island": None,
         "birth": number,
         "trial": 0,
         "status": "failed" if is_failed else "ok",
@@ -81,7 +82,13 @@ def records(
             rows.extend(
                 Record(
                     "population",
-                    {"island": 0, "births": number + 1, "birth": each, "fitness": 0.5},
+                    {
+                        "island": 0,
+                        "births": number + 1,
+                        "birth_island": None,
+                        "birth": each,
+                        "fitness": 0.5,
+                    },
                 )
                 for each in range(number - 2, number + 1)
             )

@@ -126,7 +126,8 @@ def test_every_living_robot_is_sampled_every_five_seconds() -> None:
     assert numbers(at_45) == list(range(16))
     assert {row["births"] for row in at_45} == {16}
     assert at_45[14] == {
-        "island": 0, "birth": 14, "sim_time_s": 45.0, "births": 16, "age_s": 45.0,
+        "island": 0, "birth_island": None, "birth": 14,
+        "sim_time_s": 45.0, "births": 16, "age_s": 45.0,
         "path_velocity": 0.0, "straight_velocity": 0.02, "fitness": 0.1,
         "is_mature": True,
     }  # fmt: skip
@@ -199,7 +200,8 @@ def test_a_fallen_robot_is_a_death_with_its_reason() -> None:
     (death,) = lived.rows("deaths")
     x, y = lived.world.places[BirthId(0, 3)]
     assert death == {
-        "island": 0, "birth": 3, "sim_time_s": pytest.approx(19.995), "births": 15,
+        "island": 0, "birth_island": None, "birth": 3,
+        "sim_time_s": pytest.approx(19.995), "births": 15,
         "reason": "diverged", "detail": "diverged: qacc", "x": x, "y": y, "z": 0.5,
     }  # fmt: skip
     assert 3 not in [one.birth.number for one in lived.arena.population]
@@ -225,7 +227,8 @@ def test_touches_and_poses_go_through() -> None:
     assert [append.rows for append in lived.bulk] == [*range(1, 16)]
     row = lived.rows("touches")[0]
     assert row == {
-        "island": 0, "birth": 13, "other_island": 0, "other_birth": 14,
+        "island": 0, "birth_island": None, "birth": 13,
+        "other_island": 0, "other_birth": 14,
         "sim_time_s": 2.0, "over_s": 1.0, "duration_s": 0.25,
     }  # fmt: skip
 

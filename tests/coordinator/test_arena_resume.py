@@ -45,7 +45,6 @@ from schema.operator_codec import (
 from schema.parts import BUILT_IN
 from schema.robot import Part, Robot
 from schema.run_tables import read_table
-from schema.settings import arena_settings, evaluation_settings, vetting_settings
 from tests.coordinator.arena_world import experiment
 from tests.worker.fake_world import FakeWorld, OddWorld
 from worker.shards import Shards
@@ -116,13 +115,7 @@ class Run:
         self.fleet = Fleet(other.pop("agents", LocalAgents)(agents, "any"))
         self.loop = Loop(
             {0: self.arena},
-            question=Question(
-                run="resume",
-                epoch=folder.epoch,
-                vetting=vetting_settings(EXPERIMENT),
-                evaluation=evaluation_settings(EXPERIMENT),
-                arena=arena_settings(EXPERIMENT),
-            ),
+            question=Question.of("resume", folder.epoch, EXPERIMENT),
             fleet=self.fleet,
             log=Frail(journal, point, "append"),
             rows=Frail(self.rows, point, "store"),

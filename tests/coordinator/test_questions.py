@@ -42,7 +42,7 @@ class Desk:
         self.sent: list[tuple[int, str, bytes]] = []
         self.cancelled: list[tuple[int, str]] = []
         self.fleet = Fleet(self)
-        question = Question("run", EPOCH, b"vetting", evaluation)
+        question = Question("run", EPOCH, b"vetting", {0: evaluation})
         self.questions = Questions(question, self.fleet)
         for name in ("one", "two"):
             self.tell(Joined(name, "worker", 1, f"platform-{name}"))

@@ -27,7 +27,6 @@ from schema.evaluation import Evaluation
 from schema.experiment import Experiment, Selection
 from schema.experiment_file import experiment_text
 from schema.run_tables import read_table
-from schema.settings import evaluation_settings, vetting_settings
 
 EXPERIMENT = Experiment(
     name="resume", births=40, selection=Selection(population=8, children=6)
@@ -71,12 +70,7 @@ def run(path: Path, *, answers: int = 10**9) -> int:
         )
         loop = Loop(
             {0: Island(EXPERIMENT, DETAILS.seed, DETAILS.run)},
-            question=Question(
-                run="resume",
-                epoch=folder.epoch,
-                vetting=vetting_settings(EXPERIMENT),
-                evaluation=evaluation_settings(EXPERIMENT),
-            ),
+            question=Question.of("resume", folder.epoch, EXPERIMENT),
             fleet=fleet,
             log=journal,
             rows=rows,

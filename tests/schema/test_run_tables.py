@@ -14,6 +14,7 @@ from schema.tables import EVALUATIONS, TABLES
 ROW = {
     "record": 0,
     "island": 0,
+    "birth_island": None,
     "birth": 7,
     "trial": 3,
     "status": "ok",
