@@ -216,6 +216,8 @@ class Network:
             key,
             zenoh.handlers.Callback(asked.take, asked.end, indirect=False),
             payload=payload,
+            # Agents share their time among those who send.
+            attachment=self._me.name,
             timeout=timeout_s,
             consolidation=_NOW,
         )

@@ -20,6 +20,7 @@ from schema.platform_tag import platform_tag, wire_version
 from schema.serving import Server, Tally
 from schema.supervision import Post
 from schema.topics import Member, check_name, unique_name
+from schema.turns import Turns
 
 _POLL_S = 0.2
 _RETRY_S = 0.3
@@ -195,17 +196,31 @@ def _serve_session(
         session.liveliness().declare_token(me.alive),
     ):
         hub.seen(is_there=True)
+        turns: Turns[zenoh.Query] = Turns()
         while not stop.is_set():
-            try:
-                query = inbox.get(timeout=_POLL_S)
-            except Empty:
+            if not _let_in(inbox, turns):
                 hub.seen(is_there=bool(session.info.routers_zid()))
                 continue
-            with query:
+            began_s = time.monotonic()
+            with turns.take() as query:
                 _answer(query, server, me)
-    while not inbox.empty():
-        with inbox.get():
+            turns.spent(time.monotonic() - began_s)
+    _let_in(inbox, turns)
+    while turns:
+        with turns.take():
             pass  # its end without a reply is the asker's news
+
+
+def _let_in(inbox: SimpleQueue[zenoh.Query], turns: Turns[zenoh.Query]) -> bool:
+    """Have all that came wait its turn; return whether anything waits now."""
+    try:
+        while True:
+            # Only who has nothing to do waits for more to come.
+            query = inbox.get_nowait() if turns else inbox.get(timeout=_POLL_S)
+            sender = query.attachment
+            turns.put(sender.to_bytes() if sender else b"", query)
+    except Empty:
+        return bool(turns)
 
 
 def _answer(query: zenoh.Query, server: Server, me: Member) -> None:
