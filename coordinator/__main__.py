@@ -5,8 +5,6 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from msgspec.structs import replace
-
 from coordinator.audits import Caution
 from coordinator.campaign import (
     Campaign,
@@ -23,7 +21,12 @@ from coordinator.running import Deployment, resume, start, start_campaign
 from schema.agent_command import tls_of
 from schema.crew import cores
 from schema.errors import NetworkError, RunFolderError
-from schema.experiment import Experiment, island_count, island_experiment
+from schema.experiment import (
+    Experiment,
+    island_count,
+    island_experiment,
+    with_births,
+)
 from schema.experiment_check import check_experiment
 from schema.experiment_file import experiment_from_text
 from schema.settings import fitness_function
@@ -66,7 +69,7 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
     experiments = read_experiments(options.experiments)
     if options.births is not None:
         experiments = tuple(
-            replace(experiment, births=options.births) for experiment in experiments
+            with_births(experiment, options.births) for experiment in experiments
         )
     for experiment in experiments:
         check_experiment(experiment, "--births" if options.births else experiment.name)

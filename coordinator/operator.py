@@ -18,7 +18,7 @@ from coordinator.loop import Loop
 from coordinator.orders import check_order
 from schema.birth import BirthId
 from schema.errors import RevolveError
-from schema.experiment import Experiment, body_space
+from schema.experiment import Experiment, body_space, island_experiment
 from schema.heredity import genome_of
 from schema.operator_codec import (
     BrainWish,
@@ -63,7 +63,7 @@ class Desk:
             wish = request.wish
             assert not isinstance(wish, StatusWish)  # the reception's
             if isinstance(wish, ListWish):
-                text = self._list(arena)
+                text = self._list(arena, request.island)
             elif isinstance(wish, SnapshotWish):
                 self._loop.advances.wish_snapshot(request.island)
                 text = "the state is kept at the end of the next advance"
@@ -72,7 +72,7 @@ class Desk:
                 event = Commanded(
                     request.island, request.request_id, arena.next_step, order
                 )
-                text = self._effect(event.step)
+                text = self._effect(event)
         except RevolveError as error:
             return encode_operator_reply(OperatorReply(str(error), is_refused=True))
         if not isinstance(wish, ListWish | SnapshotWish):
@@ -117,14 +117,18 @@ class Desk:
         check_order(order, self._experiment)
         return order
 
-    def _effect(self, step: int) -> str:
-        return f"takes effect at {step * self._experiment.simulation.timestep_s:g} s"
+    def _effect(self, event: Commanded) -> str:
+        step_s = self._own(event.island).simulation.timestep_s
+        return f"takes effect at {event.step * step_s:g} s"
 
-    def _list(self, arena: Arena) -> str:
+    def _own(self, island: int) -> Experiment:
+        return island_experiment(self._experiment, island)
+
+    def _list(self, arena: Arena, island: int) -> str:
         """Return a line on the arena and one on each of the living."""
         state = "paused" if arena.is_paused else "running"
-        now_s = arena.step * self._experiment.simulation.timestep_s
-        births = self._experiment.births
+        own = self._own(island)
+        now_s, births = arena.step * own.simulation.timestep_s, own.births
         about = f"{arena.births} of {births} born, {len(arena.population)} alive"
         lines = [f"{state} at {now_s:g} s, {about}", "birth  rank  fitness"]
         lines += [
