@@ -7,7 +7,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -164,29 +164,13 @@ def test_help_shows_an_example() -> None:
     assert "example: revolve worker --connect tcp/127.0.0.1:7447" in result.stdout
 
 
-def certify(folder: Path, name: str, authority: str) -> Tls:
-    """Make a certificate with openssl, signed by an authority made for it."""
-    script = f"""
-    set -e; cd "{folder}"; exec 2>&1
-    [ -f {authority}.pem ] || openssl req -x509 -newkey rsa:2048 -nodes -days 1 \
-        -keyout {authority}.key -out {authority}.pem -subj /CN={authority}
-    openssl req -newkey rsa:2048 -nodes -subj /CN={name} \
-        -keyout {name}.key -out {name}.csr
-    printf 'subjectAltName=IP:127.0.0.1,DNS:localhost\nbasicConstraints=CA:FALSE\n' \
-        > {name}.ext
-    openssl x509 -req -in {name}.csr -CA {authority}.pem -CAkey {authority}.key \
-        -CAcreateserial -days 1 -out {name}.pem -extfile {name}.ext
-    """
-    subprocess.run(["sh", "-c", script], check=True, capture_output=True)
-    files = (f"{authority}.pem", f"{name}.pem", f"{name}.key")
-    return Tls(*(str(folder / file) for file in files))
-
-
 @pytest.mark.skipif(not shutil.which("openssl"), reason="makes certificates")
-def test_only_who_is_certified_gets_in(tmp_path: Path) -> None:
-    hub = certify(tmp_path, "hub", "ca")
-    friend = certify(tmp_path, "friend", "ca")
-    stranger = certify(tmp_path, "stranger", "another")
+def test_only_who_is_certified_gets_in(
+    tmp_path: Path, certify: Callable[[Path, str, str, str], Tls]
+) -> None:
+    hub = certify(tmp_path, "hub", "ca", "127.0.0.1")
+    friend = certify(tmp_path, "friend", "ca", "127.0.0.1")
+    stranger = certify(tmp_path, "stranger", "another", "127.0.0.1")
     address = free_address().replace("tcp/", "tls/")
 
     def flags(tls: Tls) -> list[str]:

@@ -114,22 +114,39 @@ def test_worker_without_a_coordinator_says_so_and_keeps_trying(
     assert worker.wait(30) == 0
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
-def test_full_disk_loses_nothing(stage: Stage, undisturbed: Path, births: int) -> None:
+def _fill_the_disk(stage: Stage, *words: str, kilobytes: int) -> None:
+    """Run on a small disk until it is full; what stands there becomes ``moved``."""
     disk = stage.folder / "disk"
     disk.mkdir()
-    if subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(disk)], check=False
-    ).returncode:
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(disk)]
+    if subprocess.run(mount, check=False).returncode:
         pytest.skip("a small disk cannot be mounted here")
     try:
-        words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
-        said = stage.run("run", *words, "--in-process", "--out", "disk/run", code=2)
+        said = stage.run("run", *words, "--quiet", "--out", "disk/run", code=2)
         assert "full" in said
         assert "Traceback" not in said
         shutil.copytree(disk / "run", stage.folder / "moved")
     finally:
         subprocess.run(["umount", str(disk)], check=True)
-    stage.run("resume", "moved", "--in-process", "--quiet")
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
+@pytest.mark.parametrize("flags", [("--in-process",), ("--workers", "2")])
+def test_full_disk_loses_nothing(
+    stage: Stage, undisturbed: Path, births: int, flags: tuple[str, ...]
+) -> None:
+    words = ("scenario1", "--seed", "5", "--births", str(births), *flags)
+    _fill_the_disk(stage, *words, kilobytes=64)
+    stage.run("resume", "moved", "--quiet", *flags)
     said = stage.run("compare", "moved", str(undisturbed))
+    assert "equal" in said
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
+def test_full_disk_loses_nothing_of_an_arena(arena_stage: Stage, calm: Path) -> None:
+    flags = ("--in-process", "--threads", "1")
+    words = ("crowd.toml", "--seed", "4", *flags)
+    _fill_the_disk(arena_stage, *words, kilobytes=400)
+    arena_stage.run("resume", "moved", "--quiet", *flags)
+    said = arena_stage.run("compare", "moved", str(calm))
     assert "equal" in said

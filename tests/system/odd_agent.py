@@ -1,0 +1,77 @@
+"""A program: a worker that answers well, but twice, or after it was given up.
+
+Run with the address of a hub and ``twice`` or ``late``. A late one lets its token
+vanish while it holds a job, answers when it was told that it is gone, and joins
+again. It ends on SIGTERM and prints what it did, and how often.
+"""
+
+import signal
+import sys
+import threading
+from queue import Empty, SimpleQueue
+
+import zenoh
+
+from schema import revolve_pb2 as pb
+from schema.crew import one_thread_each
+from schema.network import Agent, client_config
+from schema.platform_tag import platform_tag, wire_version
+from schema.topics import Member, unique_name
+
+GONE_S = 0.3
+
+
+def main(address: str, behaviour: str) -> None:
+    """Serve until SIGTERM."""
+    one_thread_each()
+    from worker.jobs import answer  # noqa: PLC0415 - numpy comes with it
+
+    stop = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: stop.set())
+    name = unique_name("odd")
+    member = Member("default", "worker", name)
+    agent = Agent("worker", name, address, version=wire_version())
+    info = pb.AgentInfo(
+        agent=agent.name,
+        kind=agent.role,
+        slots=1,
+        platform=platform_tag(),
+        version=agent.version,
+    ).SerializeToString()
+    inbox: SimpleQueue[zenoh.Query] = SimpleQueue()
+    count = 0
+
+    def tell(query: zenoh.Query) -> None:
+        with query:
+            query.reply(member.info, info)
+
+    with zenoh.open(zenoh.Config.from_json5(client_config(address))) as session:
+        take = zenoh.handlers.Callback(inbox.put, indirect=False)
+        told = zenoh.handlers.Callback(tell)
+        _jobs = session.declare_queryable(member.jobs, take, complete=True)
+        _info = session.declare_queryable(member.info, told, complete=True)
+        token = session.liveliness().declare_token(member.alive)
+        while not stop.is_set():
+            try:
+                query = inbox.get(timeout=0.1)
+            except Empty:
+                continue
+            with query:
+                assert query.payload is not None
+                data = answer(query.payload.to_bytes())
+                count += 1
+                if behaviour == "late":
+                    token.undeclare()  # type: ignore[no-untyped-call]
+                    # Meanwhile the job is somebody else's.
+                    stop.wait(GONE_S)
+                query.reply(member.jobs, data)
+                if behaviour == "twice":
+                    query.reply(member.jobs, data)
+            if behaviour == "late":
+                stop.wait(GONE_S)
+                token = session.liveliness().declare_token(member.alive)
+    sys.stdout.write(f"{behaviour} {count}\n")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:3])

@@ -1,0 +1,133 @@
+"""Whatever befalls workers and analyzers, the tables are those of a quiet run.
+
+Each case is drawn over the run by a fixed seed. Agents that are killed stand in
+test_equal_runs.py and test_arena_runs.py.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from coordinator.compare import compare
+from coordinator.events import Advanced
+from coordinator.journal import NAME, Journal
+
+pytestmark = [
+    pytest.mark.system,
+    pytest.mark.timeout(300),
+    pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
+]
+
+Stage = Any
+Fleets = Callable[..., Any]
+ROOT = Path(__file__).parents[2]
+ODD_AGENT = Path(__file__).with_name("odd_agent.py")
+
+
+def whole(folder: Path) -> int:
+    """Return the length of a finished run's journal [bytes]."""
+    return (folder / NAME).stat().st_size
+
+
+def singles(births: int) -> tuple[str, ...]:
+    return ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
+
+
+CROWD = ("crowd.toml", "--seed", "4", "--quiet")
+
+
+def test_a_worker_is_frozen_and_comes_back(
+    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
+) -> None:
+    fleet = fleet_of(stage, *singles(births))
+    fleet.join("judge", "analyzer")
+    frozen = fleet.join("one")
+    fleet.join("two")
+    share = np.random.default_rng(21).uniform(0.1, 0.4)
+    fleet.wait_for(share * whole(undisturbed))
+    os.kill(frozen, signal.SIGSTOP)
+    fleet.wait_for((share + 0.3) * whole(undisturbed))
+    os.kill(frozen, signal.SIGCONT)
+    fleet.finish()
+    assert compare(undisturbed, fleet.folder) == []
+
+
+@pytest.mark.slow
+def test_the_holder_of_an_arena_is_frozen_and_comes_back(
+    arena_stage: Stage, calm: Path, fleet_of: Fleets
+) -> None:
+    fleet = fleet_of(arena_stage, *CROWD)
+    fleet.join("judge", "analyzer")
+    frozen = fleet.join("one")
+    share = np.random.default_rng(22).uniform(0.1, 0.4)
+    fleet.wait_for(share * whole(calm))
+    os.kill(frozen, signal.SIGSTOP)
+    fleet.join("two")
+    fleet.wait_for((share + 0.3) * whole(calm))
+    os.kill(frozen, signal.SIGCONT)
+    fleet.finish()
+    assert compare(calm, fleet.folder) == []
+    with Journal.open(fleet.folder) as journal:
+        events = journal.replay()
+    holders = {
+        each.provenance.agent[:3] for each in events if isinstance(each, Advanced)
+    }
+    assert holders == {"one", "two"}
+
+
+def test_an_analyzer_is_lost_while_another_is_there(
+    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
+) -> None:
+    fleet = fleet_of(stage, *singles(births))
+    fleet.join("judge", "analyzer")
+    fleet.join("another", "analyzer")
+    fleet.join("one")
+    share = np.random.default_rng(23).uniform(0.1, 0.7)
+    fleet.wait_for(share * whole(undisturbed))
+    fleet.kill("judge")
+    fleet.finish()
+    assert compare(undisturbed, fleet.folder) == []
+
+
+def test_the_only_analyzer_is_lost_and_replaced(
+    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
+) -> None:
+    fleet = fleet_of(stage, *singles(births))
+    fleet.join("judge", "analyzer")
+    fleet.join("one")
+    share = np.random.default_rng(24).uniform(0.1, 0.7)
+    fleet.wait_for(share * whole(undisturbed))
+    fleet.kill("judge")
+    fleet.join("another", "analyzer")
+    fleet.finish()
+    assert compare(undisturbed, fleet.folder) == []
+
+
+@pytest.mark.parametrize("behaviour", ["twice", "late"])
+def test_answers_come_twice_or_late(
+    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets, behaviour: str
+) -> None:
+    fleet = fleet_of(stage, *singles(births))
+    fleet.join("judge", "analyzer")
+    fleet.join("one")
+    command = [sys.executable, str(ODD_AGENT), fleet.address, behaviour]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, text=True
+    ) as odd:
+        try:
+            fleet.finish()
+        finally:
+            odd.terminate()
+        assert odd.stdout is not None
+        did = odd.stdout.read().split()
+    assert did[0] == behaviour
+    assert int(did[1]) > 0
+    assert compare(undisturbed, fleet.folder) == []

@@ -1,0 +1,162 @@
+"""The network between machines is cut and healed: namespaces stand for machines.
+
+Two namespaces with one cable between them: the coordinator's, and that of a worker
+far away. Whoever is cut off counts as lost after the lease; its jobs are others'.
+"""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from coordinator.compare import compare
+from coordinator.events import Advanced
+from coordinator.journal import NAME, Journal
+from schema.network import Tls
+
+Stage = Any
+Fleets = Callable[..., Any]
+Certify = Callable[[Path, str, str, str], Tls]
+
+HOST = "10.231.77.1"
+PORT = 7447
+
+
+def ip(words: str) -> None:
+    done = subprocess.run(
+        ["ip", *words.split()], capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise OSError(f"ip {words}: {done.stderr.strip()}")
+
+
+def why_not() -> str:
+    """Return why namespaces cannot be made here; empty if they can."""
+    for program in ("ip", "openssl"):
+        if shutil.which(program) is None:
+            return f"there is no program {program}"
+    name = f"revolve-try-{os.getpid()}"
+    try:
+        ip(f"netns add {name}")
+        ip(f"-n {name} link add a type veth peer name b")
+        ip(f"netns del {name}")
+    except OSError as error:
+        return f"the kernel refuses network namespaces: {error}"
+    return ""
+
+
+WHY_NOT = why_not()
+
+pytestmark = [
+    pytest.mark.system,
+    pytest.mark.slow,
+    pytest.mark.timeout(300),
+    pytest.mark.skipif(bool(WHY_NOT), reason=WHY_NOT),
+]
+
+
+@dataclass(frozen=True)
+class Cable:
+    """Two machines and what joins them."""
+
+    near: str
+    far: str
+
+    def cut(self) -> None:
+        ip(f"-n {self.far} link set wire down")
+
+    def heal(self) -> None:
+        ip(f"-n {self.far} link set wire up")
+
+
+@pytest.fixture
+def cable() -> Iterator[Cable]:
+    made = Cable(f"revolve-near-{os.getpid()}", f"revolve-far-{os.getpid()}")
+    try:
+        for name in (made.near, made.far):
+            ip(f"netns add {name}")
+            ip(f"-n {name} link set lo up")
+        ip(f"-n {made.near} link add wire type veth peer name wire netns {made.far}")
+        for name, last in ((made.near, 1), (made.far, 2)):
+            ip(f"-n {name} addr add 10.231.77.{last}/30 dev wire")
+            ip(f"-n {name} link set wire up")
+        yield made
+    finally:
+        for name in (made.near, made.far):
+            subprocess.run(["ip", "netns", "del", name], check=False)
+
+
+@dataclass(frozen=True)
+class Distant:
+    """What it takes to have a coordinator and a worker on two machines."""
+
+    cable: Cable
+    certify: Certify
+    fleet_of: Fleets
+
+    def fleet(self, stage: Stage, *words: str) -> tuple[Any, list[str]]:
+        """Return a fleet, analyzer near and worker far, and the flags of all."""
+        tls = self.certify(stage.folder, "machine", "ca", HOST)
+        flags = ["--tls-ca", tls.ca, "--tls-certificate", tls.certificate]
+        flags += ["--tls-key", tls.key]
+        listen, near = f"tls/{HOST}:{PORT}", self.cable.near
+        fleet = self.fleet_of(stage, *words, *flags, listen=listen, inside=near)
+        fleet.join("judge", "analyzer", *flags, inside=near)
+        fleet.join("far", "worker", *flags, inside=self.cable.far)
+        return fleet, flags
+
+
+@pytest.fixture
+def distant(cable: Cable, certify: Certify, fleet_of: Fleets) -> Distant:
+    return Distant(cable, certify, fleet_of)
+
+
+def heard(process: Any, what: str) -> None:  # noqa: ANN401 - a process with pipes
+    """Wait until a process says something."""
+    lines = [process.stderr.readline()]
+    while what not in lines[-1]:
+        assert lines[-1], lines
+        lines.append(process.stderr.readline())
+
+
+def test_a_worker_is_cut_off_and_comes_back(
+    stage: Stage, undisturbed: Path, births: int, distant: Distant
+) -> None:
+    words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
+    fleet, _ = distant.fleet(stage, *words)
+    share = np.random.default_rng(31).uniform(0.1, 0.7)
+    fleet.wait_for(share * (undisturbed / NAME).stat().st_size)
+    distant.cable.cut()
+    heard(fleet.agents["far"], "no coordinator at")
+    assert not fleet.is_over
+    distant.cable.heal()
+    heard(fleet.agents["far"], "connected to")
+    fleet.finish()
+    assert compare(undisturbed, fleet.folder) == []
+
+
+def test_an_arena_moves_when_its_holder_is_cut_off(
+    arena_stage: Stage, calm: Path, distant: Distant
+) -> None:
+    words = ("crowd.toml", "--seed", "4", "--quiet")
+    fleet, flags = distant.fleet(arena_stage, *words)
+    whole = (calm / NAME).stat().st_size
+    share = np.random.default_rng(32).uniform(0.1, 0.5)
+    fleet.wait_for(share * whole)
+    fleet.join("near", "worker", *flags, inside=distant.cable.near)
+    distant.cable.cut()
+    fleet.wait_for((share + 0.3) * whole)
+    distant.cable.heal()
+    fleet.finish()
+    assert compare(calm, fleet.folder) == []
+    with Journal.open(fleet.folder) as journal:
+        events = journal.replay()
+    advances = [event for event in events if isinstance(event, Advanced)]
+    holders = [each.provenance.agent.partition("-")[0] for each in advances]
+    assert sorted(dict.fromkeys(holders)) == ["far", "near"]
