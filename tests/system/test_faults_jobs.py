@@ -27,7 +27,7 @@ Until = Callable[[Callable[[], bool], str], None]
 
 DOCUMENT = """
 name = "harm"
-births = 24
+births = 16
 [selection]
 population = 8
 children = 8
@@ -53,14 +53,13 @@ def fitness(track, settings):
 
 HARMS = {
     "segfault": ("os.kill(os.getpid(), signal.SIGSEGV)", "SIGSEGV"),
-    "abort": ("os.abort()", "SIGABRT"),
     "exit": ("os._exit(3)", "exit with status 3"),
     "hang": ("while True: pass", "use of too much CPU time"),
 }
 QUARANTINED = "quarantined: ended its own process 3 times, by "
 
 
-def plug(stage: Stage, harm: str = "pass", limit: float = 0.004) -> None:
+def plug(stage: Stage, harm: str = "pass", limit: float = 0.03) -> None:
     """Put an experiment and its plug-in where the commands run."""
     (stage.folder / "harm.toml").write_text(DOCUMENT)
     text = PLUGGED.format(harm=harm, limit=limit)
@@ -73,7 +72,7 @@ def reasons(folder: Path) -> dict[int, str]:
     return {row["birth"]: row["reason"] for row in rows if row["status"] == "failed"}
 
 
-WORDS = ("harm.toml", "--seed", "1", "--cpu-limit", "2", "--quiet")
+WORDS = ("harm.toml", "--seed", "1", "--cpu-limit", "0.7", "--quiet")
 
 
 @pytest.mark.parametrize("kind", sorted(HARMS))
@@ -84,9 +83,10 @@ def test_what_ends_its_process_three_times_is_quarantined(
     plug(stage, harm)
     said = stage.run("run", *WORDS, "--workers", "2", "--out", "run")
     failed = reasons(stage.folder / "run")
+    assert 1 <= len(failed) <= 3
     assert set(failed.values()) == {f"{QUARANTINED}{cause}"}
     births = read_table(stage.folder / "run", "births")
-    assert births.num_rows == 24
+    assert births.num_rows == 16
     for birth in failed:
         assert f"birth {birth} of island 0: {QUARANTINED}{cause}" in said
 
@@ -104,6 +104,8 @@ def test_deaths_by_others_hands_count_for_nothing(stage: Stage, until: Until) ->
     until(lambda: here.exists() and here.read_text() != "", "a worker is at it")
     assert run.poll() is None
     assert reasons(stage.folder / "run") == {}
+    run.kill()
+    os.kill(int(here.read_text()), signal.SIGKILL)
 
 
 def test_a_quarantine_pauses_a_run_that_wants_it_and_resume_goes_on(
