@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from schema.assembly import place_parts
+from schema.birth import BirthId
 from schema.evaluation import Floats
 from schema.parts import BodySpace, Box
 from schema.robot import Robot
@@ -115,6 +116,29 @@ def standing(figure: Figure, spot: tuple[float, float]) -> tuple[Singles, Single
     reach = np.abs(axes[..., 2, :] * figure.half_sizes).sum(axis=-1)
     centres[..., 2] -= (centres[..., 2] - reach).min()
     return centres, attitudes
+
+
+class Figures:
+    """The figures of a run's robots, each made when it is first asked for."""
+
+    def __init__(self, space: BodySpace) -> None:
+        """Know nobody yet, of part types that are known."""
+        self._space = space
+        self._bodies: dict[BirthId, Robot] = {}
+        self._made: dict[BirthId, Figure] = {}
+
+    def add(self, birth: BirthId, body: Robot) -> None:
+        """Learn what somebody looks like; nobody changes."""
+        self._bodies.setdefault(birth, body)
+
+    def __contains__(self, birth: BirthId) -> bool:
+        return birth in self._bodies
+
+    def __getitem__(self, birth: BirthId) -> Figure:
+        if birth not in self._made:
+            body = self._bodies[birth]
+            self._made[birth] = figure(body, self._space, is_plain=True)
+        return self._made[birth]
 
 
 class _Builder:

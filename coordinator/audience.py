@@ -5,6 +5,7 @@ a slow line is sent by a thread of its own.
 """
 
 import threading
+from math import inf
 from queue import SimpleQueue
 
 from coordinator.arena import Arena
@@ -62,7 +63,8 @@ class Audience:
             self._waiting = []
 
     def close(self) -> None:
-        """Serve no more; who still waits will ask anew."""
+        """Tell what is left to tell, and serve no more."""
+        self.serve(inf)
         self._replies.put(None)
 
     def _workers(self) -> tuple[Crewman, ...]:

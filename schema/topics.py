@@ -89,6 +89,11 @@ def poses_of_all(fleet: str) -> str:
     return f"revolve/{fleet}/{_CHUNKS['worker']}/*/arena/*/pose"
 
 
+def news_of_all(fleet: str) -> str:
+    """Return the key expression of all that ``Member.events`` names."""
+    return f"revolve/{fleet}/{_CHUNKS['coordinator']}/*/events"
+
+
 def member_of(key: str) -> Member:
     """Return whose token a key is.
 

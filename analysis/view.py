@@ -1,0 +1,150 @@
+"""``revolve view``: watch a run while it lives, or again from its tables."""
+
+import argparse
+import re
+from pathlib import Path
+
+from rich.progress import track
+
+from analysis.view_blueprint import layout
+from analysis.view_live import LiveSource
+from analysis.view_output import HOST, PORT, Output, ViewerError, Window, linger
+from analysis.view_recording import Recording
+from analysis.view_replay import (
+    CHUNK_S,
+    Span,
+    last_time,
+    read_experiment,
+    read_news,
+    read_poses,
+)
+from analysis.view_show import Show
+from analysis.view_stage import stage
+from analysis.view_watch import watch
+from schema.agent_command import Flags, add_network_flags, tls_of
+from schema.birth import BirthId
+from schema.crew import stop_on_signals
+from schema.service import tell_user
+
+LAST_S = 600.0
+"""Simulated time that is replayed unless told otherwise: the last so much [s]."""
+
+
+def main(arguments: list[str]) -> int:
+    """Watch a run.
+
+    Args:
+        arguments: the command's name first.
+
+    Returns:
+        0 if done.
+
+    Raises:
+        RunFolderError: no run, or nobody born in it.
+        NetworkError: no coordinator is there.
+        ViewerError: the viewer cannot be opened, or flags that do not go together.
+    """
+    options = _flags().parse_args(arguments[1:])
+    output = Output.of(options.save, options.serve)
+    if (options.run is None) == (options.connect is None):
+        raise ViewerError("name a run folder, or a coordinator by --connect: one")
+    if options.run is not None:
+        _replay(options, output)
+        return 0
+    stop = stop_on_signals()
+    with LiveSource(options.connect, options.fleet, tls_of(options)) as source:
+        watch(source, output, options.follow, stop)
+    return 0
+
+
+def _replay(options: argparse.Namespace, output: Output) -> None:
+    """Record a run from its tables, then keep it there for who looks."""
+    folder: Path = options.run
+    scene = stage(read_experiment(folder))
+    news = read_news(folder)
+    blueprint = layout(
+        scene.islands,
+        extent_m=scene.extent_m,
+        is_online=scene.is_online,
+        follow=options.follow,
+    )
+    name = f"{news.experiment}-{folder.name}"
+    with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
+        for island, walls in zip(scene.islands, scene.walls, strict=True):
+            recording.island(island, walls)
+        show = Show(recording, scene.space)
+        show.tell(news)
+        if scene.is_online:
+            _replay_poses(folder, _span(options, folder), show)
+        stop = stop_on_signals()
+        linger(output, Window(output), recording, stop)
+
+
+def _span(options: argparse.Namespace, folder: Path) -> Span:
+    """Return the simulated time to show; say so if it is not all there is."""
+    end_s = last_time(folder) if options.until is None else options.until
+    start_s = max(0.0, end_s - LAST_S) if options.start is None else options.start
+    if start_s >= end_s:
+        raise ViewerError(f"--from {start_s:g}: must be before {end_s:g} s")
+    if start_s > 0.0:
+        tell_user(
+            f"poses from {start_s:g} s to {end_s:g} s; --from and --until show others"
+        )
+    return Span(start_s, end_s)
+
+
+def _replay_poses(folder: Path, span: Span, show: Show) -> None:
+    bits = (span.end_s - span.start_s) / CHUNK_S
+    for arena, poses in track(
+        read_poses(folder, span), "poses", total=bits, transient=True
+    ):
+        show.move(arena, poses)
+
+
+def robot_name(text: str) -> BirthId:
+    """Return the individual of a flag, as ``0:17``.
+
+    Raises:
+        argparse.ArgumentTypeError: another text.
+    """
+    match = re.fullmatch(r"(\d+):(\d+)", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(f"must be ISLAND:BIRTH, as 0:17, got {text!r}")
+    return BirthId(int(match[1]), int(match[2]))
+
+
+def _followed(text: str) -> tuple[int, BirthId]:
+    birth = robot_name(text)
+    return birth.island, birth
+
+
+def _flags() -> Flags:
+    flags = Flags(
+        prog="revolve view",
+        description="Watch a run while it lives, or again from its tables.",
+        epilog="for example: revolve view runs/scenario3-seed1 --save run.rrd",
+        allow_abbrev=False,
+    )
+    flags.add_argument("run", nargs="?", type=Path, help="folder of a run to see again")
+    flags.add_argument(
+        "--connect", metavar="ADDRESS",
+        help="the coordinator of a run to watch, as in the run folder's file 'address'",
+    )  # fmt: skip
+    flags.add_argument(
+        "--save", type=Path, metavar="FILE", help="write a recording (.rrd), no window"
+    )
+    flags.add_argument(
+        "--serve", nargs="?", const=f"{HOST}:{PORT}", metavar="HOST:PORT",
+        help=f"let viewers connect, no window; default: {HOST}:{PORT}",
+    )  # fmt: skip
+    flags.add_argument(
+        "--follow", type=_followed, metavar="ISLAND:BIRTH",
+        help="have the camera follow a robot, as 0:17",
+    )  # fmt: skip
+    flags.add_argument(
+        "--from", dest="start", type=float, metavar="S",
+        help=f"poses of a replay from there on [s]; default: the last {LAST_S:g} s",
+    )  # fmt: skip
+    flags.add_argument("--until", type=float, metavar="S", help="and to there [s]")
+    add_network_flags(flags)
+    return flags

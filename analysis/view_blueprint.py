@@ -1,0 +1,86 @@
+"""How the viewer is laid out: arenas side by side, curves, log, ancestry, workers."""
+
+from collections.abc import Sequence
+
+import rerun as rr
+import rerun.blueprint as rrb
+
+from analysis.view_recording import BIRTHS, SIMULATED, island_path, robot_path
+from schema.birth import BirthId
+
+_SKY = (246, 247, 250)
+_GRID = (205, 208, 216)
+
+
+def layout(
+    islands: Sequence[int],
+    *,
+    extent_m: float,
+    is_online: bool,
+    follow: tuple[int, BirthId] | None = None,
+) -> rrb.Blueprint:
+    """Return the layout for a run.
+
+    Args:
+        islands: their numbers.
+        extent_m: how far from its middle an arena or a gallery reaches [m].
+        is_online: robots live in arenas, in simulated time.
+        follow: island and name of the robot that the camera follows there.
+    """
+    kind = "Arena" if is_online else "Population of island"
+    scenes = [_scene(each, f"{kind} {each}", extent_m, follow) for each in islands]
+    told = rrb.Vertical(
+        _curves("Fitness", islands, "fitness"),
+        _curves("Population", islands, "size"),
+        rrb.Tabs(
+            rrb.TextLogView(name="Births, deaths, migrations", origin="/log"),
+            rrb.GraphView(name="Ancestry", origin="/ancestry"),
+            rrb.TextDocumentView(name="Workers", origin="/workers"),
+            active_tab=1,
+        ),
+        row_shares=[3, 2, 4],
+    )
+    return rrb.Blueprint(
+        rrb.Horizontal(rrb.Grid(*scenes), told, column_shares=[5, 3]),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(timeline=SIMULATED if is_online else BIRTHS, state="collapsed"),
+        auto_views=False,
+    )
+
+
+def _curves(name: str, islands: Sequence[int], what: str) -> rrb.TimeSeriesView:
+    """Return the view of one curve of each island, from its beginning to its end."""
+    all_of_it = rr.TimeRange(
+        start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
+    )
+    return rrb.TimeSeriesView(
+        name=name,
+        origin="/islands",
+        contents=[f"/{island_path(each)}/{what}" for each in islands],
+        axis_x=rrb.TimeAxis(view_range=all_of_it),
+    )
+
+
+def _scene(
+    island: int, name: str, extent_m: float, follow: tuple[int, BirthId] | None
+) -> rrb.Spatial3DView:
+    """Return the view of one island: all of it, or one robot close by."""
+    path = island_path(island)
+    followed = follow is not None and follow[0] == island
+    near = 0.6 if followed else 1.45 * extent_m
+    eye = rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital,
+        position=(0.35 * near, -near, 0.8 * near),
+        look_target=(0.0, 0.0, 0.0),
+        eye_up=(0.0, 0.0, 1.0),
+        tracking_entity=robot_path(*follow) if follow and followed else None,
+    )
+    return rrb.Spatial3DView(
+        origin=f"/{path}",
+        name=name,
+        contents=[f"/{path}/robots/**", f"/{path}/wall"],
+        background=_SKY,
+        line_grid=rrb.LineGrid3D(visible=True, spacing=0.5, color=_GRID),
+        eye_controls=eye,
+    )

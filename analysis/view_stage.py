@@ -1,0 +1,73 @@
+"""What a viewer needs to know of an experiment before anything happens in it."""
+
+from dataclasses import dataclass
+from math import cos, pi, sin, tan
+
+import numpy as np
+
+from analysis.view_body import Singles
+from schema.experiment import Arena, Experiment, body_space, island_count
+from schema.experiment import island_experiment as of_island
+from schema.parts import BodySpace
+
+_MARGIN = 1.3
+_GALLERY_M = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """Where a run takes place.
+
+    Attributes:
+        islands: their numbers.
+        is_online: robots live in arenas, in simulated time.
+        extent_m: how far from its middle an arena or a gallery reaches [m].
+        space: the part types.
+        walls: of each island: place and attitude (7,) and half sizes (3,) of each.
+    """
+
+    islands: tuple[int, ...]
+    is_online: bool
+    extent_m: float
+    space: BodySpace
+    walls: tuple[tuple[tuple[Singles, Singles], ...], ...]
+
+
+def stage(experiment: Experiment) -> Stage:
+    """Return where an experiment takes place.
+
+    Raises:
+        ExperimentError: a part type of a plug-in that is not here.
+    """
+    islands = tuple(range(island_count(experiment)))
+    arenas = [of_island(experiment, each).arena for each in islands]
+    reaches = [_reach(arena) if arena else _GALLERY_M for arena in arenas]
+    return Stage(
+        islands,
+        any(arena is not None for arena in arenas),
+        max(reaches),
+        body_space(experiment.space),
+        tuple(_ring_wall(arena) if arena else () for arena in arenas),
+    )
+
+
+def _reach(arena: Arena) -> float:
+    """Return how far from its middle an arena is looked at [m]."""
+    return _MARGIN * max(0.5 * arena.wall_diameter_m, arena.birth_radius_m)
+
+
+def _ring_wall(arena: Arena) -> tuple[tuple[Singles, Singles], ...]:
+    """Return the walls of an arena, as ``schema.mjcf`` puts them."""
+    if not arena.wall_diameter_m:
+        return ()
+    half, height = 0.5 * arena.wall_thickness_m, 0.5 * arena.wall_height_m
+    centre = 0.5 * arena.wall_diameter_m + half
+    length = (centre + half) * tan(pi / arena.wall_segments)
+    size = np.array([half, length, height], dtype=np.float32)
+    walls = []
+    for index in range(arena.wall_segments):
+        angle = 2.0 * pi * index / arena.wall_segments
+        turn = (0.0, 0.0, sin(0.5 * angle), cos(0.5 * angle))
+        place = (centre * cos(angle), centre * sin(angle), height, *turn)
+        walls.append((np.array(place, dtype=np.float32), size))
+    return tuple(walls)
