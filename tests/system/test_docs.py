@@ -67,6 +67,33 @@ def test_experiments_of_the_experiments_page(tmp_path: Path) -> None:
             parse_experiment(document, page.name)
 
 
+def test_commands_of_the_robots_page(tmp_path: Path) -> None:
+    page = TOP / "docs" / "robots.md"
+    (document,) = _blocks(page, "toml")
+    (tmp_path / "robogen.toml").write_text(document)
+    (block,) = _blocks(page, "sh")
+    own = "revolve robot simulate some.yaml --experiment robogen.toml"
+    told: list[str] = []
+    for line in (*block.splitlines(), own):
+        words = line.partition("#")[0].split()
+        done = subprocess.run(
+            [sys.executable, "-m", *words],
+            cwd=tmp_path,
+            env=_environment(),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if "render" in words and "pictures need" in done.stderr:
+            continue
+        assert done.returncode == 0, f"{line}\n{done.stderr}"
+        told += [done.stdout] if "simulate" in words else []
+    assert told[0] == told[1]
+    assert told[2] != told[0]
+    some, again = (tmp_path / name for name in ("some.yaml", "again.yaml"))
+    assert some.read_text() == again.read_text()
+
+
 def test_every_command_that_a_page_names_exists() -> None:
     named = {
         word
