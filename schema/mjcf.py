@@ -279,8 +279,9 @@ class _Builder:
         """Add a part's boxes to its segments, and its imus to their boxes."""
         boxes, rotation = self.shapes[index].boxes, self.rotations[index]
         imus = {s.box for s in self.types[index].sensors if s.kind == "imu"}
-        # Arrays where more than one box takes them: half of a tuple's time.
-        colour = np.array((*self.robot.parts[index].parameters[-3:], 1.0))
+        # Arrays where more than one box takes them: half of a tuple's time; and
+        # colours as the engine keeps them.
+        colour = np.array((*self.robot.parts[index].parameters[-3:], 1.0), np.float32)
         upright = _quaternion(rotation)
         ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = rotation.tolist()
         px, py, pz = self.positions[index].tolist()

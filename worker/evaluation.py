@@ -148,6 +148,7 @@ class _Life:
         self._mind = Solo(
             pack(robot.brain, width), width, self._tick_s, ends // self._brain_steps + 1
         )
+        self._senses.show(self._mind.readings)
 
     def tick(self, step: int) -> None:
         """Read, think and command; ``step`` counts from birth."""
@@ -156,11 +157,10 @@ class _Life:
             # it, and one velocity that is no number breaks all of a robot's.
             if not math.isfinite(sum(self._velocities.tolist())):
                 _raise_diverged(self.data, step * self._timestep_s)
-            readings = self._senses.read(self._model, self.data, self._tick_s)
+            self._senses.read(self._model, self.data, self._tick_s)
         else:
-            readings = self._senses.start(self._model, self.data)
-        outputs = self._mind.step(readings[0], step // self._brain_steps)
-        self._servos.drive(self.data, outputs)
+            self._senses.start(self._model, self.data)
+        self._servos.drive(self.data, self._mind.step(step // self._brain_steps))
 
 
 def _check_warnings(data: mujoco.MjData, time_s: float) -> None:

@@ -5,6 +5,7 @@ the last step, never of its ``sensordata``, which is empty after a restore. A ro
 is found in a model by the prefix of its names, so that many can share one.
 """
 
+from itertools import chain
 from typing import cast
 
 import mujoco
@@ -148,7 +149,8 @@ class Senses:
         if self._imus:
             self._read_sites(model, data, interval_s)
         if self.pads:
-            touching = set(data.contact.geom.ravel().tolist())
+            # No ravel: a copy of rows that lie apart costs more than the chain.
+            touching = set(chain.from_iterable(data.contact.geom.tolist()))
             for geom, place in self.pads:
                 self._cells[place] = float(geom in touching)
         return self.readings

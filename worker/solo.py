@@ -16,9 +16,12 @@ class Solo:
     """A network that ticks from birth on, a known number of times at most.
 
     What an oscillator does depends on nothing but its age: it is computed before
-    the first tick. What is not there, squeezed or linear neurons, costs nothing.
+    the first tick, as what is added to its state, which is 0 otherwise. What is not
+    there, squeezed or linear neurons, costs nothing.
 
     Attributes:
+        readings: (1, I) what the sensors read; whoever lets it tick sets them
+            before, finite, unused inputs 0.
         states: (S,) outputs and hidden states after the last tick.
     """
 
@@ -34,57 +37,59 @@ class Solo:
             ticks: how many there will be at most.
         """
         self._weights = network.weights
-        frequency, self._shift, self._scale, self._offset = network.numbers
+        frequency, self._shift, scale, offset = network.numbers
         self._is_sigmoid, is_oscillator = network.kinds
-        is_linear = (self._scale != 0.0) & ~self._is_sigmoid & ~is_oscillator
+        is_linear = (scale != 0.0) & ~self._is_sigmoid & ~is_oscillator
         self._has_sigmoids = bool(self._is_sigmoid.any())
         self._has_linears = bool(is_linear.any())
+        self._scale = np.where(is_oscillator, 0.0, scale)
         # Inputs and previous states side by side, as the weights expect them.
         self._sources = np.zeros(width.inputs + width.states)
-        self._readings = self._sources[: width.inputs]
-        self.states = self._sources[width.inputs :]
+        self.readings: Floats = self._sources[np.newaxis, : width.inputs]
+        self.states: Floats = self._sources[width.inputs :]
         self._outputs = self.states[: width.outputs]
         self._next = np.empty(width.states)
         self._other = np.empty(width.states)
-        self._oscillators = is_oscillator.nonzero()[0]
         ages = np.arange(ticks, dtype=np.float64)[:, np.newaxis] * tick_s
-        chosen = self._oscillators
-        angles = frequency[chosen] * ages - self._shift[chosen]
-        swings = np.sin(angles) * self._scale[chosen] + self._offset[chosen]
-        self._swings = list(np.clip(swings, -STATE_LIMIT, STATE_LIMIT))
+        angles = frequency[is_oscillator] * ages - self._shift[is_oscillator]
+        swings = np.sin(angles) * scale[is_oscillator] + offset[is_oscillator]
+        offsets = np.tile(offset, (ticks, 1))
+        offsets[:, is_oscillator] = np.clip(swings, -STATE_LIMIT, STATE_LIMIT)
+        self._offsets = list(offsets)
 
-    def step(self, readings: Floats, tick: int) -> Floats:
-        """Tick once and return the outputs.
+    def step(self, tick: int) -> Floats:
+        """Tick once, with the present readings, and return the outputs.
 
         Args:
-            readings: (I,) sensor readings, finite; unused inputs 0.
             tick: number of the tick, 0 at birth.
 
         Returns:
             (O,) output states, a view that the next tick overwrites; finite, not
             yet clipped to [0, 1].
         """
+        offset = self._offsets[tick]
         if self._has_sigmoids or self._has_linears:
-            self._readings[:] = readings
-            self._think()
-        self.states[self._oscillators] = self._swings[tick]
+            self._think(offset)
+        else:
+            self.states[:] = offset
         return self._outputs
 
-    def _think(self) -> None:
-        """Set all states but those of oscillators."""
+    def _think(self, offset: Floats) -> None:
+        """Set all states: weigh, squeeze, scale, add."""
+        # With where to by its place, not by ``out=``: a fifth less of each call.
         new, states = self._next, self.states
         self._weights.dot(self._sources, new)
-        np.subtract(new, self._shift, out=new)
+        np.subtract(new, self._shift, new)
         if not self._has_linears:
-            np.tanh(new, out=new)
+            np.tanh(new, new)
         elif self._has_sigmoids:
-            np.tanh(new, out=self._other)
+            np.tanh(new, self._other)
             np.putmask(new, self._is_sigmoid, self._other)
-        np.multiply(new, self._scale, out=new)
+        np.multiply(new, self._scale, new)
         if not self._has_linears:
             # Squeezed states never come near the limit.
-            np.add(new, self._offset, out=states)
+            np.add(new, offset, states)
             return
-        np.add(new, self._offset, out=new)
+        np.add(new, offset, new)
         np.maximum(new, _LOWEST, out=new)
         np.minimum(new, _HIGHEST, out=states)
