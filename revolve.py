@@ -17,8 +17,10 @@ COMMANDS = {
     "robot random": ("coordinator.robot_command", "make up a robot"),
     "robot render": ("analysis.__main__", "draw the robot of a file"),
     "robot simulate": ("worker.robot_command", "judge the robot of a file"),
+    "view": ("analysis.__main__", "watch a run, live or again"),
     "analyze": ("analysis.__main__", "draw what the tables say"),
     "bench": ("worker.bench", "measure this machine"),
+    "bench dispatch": (_COORDINATOR, "measure how far a coordinator reaches"),
 }
 """Module whose ``main`` takes the words, the command first; and what it does.
 
@@ -40,6 +42,9 @@ def main(arguments: list[str] | None = None) -> int:
     if not words or words[0] in ("-h", "--help"):
         print(_overview())
         return 0
+    name = " ".join(words[:2])
+    if name in COMMANDS:
+        words = [name, *words[2:]]
     if words[0] not in COMMANDS:
         near = import_module("schema.experiment").nearest(words[0], COMMANDS)
         print(

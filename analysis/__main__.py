@@ -41,6 +41,8 @@ def main(arguments: list[str]) -> int:
     """
     if arguments[:2] == ["robot", "render"]:
         return _render(arguments)
+    if arguments[0] == "view":
+        return _view(arguments)
     options = _flags().parse_args(arguments[1:])
     runs, left_out = read_runs(options.runs)
     try:
@@ -173,6 +175,17 @@ def _render(arguments: list[str]) -> int:
     from worker.evaluation import simulate
 
     return render(arguments, simulate)
+
+
+def _view(arguments: list[str]) -> int:
+    """Show a run, by the worker's and the coordinator's word if robots are to move."""
+    try:
+        from analysis.view import main as view
+    except ImportError as error:
+        raise MissingExtra(
+            f"the viewer needs {error.name}: pip install 'revolve-islands[view]'"
+        ) from None
+    return view(arguments)
 
 
 if __name__ == "__main__":

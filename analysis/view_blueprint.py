@@ -68,7 +68,7 @@ def _scene(
     """Return the view of one island: all of it, or one robot close by."""
     path = island_path(island)
     followed = follow is not None and follow[0] == island
-    near = 0.6 if followed else 1.45 * extent_m
+    near = 0.6 if followed else 1.2 * extent_m
     eye = rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
         position=(0.35 * near, -near, 0.8 * near),

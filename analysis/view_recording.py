@@ -215,7 +215,7 @@ class Recording:
             positions=[(24.0 * each.order, 90.0 * each.rank) for each in people],
             colors=[_ALIVE if each.is_alive else _DEAD for each in people],
             labels=[_name(each.birth) for each in people],
-            radii=[7.0 if each.is_alive else 4.0 for each in people],
+            radii=[16.0 if each.is_alive else 9.0 for each in people],
             show_labels=False,
         )
         edges = [
