@@ -34,7 +34,7 @@ MORTAL = Path(__file__).with_name("mortal.py")
 
 SINGLES = """
 name = "singles"
-births = 64
+births = 40
 [selection]
 population = 8
 children = 8
