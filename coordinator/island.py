@@ -1,4 +1,4 @@
-"""An off-line island: who is born, judged once, and lives on. A pure machine.
+"""An off-line island: who is born, is judged, and lives on. A pure machine.
 
 Founders come first, then broods of children of the population that stands when
 the brood begins. Births of a brood are in flight together, up to the experiment's

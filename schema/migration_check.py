@@ -133,11 +133,12 @@ def _migrants_problem(own: Experiment, migration: Migration) -> str:
 
 
 def _replaced_problem(own: Experiment, migration: Migration) -> str:
-    if own.arena is not None or migration.replaced != "none":
+    varies = own.arena is not None or own.selection.culling is not None
+    if varies or migration.replaced != "none":
         return ""
     return (
         'migration.replaced: "none" is for islands where the number of the living '
-        "varies; off-line it is selection.population"
+        "varies; off-line, without selection.culling, it is selection.population"
     )
 
 

@@ -83,3 +83,11 @@ def test_what_cannot_be_is_refused_in_one_line(text: str, message: str) -> None:
         parse(text)
     assert str(raised.value).startswith("test.toml: ")
     assert "\n" not in str(raised.value)
+
+
+def test_immigrants_may_come_on_top_where_a_population_varies() -> None:
+    migration = '[[islands]]\ncount = 2\n[migration]\ntopology = "ring"\n'
+    migration += 'replaced = "none"\n'
+    parse(f"[selection.culling]\n{migration}")
+    with pytest.raises(ExperimentError, match="without selection"):
+        parse(migration)
