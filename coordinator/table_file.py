@@ -13,10 +13,11 @@ from schema.errors import MalformedMessage, RunFolderError
 from schema.run_tables import (
     SEGMENTS,
     batch_ends,
-    read_chain,
+    batches_by_island,
     read_table,
     segment_path,
     segments_of,
+    stored_rows,
 )
 from schema.tables import TABLES, read_columns
 
@@ -47,8 +48,7 @@ class TableFile:
         if parquet.exists():
             self._stored: int = read_table(folder, name).num_rows
             return
-        chain, unused = read_chain(folder, name)
-        self._stored = sum(batch.num_rows for batch in chain)
+        self._stored, unused = stored_rows(folder, name)
         try:
             for _, path in unused:
                 path.unlink()
@@ -95,23 +95,30 @@ class TableFile:
         """Write all rows as Parquet, unless that is done."""
         if self._parquet.exists():
             return
-        table = read_table(self._folder, self._name)
-        if table.num_rows != self._stored:
+        rows, _ = stored_rows(self._folder, self._name)
+        if rows != self._stored:
             raise RunFolderError(
                 f"{self._folder / SEGMENTS}: {self._name}: must hold {self._stored} "
-                f"rows, got {table.num_rows}: resume the run to write them again"
+                f"rows, got {rows}: resume the run to write them again"
             )
-        replace_durably(
-            self._parquet,
-            lambda path: pa.parquet.write_table(
-                table, path, compression="zstd", row_group_size=ROW_GROUP
-            ),
-        )
+        replace_durably(self._parquet, self._write_parquet)
 
     def close(self) -> None:
         """Close the segment."""
         if self._segment is not None:
             self._segment.close()
+
+    def _write_parquet(self, path: Path) -> None:
+        """Write all rows, a group of them in memory at a time."""
+        with pa.parquet.ParquetWriter(path, self._schema, compression="zstd") as file:
+            waiting = self._schema.empty_table()
+            for batch in batches_by_island(self._folder, self._name):
+                waiting = pa.concat_tables([waiting, pa.Table.from_batches([batch])])
+                while waiting.num_rows >= ROW_GROUP:
+                    file.write_table(waiting.slice(0, ROW_GROUP))
+                    waiting = waiting.slice(ROW_GROUP)
+            if waiting.num_rows:
+                file.write_table(waiting)
 
     def _write(self, batch: pa.RecordBatch) -> None:
         """Add a batch to the segment, whole or not at all."""

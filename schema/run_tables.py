@@ -7,10 +7,13 @@ carry columns (hive partitioning), so that one call reads a campaign; in DuckDB
 ``read_parquet('runs/**/births.parquet', hive_partitioning = true)``, and so on.
 """
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import quote
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.dataset
 from pyarrow.parquet import ParquetFile
 
@@ -52,7 +55,7 @@ def read_segment(path: Path, schema: pa.Schema) -> list[pa.RecordBatch]:
         RunFolderError: the segment is of another version of its table, or the disk
             fails.
     """
-    return [batch for _, batch in _read_batches(path, schema)]
+    return [batch for _, batch in _batches(path, schema)]
 
 
 def batch_ends(path: Path, schema: pa.Schema) -> list[tuple[int, int]]:
@@ -62,32 +65,25 @@ def batch_ends(path: Path, schema: pa.Schema) -> list[tuple[int, int]]:
         RunFolderError: the segment is of another version of its table, or the disk
             fails.
     """
-    return [(end, batch.num_rows) for end, batch in _read_batches(path, schema)]
+    return [(end, batch.num_rows) for end, batch in _batches(path, schema)]
 
 
-def _read_batches(path: Path, schema: pa.Schema) -> list[tuple[int, pa.RecordBatch]]:
+def _batches(path: Path, schema: pa.Schema) -> Iterator[tuple[int, pa.RecordBatch]]:
+    """Yield where each complete batch of a segment ends, and it; one at a time."""
     try:
-        data = path.read_bytes()
+        source = pa.OSFile(str(path))
     except OSError as error:
         raise RunFolderError(f"{path}: cannot be read: {error.strerror}") from None
-    batches: list[tuple[int, pa.RecordBatch]] = []
-    try:
-        source = pa.BufferReader(data)
+    with source, contextlib.suppress(pa.ArrowInvalid, OSError, MemoryError):
+        # A cut or damaged tail raises one of these: batches before it are whole.
         reader = pa.ipc.open_stream(source)
         if not is_earlier(reader.schema, schema):
             raise RunFolderError(
                 f"{path}: was written by another version of Revolve: finish the run "
                 "with that one"
             )
-        for batch in iter(reader.read_next_batch, None):
-            whole = _whole(batch, schema)
-            batches.append((source.tell(), whole))
-    except StopIteration:
-        pass
-    except (pa.ArrowInvalid, OSError, MemoryError):
-        # A cut or damaged tail: batches before it are whole.
-        pass
-    return batches
+        for batch in reader:
+            yield source.tell(), _whole(batch, schema)
 
 
 def _whole(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
@@ -99,38 +95,80 @@ def _whole(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
     return pa.RecordBatch.from_arrays(arrays, schema=schema)
 
 
-def read_chain(
-    folder: Path, table: str
-) -> tuple[list[pa.RecordBatch], list[tuple[int, Path]]]:
-    """Return the rows that stand in a table's segments, without a gap.
+def stored_batches(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
+    """Yield the rows that stand in a table's segments, without a gap.
 
     Every row carries its number, so a row that is missing is noticed. Rows behind a
-    gap are left out: a replay of the journal writes them again.
+    gap are left out: a replay of the journal writes them again. No more than one
+    batch is in memory.
 
     Args:
         folder: the run folder.
         table: its name.
 
-    Returns:
-        The batches, rows 0, 1, 2 and so on; and the segments that they do not use.
+    Raises:
+        RunFolderError: a segment of another version.
+    """
+    for _, batch in _chain(folder, table):
+        if batch is not None:
+            yield batch
+
+
+def batches_by_island(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
+    """Yield the same rows in the order of their islands, with their numbers in it.
 
     Raises:
         RunFolderError: a segment of another version.
     """
-    chain: list[pa.RecordBatch] = []
+    islands: set[int] = set()
+    if "island" in TABLES[table].names:
+        for batch in stored_batches(folder, table):
+            islands.update(pc.unique(batch["island"]).to_pylist())
+    if len(islands) <= 1:
+        yield from stored_batches(folder, table)
+        return
     rows = 0
-    segments = segments_of(folder, table)
-    for index, (_, path) in enumerate(segments):
-        for batch in read_segment(path, TABLES[table]):
-            if batch.num_rows and batch["record"][0].as_py() != rows:
-                return chain, segments[index:]
-            chain.append(batch)
+    for island in sorted(islands):
+        for batch in stored_batches(folder, table):
+            own = batch.filter(pc.equal(batch["island"], island))
+            numbers = pa.array(range(rows, rows + own.num_rows), pa.int64())
+            rows += own.num_rows
+            columns = [numbers, *own.columns[1:]]
+            yield pa.RecordBatch.from_arrays(columns, schema=TABLES[table])
+
+
+def stored_rows(folder: Path, table: str) -> tuple[int, list[tuple[int, Path]]]:
+    """Return how many rows ``stored_batches`` yields, and segments it does not use.
+
+    Raises:
+        RunFolderError: a segment of another version.
+    """
+    rows, unused = 0, []
+    for index, batch in _chain(folder, table):
+        if batch is None:
+            unused = segments_of(folder, table)[index:]
+        else:
             rows += batch.num_rows
-    return chain, []
+    return rows, unused
+
+
+def _chain(folder: Path, table: str) -> Iterator[tuple[int, pa.RecordBatch | None]]:
+    """Yield index of the segment and batch; no batch where there is a gap."""
+    rows = 0
+    for index, (_, path) in enumerate(segments_of(folder, table)):
+        for _, batch in _batches(path, TABLES[table]):
+            if batch.num_rows and batch["record"][0].as_py() != rows:
+                yield index, None
+                return
+            rows += batch.num_rows
+            yield index, batch
 
 
 def read_table(folder: Path, table: str) -> pa.Table:
-    """Return all rows of a table of a run, finished or not.
+    """Return all rows of a table of a run, finished or not, island by island.
+
+    While a run lives, rows of several islands come as their answers do; those of
+    one island come in an order that repeats.
 
     Args:
         folder: the run folder.
@@ -144,8 +182,7 @@ def read_table(folder: Path, table: str) -> pa.Table:
         raise RunFolderError(f"{folder}: no such folder")
     finished = sorted((folder / FINISHED).glob(f"*/*/{table}.parquet"))
     if not finished:
-        chain, _ = read_chain(folder, table)
-        return pa.Table.from_batches(chain, TABLES[table])
+        return pa.Table.from_batches(batches_by_island(folder, table), TABLES[table])
     try:
         return completed(ParquetFile(finished[0]).read(), TABLES[table])
     except (ValueError, OSError) as error:

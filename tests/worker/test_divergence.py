@@ -41,7 +41,7 @@ ABSURD = replace(SETTINGS, space=SPACE)
 def with_brick(turtle: Robot, kind: str) -> Robot:
     """Return the turtle with one of its bricks of another kind."""
     made = [
-        changed(part, kind=kind) if index == 2 else part
+        replace(part, kind=kind) if index == 2 else part
         for index, part in enumerate(turtle.parts)
     ]
     return Robot(tuple(made), turtle.brain)
