@@ -1,4 +1,4 @@
-"""Commands of the coordinator: ``run``, ``coordinator``, ``resume``, ``compare``."""
+"""Commands of the coordinator: those that run, resume, compare and measure."""
 
 import argparse
 import sys
@@ -46,6 +46,8 @@ def main(arguments: list[str]) -> int:
     options = parser(command).parse_args(words)
     if command == "compare":
         return _compare(options)
+    if command == "bench dispatch":
+        return _bench(options)
     if command == "resume":
         folder = Path(options.folder)
         return resume(folder, _deployment(options, _experiments_of(folder)))
@@ -88,7 +90,7 @@ def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
 def _deployment(
     options: argparse.Namespace, experiments: tuple[Experiment, ...]
 ) -> Deployment:
-    """Return who does the work; the one place that names the other rooms."""
+    """Return who does the work; this names the other rooms."""
     import analyzer.jobs
     import analyzer.service
     import worker.jobs
@@ -131,6 +133,16 @@ def _has_one_arena(experiment: Experiment, options: argparse.Namespace) -> bool:
     is_repeated = getattr(options, "repeats", None) is not None
     is_alone = island_count(experiment) == 1 and not is_repeated
     return is_alone and island_experiment(experiment, 0).arena is not None
+
+
+def _bench(options: argparse.Namespace) -> int:
+    """Measure; another one that names the other rooms."""
+    import analyzer.service
+    import worker.null
+    from coordinator import dispatch_bench
+
+    bodies = (worker.null.process, worker.null.timed_process, analyzer.service.process)
+    return dispatch_bench.run(options, *bodies)
 
 
 def _compare(options: argparse.Namespace) -> int:

@@ -15,6 +15,7 @@ _EXAMPLES = {
     "coordinator": "revolve coordinator scenario1 --listen tcp/127.0.0.1:7447",
     "resume": "revolve resume runs/scenario1-seed1",
     "compare": "revolve compare runs/a runs/b",
+    "bench dispatch": "revolve bench dispatch",
 }
 
 _DESCRIPTIONS = {
@@ -22,6 +23,7 @@ _DESCRIPTIONS = {
     "coordinator": "Run experiments for workers and analyzers that connect.",
     "resume": "Go on with a run or campaign that was stopped or killed.",
     "compare": "Tell whether two runs are equal, row by row, where they should be.",
+    "bench dispatch": "Measure what jobs cost a coordinator; simulate large fleets.",
 }
 
 
@@ -37,6 +39,9 @@ def parser(command: str) -> argparse.ArgumentParser:
         flags.add_argument("first", help="run folder")
         flags.add_argument("second", help="run folder")
         return flags
+    if command == "bench dispatch":
+        _add_bench(flags)
+        return flags
     if command == "resume":
         flags.add_argument("folder", help="folder of the run or campaign")
     else:
@@ -44,6 +49,25 @@ def parser(command: str) -> argparse.ArgumentParser:
     flags.set_defaults(command=command)
     _add_deployment(flags, command)
     return flags
+
+
+def _add_bench(flags: argparse.ArgumentParser) -> None:
+    flags.add_argument(
+        "--seconds",
+        type=_speed,
+        default=5.0,
+        metavar="S",
+        help="of each measurement through the network (default: 5)",
+    )
+    flags.add_argument(
+        "--workers",
+        type=_count,
+        default=8,
+        help="that take 40 ms, and no processor time, for an evaluation (default: 8)",
+    )
+    flags.add_argument(
+        "--births", type=_count, default=1500, help="without physics (default: 1500)"
+    )
 
 
 def _add_science(flags: argparse.ArgumentParser) -> None:

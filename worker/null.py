@@ -1,13 +1,19 @@
-"""A worker that does not simulate: what everything else costs.
+"""Workers that do not simulate: what everything else costs.
 
-Every robot is judged 0 at once. For benchmarks of dispatch, network and tables.
+Every robot is judged 0, at once or after a time in which the processor is free. For
+benchmarks of dispatch, network and tables.
 """
+
+import time
 
 from schema.codec import Answer, decode_request, encode_answer
 from schema.evaluation import Evaluation
 from schema.network import Agent
 from schema.service import serve_as_process
 from schema.supervision import Post
+
+TIMED_S = 0.04
+"""How long ``timed_process`` takes for an evaluation [s]."""
 
 
 def answer(request: bytes) -> bytes:
@@ -24,3 +30,15 @@ def answer(request: bytes) -> bytes:
 def process(agent: Agent, post: Post) -> None:
     """Be one process of a crew of such workers; returns when asked to end."""
     serve_as_process(answer, agent, post)
+
+
+def timed_process(agent: Agent, post: Post) -> None:
+    """Be one that takes its time; returns when asked to end."""
+
+    def slow_answer(request: bytes) -> bytes:
+        until_s = time.monotonic() + TIMED_S
+        answered = answer(request)
+        time.sleep(max(0.0, until_s - time.monotonic()))
+        return answered
+
+    serve_as_process(slow_answer, agent, post)
