@@ -27,6 +27,7 @@ HOMES = {
     ),
     "rerun": ("analysis/view*.py",),
     "plotnine": ("analysis/figure*.py",),
+    "numba": ("analysis/distance.py",),
     "matplotlib": ("analysis/figure*.py",),
     "networkx": ("coordinator/topology.py",),
 }

@@ -29,20 +29,28 @@ def _environment(*paths: Path) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": found}
 
 
-def test_python_of_the_tables_page(undisturbed: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("page", "least"), [("tables.md", 5), ("analysis.md", 3)])
+def test_python_of_the_pages_on_tables(
+    page: str, least: int, undisturbed: Path, tmp_path: Path
+) -> None:
     shutil.copytree(undisturbed, tmp_path / "runs" / "a")
-    blocks = _blocks(TOP / "docs" / "tables.md", "python")
-    assert len(blocks) >= 4
-    for block in blocks:
+    commands = [[sys.executable, "-m", *block.split()]
+                for block in _blocks(TOP / "docs" / page, "bash")]  # fmt: skip
+    blocks = _blocks(TOP / "docs" / page, "python")
+    assert len(blocks) >= least
+    for words in [
+        *commands,
+        *([sys.executable, "-W", "error", "-c", block] for block in blocks),
+    ]:
         done = subprocess.run(
-            [sys.executable, "-W", "error", "-c", block],
+            words,
             cwd=tmp_path,
             env=_environment(),
             capture_output=True,
             text=True,
             check=False,
         )
-        assert done.returncode == 0, f"{block}\n{done.stderr}"
+        assert done.returncode == 0, f"{words[-1]}\n{done.stderr}"
 
 
 def test_experiments_of_the_experiments_page(tmp_path: Path) -> None:

@@ -1,0 +1,66 @@
+"""``revolve analyze`` as a user starts it, on runs that were really made."""
+
+import shutil
+from pathlib import Path
+
+import duckdb
+import polars as pl
+import pyarrow.parquet as pq
+import pytest
+
+from analysis.outputs import OUTPUTS, schema
+from tests.system.conftest import Stage
+
+pytestmark = pytest.mark.system
+
+
+@pytest.fixture
+def analysed(stage: Stage, undisturbed: Path, calm: Path) -> tuple[Path, str]:
+    """Return the measures of an off-line run, an arena and two broken runs."""
+    for name, run in (("a", undisturbed), ("b", calm), ("c", undisturbed)):
+        shutil.copytree(run, stage.folder / "runs" / name)
+    (stage.folder / "runs" / "d").mkdir()
+    (stage.folder / "runs" / "d" / "run.json").write_text("{")
+    told = stage.run("analyze", "runs", "--out", "report")
+    return stage.folder / "report", told
+
+
+def test_runs_are_measured_and_what_is_left_out_is_named(
+    analysed: tuple[Path, str],
+) -> None:
+    report, told = analysed
+    measures = {path.stem: pq.read_table(path) for path in report.glob("*/*.parquet")}
+    assert set(measures) == set(OUTPUTS) - {"between", "migrants"}
+    for name, table in measures.items():
+        assert table.schema.equals(schema(name), check_metadata=True)
+    assert measures["runs"]["experiment"].to_pylist() == ["scenario1", "crowd"]
+    assert measures["runs"]["births"].to_pylist() == [60, 25]
+    (arena,) = measures["interactions"].to_pylist()
+    assert arena["robots"] == 25
+    assert 0 < arena["touched"] <= 1
+    assert {row["experiment"] for row in measures["variability"].to_pylist()} == {
+        "crowd"
+    }
+    named = measures["left_out"].to_pylist()
+    assert [(row["folder"], row["why"][:12]) for row in named] == [
+        ("runs/d", "run.json: ca"),
+        ("runs/c", "the same run"),
+    ]
+    assert "left out: runs/d: run: run.json" in told
+    assert (report / "progression.png").is_file()
+
+
+def test_three_readers_read_the_same(analysed: tuple[Path, str]) -> None:
+    report, _ = analysed
+    for path in sorted(report.glob("measures/*.parquet")):
+        arrow = pq.read_table(path)
+        assert pl.read_parquet(path).rows() == [
+            tuple(row.values()) for row in arrow.to_pylist()
+        ]
+        rows = duckdb.read_parquet(str(path)).fetchall()
+        assert rows == [tuple(row.values()) for row in arrow.to_pylist()]
+
+
+def test_no_run_is_one_line(stage: Stage) -> None:
+    told = stage.run("analyze", "nowhere", code=2)
+    assert told == "revolve: nowhere: no such folder\n"
