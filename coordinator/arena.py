@@ -291,22 +291,26 @@ class Arena:
                 resident = self._residents.remove(one.birth)
                 commands.append(self._gone(resident, "migrated"))
         if landing.is_complete:
-            landing.arrive(self.births, now_s)
-            self.is_extinct = self._is_starving and not landing.queue
+            living = [one.birth for one in self._residents]
+            came = landing.arrive(living, self.births, now_s)
+            self.is_extinct = self._is_starving and not came
             self._is_starving = False
             if self.is_extinct:
                 return [*commands, self._finish()]
         return commands if landing.is_waiting else commands + self._admit(landing)
 
     def _admit(self, landing: Landing) -> list[ArenaCommand]:
-        """Let immigrants in, each at a place of chance; no copies of the living."""
+        """Let immigrants in, each at a place of chance.
+
+        Nobody makes room where the living are few.
+        """
         commands: list[ArenaCommand] = []
-        landing.queue = [
-            one for one in landing.queue if not self._residents.get(one.birth)
-        ]
-        while found := landing.next_in(
-            self._residents.mature(), has_room=self._has_room()
-        ):
+        while True:
+            is_few = len(self._residents) < self._rules.population_floor
+            mature = () if is_few else self._residents.mature()
+            found = landing.next_in(mature, has_room=self._has_room())
+            if found is None:
+                return commands
             immigrant, replaced = found
             if replaced is not None:
                 resident = self._residents.remove(replaced.birth)
@@ -316,7 +320,6 @@ class Arena:
             robot = develop(immigrant.genome, self._space)
             self._residents.add(Resident(immigrant, robot, place))
             self._pending.insert(immigrant.birth, robot, place)
-        return commands
 
     def _advance(self) -> AdvanceShard:
         clock, step = self._clock, self.step

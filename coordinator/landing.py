@@ -6,6 +6,7 @@ from dataclasses import replace
 from coordinator.events import Emigrate, Travelled
 from coordinator.exchange import Exchange
 from coordinator.selection import Individual
+from schema.birth import BirthId
 
 
 class Landing:
@@ -72,14 +73,24 @@ class Landing:
         """
         self._exchange.take(event)
 
-    def arrive(self, births: int, now_s: float) -> None:
-        """Begin the next epoch; have whoever came wait for room."""
-        known = [one.birth for one in self.queue]
-        self.queue += [
+    def arrive(
+        self, living: Sequence[BirthId], births: int, now_s: float
+    ) -> list[Individual]:
+        """Begin the next epoch; return who came and waits for room now.
+
+        Args:
+            living: who is there already, and needs no copy.
+            births: in the arena.
+            now_s: simulated time [s].
+        """
+        known = [*living, *(one.birth for one in self.queue)]
+        came = [
             replace(one, fitness=0.0, has_failed=False)
             for one, _ in self._exchange.arrive(births, now_s)
             if one.birth not in known
         ]
+        self.queue += came
+        return came
 
     def next_in(
         self, mature: Sequence[Individual], *, has_room: bool

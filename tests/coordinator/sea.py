@@ -1,0 +1,134 @@
+"""Several islands in one process, whose questions are answered in any order."""
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from coordinator.archipelago import archipelago
+from coordinator.arena import Arena
+from coordinator.events import (
+    AdvanceShard,
+    ArenaCommand,
+    Emigrate,
+    Evaluate,
+    Evaluated,
+    Finish,
+    Immigrated,
+    IslandCommand,
+    NeighbourClosed,
+    Record,
+    Started,
+    Vet,
+    Vetted,
+)
+from coordinator.island import Island
+from schema.birth import BirthId
+from schema.evaluation import Evaluation, Provenance
+from schema.experiment import Experiment
+from tests.coordinator.arena_world import VIABLE, World, golden
+
+SOMEBODY = Provenance("worker-1", "x86", 0.5)
+
+Fit = Callable[[BirthId, int], float]
+
+
+def spread(birth: BirthId, island: int) -> float:
+    """Find everybody differently fit, and on each island otherwise; in (0, 1)."""
+    return (birth.number * 0.618034 + birth.island * 0.31 + island * 0.07 + 0.1) % 1.0
+
+
+@dataclass
+class Sea:
+    """An archipelago and all that its islands said.
+
+    Attributes:
+        order: how far to rotate the open questions before each answer.
+        fit: fitness off-line, of a birth on an island.
+        lazy: islands whose questions wait until nobody else has one.
+    """
+
+    experiment: Experiment
+    seed: int = 1
+    order: Iterator[int] | None = None
+    fit: Fit = spread
+    lazy: tuple[int, ...] = ()
+    islands: dict[int, Island | Arena] = field(default_factory=dict)
+    worlds: dict[int, World] = field(default_factory=dict)
+    commands: dict[int, list[IslandCommand | ArenaCommand]] = field(
+        default_factory=dict
+    )
+    waiting: deque[tuple[int, Vet | Evaluate | AdvanceShard]] = field(
+        default_factory=deque
+    )
+
+    def __post_init__(self) -> None:
+        """Make the islands."""
+        self.islands = archipelago(self.experiment, self.seed, 0)
+        self.worlds = {number: World(golden) for number in self.islands}
+        self.commands = {number: [] for number in self.islands}
+
+    def live(self, turns: int = 1_000_000) -> "Sea":
+        """Go on to the end, or for some turns."""
+        if not any(self.commands.values()):
+            self.start()
+        for _ in range(turns):
+            if not self.waiting:
+                break
+            self.turn()
+        return self
+
+    def start(self) -> None:
+        for number in self.islands:
+            self.tell(number, Started())
+
+    def turn(self) -> None:
+        """Answer one question."""
+        self.waiting.rotate(-next(self.order) if self.order else 0)
+        for _ in range(len(self.waiting)):
+            if self.waiting[0][0] not in self.lazy:
+                break
+            self.waiting.rotate(-1)
+        number, asked = self.waiting.popleft()
+        match asked:
+            case Vet():
+                self.tell(number, Vetted(asked.birth, asked.attempt, VIABLE))
+            case Evaluate():
+                found = Evaluation(self.fit(asked.birth, number), 0.1, 0.0, 12.0)
+                answer = Evaluated(
+                    asked.birth, found, SOMEBODY, asked.trial, asked.asker
+                )
+                self.tell(number, answer)
+            case AdvanceShard():
+                self.tell(number, self.worlds[number].advance(asked))
+
+    def tell(self, number: int, event: Any) -> None:  # noqa: ANN401 - any event
+        told = deque([(number, event)])
+        while told:
+            number, event = told.popleft()
+            for command in self.islands[number].handle(event):
+                self.commands[number].append(command)
+                match command:
+                    case Vet() | Evaluate() | AdvanceShard():
+                        self.waiting.append((number, command))
+                    case Emigrate(island, to, epoch, migrants):
+                        told.append((to, Immigrated(to, island, epoch, migrants)))
+                    case Finish(island, neighbours):
+                        told += [(to, NeighbourClosed(to, island)) for to in neighbours]
+
+    def rows(self, table: str) -> list[Any]:
+        """Return the rows of a table, island by island."""
+        return [
+            one.row
+            for number in sorted(self.commands)
+            for one in self.commands[number]
+            if isinstance(one, Record) and one.table == table
+        ]
+
+    @property
+    def story(self) -> dict[int, list[Any]]:
+        """All rows of each island and when it finished: what must repeat."""
+        return {
+            number: [one for one in said if isinstance(one, Record | Finish)]
+            for number, said in self.commands.items()
+        }
