@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import zenoh
 
-from schema.network import Tls
+from schema.network import Tls, client_config
+from schema.topics import agents_alive
 
 BIRTHS = 60
 PATIENCE_S = 240.0
@@ -154,6 +156,17 @@ class Fleet:
         wait_until(lambda: agent_processes(process.pid) != [], f"{name} starts")
         return agent_processes(process.pid)[0]
 
+    def begin(self, workers: int) -> None:
+        """Let an analyzer join as soon as so many workers are there: births begin."""
+        config = zenoh.Config.from_json5(client_config(self.address))
+        with zenoh.open(config) as session:
+            key = agents_alive("default", "worker")
+            wait_until(
+                lambda: len(list(session.liveliness().get(key))) >= workers,
+                "all workers are there",
+            )
+        self.join("judge", "analyzer")
+
     def kill(self, name: str) -> None:
         """Kill an agent, and whoever would revive it."""
         crew = self.agents.pop(name)
@@ -231,5 +244,46 @@ def calm(tmp_path_factory: pytest.TempPathFactory) -> Path:
     stage = Stage(tmp_path_factory.mktemp("calm"))
     (stage.folder / "crowd.toml").write_text(CROWD)
     words = ("crowd.toml", "--seed", "4", "--quiet", "--out", "run")
+    stage.run("run", *words, "--in-process", "--threads", "1")
+    return stage.folder / "run"
+
+
+HAMLET = """
+name = "hamlet"
+births = 12
+[selection]
+population = 5
+[simulation]
+warmup_steps = 200
+window_steps = 800
+[arena]
+birth_interval_s = 4.0
+cull_interval_s = 8.0
+sample_interval_s = 2.0
+snapshot_interval_s = 6.0
+birth_radius_m = 0.4
+record_touches = true
+"""
+"""An arena for little more than half a minute, in which all happens that can."""
+
+
+@pytest.fixture(scope="session")
+def hamlet_document() -> str:
+    return HAMLET
+
+
+@pytest.fixture
+def hamlet_stage(stage: Stage) -> Stage:
+    """Return a stage on which ``hamlet.toml`` lies."""
+    (stage.folder / "hamlet.toml").write_text(HAMLET)
+    return stage
+
+
+@pytest.fixture(scope="session")
+def quiet_hamlet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of such an arena to which nothing happened."""
+    stage = Stage(tmp_path_factory.mktemp("hamlet"))
+    (stage.folder / "hamlet.toml").write_text(HAMLET)
+    words = ("hamlet.toml", "--seed", "4", "--quiet", "--out", "run")
     stage.run("run", *words, "--in-process", "--threads", "1")
     return stage.folder / "run"

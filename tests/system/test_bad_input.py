@@ -143,10 +143,12 @@ def test_full_disk_loses_nothing(
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
-def test_full_disk_loses_nothing_of_an_arena(arena_stage: Stage, calm: Path) -> None:
+def test_full_disk_loses_nothing_of_an_arena(
+    hamlet_stage: Stage, quiet_hamlet: Path
+) -> None:
     flags = ("--in-process", "--threads", "1")
-    words = ("crowd.toml", "--seed", "4", *flags)
-    _fill_the_disk(arena_stage, *words, kilobytes=400)
-    arena_stage.run("resume", "moved", "--quiet", *flags)
-    said = arena_stage.run("compare", "moved", str(calm))
+    words = ("hamlet.toml", "--seed", "4", *flags)
+    _fill_the_disk(hamlet_stage, *words, kilobytes=120)
+    hamlet_stage.run("resume", "moved", "--quiet", *flags)
+    said = hamlet_stage.run("compare", "moved", str(quiet_hamlet))
     assert "equal" in said

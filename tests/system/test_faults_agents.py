@@ -40,16 +40,16 @@ def singles(births: int) -> tuple[str, ...]:
     return ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
 
 
-CROWD = ("crowd.toml", "--seed", "4", "--quiet")
+HAMLET = ("hamlet.toml", "--seed", "4", "--speed", "20", "--quiet")
 
 
 def test_a_worker_is_frozen_and_comes_back(
     stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:
     fleet = fleet_of(stage, *singles(births))
-    fleet.join("judge", "analyzer")
     frozen = fleet.join("one")
     fleet.join("two")
+    fleet.begin(workers=2)
     share = np.random.default_rng(21).uniform(0.1, 0.4)
     fleet.wait_for(share * whole(undisturbed))
     os.kill(frozen, signal.SIGSTOP)
@@ -61,19 +61,20 @@ def test_a_worker_is_frozen_and_comes_back(
 
 @pytest.mark.slow
 def test_the_holder_of_an_arena_is_frozen_and_comes_back(
-    arena_stage: Stage, calm: Path, fleet_of: Fleets
+    hamlet_stage: Stage, quiet_hamlet: Path, fleet_of: Fleets
 ) -> None:
-    fleet = fleet_of(arena_stage, *CROWD)
-    fleet.join("judge", "analyzer")
+    fleet = fleet_of(hamlet_stage, *HAMLET)
+    # The first by name is the holder.
     frozen = fleet.join("one")
-    share = np.random.default_rng(22).uniform(0.1, 0.4)
-    fleet.wait_for(share * whole(calm))
-    os.kill(frozen, signal.SIGSTOP)
     fleet.join("two")
-    fleet.wait_for((share + 0.3) * whole(calm))
+    fleet.begin(workers=2)
+    share = np.random.default_rng(22).uniform(0.1, 0.4)
+    fleet.wait_for(share * whole(quiet_hamlet))
+    os.kill(frozen, signal.SIGSTOP)
+    fleet.wait_for((share + 0.3) * whole(quiet_hamlet))
     os.kill(frozen, signal.SIGCONT)
     fleet.finish()
-    assert compare(calm, fleet.folder) == []
+    assert compare(quiet_hamlet, fleet.folder) == []
     with Journal.open(fleet.folder) as journal:
         events = journal.replay()
     holders = {
@@ -115,7 +116,6 @@ def test_answers_come_twice_or_late(
     stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets, behaviour: str
 ) -> None:
     fleet = fleet_of(stage, *singles(births))
-    fleet.join("judge", "analyzer")
     fleet.join("one")
     command = [sys.executable, str(ODD_AGENT), fleet.address, behaviour]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -123,6 +123,7 @@ def test_answers_come_twice_or_late(
         command, env=environment, stdout=subprocess.PIPE, text=True
     ) as odd:
         try:
+            fleet.begin(workers=2)
             fleet.finish()
         finally:
             odd.terminate()

@@ -42,32 +42,14 @@ children = 8
 window_steps = 400
 """
 
-HAMLET = """
-name = "hamlet"
-births = 12
-[selection]
-population = 5
-[simulation]
-warmup_steps = 200
-window_steps = 800
-[arena]
-birth_interval_s = 4.0
-cull_interval_s = 8.0
-sample_interval_s = 2.0
-snapshot_interval_s = 6.0
-birth_radius_m = 0.4
-record_touches = true
-"""
-
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("document", "kills", "seed"), [(SINGLES, 40, 41), (HAMLET, 20, 42)]
-)
+@pytest.mark.parametrize(("kind", "kills", "seed"), [("off", 40, 41), ("on", 20, 42)])
 def test_killed_at_any_point(
-    tmp_path: Path, document: str, kills: int, seed: int
+    tmp_path: Path, hamlet_document: str, kind: str, kills: int, seed: int
 ) -> None:
     """Sixty instants in all, drawn over lives that last up to half a run."""
+    document = SINGLES if kind == "off" else hamlet_document
     (tmp_path / "mine.toml").write_text(document)
     done = subprocess.run(
         [sys.executable, str(MORTAL), "mine.toml", str(kills), str(seed)],

@@ -180,9 +180,9 @@ def test_workers_that_do_not_agree_are_named_and_stop_the_run(
     module.write_text(module.read_text().replace("return value", drift))
     stage.run("run", *WORDS, "--in-process", "--out", "calm")
     fleet = fleet_of(stage, *WORDS, "--audit", "1")
-    fleet.join("judge", "analyzer")
     fleet.join("sound")
     fleet.join("broken", environment={"DRIFT": "1"})
+    fleet.begin(workers=2)
     _, err = fleet.coordinator.communicate(timeout=60)
     assert fleet.coordinator.returncode == 2
     told = err.strip().splitlines()[-1]

@@ -92,13 +92,12 @@ class Distant:
     fleet_of: Fleets
 
     def fleet(self, stage: Stage, *words: str) -> tuple[Any, list[str]]:
-        """Return a fleet, analyzer near and worker far, and the flags of all."""
+        """Return a fleet with a worker far away, and the flags of all."""
         tls = self.certify(stage.folder, "machine", "ca", HOST)
         flags = ["--tls-ca", tls.ca, "--tls-certificate", tls.certificate]
         flags += ["--tls-key", tls.key]
         listen, near = f"tls/{HOST}:{PORT}", self.cable.near
         fleet = self.fleet_of(stage, *words, *flags, listen=listen, inside=near)
-        fleet.join("judge", "analyzer", *flags, inside=near)
         fleet.join("far", "worker", *flags, inside=self.cable.far)
         return fleet, flags
 
@@ -120,7 +119,8 @@ def test_a_worker_is_cut_off_and_comes_back(
     stage: Stage, undisturbed: Path, births: int, distant: Distant
 ) -> None:
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
-    fleet, _ = distant.fleet(stage, *words)
+    fleet, flags = distant.fleet(stage, *words)
+    fleet.join("judge", "analyzer", *flags, inside=distant.cable.near)
     share = np.random.default_rng(31).uniform(0.1, 0.7)
     fleet.wait_for(share * (undisturbed / NAME).stat().st_size)
     distant.cable.cut()
@@ -133,19 +133,20 @@ def test_a_worker_is_cut_off_and_comes_back(
 
 
 def test_an_arena_moves_when_its_holder_is_cut_off(
-    arena_stage: Stage, calm: Path, distant: Distant
+    hamlet_stage: Stage, quiet_hamlet: Path, distant: Distant
 ) -> None:
-    words = ("crowd.toml", "--seed", "4", "--quiet")
-    fleet, flags = distant.fleet(arena_stage, *words)
-    whole = (calm / NAME).stat().st_size
+    words = ("hamlet.toml", "--seed", "4", "--speed", "20", "--quiet")
+    fleet, flags = distant.fleet(hamlet_stage, *words)
+    whole = (quiet_hamlet / NAME).stat().st_size
     share = np.random.default_rng(32).uniform(0.1, 0.5)
+    fleet.join("judge", "analyzer", *flags, inside=distant.cable.near)
     fleet.wait_for(share * whole)
-    fleet.join("near", "worker", *flags, inside=distant.cable.near)
     distant.cable.cut()
+    fleet.join("near", "worker", *flags, inside=distant.cable.near)
     fleet.wait_for((share + 0.3) * whole)
     distant.cable.heal()
     fleet.finish()
-    assert compare(calm, fleet.folder) == []
+    assert compare(quiet_hamlet, fleet.folder) == []
     with Journal.open(fleet.folder) as journal:
         events = journal.replay()
     advances = [event for event in events if isinstance(event, Advanced)]
