@@ -204,9 +204,15 @@ def test_null_evaluations_per_second(tmp_path: Path) -> None:
 
 
 def test_second_worker(tmp_path: Path) -> None:
-    """One of two workers is stopped and continued in turn.
+    """Evaluations per second of two workers against one, everything else counted.
 
-    The machine's speed drifts: both halves of the comparison must see the same of it.
+    Coordinator, analyzer, two workers, real physics, network, journal and tables
+    share the machine; scenario 1's children of random founders, each vetted, bred
+    and evaluated. Two things differ from a run of scenario 1: the brood does not
+    end while it is measured, so that no worker waits for its last child, and 60
+    births are in flight. One of two workers is stopped and continued in turn: the
+    machine's speed drifts, and both halves of the comparison must see the same of
+    it. While it is stopped the second core serves coordinator and analyzer alone.
     """
     experiment = _experiment(10_000, 9_000)
     wide = replace(experiment.selection, window=60)
