@@ -185,7 +185,11 @@ def _view(arguments: list[str]) -> int:
         raise MissingExtra(
             f"the viewer needs {error.name}: pip install 'revolve-islands[view]'"
         ) from None
-    return view(arguments)
+    from analysis.view_again import Simulators
+    from coordinator.history import arena_history
+    from worker.again import alone, together
+
+    return view(arguments, Simulators(alone, arena_history, together))
 
 
 if __name__ == "__main__":

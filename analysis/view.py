@@ -4,10 +4,13 @@ import argparse
 import re
 from pathlib import Path
 
-from rich.progress import track
+from rich.progress import Progress, track
 
+from analysis.view_again import Simulators, move_again
 from analysis.view_blueprint import layout
+from analysis.view_body import figure
 from analysis.view_live import LiveSource
+from analysis.view_motion import Motion, chosen, show_motion
 from analysis.view_output import HOST, PORT, Output, ViewerError, Window, linger
 from analysis.view_recording import Recording
 from analysis.view_replay import (
@@ -30,11 +33,12 @@ LAST_S = 600.0
 """Simulated time that is replayed unless told otherwise: the last so much [s]."""
 
 
-def main(arguments: list[str]) -> int:
+def main(arguments: list[str], simulators: Simulators) -> int:
     """Watch a run.
 
     Args:
         arguments: the command's name first.
+        simulators: do again what robots did.
 
     Returns:
         0 if done.
@@ -49,7 +53,7 @@ def main(arguments: list[str]) -> int:
     if (options.run is None) == (options.connect is None):
         raise ViewerError("name a run folder, or a coordinator by --connect: one")
     if options.run is not None:
-        _replay(options, output)
+        _replay(options, output, simulators)
         return 0
     stop = stop_on_signals()
     with LiveSource(options.connect, options.fleet, tls_of(options)) as source:
@@ -57,16 +61,20 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _replay(options: argparse.Namespace, output: Output) -> None:
+def _replay(
+    options: argparse.Namespace, output: Output, simulators: Simulators
+) -> None:
     """Record a run from its tables, then keep it there for who looks."""
     folder: Path = options.run
     scene = stage(read_experiment(folder))
     news = read_news(folder)
+    motions = _motions(options, simulators)
     blueprint = layout(
         scene.islands,
         extent_m=scene.extent_m,
         is_online=scene.is_online,
         follow=options.follow,
+        motions=[each.birth for each in motions],
     )
     name = f"{news.experiment}-{folder.name}"
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
@@ -76,8 +84,35 @@ def _replay(options: argparse.Namespace, output: Output) -> None:
         show.tell(news)
         if scene.is_online:
             _replay_poses(folder, _span(options, folder), show)
+        bodies = {one.birth: one.body for one in news.births}
+        recording.upright("motion")
+        for lane, motion in enumerate(motions):
+            body = bodies[motion.birth]
+            assert body is not None
+            drawn = figure(body, scene.space, is_plain=False)
+            show_motion(recording, motion, drawn, 0 if scene.is_online else lane)
         stop = stop_on_signals()
         linger(output, Window(output), recording, stop)
+
+
+def _motions(options: argparse.Namespace, simulators: Simulators) -> list[Motion]:
+    """Return the motion of the robots that were asked for; tell if it is equal."""
+    folder: Path = options.run
+    births = chosen(folder, options.robot, has_ancestry=options.ancestry)
+    if not births:
+        return []
+    with Progress(transient=True) as bar:
+        task = bar.add_task("simulating again", total=1.0)
+        motions = move_again(
+            folder,
+            read_experiment(folder),
+            births,
+            simulators,
+            lambda share: bar.update(task, completed=share),
+        )
+    for motion in motions:
+        tell_user(motion.verdict)
+    return motions
 
 
 def _span(options: argparse.Namespace, folder: Path) -> Span:
@@ -113,6 +148,11 @@ def robot_name(text: str) -> BirthId:
     return BirthId(int(match[1]), int(match[2]))
 
 
+def _chosen(text: str) -> BirthId | None:
+    """Return whom a flag names; None is the best."""
+    return None if text == "best" else robot_name(text)
+
+
 def _followed(text: str) -> tuple[int, BirthId]:
     birth = robot_name(text)
     return birth.island, birth
@@ -140,6 +180,15 @@ def _flags() -> Flags:
     flags.add_argument(
         "--follow", type=_followed, metavar="ISLAND:BIRTH",
         help="have the camera follow a robot, as 0:17",
+    )  # fmt: skip
+    flags.add_argument(
+        "--robot", action="append", default=[], type=_chosen, metavar="WHO",
+        help="simulate a robot again to see all of its motion: best, or ISLAND:BIRTH; "
+        "may be given more than once",
+    )  # fmt: skip
+    flags.add_argument(
+        "--ancestry", action="store_true",
+        help="and its first parent, and so on, back to the founder",
     )  # fmt: skip
     flags.add_argument(
         "--from", dest="start", type=float, metavar="S",

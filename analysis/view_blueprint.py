@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import rerun as rr
 import rerun.blueprint as rrb
 
-from analysis.view_recording import BIRTHS, SIMULATED, island_path, robot_path
+from analysis.view_entries import island_path, motion_path, robot_path
+from analysis.view_recording import BIRTHS, SIMULATED
 from schema.birth import BirthId
 
 _SKY = (246, 247, 250)
@@ -18,6 +19,7 @@ def layout(
     extent_m: float,
     is_online: bool,
     follow: tuple[int, BirthId] | None = None,
+    motions: Sequence[BirthId] = (),
 ) -> rrb.Blueprint:
     """Return the layout for a run.
 
@@ -26,9 +28,12 @@ def layout(
         extent_m: how far from its middle an arena or a gallery reaches [m].
         is_online: robots live in arenas, in simulated time.
         follow: island and name of the robot that the camera follows there.
+        motions: robots that are shown by themselves, moving.
     """
     kind = "Arena" if is_online else "Population of island"
     scenes = [_scene(each, f"{kind} {each}", extent_m, follow) for each in islands]
+    if motions:
+        scenes.insert(0, _motion(motions, is_online=is_online))
     told = rrb.Vertical(
         _curves("Fitness", islands, "fitness"),
         _curves("Population", islands, "size"),
@@ -44,7 +49,9 @@ def layout(
         rrb.Horizontal(rrb.Grid(*scenes), told, column_shares=[5, 3]),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(timeline=SIMULATED if is_online else BIRTHS, state="collapsed"),
+        rrb.TimePanel(
+            timeline=SIMULATED if is_online or motions else BIRTHS, state="collapsed"
+        ),
         auto_views=False,
     )
 
@@ -69,18 +76,36 @@ def _scene(
     path = island_path(island)
     followed = follow is not None and follow[0] == island
     near = 0.6 if followed else 1.2 * extent_m
-    eye = rrb.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital,
-        position=(0.35 * near, -near, 0.8 * near),
-        look_target=(0.0, 0.0, 0.0),
-        eye_up=(0.0, 0.0, 1.0),
-        tracking_entity=robot_path(*follow) if follow and followed else None,
-    )
     return rrb.Spatial3DView(
         origin=f"/{path}",
         name=name,
         contents=[f"/{path}/robots/**", f"/{path}/wall"],
         background=_SKY,
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.5, color=_GRID),
-        eye_controls=eye,
+        eye_controls=_eye(near, robot_path(*follow) if follow and followed else None),
+    )
+
+
+def _motion(births: Sequence[BirthId], *, is_online: bool) -> rrb.Spatial3DView:
+    """Return the view of robots that do again what they did."""
+    is_close = is_online or len(births) == 1
+    near = 0.9 if is_close else 0.8 + 0.4 * len(births)
+    return rrb.Spatial3DView(
+        origin="/motion",
+        name="Robots again",
+        contents="/motion/**",
+        background=_SKY,
+        line_grid=rrb.LineGrid3D(visible=True, spacing=0.1, color=_GRID),
+        eye_controls=_eye(near, motion_path(births[0]) if is_close else None),
+    )
+
+
+def _eye(near: float, tracked: str | None) -> rrb.EyeControls3D:
+    """Return a camera that looks at the middle, or follows an entity."""
+    return rrb.EyeControls3D(
+        kind=rrb.Eye3DKind.Orbital,
+        position=(0.35 * near, -near, 0.8 * near),
+        look_target=(0.0, 0.0, 0.0),
+        eye_up=(0.0, 0.0, 1.0),
+        tracking_entity=tracked,
     )

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import pyarrow as pa
 
+from analysis.view_turns import product, quaternion, rotated
 from schema.assembly import place_parts
-from schema.birth import BirthId
 from schema.evaluation import Floats
 from schema.parts import BodySpace, Box
 from schema.robot import Robot
@@ -83,17 +84,29 @@ def place(figure: Figure, roots: Floats, angles: Floats) -> tuple[Singles, Singl
     for joint, parent in enumerate(figure.parents[1:]):
         half = 0.5 * angles[:, joint : joint + 1]
         turn = np.hstack([np.sin(half) * figure.axes[joint + 1], np.cos(half)])
-        offset = _rotated(turns[parent], figure.anchors[joint + 1])
+        offset = rotated(turns[parent], figure.anchors[joint + 1])
         places.append(places[parent] + offset)
-        turns.append(_product(turns[parent], turn))
+        turns.append(product(turns[parent], turn))
     turned, placed = np.stack(turns, axis=1), np.stack(places, axis=1)
-    centres = placed[:, figure.segments] + _rotated(
+    centres = placed[:, figure.segments] + rotated(
         turned[:, figure.segments], figure.centres
     )
-    attitudes = _product(turned[:, figure.carried_by], figure.attitudes)
+    attitudes = product(turned[:, figure.carried_by], figure.attitudes)
     return (
         centres.astype(np.float32),
         attitudes[:, figure.attitude_of].astype(np.float32),
+    )
+
+
+def place_rows(figure: Figure, rows: pa.Table) -> tuple[Singles, Singles]:
+    """Return where a figure's boxes are, as ``place`` does, from rows of poses."""
+    axes = ("x", "y", "z", "qw", "qx", "qy", "qz")
+    roots = np.stack([rows[axis].to_numpy() for axis in axes], axis=1)
+    angles = rows["angles"].combine_chunks().flatten().to_numpy()
+    return place(
+        figure,
+        roots.astype(np.float64),
+        angles.astype(np.float64).reshape(len(roots), -1),
     )
 
 
@@ -111,34 +124,11 @@ def standing(figure: Figure, spot: tuple[float, float]) -> tuple[Singles, Single
     centres, attitudes = place(figure, root, np.zeros((1, len(figure.parents) - 1)))
     # Of a turned box the sum over its axes' heights reaches deepest.
     axes = np.stack(
-        [_rotated(attitudes.astype(np.float64), axis) for axis in np.eye(3)], axis=-1
+        [rotated(attitudes.astype(np.float64), axis) for axis in np.eye(3)], axis=-1
     )
     reach = np.abs(axes[..., 2, :] * figure.half_sizes).sum(axis=-1)
     centres[..., 2] -= (centres[..., 2] - reach).min()
     return centres, attitudes
-
-
-class Figures:
-    """The figures of a run's robots, each made when it is first asked for."""
-
-    def __init__(self, space: BodySpace) -> None:
-        """Know nobody yet, of part types that are known."""
-        self._space = space
-        self._bodies: dict[BirthId, Robot] = {}
-        self._made: dict[BirthId, Figure] = {}
-
-    def add(self, birth: BirthId, body: Robot) -> None:
-        """Learn what somebody looks like; nobody changes."""
-        self._bodies.setdefault(birth, body)
-
-    def __contains__(self, birth: BirthId) -> bool:
-        return birth in self._bodies
-
-    def __getitem__(self, birth: BirthId) -> Figure:
-        if birth not in self._made:
-            body = self._bodies[birth]
-            self._made[birth] = figure(body, self._space, is_plain=True)
-        return self._made[birth]
 
 
 class _Builder:
@@ -205,7 +195,7 @@ class _Builder:
             colours=np.round(255.0 * colours).astype(np.uint8),
             segments=np.array([row[0] for row in rows], dtype=np.intp),
             centres=np.array([row[2] for row in rows]),
-            attitudes=np.array([_quaternion(each) for _, each in self.attitudes]),
+            attitudes=np.array([quaternion(each) for _, each in self.attitudes]),
             attitude_of=np.array([row[1] for row in rows], dtype=np.intp),
             carried_by=np.array([owner for owner, _ in self.attitudes], dtype=np.intp),
             parents=tuple(self.parents),
@@ -232,41 +222,3 @@ def _plain(boxes: Iterable[Box]) -> list[Box]:
                 Box("all", tuple(size), tuple(middle), 0.0, segment, chosen[0].rotation)
             )
     return found
-
-
-def _quaternion(matrix: Floats) -> Floats:
-    """Return the unit quaternion x, y, z, w of a rotation matrix.
-
-    Source: Bar-Itzhack 2000, New method for extracting the quaternion from a
-    rotation matrix: the greatest eigenvector of a symmetric matrix.
-    """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix.tolist()
-    symmetric = [
-        [xx - yy - zz, yx + xy, zx + xz, zy - yz],
-        [yx + xy, yy - xx - zz, zy + yz, xz - zx],
-        [zx + xz, zy + yz, zz - xx - yy, yx - xy],
-        [zy - yz, xz - zx, yx - xy, xx + yy + zz],
-    ]
-    _, vectors = np.linalg.eigh(np.array(symmetric))
-    greatest: Floats = vectors[:, -1]
-    return greatest
-
-
-def _product(first: Floats, second: Floats) -> Floats:
-    """Return the quaternions of one turn after another, x, y, z, w, broadcast."""
-    vector, scalar = first[..., :3], first[..., 3:]
-    other, rest = second[..., :3], second[..., 3:]
-    return np.concatenate(
-        [
-            scalar * other + rest * vector + np.cross(vector, other),
-            scalar * rest - (vector * other).sum(axis=-1, keepdims=True),
-        ],
-        axis=-1,
-    )
-
-
-def _rotated(turns: Floats, points: Floats) -> Floats:
-    """Return points turned by quaternions x, y, z, w, broadcast."""
-    vector, scalar = turns[..., :3], turns[..., 3:]
-    across = 2.0 * np.cross(vector, points)
-    return points + scalar * across + np.cross(vector, across)

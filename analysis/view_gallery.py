@@ -2,8 +2,10 @@
 
 from itertools import count
 
-from analysis.view_body import Figures, standing
-from analysis.view_recording import Recording, When, robot_path
+from analysis.view_body import standing
+from analysis.view_entries import When, robot_path
+from analysis.view_figures import Figures
+from analysis.view_recording import Recording
 from schema.birth import BirthId
 from schema.live import Level
 

@@ -3,7 +3,8 @@
 from collections import OrderedDict
 from dataclasses import dataclass
 
-from analysis.view_recording import Kin, Recording, When
+from analysis.view_entries import Kin, When
+from analysis.view_recording import Recording
 from schema.birth import BirthId
 from schema.live import Departed, Level, Newborn
 

@@ -6,7 +6,6 @@ All of it is logged from one thread, for the current time is a thread's own.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -16,6 +15,7 @@ import numpy.typing as npt
 import rerun as rr
 
 from analysis.view_body import Figure, Singles
+from analysis.view_entries import Kin, Moves, When, island_path
 from schema.birth import BirthId
 
 APPLICATION = "revolve"
@@ -27,45 +27,6 @@ _DEAD = (150, 150, 155)
 _WALL = (190, 190, 195)
 _LINES = ((40, 110, 190), (225, 120, 40))
 _MEMORY = "512MiB"
-
-
-@dataclass(frozen=True, slots=True)
-class When:
-    """A moment: simulated time [s], None off-line, and births so far, if known."""
-
-    sim_time_s: float | None = None
-    births: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Moves:
-    """T poses of one robot, at times (T,) [s] and after so many births (T,)."""
-
-    sim_time_s: npt.NDArray[np.float64]
-    births: npt.NDArray[np.int64]
-    centres: Singles
-    attitudes: Singles
-
-
-@dataclass(frozen=True, slots=True)
-class Kin:
-    """One individual in the ancestry: column and row in the picture, and parents."""
-
-    birth: BirthId
-    order: int
-    rank: int
-    parents: tuple[BirthId, ...]
-    is_alive: bool
-
-
-def island_path(island: int) -> str:
-    """Return the entity of an island."""
-    return f"islands/{island}"
-
-
-def robot_path(island: int, birth: BirthId) -> str:
-    """Return the entity of a robot that lives on an island."""
-    return f"islands/{island}/robots/{birth.island}-{birth.number}"
 
 
 class Recording:
@@ -127,7 +88,7 @@ class Recording:
             walls: centre, attitude (7,) and half sizes (3,) of each.
         """
         path = island_path(island)
-        self._stream.log(path, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        self.upright(path)
         names = rr.SeriesLines(names=["mean", "best"], colors=_LINES)
         self._stream.log(f"{path}/fitness", names, static=True)
         self._stream.log(
@@ -157,17 +118,16 @@ class Recording:
     def moved(self, path: str, moves: Moves) -> None:
         """Add poses of a robot, all at once."""
         rows, count, _ = moves.centres.shape
-        times = np.round(moves.sim_time_s * 1e9).astype("timedelta64[ns]")
+        index = [rr.TimeColumn(SIMULATED, duration=_nanoseconds(moves.sim_time_s))]
+        if moves.births is not None:
+            index.append(rr.TimeColumn(BIRTHS, sequence=moves.births))
         columns = rr.Boxes3D.columns(
             centers=moves.centres.reshape(-1, 3),
             quaternions=moves.attitudes.reshape(-1, 4),
         )
         self._stream.send_columns(
             path,
-            [
-                rr.TimeColumn(SIMULATED, duration=times),
-                rr.TimeColumn(BIRTHS, sequence=moves.births),
-            ],
+            index,
             columns.partition([count] * rows),
         )
 
@@ -199,6 +159,10 @@ class Recording:
         self._stream.log(f"{path}/size", rr.Scalars(float(size)))
         if fitness:
             self._stream.log(f"{path}/fitness", rr.Scalars(list(fitness)))
+
+    def upright(self, path: str) -> None:
+        """Tell that z is up there."""
+        self._stream.log(path, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
     def said(self, text: str, when: When, level: str) -> None:
         """Add a line to the log; "INFO" of what goes on, "WARN" of ends."""
@@ -240,6 +204,10 @@ class Recording:
             self._stream.set_time(SIMULATED, duration=time)
         if when.births is not None:
             self._stream.set_time(BIRTHS, sequence=when.births)
+
+
+def _nanoseconds(times_s: npt.NDArray[np.float64]) -> npt.NDArray[np.timedelta64]:
+    return np.round(times_s * 1e9).astype("timedelta64[ns]")
 
 
 def _name(birth: BirthId) -> str:

@@ -4,18 +4,18 @@ Who lives where is kept here, so that a robot's boxes come with its first pose, 
 go with its death; whatever is told twice is shown once.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
-import pyarrow.compute as pc
 
-from analysis.view_body import Figures, Singles, place
+from analysis.view_body import Singles, place_rows
+from analysis.view_entries import Moves, When, robot_path
+from analysis.view_figures import Figures, rows_by_robot
 from analysis.view_gallery import Gallery
 from analysis.view_lineage import Lineage
-from analysis.view_recording import Moves, Recording, When, robot_path
+from analysis.view_recording import Recording
 from schema.birth import BirthId
 from schema.live import Crewman, Departed, Level, Migrant, Newborn, News
 from schema.parts import BodySpace
@@ -114,21 +114,14 @@ class Show:
         """
         strangers: list[BirthId] = []
         shown: set[BirthId] = set()
-        for birth, rows in _by_robot(poses):
+        for birth, rows in rows_by_robot(poses):
             shown.add(birth)
             if birth not in self._figures:
                 strangers.append(birth)
                 continue
             times = rows["sim_time_s"].to_numpy()
             path = self._settle(arena, birth, times)
-            axes = ("x", "y", "z", "qw", "qx", "qy", "qz")
-            roots = np.stack([rows[axis].to_numpy() for axis in axes], axis=1)
-            angles = rows["angles"].combine_chunks().flatten().to_numpy()
-            centres, attitudes = place(
-                self._figures[birth],
-                roots.astype(np.float64),
-                angles.astype(np.float64).reshape(len(times), -1),
-            )
+            centres, attitudes = place_rows(self._figures[birth], rows)
             births = self._clock(arena).births_at(times)
             moves = Moves(
                 times, births, _coarse(centres, _PER_M), _coarse(attitudes, _PER_TURN)
@@ -237,22 +230,6 @@ def _in_order(news: News) -> list[Newborn | Level | Departed]:
         *births, *levels, *deaths
     ]  # fmt: skip
     return [each for _, each in sorted(keyed, key=lambda pair: pair[0])]
-
-
-def _by_robot(poses: pa.Table) -> Iterator[tuple[BirthId, pa.Table]]:
-    """Return each robot's rows, robots ascending, times as they came."""
-    born = poses["island"]
-    if "birth_island" in poses.column_names:
-        born = pc.coalesce(poses["birth_island"], born)
-    islands, numbers = born.to_numpy(), poses["birth"].to_numpy()
-    order = np.lexsort((numbers, islands))
-    poses = poses.take(order)
-    islands, numbers = islands[order], numbers[order]
-    is_new = (np.diff(islands) != 0) | (np.diff(numbers) != 0)
-    starts = [0, *(np.flatnonzero(is_new) + 1).tolist()] if len(order) else []
-    for start, end in zip(starts, [*starts[1:], len(order)], strict=True):
-        birth = BirthId(int(islands[start]), int(numbers[start]))
-        yield birth, poses.slice(start, end - start)
 
 
 def _crew(workers: tuple[Crewman, ...]) -> str:

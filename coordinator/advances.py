@@ -123,6 +123,12 @@ class Advances:
         """Return the step at which a shard stands."""
         return self._past(shard).step
 
+    def past(self, shard: int) -> Rebuild:
+        """Return how a shard came to be what it is."""
+        past = self._past(shard)
+        base = self._vault.read(shard, past.base) if past.base else b""
+        return Rebuild(base, tuple(past.history))
+
     def note(self, command: AdvanceShard) -> None:
         """Remember what an arena asks for; ``request`` asks for it."""
         self._past(command.island).asked = command

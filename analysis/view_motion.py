@@ -1,0 +1,98 @@
+"""Robots that are shown by themselves, in full motion: who, and how."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from analysis.view_body import Figure, place_rows
+from analysis.view_entries import Moves, When, motion_path
+from analysis.view_output import ViewerError
+from analysis.view_recording import Recording
+from schema.birth import BirthId
+from schema.live import individual
+from schema.run_tables import read_table
+
+LANE_M = 0.8
+"""Between robots that moved alone and are shown side by side [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """How a robot moved, and a line that tells whether it is what was recorded."""
+
+    birth: BirthId
+    poses: pa.Table
+    verdict: str
+
+
+def chosen(
+    folder: Path, wanted: Iterable[BirthId | None], *, has_ancestry: bool
+) -> list[BirthId]:
+    """Return the robots of ``--robot``, each once, in their order.
+
+    Args:
+        folder: of the run.
+        wanted: None is the best.
+        has_ancestry: with each its first parent, and so on, back to a founder.
+
+    Raises:
+        ViewerError: nobody of that name was born, or nobody was judged.
+    """
+    births = read_table(folder, "births").select(["island", "birth", "parents"])
+    parents = {
+        BirthId(row["island"], row["birth"]): row["parents"]
+        for row in births.to_pylist()
+    }
+    found: dict[BirthId, None] = {}
+    for who in wanted:
+        birth = _best(folder) if who is None else who
+        if birth not in parents:
+            name = name_of(birth)
+            raise ViewerError(f"--robot {name}: nobody of that name was born")
+        found[birth] = None
+        while has_ancestry and parents[birth]:
+            first = parents[birth][0]
+            birth = BirthId(first["island"], first["birth"])
+            found[birth] = None
+    return list(found)
+
+
+def _best(folder: Path) -> BirthId:
+    """Return the fittest of all that a run has judged, the first of equals."""
+    for table in ("evaluations", "fitness"):
+        rows = read_table(folder, table)
+        if table == "fitness":
+            rows = rows.filter(rows["is_mature"])
+        best = pc.max(rows["fitness"]).as_py()
+        if best is not None:
+            row = rows.filter(pc.equal(rows["fitness"], best)).slice(0, 1).to_pylist()
+            return individual(row[0])
+    raise ViewerError(f"{folder}: nobody has been judged yet")
+
+
+def show_motion(
+    recording: Recording, motion: Motion, figure: Figure, lane: int
+) -> None:
+    """Show how a robot moved.
+
+    Args:
+        recording: to fill.
+        motion: of the robot.
+        figure: its body.
+        lane: how many lanes beside its own track it is shown.
+    """
+    path = motion_path(motion.birth)
+    times = motion.poses["sim_time_s"].to_numpy()
+    centres, attitudes = place_rows(figure, motion.poses)
+    centres[..., 0] += LANE_M * lane
+    recording.born(path, figure, When(float(times[0])))
+    recording.moved(path, Moves(times, None, centres, attitudes))
+    recording.said(motion.verdict, When(float(times[0])), "INFO")
+
+
+def name_of(birth: BirthId) -> str:
+    """Return how an individual is called: ISLAND:BIRTH."""
+    return f"{birth.island}:{birth.number}"
