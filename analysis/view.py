@@ -90,7 +90,7 @@ def _replay(
             body = bodies[motion.birth]
             assert body is not None
             drawn = figure(body, scene.space, is_plain=False)
-            show_motion(recording, motion, drawn, 0 if scene.is_online else lane)
+            show_motion(recording, motion, drawn, None if scene.is_online else lane)
         stop = stop_on_signals()
         linger(output, Window(output), recording, stop)
 

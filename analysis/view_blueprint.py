@@ -6,6 +6,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from analysis.view_entries import island_path, motion_path, robot_path
+from analysis.view_motion import LANES
 from analysis.view_recording import BIRTHS, SIMULATED
 from schema.birth import BirthId
 
@@ -32,8 +33,11 @@ def layout(
     """
     kind = "Arena" if is_online else "Population of island"
     scenes = [_scene(each, f"{kind} {each}", extent_m, follow) for each in islands]
+    if motions and not is_online:
+        # Time alone is not the births' time: nothing else could be seen at once.
+        return _framed(_motion(motions, is_online=False), SIMULATED)
     if motions:
-        scenes.insert(0, _motion(motions, is_online=is_online))
+        scenes.insert(0, _motion(motions, is_online=True))
     told = rrb.Vertical(
         _curves("Fitness", islands, "fitness"),
         _curves("Population", islands, "size"),
@@ -45,13 +49,17 @@ def layout(
         ),
         row_shares=[3, 2, 4],
     )
+    whole = rrb.Horizontal(rrb.Grid(*scenes), told, column_shares=[5, 3])
+    return _framed(whole, SIMULATED if is_online else BIRTHS)
+
+
+def _framed(root: rrb.Horizontal | rrb.Spatial3DView, timeline: str) -> rrb.Blueprint:
+    """Return a layout without panels that are not looked at."""
     return rrb.Blueprint(
-        rrb.Horizontal(rrb.Grid(*scenes), told, column_shares=[5, 3]),
+        root,
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(
-            timeline=SIMULATED if is_online or motions else BIRTHS, state="collapsed"
-        ),
+        rrb.TimePanel(timeline=timeline, state="collapsed"),
         auto_views=False,
     )
 
@@ -88,15 +96,15 @@ def _scene(
 
 def _motion(births: Sequence[BirthId], *, is_online: bool) -> rrb.Spatial3DView:
     """Return the view of robots that do again what they did."""
-    is_close = is_online or len(births) == 1
-    near = 0.9 if is_close else 0.8 + 0.4 * len(births)
+    middle = len(births) // 2 // LANES * LANES + LANES // 2
+    near = 0.9 if is_online else 0.9 + 0.7 * min(len(births), LANES)
     return rrb.Spatial3DView(
         origin="/motion",
         name="Robots again",
         contents="/motion/**",
         background=_SKY,
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.1, color=_GRID),
-        eye_controls=_eye(near, motion_path(births[0]) if is_close else None),
+        eye_controls=_eye(near, motion_path(births[min(middle, len(births) - 1)])),
     )
 
 

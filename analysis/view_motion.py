@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
@@ -16,7 +17,8 @@ from schema.live import individual
 from schema.run_tables import read_table
 
 LANE_M = 0.8
-"""Between robots that moved alone and are shown side by side [m]."""
+LANES = 4
+"""Robots that moved alone are shown side by side, so far apart [m], so many a row."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +76,7 @@ def _best(folder: Path) -> BirthId:
 
 
 def show_motion(
-    recording: Recording, motion: Motion, figure: Figure, lane: int
+    recording: Recording, motion: Motion, figure: Figure, lane: int | None
 ) -> None:
     """Show how a robot moved.
 
@@ -82,12 +84,14 @@ def show_motion(
         recording: to fill.
         motion: of the robot.
         figure: its body.
-        lane: how many lanes beside its own track it is shown.
+        lane: which lane it is shown in, from 0; where it was if None.
     """
     path = motion_path(motion.birth)
     times = motion.poses["sim_time_s"].to_numpy()
     centres, attitudes = place_rows(figure, motion.poses)
-    centres[..., 0] += LANE_M * lane
+    if lane is not None:
+        row, column = divmod(lane, LANES)
+        centres[..., :2] += LANE_M * np.array([column, row], dtype=np.float32)
     recording.born(path, figure, When(float(times[0])))
     recording.moved(path, Moves(times, None, centres, attitudes))
     recording.said(motion.verdict, When(float(times[0])), "INFO")

@@ -176,10 +176,10 @@ class Recording:
         shown = {each.birth for each in people}
         nodes = rr.GraphNodes(
             [_name(each.birth) for each in people],
-            positions=[(24.0 * each.order, 90.0 * each.rank) for each in people],
+            positions=[(30.0 * each.order, 90.0 * each.rank) for each in people],
             colors=[_ALIVE if each.is_alive else _DEAD for each in people],
             labels=[_name(each.birth) for each in people],
-            radii=[16.0 if each.is_alive else 9.0 for each in people],
+            radii=[13.0 if each.is_alive else 8.0 for each in people],
             show_labels=False,
         )
         edges = [
