@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from uuid import uuid4
 
-from coordinator.service import ask_coordinators
+from coordinator.client_service import ask_coordinators
 from coordinator.status_command import ask_status
 from schema.agent_command import Flags, add_network_flags, tls_of
 from schema.birth import BirthId

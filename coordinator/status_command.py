@@ -8,10 +8,10 @@ from rich.console import Console
 from rich.table import Table
 
 from coordinator.campaign import is_campaign, read_campaign
+from coordinator.client_service import ask_coordinators
 from coordinator.folder import DETAILS
 from coordinator.folder_status import folder_status, unbegun_status
 from coordinator.running import ADDRESS
-from coordinator.service import ask_coordinators
 from coordinator.wording import about_arenas, best_of, duration
 from schema.agent_command import Flags, add_network_flags, tls_of
 from schema.errors import NetworkError, RunFolderError

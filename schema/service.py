@@ -192,7 +192,9 @@ def _serve_session(
         session.declare_queryable(
             me.info, zenoh.handlers.Callback(tell_info), complete=True
         ),
-        session.declare_subscriber(me.cancelled, zenoh.handlers.Callback(cancel)),
+        session.declare_subscriber(
+            me.cancelled, zenoh.handlers.Callback(cancel, indirect=False)
+        ),
         session.liveliness().declare_token(me.alive),
     ):
         hub.seen(is_there=True)

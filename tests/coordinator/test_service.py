@@ -187,6 +187,34 @@ def test_a_frozen_worker_is_gone_and_a_thawed_one_is_back(network: Network) -> N
         assert until(network, has(1)) == joined
 
 
+def test_a_job_that_is_called_off_before_it_is_begun_is_not_done(
+    network: Network,
+) -> None:
+    with agent(network, "w", "slow") as process:
+        until(network, has(1))
+        network.send(0, "w", request(0))
+        # What is sent in this order arrives in it.
+        network.cancel("w", request(1))
+        network.send(1, "w", request(1))
+        network.cancel("nobody", request(1))
+        assert line_of(process) == "begun\n"
+        assert process.stdin is not None
+        process.stdin.write("on\n")
+        process.stdin.flush()
+        events = until(network, has(2))
+    told = {e.number: (e.outcome, e.reason) for e in events if isinstance(e, Returned)}
+    assert told == {0: ("ok", ""), 1: ("error", "nobody waits for this job any more")}
+
+
+def test_who_lacks_a_plug_in_is_refused_and_leaves(network: Network) -> None:
+    with agent(network, "w"):
+        until(network, has(1))
+        message = pb.Request(run="r", epoch=1, number=4, plugins="not_here=abc")
+        network.send(4, "w", message.SerializeToString())
+        assert until(network, has(1)) == [Left("w")]
+        assert network.refused == {"w": "has no plug-in 'not_here'"}
+
+
 def test_workers_come_back_to_a_new_coordinator() -> None:
     with Network(name="c1") as first, agent(first, "w"):
         until(first, has(1))
