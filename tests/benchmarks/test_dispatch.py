@@ -1,0 +1,136 @@
+"""How busy a campaign keeps its workers, and what dispatch and network cost.
+
+Utilisation: of two workers in a campaign of eight runs of 15+1, vetting, journal and
+tables on, between the births that are a tenth and nine tenths of all. It is the time
+that the workers say their evaluations took, over twice the time that passed. The
+coordinator's share of the two cores is thereby set apart: a worker that has a job and
+waits for its core, because coordinator or analyzer is on it, is busy; one that waits
+for a job is not.
+"""
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+import analyzer.service
+import worker.null
+import worker.service
+from coordinator.active import ActiveRun
+from coordinator.campaign import Campaign
+from coordinator.conductor import Conductor, Planned
+from coordinator.dispatch_bench import (
+    LEAST_NULL_PER_S,
+    LEAST_WORKERS,
+    MOST_NULL_CPU_S,
+    birth_cost,
+    null_rate,
+)
+from coordinator.events import DispatchEvent, Returned
+from coordinator.fleet import Fleet
+from coordinator.fleet_model import Setting, most_workers
+from coordinator.folder import RunFolder
+from coordinator.folder_status import unbegun_status
+from coordinator.service import Network
+from schema.codec import decode_answer
+from schema.crew import Crew, one_thread_each
+from schema.experiment_file import read_experiment
+from schema.network import Agent
+from schema.topics import unique_name
+
+one_thread_each()  # as the command does, before anybody opens a session
+
+pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
+
+UTILISATION = 0.95
+RUNS = 8
+BIRTHS = 60
+
+
+class Watched:
+    """Agents whose workers' busy time is counted."""
+
+    def __init__(self, network: Network) -> None:
+        self.busy_s = 0.0
+        self.send = network.send
+        self.cancel = network.cancel
+        self._network = network
+
+    def receive(self, timeout_s: float) -> Sequence[DispatchEvent]:
+        events = self._network.receive(timeout_s)
+        for event in events:
+            if isinstance(event, Returned) and event.agent.startswith("worker"):
+                self.busy_s += decode_answer(event.answer).wall_s
+        return events
+
+
+@contextmanager
+def campaign(folder: Path) -> Iterator[tuple[Conductor, Watched]]:
+    """Give a campaign that is about to begin, and its agents."""
+    experiment = replace(read_experiment("scenario2"), births=BIRTHS)
+    planned = [
+        Planned(
+            details,
+            unbegun_status(path, details),
+            lambda path=path, details=details: RunFolder(path, details),  # type: ignore[misc]
+        )
+        for path, details in Campaign((experiment,), RUNS, 1).runs(folder)
+    ]
+    with ExitStack() as stack:
+        network = stack.enter_context(Network(name=unique_name("bench")))
+        judge = Agent("analyzer", "analyzer", network.address)
+        stack.enter_context(Crew(analyzer.service.process, (judge,), size=1))
+        hand = Agent("worker", "worker", network.address)
+        stack.enter_context(Crew(worker.service.process, (hand,), size=2))
+        watched = Watched(network)
+        fleet = Fleet(watched)
+        conductor = Conductor(
+            planned,
+            fleet,
+            open_run=lambda held, _watched: ActiveRun(held, fleet),
+            most=100,
+            conclude=lambda _run: None,
+            report=lambda _details, error: pytest.fail(str(error)),
+        )
+        stack.callback(conductor.close)
+        yield conductor, watched
+
+
+def test_two_workers_of_a_campaign_are_busy(tmp_path: Path) -> None:
+    marks: list[tuple[float, float, float]] = []
+    with campaign(tmp_path) as (conductor, watched):
+        while len(marks) < 2:
+            conductor.turn(0.2, time.monotonic)
+            born = conductor.status(time.monotonic()).births
+            if born >= (0.1, 0.9)[len(marks)] * RUNS * BIRTHS:
+                now_s = time.monotonic()
+                marks.append((now_s, watched.busy_s, time.process_time()))
+    wall_s, busy_s, own_s = (end - begin for begin, end in zip(*marks, strict=True))
+    share = busy_s / (2 * wall_s)
+    print(
+        f"\ntwo workers busy for {busy_s:.1f} s in {wall_s:.1f} s: utilisation "
+        f"{share:.3f}; coordinator {own_s:.1f} s CPU"
+    )
+    assert share >= UTILISATION
+
+
+def test_null_evaluations() -> None:
+    best = max(
+        (null_rate(worker.null.process, 1, 3.0) for _ in range(3)),
+        key=lambda rate: rate.per_s,
+    )
+    print(f"\n{best.per_s:.0f} null evaluations/s, {1e3 * best.cpu_s:.3f} ms CPU each")
+    assert best.cpu_s <= MOST_NULL_CPU_S
+    assert best.per_s >= LEAST_NULL_PER_S
+
+
+def test_a_thousand_workers_with_evaluations_of_ten_seconds() -> None:
+    cost = birth_cost(worker.null.process, analyzer.service.process, 600).cpu_s
+    setting = Setting(1, 10.0, cost)
+    reached, outcome = most_workers(setting)
+    rate = outcome.births_per_s
+    print(f"\n{1e3 * cost:.2f} ms per birth: {reached} workers, {rate:.0f} births/s")
+    assert reached >= LEAST_WORKERS
