@@ -12,11 +12,11 @@ def parents_of(births: pa.Table) -> list[list[int]]:
     """Return the births rows of each individual's parents.
 
     Args:
-        births: of one run, in the order of its records: ``island``, ``birth``,
-            ``parents``.
+        births: of one run: ``island``, ``birth``, ``parents``. Of several islands a
+            parent's row may stand behind its child's.
 
     Raises:
-        RunFolderError: a parent that is not born before its child.
+        RunFolderError: a parent whose birth is not recorded.
     """
     lists = births["parents"].combine_chunks()
     named = pa.table(
@@ -25,12 +25,35 @@ def parents_of(births: pa.Table) -> list[list[int]]:
     found = rows_of(names(named, "island", "birth"), births)
     ends = np.cumsum(lists.value_lengths().to_numpy())
     child = np.repeat(np.arange(len(lists)), np.diff(ends, prepend=0))
-    wrong = child[(found < 0) | (found >= child)]
-    if len(wrong):
+    orphans = child[found < 0]
+    if len(orphans):
         raise RunFolderError(
-            f"births: row {wrong[0]} has a parent that was not born before it"
+            f"births: row {orphans[0]} has a parent whose birth is not recorded"
         )
     return [part.tolist() for part in np.split(found, ends[:-1])] if len(ends) else []
+
+
+def parents_first(parents: list[list[int]]) -> list[int]:
+    """Return all births rows in an order in which parents stand before children.
+
+    Raises:
+        RunFolderError: somebody who is an ancestor of itself.
+    """
+    children: list[list[int]] = [[] for _ in parents]
+    waits_for = [len(couple) for couple in parents]
+    for child, couple in enumerate(parents):
+        for parent in couple:
+            children[parent].append(child)
+    order = [row for row, count in enumerate(waits_for) if not count]
+    for row in order:  # grows while it is walked
+        for child in children[row]:
+            waits_for[child] -= 1
+            if not waits_for[child]:
+                order.append(child)
+    if len(order) < len(parents):
+        own = next(row for row, count in enumerate(waits_for) if count)
+        raise RunFolderError(f"births: row {own} descends from itself")
+    return order
 
 
 def ancestors(parents: list[list[int]]) -> list[int]:
@@ -43,12 +66,10 @@ def ancestors(parents: list[list[int]]) -> list[int]:
         One number per individual: bit r is set if births row r is an ancestor. Nobody
         is an ancestor of itself.
     """
-    found: list[int] = []
-    for couple in parents:
-        line = 0
-        for parent in couple:
-            line |= found[parent] | 1 << parent
-        found.append(line)
+    found = [0] * len(parents)
+    for row in parents_first(parents):
+        for parent in parents[row]:
+            found[row] |= found[parent] | 1 << parent
     return found
 
 
@@ -74,13 +95,10 @@ def unique_ancestors(census: Census, lines: list[int]) -> Integers:
 
 def origins(births: pa.Table, parents: list[list[int]]) -> list[int]:
     """Return on which islands an individual and its ancestors were born, as bits."""
-    homes = births["island"].to_pylist()
-    found: list[int] = []
-    for home, couple in zip(homes, parents, strict=True):
-        line = 1 << home
-        for parent in couple:
-            line |= found[parent]
-        found.append(line)
+    found = [1 << home for home in births["island"].to_pylist()]
+    for row in parents_first(parents):
+        for parent in parents[row]:
+            found[row] |= found[parent]
     return found
 
 

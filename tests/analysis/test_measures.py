@@ -81,6 +81,22 @@ def test_unique_ancestors_are_counted_once_each() -> None:
     assert column(tables, "ancestors_per_robot") == [0, 1, 2]
 
 
+def test_a_parent_on_another_island_may_stand_behind_its_child() -> None:
+    # Island 0 is recorded first; its G descends from F and H of island 1.
+    f, g, h = (1, 0), (0, 0), (1, 1)
+    born = births((g, [h]), (f, []), (h, [f]))
+    assert ancestors(parents_of(born)) == [0b110, 0, 0b010]
+    living = population((0, 1, {g: 1}), (1, 2, {f: 1, h: 1}))
+    tables = run(births=born, population=living)
+    assert column(tables, "ancestors") == [2, 1]
+    assert column(tables, "foreign") == [1, 0]
+
+
+def test_nobody_descends_from_itself() -> None:
+    with pytest.raises(RunFolderError, match="row 0 descends from itself"):
+        ancestors(parents_of(births((A, [B]), (B, [A]))))
+
+
 def test_ancestors_of_the_immature_do_not_count() -> None:
     tables = run(
         births=FAMILY, population=population((0, 5, {C: 0.1, E: None}), is_online=True)
@@ -93,7 +109,7 @@ def test_a_parent_that_is_not_there_is_told_and_the_rest_is_measured() -> None:
     tables = run(
         births=births((A, []), (C, [A, B])), population=population((0, 2, {A: 1, C: 2}))
     )
-    with pytest.raises(RunFolderError, match="row 1 has a parent that was not born"):
+    with pytest.raises(RunFolderError, match="row 1 has a parent whose birth is not"):
         parents_of(tables["births"])
     found, refusals = measure(Material(tables), frozenset())
     assert found["populations"]["fitness"].to_pylist() == [1.5]
