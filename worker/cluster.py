@@ -25,7 +25,8 @@ class Track:
     """A cluster's states at K moments of a stretch of time, one row each.
 
     Attributes:
-        qpos, qvel: (K, Q) and (K, V).
+        state: (K, Q + V) positions, then velocities.
+        qpos, qvel: the same apart, (K, Q) and (K, V).
         xpos, xmat: frames of all bodies, (K, N, 3) and (K, N, 9).
         warnings: how often the engine had given each of its own.
         touching: the pairs of members in contact, if they are kept.
@@ -34,8 +35,12 @@ class Track:
     def __init__(self, data: mujoco.MjData, count: int) -> None:
         """Make room for moments of a state."""
         live = (data.qpos, data.qvel, data.xpos, data.xmat)
-        rows = [np.zeros((count, *array.shape)) for array in live]
-        self.qpos, self.qvel, self.xpos, self.xmat = rows
+        size = len(data.qpos)
+        self.state = np.zeros((count, size + len(data.qvel)))
+        self.qpos, self.qvel = self.state[:, :size], self.state[:, size:]
+        self.xpos = np.zeros((count, *data.xpos.shape))
+        self.xmat = np.zeros((count, *data.xmat.shape))
+        rows = (self.qpos, self.qvel, self.xpos, self.xmat)
         self._complaints: Indices = data.warning.number
         self.warnings = np.zeros((count, len(self._complaints)), dtype=np.intp)
         self.touching: list[list[tuple[int, int]]] = [[] for _ in range(count)]

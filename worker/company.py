@@ -122,14 +122,10 @@ class Company:
         stride, layout, proximity = self.stride, self.layout, self.proximity
         if stride is None:
             state = layout.read()
-            differences = np.abs(state - proximity.anchor)
-            bounds = (
-                layout.moved(differences[: layout.size]),
-                layout.speeds(differences[layout.size :]),
-            )
+            bounds = layout.bounds(np.abs(state - proximity.anchor))
         else:
             state = stride.state
-            bounds = stride.moved[stride.moment], stride.speeds[stride.moment]
+            bounds = stride.bounds[stride.moment]
         is_anchored, pairs = proximity.look(layout, state, bounds, self._balls)
         if is_anchored and stride is not None:
             stride.measure(layout, proximity.anchor, stride.moment)
@@ -212,11 +208,10 @@ class Company:
     def _anchor(self) -> None:
         """Note how far all have moved, before they stand elsewhere in the layout."""
         if self.stride is not None:
-            self.proximity.settle(self.stride.moved[self.stride.moment])
+            self.proximity.settle(self.stride.bounds[self.stride.moment, 0])
             return
-        size = self.layout.size
-        positions = (self.layout.read() - self.proximity.anchor)[:size]
-        self.proximity.settle(self.layout.moved(np.abs(positions)))
+        differences = np.abs(self.layout.read() - self.proximity.anchor)
+        self.proximity.settle(self.layout.bounds(differences)[0])
 
     def _parts(self, cluster: Cluster) -> list[Group]:
         """Return the parts of a cluster, one if it holds together."""

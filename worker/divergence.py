@@ -35,7 +35,7 @@ def diverged(
     """
     is_quiet = _is_quiet(stride.loudest)
     if not is_quiet:
-        velocities = np.abs(stride.state[company.layout.size :])
+        velocities = np.abs(stride.state[company.layout.velocities])
         is_quiet = _is_quiet(float(velocities.max(initial=0.0)))
     moment = stride.moment
     found: list[Casualty] = []

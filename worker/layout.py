@@ -45,10 +45,12 @@ class Roster:
 class Layout:
     """Indices into the states of R robots in their clusters.
 
+    The row has N numbers: of each cluster all positions, then all velocities.
+
     Attributes:
         roster: the robots; its ``islands``, ``numbers`` and ``joint_counts``.
         clusters: in the order of the row.
-        size: number of all positions; velocities stand after them.
+        positions, velocities: which of the numbers are what.
         starts, dofs: (R,) where each one's position and velocity begin.
         roots: (R, 7) where place and quaternion stand.
         motions: (R, 6) where velocity and turning of the core stand.
@@ -66,71 +68,72 @@ class Layout:
         self.islands, self.numbers = roster.islands, roster.numbers
         self.joint_counts = roster.joint_counts
         self.clusters = tuple(clusters)
-        order, joints, dofs = [], [], []
-        joint = dof = 0
+        starts = np.zeros((2, len(roster.everybody)), dtype=np.intp)
+        # Where the terms of each sum begin, whose sums they are, and their weights.
+        edges: list[int] = []
+        owners: list[int] = []
+        weights: list[Floats] = []
+        kinds: list[tuple[int, int]] = []
+        begin = 0
         for cluster in clusters:
-            for birth, seat in zip(cluster.members, cluster.seats, strict=True):
-                order.append(roster.rows[birth])
-                joints.append(joint + seat.joints)
-                dofs.append(dof + seat.dofs)
-            joint += len(cluster.qpos)
-            dof += len(cluster.qvel)
-        self.size = joint
-        # Rows by birth, of what comes in the order of the clusters.
-        self._seated = np.argsort(np.array(order, dtype=np.intp))
-        self._first = np.array(joints, dtype=np.intp)
-        self._first_dof = np.array(dofs, dtype=np.intp)
-        self.starts: Indices = self._first[self._seated]
-        self.dofs: Indices = self._first_dof[self._seated] + joint
+            rows = [roster.rows[birth] for birth in cluster.members]
+            size = len(cluster.qpos)
+            first = [begin + seat.joints for seat in cluster.seats]
+            second = [begin + size + seat.dofs for seat in cluster.seats]
+            starts[0, rows], starts[1, rows] = first, second
+            edges += first + second
+            owners += rows + [row + len(roster.everybody) for row in rows]
+            weights += [roster.shifts[row] for row in rows]
+            weights += [roster.weights[row] for row in rows]
+            kinds.append((size, len(cluster.qvel)))
+            begin += size + len(cluster.qvel)
+        self.starts, self.dofs = starts
+        self._edges = np.array(edges, dtype=np.intp)
+        self._order: Indices = np.argsort(np.array(owners, dtype=np.intp))
+        self._weights = _joined(weights)
+        are_positions = np.repeat(
+            np.tile([True, False], len(kinds)), np.array(kinds, np.intp).reshape(-1)
+        )
+        self.positions: Indices = are_positions.nonzero()[0]
+        self.velocities: Indices = (~are_positions).nonzero()[0]
         self.roots = self.starts[:, None] + np.arange(_FREE)
         self.motions = self.dofs[:, None] + np.arange(_FREE_DOFS)
         counts = roster.sizes - _FREE
         ends = np.cumsum(counts)
         own = np.repeat(self.starts + (_FREE - ends + counts), counts)
         self.joints = own + np.arange(len(own))
-        self._shifts = _joined([roster.shifts[row] for row in order])
-        self._weights = _joined([roster.weights[row] for row in order])
 
     def read(self) -> Floats:
-        """Return all positions in a row, then all velocities: a copy."""
-        parts = [cluster.qpos for cluster in self.clusters]
-        return _joined(parts + [cluster.qvel for cluster in self.clusters])
+        """Return all numbers in a row: a copy."""
+        return _joined([part for c in self.clusters for part in (c.qpos, c.qvel)])
 
     def history(self, count: int) -> Floats:
         """Return the same at the moments of a stretch, (count, N)."""
         if not self.clusters:
             return np.zeros((count, 0))
-        tracks = [cluster.track for cluster in self.clusters]
-        parts = [track.qpos[:count] for track in tracks]
-        return np.concatenate([*parts, *(t.qvel[:count] for t in tracks)], axis=1)
+        states = [cluster.track.state[:count] for cluster in self.clusters]
+        return np.concatenate(states, axis=1)
 
-    def moved(self, differences: Floats) -> Floats:
-        """Return how far any point of each robot is at most from where it was [m].
+    def bounds(self, differences: Floats) -> Floats:
+        """Return how far robots moved and how fast they are at most, (..., 2, R).
 
-        Args:
-            differences: (..., N) of positions from what they were, absolute.
-        """
-        return self._summed(differences * self._shifts, self._first)
-
-    def speeds(self, velocities: Floats) -> Floats:
-        """Return a bound on the speed of each robot's fastest point [m/s].
+        The first bounds how far any point of a robot is from where it was [m], the
+        second the speed of its fastest point [m/s].
 
         Args:
-            velocities: (..., V) absolute.
+            differences: (..., N) of positions from what they were, and velocities,
+                all absolute.
         """
-        return self._summed(velocities * self._weights, self._first_dof)
+        shape = (*differences.shape[:-1], 2, len(self.starts))
+        if not len(self._edges):
+            return np.zeros(shape)
+        sums = np.add.reduceat(differences * self._weights, self._edges, axis=-1)
+        return np.asarray(sums[..., self._order].reshape(shape))
 
     def part(self, row: int) -> slice:
         """Return where a robot's configuration stands."""
         start = int(self.starts[row])
         return slice(start, start + int(self.roster.sizes[row]))
-
-    def _summed(self, terms: Floats, starts: Indices) -> Floats:
-        """Return the sums of each robot's terms, (..., R), by birth."""
-        if not len(starts):
-            return np.zeros((*terms.shape[:-1], 0))
-        sums = np.add.reduceat(terms, starts, axis=-1)
-        return np.asarray(sums[..., self._seated])
 
 
 def _joined(parts: Sequence[Floats]) -> Floats:

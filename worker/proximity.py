@@ -37,7 +37,7 @@ class Proximity:
         slack: (R, R) upper triangle: distance at the last measurement plus both
             travels then [m]; infinite for pairs that live together.
         anchor: positions that the present ones are compared with, in the layout's
-            order, then zeros for the velocities.
+            order, and zeros for the velocities.
     """
 
     def __init__(self, settings: ArenaSettings) -> None:
@@ -88,7 +88,7 @@ class Proximity:
         self._radius = [reach.radius for reach in reaches]
         self._radii = [reach.radii[:, None] for reach in reaches]
         self.anchor = state
-        self.anchor[layout.size :] = 0.0
+        self.anchor[layout.velocities] = 0.0
         self.refresh()
 
     def refresh(self) -> None:
@@ -99,7 +99,7 @@ class Proximity:
         self,
         layout: Layout,
         state: Floats,
-        bounds: tuple[Floats, Floats],
+        bounds: Floats,
         balls: Balls,
     ) -> tuple[bool, list[tuple[int, int]]]:
         """Return whether anybody was measured, and who is to live with whom now.
@@ -107,7 +107,7 @@ class Proximity:
         Args:
             layout: where robots stand in the state.
             state: of all clusters in a row.
-            bounds: how far each robot moved from its anchor, and how fast it is.
+            bounds: (2, R) how far each moved from its anchor, and how fast it is.
             balls: gives spheres, those that are needed.
 
         Returns:

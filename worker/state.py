@@ -5,6 +5,7 @@ import numpy as np
 from schema.arena import Casualty
 from schema.birth import BirthId
 from schema.codec import decode_robot
+from schema.evaluation import Floats
 from schema.settings import ArenaSettings
 from worker.arrival import inhabitant
 from worker.company import Company
@@ -49,7 +50,7 @@ def write(
             clusters=[[rows[b] for b in c.members] for c in company.clusters],
             travel=pack_floats(proximity.travel),
             slack=pack_floats(proximity.slack[upper]),
-            anchor=pack_floats(proximity.anchor),
+            anchor=pack_floats(_anchor(company)),
             casualties=[
                 CasualtyState(_name(c.birth), c.step, c.reason, c.place)
                 for c in casualties
@@ -84,11 +85,19 @@ def read(
     proximity.slack[np.triu_indices(count, 1)] = unpack_floats(
         state.slack, count * (count - 1) // 2
     )
-    proximity.anchor = unpack_floats(state.anchor, *proximity.anchor.shape)
+    layout = company.layout
+    anchor = unpack_floats(state.anchor, *proximity.anchor.shape)
+    proximity.anchor[layout.positions] = anchor[: len(layout.positions)]
     proximity.refresh()
     return state.step, tuple(
         Casualty(BirthId(*c.birth), c.step, c.reason, c.place) for c in state.casualties
     )
+
+
+def _anchor(company: Company) -> Floats:
+    """Return the anchor with all positions before all velocities, which are 0."""
+    layout, anchor = company.layout, company.proximity.anchor
+    return np.concatenate([anchor[layout.positions], anchor[layout.velocities]])
 
 
 def _name(birth: BirthId) -> tuple[int, int]:

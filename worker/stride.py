@@ -16,17 +16,18 @@ class Stride:
     Attributes:
         plan: steps to each moment from the one before.
         moment: the one that is being looked at.
-        states: (K, N) positions, then velocities, as the layout puts them.
-        moved: (K, R) how far any point is at most from where it was measured [m].
-        speeds: (K, R) of the fastest points at most [m/s].
-        loudest: the greatest absolute velocity of all; not a number if one is none.
+        states: (K, N) as the layout puts them.
+        bounds: (K, 2, R) how far any point is at most from where it was measured
+            [m], and the speed of the fastest point at most [m/s].
+        loudest: no velocity of all is greater; not a number if one is none.
     """
 
     def __init__(self, plan: tuple[int, ...]) -> None:
         """Begin with the first moment; nothing is known of any."""
         self.plan = plan
         self.moment = 0
-        self.states = self.moved = self.speeds = np.zeros((len(plan), 0))
+        self.states = np.zeros((len(plan), 0))
+        self.bounds = np.zeros((len(plan), 2, 0))
         self.loudest = 0.0
 
     @property
@@ -35,19 +36,19 @@ class Stride:
         return np.asarray(self.states[self.moment])
 
     def read(self, layout: Layout) -> None:
-        """Read all states; how far anybody moved is to be measured anew.
-
-        Args:
-            layout: where everybody is, from this moment on.
-        """
+        """Read all states, from this moment on; they are to be measured anew."""
         self.states = layout.history(len(self.plan))
-        velocities = np.abs(self.states[:, layout.size :])
-        self.loudest = float(velocities.max(initial=0.0))
-        self.speeds = layout.speeds(velocities)
-        self.moved = np.zeros_like(self.speeds)
+        self.bounds = np.zeros((len(self.plan), 2, len(layout.starts)))
 
     def measure(self, layout: Layout, anchor: Floats, first: int) -> None:
-        """Compare the states from a moment on with a new anchor."""
+        """Compare the states from a moment on with an anchor.
+
+        Args:
+            layout: where everybody is.
+            anchor: positions, and zeros for the velocities, (N,).
+            first: the moment.
+        """
         if first < len(self.plan):
-            positions = self.states[first:, : layout.size]
-            self.moved[first:] = layout.moved(np.abs(positions - anchor[: layout.size]))
+            differences = np.abs(self.states[first:] - anchor)
+            self.loudest = float(differences.max(initial=0.0))
+            self.bounds[first:] = layout.bounds(differences)
