@@ -98,6 +98,8 @@ def _deployment(
 
     if options.connect and options.listen:
         raise NetworkError("--listen and --connect: a hub is here or elsewhere")
+    if options.view and options.in_process:
+        raise NetworkError("--view needs a network, and --in-process has none")
     is_for_others = options.command == "coordinator" and not options.connect
     workers: int | None = options.workers
     if workers is None:
@@ -124,6 +126,7 @@ def _deployment(
         fsync=options.fsync,
         threads=threads,
         speed=options.speed,
+        view=options.view,
         cpu_limit_s=options.cpu_limit,
         caution=Caution(options.audit, options.on_quarantine == "pause"),
     )

@@ -4,6 +4,8 @@ The run's thread condenses and encodes, at most so often; what may have to wait 
 a slow line is sent by a thread of its own.
 """
 
+import subprocess
+import sys
 import threading
 from math import inf
 from queue import SimpleQueue
@@ -15,6 +17,7 @@ from coordinator.loop import Loop
 from coordinator.service import Network, Order
 from schema.live import Crewman
 from schema.live_codec import encode_news
+from schema.network import Tls
 
 _NEWS_S = 0.25
 _WHOLE_S = 1.0
@@ -83,3 +86,21 @@ class Audience:
         while (reply := self._replies.get()) is not None:
             order, data = reply
             order.reply(data)
+
+
+def open_viewer(address: str, fleet: str, tls: Tls | None) -> None:
+    """Start a viewer as a process of its own, which outlives the run.
+
+    Args:
+        address: of the hub.
+        fleet: name of the fleet.
+        tls: files for a ``tls/`` address.
+    """
+    words = ["--connect", address, "--fleet", fleet]
+    if tls is not None:
+        words += ["--tls-ca", tls.ca, "--tls-certificate", tls.certificate]
+        words += ["--tls-key", tls.key]
+    # Of its own session: a Ctrl-C that stops the run leaves the window open.
+    subprocess.Popen(  # noqa: S603 - our own interpreter
+        [sys.executable, "-m", "revolve", "view", *words], start_new_session=True
+    )

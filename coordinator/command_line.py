@@ -137,6 +137,9 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         metavar="X",
         help="for watching an arena: at most X simulated seconds per second",
     )
+    flags.add_argument(
+        "--view", action="store_true", help="open a viewer's window, see revolve view"
+    )
     add_cpu_limit(flags)
     flags.add_argument(
         "--audit",

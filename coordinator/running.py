@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 
 from coordinator.active import ActiveRun
-from coordinator.audience import Audience
+from coordinator.audience import Audience, open_viewer
 from coordinator.audits import CARELESS, Caution
 from coordinator.campaign import (
     Campaign,
@@ -69,6 +69,7 @@ class Deployment:
         fsync: survive power loss, too.
         threads: that advance one arena together in a process here.
         speed: simulated seconds per second at most, of arenas; None: no limit.
+        view: a viewer is to be opened; the run does not wait for it.
         cpu_limit_s: CPU time of a job after which its process here is ended [s].
         caution: what to look out for.
     """
@@ -84,6 +85,7 @@ class Deployment:
     fsync: bool
     threads: int = 1
     speed: float | None = None
+    view: bool = False
     cpu_limit_s: float = CPU_LIMIT_S
     caution: Caution = CARELESS
 
@@ -311,6 +313,8 @@ def _agents(
         text = f"{network.address}\n"
         replace_durably(note, lambda file: file.write_text(text, encoding="utf-8"))
         stack.callback(_take_away, note, text)
+        if deployment.view:
+            open_viewer(network.address, deployment.fleet, deployment.tls)
         crews: list[Callable[[], None]] = []
         sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
         for kind, size in sizes.items() if deployment.workers else ():
