@@ -43,7 +43,6 @@ class Conductor:
         fleet: who does the work.
         active: runs on their way, in the order in which they were begun.
         failed: runs that could not go on, and why.
-        finished: runs that came to their end here.
     """
 
     def __init__(
@@ -68,7 +67,6 @@ class Conductor:
         """
         self.active: list[ActiveRun] = []
         self.failed: list[tuple[RunDetails, RevolveError]] = []
-        self.finished = 0
         self.fleet = fleet
         self._open_run = open_run
         self._most = most
@@ -146,7 +144,6 @@ class Conductor:
             self._dismiss(run)
             return
         if run.loop.is_finished:
-            self.finished += 1
             self._known[self._places[run]] = replace(run.status(0.0), births_per_s=0.0)
             self._dismiss(run)
 

@@ -35,7 +35,7 @@ from schema.birth import BirthId
 
 LEAST_UTILISATION = 0.95
 _ROUNDS = 10
-_LEAST = 10_000
+_LEAST = 5_000
 _TICK_S = 0.2
 
 
