@@ -66,12 +66,13 @@ class Stage:
         return out + err
 
     def clear(self) -> None:
-        """Kill whatever still runs."""
+        """Kill whatever still runs; a test that failed shows what all said."""
         for process in self._started:
             if process.poll() is None:
                 process.send_signal(signal.SIGCONT)
                 process.kill()
-            process.communicate()
+            out, err = process.communicate()
+            sys.stdout.write(f"{process.args}: {process.returncode}\n{out}{err}\n")
 
 
 def wait_until(condition: Callable[[], bool], what: str) -> None:
