@@ -1,0 +1,271 @@
+"""A recording holds what the tables hold, and nobody who watches changes a run."""
+
+import signal
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+import pytest
+from rerun.chunk import RrdReader
+
+from coordinator.compare import compare
+from schema.run_tables import read_table
+
+pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+
+Stage = Any
+Fleet = Callable[..., Any]
+Until = Callable[[Callable[[], bool], str], None]
+
+WORDS = ("hamlet.toml", "--seed", "4", "--quiet")
+CENTRES, QUATERNIONS = "Boxes3D:centers", "Boxes3D:quaternions"
+
+
+def batches(file: Path, path: str) -> Iterator[tuple[pa.RecordBatch, bool]]:
+    """Return what an entity was told, and whether for all time."""
+    for chunk in RrdReader(file).stream().filter(content=path):
+        yield chunk.to_record_batch(), chunk.is_static
+
+
+def paths(file: Path) -> set[str]:
+    return {str(chunk.entity_path) for chunk in RrdReader(file).stream()}
+
+
+def poses(file: Path, path: str) -> dict[int, Any]:
+    """Return centres (B, 3) by time [ns] of a robot."""
+    found = {}
+    for batch, _ in batches(file, path):
+        if CENTRES not in batch.schema.names:
+            continue
+        for time, row in zip(batch["sim_time"], batch[CENTRES], strict=True):
+            if row.is_valid:
+                found[time.value] = np.array(row.as_py())
+    return found
+
+
+def clears(file: Path, path: str) -> set[int]:
+    """Return when a robot was taken away [ns]."""
+    return {
+        time.value
+        for batch, _ in batches(file, path)
+        if "Clear:is_recursive" in batch.schema.names
+        for time, row in zip(
+            batch["sim_time"], batch["Clear:is_recursive"], strict=True
+        )
+        if row.is_valid
+    }
+
+
+def curves(file: Path, name: str) -> dict[int, tuple[float, ...]]:
+    """Return an island's curve by births."""
+    return {
+        births.as_py(): tuple(row.as_py())
+        for batch, is_static in batches(file, f"/islands/0/{name}")
+        if not is_static
+        for births, row in zip(batch["births"], batch["Scalars:scalars"], strict=True)
+    }
+
+
+def expected_curve(folder: Path) -> dict[int, tuple[float, ...]]:
+    """Return mean and best fitness by births, as the table engine finds them."""
+    rows = read_table(folder, "population").filter(pc.field("fitness").is_valid())
+    grouped = rows.group_by("births").aggregate(
+        [("fitness", "mean"), ("fitness", "max")]
+    )
+    return {
+        row["births"]: (row["fitness_mean"], row["fitness_max"])
+        for row in grouped.to_pylist()
+    }
+
+
+def nanoseconds(time_s: float) -> int:
+    return round(time_s * 1e9)
+
+
+def check_curves(file: Path, folder: Path) -> None:
+    shown, expected = curves(file, "fitness"), expected_curve(folder)
+    assert shown.keys() == expected.keys()
+    for births, values in expected.items():
+        assert shown[births] == pytest.approx(values, abs=1e-12)
+    sizes = Counter(read_table(folder, "population")["births"].to_pylist())
+    assert {each: (float(size),) for each, size in sizes.items()} == curves(
+        file, "size"
+    )
+
+
+@pytest.fixture(scope="session")
+def replayed(quiet_hamlet: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a recording of a run's tables."""
+    file = tmp_path_factory.mktemp("replay") / "run.rrd"
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-m",
+            "revolve",
+            "view",
+            str(quiet_hamlet),
+            "--save",
+            str(file),
+        ],
+        cwd=Path(__file__).parents[2],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    return file
+
+
+def test_a_replay_has_each_pose_of_each_robot(
+    replayed: Path, quiet_hamlet: Path
+) -> None:
+    table = read_table(quiet_hamlet, "poses")
+    for number in sorted(set(table["birth"].to_pylist())):
+        rows = table.filter(pc.field("birth") == number)
+        shown = poses(replayed, f"/islands/0/robots/0-{number}")
+        recorded = {
+            nanoseconds(row["sim_time_s"]): (row["x"], row["y"], row["z"])
+            for row in rows.select(["sim_time_s", "x", "y", "z"]).to_pylist()
+        }
+        assert shown.keys() == recorded.keys()
+        for time, place in recorded.items():
+            # One of the boxes is the core, whose centre the table has.
+            apart = np.linalg.norm(shown[time] - np.array(place), axis=1)
+            assert apart.min() < 1e-3
+
+
+def test_who_died_is_cleared_then_and_nobody_stays_for_ever(
+    replayed: Path, quiet_hamlet: Path
+) -> None:
+    deaths = {
+        row["birth"]: nanoseconds(row["sim_time_s"])
+        for row in read_table(quiet_hamlet, "deaths").to_pylist()
+    }
+    assert deaths
+    robots = [path for path in paths(replayed) if "/robots/" in path]
+    for path in robots:
+        number = int(path.rpartition("-")[2])
+        if number in deaths:
+            assert deaths[number] in clears(replayed, path)
+        assert not any(is_static for _, is_static in batches(replayed, path))
+
+
+def test_boxes_are_told_of_with_the_first_pose(replayed: Path) -> None:
+    for path in sorted(each for each in paths(replayed) if "/robots/" in each):
+        told = [
+            time.value
+            for batch, _ in batches(replayed, path)
+            if "Boxes3D:half_sizes" in batch.schema.names
+            for time, row in zip(
+                batch["sim_time"], batch["Boxes3D:half_sizes"], strict=True
+            )
+            if row.is_valid
+        ]
+        assert min(told) == min(poses(replayed, path))
+
+
+def test_a_replays_curves_are_the_tables(replayed: Path, quiet_hamlet: Path) -> None:
+    check_curves(replayed, quiet_hamlet)
+
+
+def test_the_log_tells_each_birth_and_death(replayed: Path, quiet_hamlet: Path) -> None:
+    lines = [
+        line.as_py()[0]
+        for batch, _ in batches(replayed, "/log")
+        for line in batch["TextLog:text"]
+    ]
+    births = read_table(quiet_hamlet, "births").num_rows
+    deaths = read_table(quiet_hamlet, "deaths").num_rows
+    assert sum("is born" in line for line in lines) == births
+    assert sum("is gone" in line for line in lines) == deaths
+
+
+def test_who_watches_changes_nothing_and_is_told_all(
+    hamlet_stage: Stage, quiet_hamlet: Path, fleet_of: Fleet, until: Until
+) -> None:
+    """One viewer sees all of a run; one is killed, one frozen while it lives."""
+    stage = hamlet_stage
+    fleet = fleet_of(stage, *WORDS)
+    viewers = {}
+    for name in ("whole", "killed", "frozen"):
+        words = ("view", "--connect", fleet.address, "--save", f"{name}.rrd")
+        viewers[name] = stage.start(*words)
+        file = stage.folder / f"{name}.rrd"
+        until(file.exists, f"the viewer {name} has been told of the run")
+    fleet.join("w", "worker")
+    fleet.begin(1)
+    fleet.wait_for(30_000)
+    viewers["killed"].kill()
+    viewers["frozen"].send_signal(signal.SIGSTOP)
+    fleet.finish()
+    assert not compare(fleet.folder, quiet_hamlet)
+    out, err = viewers["whole"].communicate(timeout=60)
+    assert viewers["whole"].returncode == 0, out + err
+    assert "the run has ended" in err
+    file = stage.folder / "whole.rrd"
+    check_curves(file, fleet.folder)
+    table = read_table(fleet.folder, "poses")
+    shown = sum(len(poses(file, path)) for path in paths(file) if "/robots/" in path)
+    # Best effort: but nothing is lost on a machine that keeps up.
+    assert 0.9 * table.num_rows <= shown <= table.num_rows
+
+
+def test_a_robot_of_an_arena_moves_again_as_recorded(
+    stage: Stage, quiet_hamlet: Path
+) -> None:
+    words = ("view", str(quiet_hamlet), "--robot", "0:3", "--robot", "best")
+    out = stage.run(*words, "--save", "again.rrd")
+    assert "0:3: moves again as recorded, to the last bit" in out
+    again = poses(stage.folder / "again.rrd", "/motion/0-3")
+    table = read_table(quiet_hamlet, "poses").filter(pc.field("birth") == 3)
+    # Brains tick more often than poses are recorded.
+    assert len(again) > 1.5 * table.num_rows
+
+
+def test_a_robot_that_was_alone_moves_again_as_recorded(
+    stage: Stage, undisturbed: Path
+) -> None:
+    words = ("view", str(undisturbed), "--robot", "best", "--ancestry")
+    out = stage.run(*words, "--save", "again.rrd")
+    assert "moves again as recorded, to the last bit" in out
+    assert "DIFFERS" not in out
+
+
+def test_a_record_that_is_not_what_happens_is_told(
+    stage: Stage, undisturbed: Path
+) -> None:
+    folder = stage.folder / "forged"
+    subprocess.run(["cp", "-r", str(undisturbed), str(folder)], check=True)
+    (file,) = folder.glob("tables/*/*/evaluations.parquet")
+    table = pq.ParquetFile(file).read()
+    index = table.schema.get_field_index("fitness")
+    fitness = pc.add(table["fitness"], 1e-9)
+    pq.write_table(table.set_column(index, table.schema.field(index), fitness), file)
+    out = stage.run("view", str(folder), "--robot", "0:4", "--save", "a.rrd")
+    assert "0:4: DIFFERS from what was recorded: fitness" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("view",), "name a run folder, or a coordinator"),
+        (("view", "nowhere"), "no run is there"),
+        (("view", "--connect", "tcp/127.0.0.1:1"), "no coordinator at"),
+        (("view", "nowhere", "--serve", "9876"), "must be HOST:PORT"),
+        (("view", "nowhere", "--follow", "7"), "must be ISLAND:BIRTH"),
+        (("view", "nowhere", "--save", "no/such/a.rrd"), "there is no folder no/such"),
+    ],
+)
+def test_bad_words_are_told_in_one_line(
+    stage: Stage, words: tuple[str, ...], said: str
+) -> None:
+    out = stage.run(*words, code=2)
+    assert said in out
+    assert out.count("\n") == 1
