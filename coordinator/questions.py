@@ -32,6 +32,8 @@ from schema.settings import arena_settings, evaluation_settings, vetting_setting
 
 QUARANTINED = "quarantined: "
 """How the reason begins why a robot that ends its processes has no evaluation."""
+REMEMBERED = 256
+"""Robots whose bytes are kept from their vetting to their evaluation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +104,9 @@ class Questions:
         asks = self._question
         if isinstance(command, Vet):
             self._encoded[birth] = (command.robot, robot)
+            if len(self._encoded) > REMEMBERED:
+                # The eldest: no robot of an arena is ever evaluated.
+                del self._encoded[next(iter(self._encoded))]
             attempt, steps, settings = command.attempt, 0, asks.vetting
         else:
             attempt, steps = command.trial, command.steps

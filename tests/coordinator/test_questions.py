@@ -20,7 +20,7 @@ from coordinator.events import (
     VettingFailed,
 )
 from coordinator.fleet import Fleet
-from coordinator.questions import QUARANTINED, Question, Questions
+from coordinator.questions import QUARANTINED, REMEMBERED, Question, Questions
 from schema import revolve_pb2 as pb
 from schema.birth import BirthId
 from schema.codec import Answer, decode_request, encode_answer
@@ -95,6 +95,15 @@ def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:
     assert event.provenance.agent == "one"
     assert event.provenance.platform == "platform-one"
     assert event.provenance.wall_s == 0.5
+
+
+def test_robots_that_are_never_evaluated_are_forgotten(desk: Desk) -> None:
+    """An arena's robots are vetted, born and gone: 3000 of them in a run."""
+    for number in range(REMEMBERED + 50):
+        desk.questions.ask(Vet(BirthId(0, number), 0, ROBOT))
+        (event,) = desk.tell(desk.reply(VIABLE))
+        assert isinstance(event, Vetted)
+    assert len(desk.questions._encoded) == REMEMBERED
 
 
 def test_a_request_names_its_plug_ins_by_what_they_are() -> None:
