@@ -25,7 +25,7 @@ COMMANDS = {
 """Module whose ``main`` takes the words, the command first; and what it does.
 
 A command of two words goes before the command of the first one, which is another
-room's.
+room's; its module is told both in one.
 """
 
 
@@ -46,7 +46,7 @@ def main(arguments: list[str] | None = None) -> int:
     if name in COMMANDS:
         words = [name, *words[2:]]
     if words[0] not in COMMANDS:
-        near = import_module("schema.experiment").nearest(words[0], COMMANDS)
+        near = import_module("schema.experiment_file").nearest(words[0], COMMANDS)
         print(
             f"revolve: no command {words[0]!r}{near}; allowed: {', '.join(COMMANDS)}",
             file=sys.stderr,
@@ -56,8 +56,7 @@ def main(arguments: list[str] | None = None) -> int:
     import_module("schema.crew").one_thread_each()
     error_type = import_module("schema.errors").RevolveError
     try:
-        pair = " ".join(words[:2])
-        room = import_module(COMMANDS.get(pair, COMMANDS[words[0]])[0])
+        room = import_module(COMMANDS[words[0]][0])
         return int(room.main(words))
     except error_type as error:
         print(f"revolve: {error}", file=sys.stderr)

@@ -43,7 +43,7 @@ def main(arguments: list[str], simulate: Simulate) -> int:
     """Draw a robot standing, or what it does; return the exit code.
 
     Args:
-        arguments: ``robot render`` and what follows.
+        arguments: the command's name, ``robot render``, first.
         simulate: the worker's.
 
     Returns:
@@ -55,7 +55,7 @@ def main(arguments: list[str], simulate: Simulate) -> int:
         SimulationDiverged: the physics did.
         ExperimentError: no such experiment, or a sensor that it cannot feed.
     """
-    options = _parser().parse_args(arguments[2:])
+    options = _parser().parse_args(arguments[1:])
     out: Path = options.out
     is_film = out.suffix.lower() == FILM_ENDING
     if not is_film and out.suffix.lower() != PICTURE_ENDING:

@@ -19,7 +19,7 @@ def main(arguments: list[str]) -> int:
     They have passed the experiment's restrictions, not its analyzer.
 
     Args:
-        arguments: ``robot random`` and what follows.
+        arguments: the command's name, ``robot random``, first.
 
     Returns:
         0 if all are written.
@@ -28,7 +28,7 @@ def main(arguments: list[str]) -> int:
         ExperimentError: no such experiment, or one that allows (nearly) no robot.
         InvalidRobot: a file that cannot be written.
     """
-    options = _parser().parse_args(arguments[2:])
+    options = _parser().parse_args(arguments[1:])
     experiment = read_experiment(options.experiment)
     space = body_space(experiment.space)
     for number in range(options.count):
@@ -57,4 +57,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    sys.exit(main(["robot", "random", *sys.argv[1:]]))
+    sys.exit(main(["robot random", *sys.argv[1:]]))

@@ -18,7 +18,7 @@ def main(arguments: list[str]) -> int:
     """Simulate a robot, print what it came to, and return the exit code.
 
     Args:
-        arguments: ``robot simulate`` and what follows.
+        arguments: the command's name, ``robot simulate``, first.
 
     Returns:
         0 if it was judged.
@@ -29,7 +29,7 @@ def main(arguments: list[str]) -> int:
         FitnessUndefined: there is no number for what it did.
         ExperimentError: an experiment that is none, or a sensor that it cannot feed.
     """
-    options = _parser().parse_args(arguments[2:])
+    options = _parser().parse_args(arguments[1:])
     robot, settings = _read(options.file, options.experiment)
     track = simulate(robot, settings.space, settings.simulation)
     clock = settings.simulation
@@ -70,4 +70,4 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    sys.exit(main(["robot", "simulate", *sys.argv[1:]]))
+    sys.exit(main(["robot simulate", *sys.argv[1:]]))

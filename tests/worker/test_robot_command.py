@@ -17,7 +17,7 @@ def test_a_file_is_judged_as_its_robot_is(
     expected = evaluate(spider(), settings_of(None))
     for name in ("spider.xml", "spider.yaml", "spider.pb"):
         write_robot(spider(), tmp_path / name, BUILT_IN)
-        assert main(["robot", "simulate", str(tmp_path / name)]) == 0
+        assert main(["robot simulate", str(tmp_path / name)]) == 0
         told = capsys.readouterr().out.splitlines()
         assert told[0] == f"fitness:           {expected.fitness!r}"
         assert told[1] == f"path velocity:     {expected.path_velocity!r} m/s"
