@@ -72,7 +72,7 @@ class Stage:
                 process.send_signal(signal.SIGCONT)
                 process.kill()
             out, err = process.communicate()
-            sys.stdout.write(f"{process.args}: {process.returncode}\n{out}{err}\n")
+            sys.stdout.write(f"{process.args!r}: {process.returncode}\n{out}{err}\n")
 
 
 def wait_until(condition: Callable[[], bool], what: str) -> None:
