@@ -1,0 +1,186 @@
+"""Campaigns as a user runs them: interrupted, killed, adopted, shared."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+
+from coordinator.compare import compare
+from coordinator.folder import RunDetails, RunFolder, read_state
+from schema.experiment_file import experiment_text, read_experiment
+from schema.network import hub_config
+
+pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+
+Stage = Any
+Until = Callable[[Callable[[], bool], str], None]
+
+SHORT = """
+name = "{name}"
+births = 20
+[selection]
+population = 8
+children = {children}
+[simulation]
+window_steps = 400
+"""
+"""Two seconds of each robot's life: what is tested here is not the physics."""
+
+HUB = "tcp/127.0.0.1:0"
+REPEATS = 2
+NAMES = ("steady", "broods")
+
+
+def _write(folder: Path) -> None:
+    for name, children in zip(NAMES, (1, 8), strict=True):
+        text = SHORT.format(name=name, children=children)
+        (folder / f"{name}.toml").write_text(text)
+
+
+def _words(out: str, *more: str) -> tuple[str, ...]:
+    sources = tuple(f"{name}.toml" for name in NAMES)
+    return ("run", *sources, "--seed", "7", "--repeats", str(REPEATS), "--out", out,
+            *more)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a campaign that ran in one process, to which nothing happened."""
+    folder = tmp_path_factory.mktemp("whole")
+    _write(folder)
+    subprocess.run(
+        [sys.executable, "-m", "revolve", *_words("all", "--in-process", "--quiet")],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
+    return folder / "all"
+
+
+def _check_equal(whole: Path, other: Path) -> None:
+    for name in NAMES:
+        for repeat in range(REPEATS):
+            folder = f"{name}-{repeat}"
+            assert compare(whole / folder, other / folder) == [], folder
+
+
+def _sizes(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.glob("*/journal.bin"))
+
+
+def _make_alone(stage: Stage, path: Path, name: str, run: int) -> None:
+    """Make a run by itself, as if nobody thought of a campaign."""
+    text = experiment_text(read_experiment(str(stage.folder / f"{name}.toml")))
+    with RunFolder(path, RunDetails(name, run, 7, text)):
+        pass
+    stage.run("resume", str(path), "--in-process", "--quiet")
+
+
+def test_a_killed_campaign_goes_on_and_takes_what_is_there(
+    stage: Stage, whole: Path, until: Until
+) -> None:
+    _write(stage.folder)
+    campaign = stage.folder / "campaign"
+    _make_alone(stage, campaign / "steady-1", "steady", 1)
+    taken = campaign / "steady-1" / "journal.bin"
+    before = taken.stat().st_mtime_ns
+    first = stage.start(*_words("campaign", "--workers", "2"))
+    share = taken.stat().st_size + 0.4 * (_sizes(whole) - taken.stat().st_size)
+    until(lambda: _sizes(campaign) > share, "the campaign is on its way")
+    first.send_signal(signal.SIGKILL)
+    first.communicate()
+    assert "stopped" in stage.run("status", "campaign")
+    said = stage.run("resume", "campaign", "--workers", "1", "--quiet")
+    assert "4 runs are finished" in said
+    _check_equal(whole, campaign)
+    assert taken.stat().st_mtime_ns == before
+    again = stage.run("resume", "campaign", "--workers", "1", "--quiet")
+    assert "4 of 4 runs are finished already" in again
+
+
+def test_ctrl_c_stops_all_runs_and_says_how_to_go_on(
+    stage: Stage, whole: Path, until: Until
+) -> None:
+    _write(stage.folder)
+    campaign = stage.folder / "campaign"
+    first = stage.start(*_words("campaign", "--workers", "2"))
+    until(lambda: _sizes(campaign) > 0.3 * _sizes(whole), "the campaign is on its way")
+    assert "2 workers" in stage.run("status", "campaign")
+    first.send_signal(signal.SIGINT)
+    out, err = first.communicate(timeout=60)
+    assert first.returncode == 130, out + err
+    assert "revolve resume campaign" in err
+    assert "Traceback" not in err
+    there = [path.parent for path in campaign.glob("*/run.json")]
+    assert {read_state(path) for path in there} <= {"stopped", "finished"}
+    assert stage.run(*_words("campaign"), code=2).count("revolve resume campaign") == 1
+    stage.run("resume", "campaign", "--in-process", "--quiet")
+    _check_equal(whole, campaign)
+
+
+def test_two_coordinators_share_the_workers_of_a_hub(stage: Stage, whole: Path) -> None:
+    _write(stage.folder)
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        address = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))):
+        users = [
+            stage.start(
+                "run", f"{name}.toml", "--seed", "7", "--repeats", str(REPEATS),
+                "--connect", address, "--out", name,
+            )
+            for name in NAMES
+        ]  # fmt: skip
+        stage.start("analyzer", "--connect", address)
+        stage.start("worker", "--connect", address, "--processes", "2")
+        for user in users:
+            out, err = user.communicate(timeout=200)
+            assert user.returncode == 0, out + err
+    for name in NAMES:
+        for repeat in range(REPEATS):
+            run = f"{name}-{repeat}"
+            assert compare(whole / run, stage.folder / name / run) == []
+
+
+def test_status_of_all_who_share_a_hub(stage: Stage, until: Until) -> None:
+    _write(stage.folder)
+    first = stage.start("coordinator", *_words("one")[1:], "--listen", HUB)
+    until((stage.folder / "one" / "address").exists, "the first one listens")
+    address = (stage.folder / "one" / "address").read_text().strip()
+    stage.start("coordinator", "steady.toml", "--connect", address, "--out", "two")
+    until((stage.folder / "two" / "address").exists, "the second one is there")
+
+    def told() -> str:
+        text = stage.run("status", "--connect", address)
+        return str(text)
+
+    until(lambda: "two" in told() and "broods-1" in told(), "both tell")
+    assert "0 workers" not in told()
+    assert "0 of 4 runs finished, 0 of 80 births" in told()
+    assert first.poll() is None
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("status",), "either a folder or --connect"),
+        (("status", "nowhere"), "no run and no campaign"),
+        (("run", "thesis", "scenario1"), "names of their own"),
+        (("run", "scenario1", "--repeats", "0"), "must be >= 1"),
+        (("run", "scenario1", "--connect", HUB, "--listen", HUB), "here or elsewhere"),
+        (("run", "scenario1", "--connect", "tcp/127.0.0.1:9"), "no hub"),
+    ],
+)
+def test_complaints_are_one_line(
+    stage: Stage, words: tuple[str, ...], complaint: str
+) -> None:
+    said = stage.run(*words, code=2)
+    assert complaint in said
+    assert len(said.strip().splitlines()) == 1
