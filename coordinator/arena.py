@@ -284,8 +284,8 @@ class Arena:
         is_due = self._is_starving or landing.is_due(self.births, now_s)
         if is_due and not landing.is_waiting and self.births < self._experiment.births:
             mature = self._residents.mature()
-            floor = self._rules.population_floor
-            sent, gone = landing.depart(mature, len(self._residents), floor)
+            stay = self._experiment.selection.parents_needed
+            sent, gone = landing.depart(mature, len(self._residents), stay)
             commands += [*migration_records(sent, self.births, now_s), *sent]
             for one in gone:
                 resident = self._residents.remove(one.birth)

@@ -52,16 +52,16 @@ class Landing:
         return not self.is_waiting and self._exchange.is_due(births, now_s)
 
     def depart(
-        self, mature: Sequence[Individual], living: int, floor: int
+        self, mature: Sequence[Individual], living: int, stay: int
     ) -> tuple[list[Emigrate], list[Individual]]:
         """End the epoch; return what is sent, and who is moved away.
 
         Args:
             mature: who may leave.
             living: how many live there.
-            floor: so many of the mature stay.
+            stay: so many of the mature are not moved away.
         """
-        sent, gone = self._exchange.leave(mature, living, len(mature) - floor)
+        sent, gone = self._exchange.leave(mature, living, len(mature) - stay)
         self._empty += len(gone)
         return sent, gone
 

@@ -123,7 +123,7 @@ def _migrants_problem(own: Experiment, migration: Migration) -> str:
             f"migration.migrants: must be <= {living}, those who live there at most, "
             f"got {migration.migrants}"
         )
-    stay = selection.parents_needed if arena is None else arena.population_floor
+    stay = selection.parents_needed
     if migration.handling == "evict" and living <= stay:
         return (
             f'migration.handling: "evict" leaves at least {stay} on their island, and '

@@ -36,7 +36,7 @@ _ARENA = """
 birth_interval_s = 5.0
 cull_interval_s = 10.0
 population_limit = 8
-population_floor = 3
+population_floor = 4
 record_touches = true
 """
 
@@ -58,7 +58,7 @@ count = 2
 [migration]
 topology = "ring"
 epoch = 7
-epoch_s = 20.0
+epoch_s = 10.0
 handling = "evict"
 """
 
