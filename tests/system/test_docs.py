@@ -29,7 +29,9 @@ def _environment(*paths: Path) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": found}
 
 
-@pytest.mark.parametrize(("page", "least"), [("tables.md", 5), ("analysis.md", 3)])
+@pytest.mark.parametrize(
+    ("page", "least"), [("tables.md", 5), ("analysis.md", 3), ("viewing.md", 0)]
+)
 def test_python_of_the_pages_on_tables(
     page: str, least: int, undisturbed: Path, tmp_path: Path
 ) -> None:

@@ -1,0 +1,131 @@
+"""What a viewer shows, live and again, looked at without a screen.
+
+Needs a Vulkan driver (Debian: mesa-vulkan-drivers) and is skipped without one.
+"""
+
+import io
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow.compute as pc
+import pytest
+from PIL import Image
+from rerun.experimental import ViewerClient
+
+from schema.run_tables import read_table
+
+pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
+
+Stage = Any
+Fleet = Callable[..., Any]
+Until = Callable[[Callable[[], bool], str], None]
+Floats = npt.NDArray[np.float64]
+
+PORT, SERVED = 9898, 9899
+SEEN_S = 12.0
+"""A time at which all founders live."""
+FIELD_OF_VIEW = np.radians(55.0)
+EYE = 1.2 * 1.3 * 0.4 * np.array([0.35, -1.0, 0.8])
+"""Where the camera is in an arena of 0.4 m, if the layout is as it says."""
+
+
+@pytest.fixture
+def viewer() -> Iterator[ViewerClient]:
+    program = str(Path(sys.executable).parent / "rerun")
+    try:
+        client = ViewerClient.spawn(
+            headless=True, port=PORT, hide_welcome_screen=True, executable_path=program
+        )
+        client.take_screenshot()
+    except Exception as error:  # noqa: BLE001 - the library tells it in many ways
+        pytest.skip(f"no viewer without a Vulkan driver: {type(error).__name__}")
+    with client:
+        yield client
+
+
+def look(viewer: ViewerClient, source: str) -> Floats:
+    """Return the picture of the arena, (H, W, 3), after checking all views."""
+    viewer.open(source)
+    deadline = time.monotonic() + 60.0
+    while viewer.get_state().loading or not viewer.get_state().views:
+        assert time.monotonic() < deadline, "the viewer never has the recording"
+        time.sleep(0.1)
+    time.sleep(1.0)  # the viewer does not tell when a recording has become active
+    viewer.set_time("sim_time", duration=SEEN_S, play_state="paused")
+    time.sleep(2.0)  # nor when it has drawn what it loads on demand
+    views = {view.name: view for view in viewer.get_state().views}
+    assert {"Arena 0", "Fitness", "Population", "Ancestry", "Workers"} <= views.keys()
+    assert [view.reports for view in views.values() if view.reports] == []
+    shot = viewer.take_screenshot(view_id=views["Arena 0"].view_id)
+    return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"), dtype=np.float64)
+
+
+def pixels(places: Floats, height: int, width: int) -> Floats:
+    """Return where points (N, 3) are in a picture, (N, 2) column and row."""
+    forward = -EYE / np.linalg.norm(EYE)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    seen = places - EYE
+    scale = 0.5 * height / np.tan(0.5 * FIELD_OF_VIEW) / (seen @ forward)
+    across, up = seen @ right * scale, seen @ np.cross(right, forward) * scale
+    return np.stack([0.5 * width + across, 0.5 * height - up], axis=1)
+
+
+def check_robots(picture: Floats, folder: Path) -> None:
+    """Most cores show their colours where the table has them; the rest is hidden."""
+    rows = read_table(folder, "poses")
+    rows = rows.filter(pc.less(pc.abs(pc.subtract(rows["sim_time_s"], SEEN_S)), 1e-6))
+    colours = {
+        row["birth"]: np.array(row["body"][0]["params"][-3:]) * 255.0
+        for row in read_table(folder, "births").to_pylist()
+    }
+    places = np.stack([rows[axis].to_numpy() for axis in "xyz"], axis=1)
+    height, width, _ = picture.shape
+    found = []
+    for birth, (column, row) in zip(
+        rows["birth"].to_pylist(), pixels(places, height, width), strict=True
+    ):
+        x, y = round(column), round(row)
+        if not (2 <= x < width - 2 and 2 <= y < height - 2):
+            continue
+        shown = picture[y - 2 : y + 3, x - 2 : x + 3].reshape(-1, 3)
+        # Light and shade change how bright a face is, not which colour it has.
+        faces = [_hue(colours[birth]) @ _hue(each) for each in shown]
+        found.append(max(faces) > 0.995)
+    assert len(found) >= 3
+    assert np.mean(found) >= 0.75
+
+
+def _hue(colour: Floats) -> Floats:
+    return np.asarray(colour / max(float(np.linalg.norm(colour)), 1e-9))
+
+
+def test_a_replay_shows_robots_where_they_were(
+    viewer: ViewerClient, stage: Stage, quiet_hamlet: Path
+) -> None:
+    stage.run("view", str(quiet_hamlet), "--save", "run.rrd")
+    check_robots(look(viewer, str(stage.folder / "run.rrd")), quiet_hamlet)
+
+
+def test_a_live_view_shows_robots_where_they_are(
+    viewer: ViewerClient, hamlet_stage: Stage, fleet_of: Fleet, until: Until
+) -> None:
+    fleet = fleet_of(hamlet_stage, "hamlet.toml", "--seed", "4", "--quiet")
+    words = ("--serve", f"127.0.0.1:{SERVED}", "--save", "live.rrd")
+    hamlet_stage.start("view", "--connect", fleet.address, *words)
+    until((hamlet_stage.folder / "live.rrd").exists, "the viewer has been told")
+    fleet.join("w", "worker")
+    fleet.begin(1)
+    fleet.finish()
+    picture = look(viewer, f"rerun+http://127.0.0.1:{SERVED}/proxy")
+    check_robots(picture, fleet.folder)
+
+
+def test_a_picture_of_something_else_is_noticed(quiet_hamlet: Path) -> None:
+    with pytest.raises(AssertionError):
+        check_robots(np.full((900, 1200, 3), 246.0), quiet_hamlet)
