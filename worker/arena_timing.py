@@ -172,7 +172,7 @@ def time_arena(
     if warm_s:
         world.advance(warm_s * second)
     looking.wrap(world.company, "look")
-    coming.wrap(world.company, "regroup", "part", "remove")
+    coming.wrap(world.company, "regroup", "part", "remove", "catch_up")
     coming.wrap(world, "apply")
     company, wall, bare, steps = world.company, 0.0, 0.0, 0
     merges, splits = company.merges, company.splits

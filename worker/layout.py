@@ -26,6 +26,8 @@ class Roster:
         islands, numbers: (R,) names.
         sizes: (R,) numbers of each one's position.
         joint_counts: (R,) how many joint angles each has.
+        radius: of a sphere about each one's core that holds all of it [m].
+        radii: (B, 1) of the spheres that cover each [m].
     """
 
     def __init__(self, everybody: Sequence[Inhabitant]) -> None:
@@ -36,6 +38,8 @@ class Roster:
         self.islands = np.array([birth.island for birth in births], dtype=np.int32)
         self.numbers = np.array([birth.number for birth in births], dtype=np.int64)
         reaches = [one.body.reach for one in everybody]
+        self.radius = [reach.radius for reach in reaches]
+        self.radii = [reach.radii[:, None] for reach in reaches]
         self.shifts = [reach.shifts for reach in reaches]
         self.weights = [reach.weights for reach in reaches]
         self.sizes = np.array([len(shifts) for shifts in self.shifts], dtype=np.intp)
@@ -51,6 +55,7 @@ class Layout:
         roster: the robots; its ``islands``, ``numbers`` and ``joint_counts``.
         clusters: in the order of the row.
         positions, velocities: which of the numbers are what.
+        homes: (R,) which of the clusters each one lives in.
         starts, dofs: (R,) where each one's position and velocity begin.
         roots: (R, 7) where place and quaternion stand.
         motions: (R, 6) where velocity and turning of the core stand.
@@ -68,40 +73,45 @@ class Layout:
         self.islands, self.numbers = roster.islands, roster.numbers
         self.joint_counts = roster.joint_counts
         self.clusters = tuple(clusters)
-        starts = np.zeros((2, len(roster.everybody)), dtype=np.intp)
-        # Where the terms of each sum begin, whose sums they are, and their weights.
-        edges: list[int] = []
-        owners: list[int] = []
-        weights: list[Floats] = []
-        kinds: list[tuple[int, int]] = []
-        begin = 0
-        for cluster in clusters:
-            rows = [roster.rows[birth] for birth in cluster.members]
-            size = len(cluster.qpos)
-            first = [begin + seat.joints for seat in cluster.seats]
-            second = [begin + size + seat.dofs for seat in cluster.seats]
-            starts[0, rows], starts[1, rows] = first, second
-            edges += first + second
-            owners += rows + [row + len(roster.everybody) for row in rows]
-            weights += [roster.shifts[row] for row in rows]
-            weights += [roster.weights[row] for row in rows]
-            kinds.append((size, len(cluster.qvel)))
-            begin += size + len(cluster.qvel)
-        self.starts, self.dofs = starts
-        self._edges = np.array(edges, dtype=np.intp)
-        self._order: Indices = np.argsort(np.array(owners, dtype=np.intp))
-        self._weights = _joined(weights)
-        are_positions = np.repeat(
-            np.tile([True, False], len(kinds)), np.array(kinds, np.intp).reshape(-1)
+        rows = [roster.rows[birth] for cluster in clusters for birth in cluster.members]
+        own = [(s.joints, s.dofs) for cluster in clusters for s in cluster.seats]
+        sizes = [size for c in clusters for size in (len(c.qpos), len(c.qvel))]
+        ends = np.cumsum(sizes, dtype=np.intp)
+        # Where each cluster's positions and velocities begin, for each of its seats.
+        blocks = (ends - np.array(sizes, dtype=np.intp)).reshape(-1, 2)
+        counts = [len(cluster.members) for cluster in clusters]
+        begins = np.repeat(blocks, counts, axis=0) + np.array(own, np.intp).reshape(
+            -1, 2
         )
+        order = np.argsort(np.array(rows, dtype=np.intp))
+        self.starts, self.dofs = begins[order].T
+        self.homes: Indices = np.repeat(np.arange(len(counts)), counts)[order]
+        self._set_sums(begins.T.reshape(-1), rows, order)
+        are_positions = np.repeat(np.arange(len(sizes)) % 2 == 0, sizes)
         self.positions: Indices = are_positions.nonzero()[0]
         self.velocities: Indices = (~are_positions).nonzero()[0]
         self.roots = self.starts[:, None] + np.arange(_FREE)
         self.motions = self.dofs[:, None] + np.arange(_FREE_DOFS)
-        counts = roster.sizes - _FREE
-        ends = np.cumsum(counts)
-        own = np.repeat(self.starts + (_FREE - ends + counts), counts)
-        self.joints = own + np.arange(len(own))
+        angles = roster.sizes - _FREE
+        first = np.repeat(self.starts + (_FREE - np.cumsum(angles) + angles), angles)
+        self.joints = first + np.arange(len(first))
+
+    def _set_sums(self, begins: Indices, rows: list[int], order: Indices) -> None:
+        """Prepare the sums of ``bounds``.
+
+        Args:
+            begins: (2 R,) where positions and then velocities begin, seat by seat.
+            rows: of the seats.
+            order: of the seats by row.
+        """
+        sequence = np.argsort(begins)
+        self._edges = begins[sequence]
+        places = np.empty_like(sequence)
+        places[sequence] = np.arange(len(sequence))
+        self._order = np.concatenate([places[order], places[len(rows) + order]])
+        shifts, weights = self.roster.shifts, self.roster.weights
+        terms = [shifts[row] for row in rows] + [weights[row] for row in rows]
+        self._weights = _joined([terms[number] for number in sequence.tolist()])
 
     def read(self) -> Floats:
         """Return all numbers in a row: a copy."""

@@ -9,15 +9,11 @@ import numpy as np
 
 from schema.evaluation import Floats
 from schema.experiment import Simulation
-from worker.cluster import Cluster
 from worker.controller import Widths
 from worker.layout import Layout, Roster
 from worker.reach import Indices
 from worker.seat import Seat
 from worker.sensors import HIGHEST_OUTPUT, LOWEST_OUTPUT
-
-_Pads = tuple[int, list[tuple[int, int]]]
-"""Row of a robot, and its pads' geoms and places in the readings."""
 
 
 class Nerves:
@@ -59,11 +55,15 @@ class Nerves:
                 seat.senses.show(self.readings[row : row + 1])
         self._seats = seats
         self._controls = [seat.ctrl for seat in seats]
-        self._alone = [seat for seat in seats if not seat.senses.is_simple]
+        self._alone = [seats[row] for row in self._others]
         self._turns = layout.roots[self._simple, 3:]
         self._motions = layout.motions[self._simple]
         self._angles = layout.starts[self._motor_rows] + self._motor_offsets
-        self._pads = self._padded(layout)
+        homes = layout.homes.tolist()
+        self._pads = [
+            (row, seats[row].senses.pads, layout.clusters[homes[row]])
+            for row in self._padded
+        ]
 
     def feel(self, state: Floats) -> None:
         """Read all sensors but those of light.
@@ -74,11 +74,9 @@ class Nerves:
         self._feel_cores(state)
         for seat in self._alone:
             seat.feel(self._tick_s)
-        for cluster, pads in self._pads:
-            touched = cluster.touched
-            for row, own in pads:
-                for geom, place in own:
-                    self.readings[row, place] = geom in touched
+        for row, pads, cluster in self._pads:
+            for geom, place in pads:
+                self.readings[row, place] = geom in cluster.touched
 
     def drive(self, state: Floats, outputs: Floats) -> None:
         """Command all motors, until the next tick.
@@ -110,8 +108,9 @@ class Nerves:
             seat.senses.show(self.readings[row : row + 1])
         self._seats = seats
         simple = [row for row, seat in enumerate(seats) if seat.senses.is_simple]
+        self._others = sorted(set(range(len(seats))).difference(simple))
+        self._padded = [row for row in simple if seats[row].senses.pads]
         self._simple = np.array(simple, dtype=np.intp)
-        self._memories = [seats[row].senses for row in simple]
         cores = [seats[row].senses.core_imu for row in simple]
         self._places = self._simple * self._width.inputs + np.array(cores, np.intp)
         counts = np.array([len(seat.ctrl) for seat in seats], dtype=np.intp)
@@ -119,13 +118,9 @@ class Nerves:
         ends = np.cumsum(counts)
         first = np.repeat(ends - counts, counts)
         self._motor_outputs: Indices = np.arange(len(first)) - first
-        motors = [motor for seat in seats for motor in seat.servos.motors]
-        columns = np.array(motors, dtype=np.float64).reshape(-1, 5).T
-        addresses = [
-            motor[0] - seat.joints for seat in seats for motor in seat.servos.motors
-        ]
-        self._motor_offsets = np.array(addresses, dtype=np.intp)
-        self._motors = columns[1:]
+        motors = np.concatenate([np.zeros((0, 5)), *(seat.motors for seat in seats)])
+        self._motor_offsets = motors[:, 0].astype(np.intp)
+        self._motors = motors.T[1:]
 
     def _feel_cores(self, state: Floats) -> None:
         """Read the imus at cores' centres from the free joints' states."""
@@ -158,16 +153,3 @@ class Nerves:
             cells[places + 3 + axis] = motions[:, 3 + axis]
         for senses, (vx, vy, vz) in zip(simple, motions[:, :3].tolist(), strict=True):
             senses.velocities[0] = (vx, vy, vz)
-
-    def _padded(self, layout: Layout) -> list[tuple[Cluster, list[_Pads]]]:
-        """Return the clusters in which somebody has pads, with those pads."""
-        found = []
-        for cluster in layout.clusters:
-            pads = [
-                (layout.roster.rows[birth], seat.senses.pads)
-                for birth, seat in zip(cluster.members, cluster.seats, strict=True)
-                if seat.senses.is_simple and seat.senses.pads
-            ]
-            if pads:
-                found.append((cluster, pads))
-        return found

@@ -84,9 +84,7 @@ class Proximity:
             layout: where they stand.
             state: of all clusters in a row, not used otherwise.
         """
-        reaches = [one.body.reach for one in layout.roster.everybody]
-        self._radius = [reach.radius for reach in reaches]
-        self._radii = [reach.radii[:, None] for reach in reaches]
+        self._radius, self._radii = layout.roster.radius, layout.roster.radii
         self.anchor = state
         self.anchor[layout.velocities] = 0.0
         self.refresh()

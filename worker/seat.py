@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import mujoco
+import numpy as np
 
 from schema.evaluation import Floats
 from schema.parts import BodySpace
@@ -36,6 +37,7 @@ class Seat:
         joints, dofs: where its part of qpos and of qvel starts in the cluster's.
         bodies: which of the cluster's are its own.
         geoms: first and last + 1 of its geoms.
+        motors: (M, 5) as ``Servos.motors``, addresses counted from its first angle.
     """
 
     def __init__(
@@ -72,6 +74,8 @@ class Seat:
             has_light=rules.has_light,
         )
         self.servos = Servos(robot, rules.types, model, prefix=prefix)
+        self.motors = np.array(self.servos.motors, dtype=np.float64).reshape(-1, 5)
+        self.motors[:, 0] -= self.joints
         self.qpos: Floats = data.qpos[self.joints : self.joints + solo.nq]
         self.qvel: Floats = data.qvel[self.dofs : self.dofs + solo.nv]
         self.ctrl: Floats = data.ctrl[self.servos.slots]
