@@ -1,0 +1,188 @@
+"""Watching costs little, and costs a run nothing: promises of the viewer."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from analysis.view_blueprint import layout
+from analysis.view_recording import Recording
+from analysis.view_show import Show
+from analysis.view_watch import Spectator
+from schema.arena import Advance
+from schema.arena_codec import Live, decode_live, encode_live
+from schema.birth import BirthId
+from schema.experiment import Space, body_space
+from schema.experiment_file import read_experiment
+from schema.live import Newborn, News
+from schema.robot import Robot
+from schema.settings import EvaluationSettings
+from worker.again import alone
+from worker.spider import spider
+
+pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(900)]
+
+ROBOTS, HERTZ, ADVANCE_S = 30, 5, 5
+MINUTES = 3
+PAIRS = 3
+ARENA = """
+name = "watched"
+births = 18
+[selection]
+population = 12
+[arena]
+birth_interval_s = 6.0
+"""
+
+
+def say(line: str) -> None:
+    sys.stdout.write(f"\n{line}")
+
+
+def crowd() -> tuple[News, list[pa.Table]]:
+    """Return the births of 30 spiders, and poses of real motion, advance by advance."""
+    experiment = read_experiment("scenario1")
+    settings = EvaluationSettings(
+        space=experiment.space,
+        simulation=experiment.simulation,
+        fitness=experiment.fitness,
+    )
+    robot = spider()
+    _, motion = alone(robot, settings, BirthId(0, 0))
+    rng = np.random.default_rng(1)
+    starts = rng.integers(0, motion.num_rows, ROBOTS)
+    places = rng.uniform(-2.0, 2.0, (ROBOTS, 2)).astype(np.float32)
+    body = Robot(robot.parts)
+    births = tuple(
+        Newborn(BirthId(0, number), (), 1, number + 1, 0.0, body)
+        for number in range(ROBOTS)
+    )
+    told = News("run", 1, 1, is_whole=True, experiment="watched", births=births)
+    rows = ADVANCE_S * HERTZ
+    tables = []
+    for first in range(0, MINUTES * 60 * HERTZ, rows):
+        parts = []
+        for number in range(ROBOTS):
+            index = (starts[number] + first + np.arange(rows)) % motion.num_rows
+            own = motion.take(index)
+            times = (first + np.arange(rows)) / HERTZ
+            values = {
+                "birth": pa.array(np.full(rows, number)),
+                "sim_time_s": pa.array(times),
+                "x": pa.array(own["x"].to_numpy() + places[number, 0]),
+                "y": pa.array(own["y"].to_numpy() + places[number, 1]),
+            }
+            for name, column in values.items():
+                at = own.schema.get_field_index(name)
+                own = own.set_column(at, own.schema.field(name), column)
+            parts.append(own)
+        tables.append(pa.concat_tables(parts))
+    return told, tables
+
+
+def message(poses: pa.Table) -> bytes:
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, poses.schema) as writer:
+        writer.write_table(poses.combine_chunks())
+    columns = bytes(sink.getvalue().to_pybytes())
+    return encode_live(Live("run", 0, Advance(1, bytes(32), (), (), (), columns)))
+
+
+def test_an_arena_of_thirty_costs_the_viewer_a_fifth_of_a_core_at_most(
+    tmp_path: Path,
+) -> None:
+    """CPU of the process that watches, per simulated second at real time."""
+    told, tables = crowd()
+    messages = [message(poses) for poses in tables]
+    file = tmp_path / "watched.rrd"
+    space = body_space(Space())
+    blueprint = layout((0,), extent_m=2.6, is_online=True)
+    with Recording("watched", blueprint, file=file) as recording:
+        spectator = Spectator(Show(recording, space), "run")
+        spectator.tell([told])
+        began = time.process_time()
+        for data in messages:
+            spectator.tell([decode_live(data)])
+        recording.flush()
+        used_s = time.process_time() - began
+    share = used_s / (60.0 * MINUTES)
+    hour_mb = file.stat().st_size * 60.0 / MINUTES / 1e6
+    say(f"viewer: {100 * share:.1f} % of a core; {hour_mb:.0f} MB an hour")
+    assert share <= 0.20
+    assert hour_mb <= 350.0
+
+
+@pytest.fixture
+def arena(tmp_path: Path) -> Path:
+    (tmp_path / "watched.toml").write_text(ARENA)
+    return tmp_path
+
+
+def start(folder: Path, *words: str) -> subprocess.Popen[bytes]:
+    top = str(Path(__file__).parents[2])
+    return subprocess.Popen(
+        [sys.executable, "-m", "revolve", *words],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": top},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def run(folder: Path, out: str, *, is_watched: bool) -> float:
+    """Return how long a run takes from its first birth on [s], viewer elsewhere."""
+    cores = sorted(os.sched_getaffinity(0))
+    words = ("watched.toml", "--seed", "2", "--quiet", "--out", out)
+    process = start(folder, "run", *words, "--workers", "1", "--threads", "1")
+    os.sched_setaffinity(process.pid, {cores[0]})
+    viewer: subprocess.Popen[bytes] | None = None
+    journal, address = folder / out / "journal.bin", folder / out / "address"
+    for _ in ticks():
+        if address.exists():
+            break
+    if is_watched:
+        connect = address.read_text().strip()
+        file = f"{out}.rrd"
+        viewer = start(folder, "view", "--connect", connect, "--save", file)
+        os.sched_setaffinity(viewer.pid, {cores[-1]})
+    for _ in ticks():
+        if journal.exists() and journal.stat().st_size > 20_000:
+            break
+    began = time.perf_counter()
+    assert process.wait(300) == 0
+    took_s = time.perf_counter() - began
+    if viewer is not None:
+        viewer.send_signal(signal.SIGINT)
+        viewer.wait(60)
+        assert (folder / f"{out}.rrd").stat().st_size > 100_000
+    return took_s
+
+
+def ticks() -> Iterator[None]:
+    deadline = time.monotonic() + 120.0
+    while time.monotonic() < deadline:
+        yield
+        time.sleep(0.002)
+    raise AssertionError("the run never got going")
+
+
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="needs two cores")
+def test_a_run_that_is_watched_is_as_fast(arena: Path) -> None:
+    """Watched and not in turn: the same run, again and again."""
+    alone_s, watched_s = [], []
+    for pair in range(PAIRS):
+        alone_s.append(run(arena, f"alone-{pair}", is_watched=False))
+        watched_s.append(run(arena, f"watched-{pair}", is_watched=True))
+    ratio = min(alone_s) / min(watched_s)
+    say(
+        f"unwatched {', '.join(f'{each:.2f}' for each in alone_s)} s, watched "
+        f"{', '.join(f'{each:.2f}' for each in watched_s)} s, speed ratio {ratio:.3f}"
+    )
+    assert ratio >= 0.97
