@@ -1,22 +1,158 @@
-"""Figures as files."""
+"""What figures show, read back from what would be drawn."""
 
-from pathlib import Path
+from typing import Any
 
+import plotnine as p9
 import pyarrow as pa
+import pytest
 
-from analysis.figures import progression_figure, save
+from analysis.figure_forms import (
+    NothingToDraw,
+    Panel,
+    over_births,
+    over_runs,
+    stacked,
+)
+from analysis.figure_style import colours, in_order, label
+from analysis.figures import FIGURES
+from analysis.outputs import schema
+
+Row = dict[str, Any]
 
 
-def test_progression_is_drawn_with_both_experiments(tmp_path: Path) -> None:
-    table = pa.table(
+def table(name: str, rows: list[Row]) -> pa.Table:
+    """Return a table of measures; what rows do not say is null."""
+    return pa.Table.from_pylist(rows, schema(name))
+
+
+def outcomes(experiment: str, *fitness: float) -> list[Row]:
+    return [
+        {"experiment": experiment, "folder": f"{experiment}-{n}", "fitness": value}
+        for n, value in enumerate(fitness)
+    ]
+
+
+def robots(experiment: str, *fitness: float) -> list[Row]:
+    return [
+        {"experiment": experiment, "fitness": value, "is_last": value > 0}
+        for value in fitness
+    ]
+
+
+def course(experiment: str, runs: int, *mean: float) -> list[Row]:
+    return [
+        {"experiment": experiment, "measure": "fitness", "births": 15 * n, "runs": runs,
+         "mean": value, "low": value - 0.1, "high": value + 0.1, "least": value,
+         "greatest": value + 0.05}
+        for n, value in enumerate(mean, 1)
+    ]  # fmt: skip
+
+
+def layers(figure: p9.ggplot) -> dict[str, Row]:
+    """Return the columns that each layer shows, by its form."""
+    return {
+        type(layer.geom).__name__: (
+            figure.data if layer._data is None else layer._data
+        ).to_dict("list")
+        for layer in figure.layers
+    }
+
+
+FITNESS = Panel("fitness", "fitness [m/s]")
+
+
+def test_spread_shows_runs_as_points_and_robots_as_violins() -> None:
+    figure = over_runs(
         {
-            "experiment": ["a", "a", "b", "b"],
-            "births": [15, 30, 15, 30],
-            "mean": [0.1, 0.2, 0.1, 0.1],
-            "low": [0.05, 0.1, 0.1, 0.1],
-            "high": [0.2, 0.3, 0.1, 0.1],
-        }
+            "outcomes": table(
+                "outcomes",
+                [*outcomes("scenario1", 0.1, 0.4, 0.3), *outcomes("b", 1, 2, 3, 4, 9)],
+            ),
+            "robots": table(
+                "robots", [*robots("scenario1", 0.2, 0.6, -1.0), *robots("b", 5.0, 5.0)]
+            ),
+        },
+        FITNESS,
     )
-    save(progression_figure(table), tmp_path / "figure")
-    assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "figure.pdf").read_bytes().startswith(b"%PDF")
+    shown = layers(figure)
+    assert shown["geom_point"]["value"] == [0.1, 0.4, 0.3, 1, 2, 3, 4, 9]
+    # Those who are dead do not count, and what does not vary has no shape.
+    assert shown["geom_violin"]["value"] == [0.2, 0.6]
+    assert set(shown["geom_violin"]["experiment"]) == {"scenario1"}
+    # Five runs have a box, three a bar at their median.
+    assert set(shown["geom_boxplot"]["experiment"]) == {"b"}
+    assert shown["geom_errorbar"]["value"] == [0.3]
+    assert figure.labels.y == "fitness [m/s]"
+    figure.draw()
+
+
+def test_panels_stand_in_their_order_whatever_their_names() -> None:
+    panels = [Panel("parts", "z"), Panel("hidden", "a")]
+    rows = [{"experiment": "x", "parts": 7.0, "hidden": 1.0}]
+    figure = over_runs({"outcomes": table("outcomes", rows)}, *panels)
+    assert list(figure.data["panel"].cat.categories) == ["z", "a"]
+    assert figure.data["value"].tolist() == [7.0, 1.0]
+    figure.draw()
+
+
+def test_course_has_bands_only_where_runs_are_enough() -> None:
+    rows = [*course("a", 2, 0.1, 0.2), *course("b", 3, 0.3, 0.4)]
+    shown = layers(
+        over_births({"progression": table("progression", rows)}, "fitness", "f")
+    )
+    assert shown["geom_line"]["mean"] == [0.1, 0.2, 0.3, 0.4]
+    assert shown["geom_ribbon"]["low"] == pytest.approx([0.2, 0.3])
+    assert set(shown["geom_ribbon"]["experiment"]) == {"b"}
+
+
+def test_course_of_few_runs_is_drawn_without_bands() -> None:
+    rows = table("progression", course("a", 1, 0.1, 0.2))
+    figure = over_births({"progression": rows}, "fitness", "f")
+    assert set(layers(figure)) == {"geom_line"}
+    figure.draw()
+
+
+def test_what_is_missing_is_said() -> None:
+    empty = {name: table(name, []) for name in ("outcomes", "progression")}
+    with pytest.raises(NothingToDraw, match="no run is finished"):
+        over_runs(empty, FITNESS)
+    with pytest.raises(NothingToDraw, match="fitness at two births"):
+        over_births(empty, "fitness", "f")
+    none = {"outcomes": table("outcomes", [{"experiment": "a", "rank": 1.0}])}
+    with pytest.raises(NothingToDraw, match="has a value of fitness"):
+        over_runs(none, FITNESS)
+
+
+def test_every_figure_has_its_place_or_a_reason() -> None:
+    # The thesis's, but for those of pictures; then ours by letters.
+    numbers = [one.number for one in FIGURES]
+    thesis = [number.rstrip("ab") for number in numbers if number[0].isdigit()]
+    assert list(dict.fromkeys(thesis)) == [
+        *(f"6.{n}" for n in range(1, 18) if n != 10),
+        "7.1",
+    ]
+    nothing = {
+        name: table(name, [])
+        for name in ("outcomes", "progression", "runs", "populations", "extremities",
+                     "findings", "robots")
+    }  # fmt: skip
+    for one in FIGURES:
+        with pytest.raises(NothingToDraw):
+            one.draw(nothing)
+
+
+def test_an_experiment_has_its_colour_in_every_company() -> None:
+    assert in_order(["b", "no-selection", "scenario1", "b"]) == [
+        "scenario1",
+        "no-selection",
+        "b",
+    ]
+    alone, others = colours(["scenario2"]), colours(["x", "scenario2", "scenario1"])
+    assert alone["scenario2"] == others["scenario2"]
+    assert len(set(others.values())) == 3
+    assert [label("scenario3"), label("no-selection")] == ["scenario 3", "no selection"]
+
+
+def test_values_of_no_run_are_no_rows() -> None:
+    rows = table("outcomes", [*outcomes("a", 0.1), {"experiment": "b"}])
+    assert stacked(rows, [FITNESS])["value"].to_pylist() == [0.1]

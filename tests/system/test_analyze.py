@@ -8,6 +8,7 @@ import polars as pl
 import pyarrow.parquet as pq
 import pytest
 
+from analysis.figures import FIGURES
 from analysis.outputs import OUTPUTS, schema
 from tests.system.conftest import Stage
 
@@ -41,13 +42,33 @@ def test_runs_are_measured_and_what_is_left_out_is_named(
     assert {row["experiment"] for row in measures["variability"].to_pylist()} == {
         "crowd"
     }
-    named = measures["left_out"].to_pylist()
+    everything = measures["left_out"].to_pylist()
+    named = [row for row in everything if row["folder"]]
     assert [(row["folder"], row["why"][:12]) for row in named] == [
         ("runs/d", "run.json: ca"),
         ("runs/c", "the same run"),
     ]
     assert "left out: runs/d: run: run.json" in told
-    assert (report / "progression.png").is_file()
+
+
+def test_figures_and_report_are_written_and_what_is_left_out_has_a_reason(
+    analysed: tuple[Path, str],
+) -> None:
+    report, told = analysed
+    page = (report / "report.html").read_text("utf-8")
+    drawn = {path.stem for path in (report / "figures").glob("*.png")}
+    assert drawn == {path.stem for path in (report / "figures").glob("*.pdf")}
+    assert {f"figure-6.{n}" for n in ("2", "3", "5a", "8", "9", "16")} <= drawn
+    assert {f'<figure id="{name}">' in page for name in drawn} == {True}
+    table = pq.read_table(report / "measures" / "left_out.parquet").to_pylist()
+    why = {row["what"]: row["why"] for row in table if not row["folder"]}
+    assert "revolve bench arena" in why["figure 6.1"]
+    assert why["figure 6.19"] == "no robot of scenario2 was judged"
+    assert "left out: figure B: no run has several islands" in told
+    everything = {f"figure-{one.number}" for one in FIGURES}
+    assert everything == (everything & drawn) | {
+        name.replace(" ", "-") for name in why if name.replace(" ", "-") in everything
+    }
 
 
 def test_three_readers_read_the_same(analysed: tuple[Path, str]) -> None:
