@@ -203,6 +203,8 @@ def _serve_session(
             if not _let_in(inbox, turns):
                 hub.seen(is_there=bool(session.info.routers_zid()))
                 continue
+            # A job that came after all was quiet: the hub is back.
+            hub.seen(is_there=True)
             began_s = time.monotonic()
             with turns.take() as query:
                 _answer(query, server, me)
