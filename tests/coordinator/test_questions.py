@@ -6,6 +6,7 @@ import pytest
 
 from coordinator.events import (
     Answered,
+    Audited,
     Died,
     DispatchEvent,
     Evaluate,
@@ -58,7 +59,7 @@ class Desk:
     def receive(self, _timeout_s: float) -> list[DispatchEvent]:
         return []
 
-    def tell(self, event: DispatchEvent) -> list[Answered]:
+    def tell(self, event: DispatchEvent) -> list[Answered | Audited]:
         """Tell the fleet; return the answers that this comes to."""
         self.fleet.tell(event)
         return self.questions.take()
