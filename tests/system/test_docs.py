@@ -104,6 +104,25 @@ def test_commands_of_the_robots_page(tmp_path: Path) -> None:
     assert some.read_text() == again.read_text()
 
 
+def test_the_archipelagos_of_the_islands_page(tmp_path: Path) -> None:
+    page = TOP / "docs" / "islands.md"
+    (document,) = _blocks(page, "toml")
+    (tmp_path / "mine.toml").write_text(document)
+    (block,) = _blocks(page, "sh")
+    own = "revolve run mine.toml --births 24 --out mine"
+    for line in (own, *block.splitlines()):
+        words = line.split()
+        done = subprocess.run(
+            [sys.executable, "-m", *words],
+            cwd=tmp_path,
+            env=_environment(),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, f"{line}\n{done.stderr}"
+
+
 def test_every_command_that_a_page_names_exists() -> None:
     named = {
         word

@@ -128,7 +128,11 @@ class Play:
                 ),
                 "the run is on its way",
             )
-            os.kill(one.pid, signal.SIGKILL)
+            # First the process that would revive the worker, stopped, then both.
+            one.send_signal(signal.SIGSTOP)
+            found = Path(f"/proc/{one.pid}/task/{one.pid}/children").read_text()
+            for pid in (*found.split(), one.pid):
+                os.kill(int(pid), signal.SIGKILL)
         self.until(lambda: coordinator.poll() is not None, "the run ends")
         assert coordinator.returncode == 0, coordinator.communicate()
         return compare(self.calm, folder)
