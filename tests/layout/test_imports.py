@@ -18,7 +18,7 @@ ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis")
 
 # Library -> the files, as patterns from the root, that may import it.
 HOMES = {
-    "zenoh": ("*/service.py", "*/client_service.py", "analysis/view.py"),
+    "zenoh": ("*/service.py", "*/client_service.py", "analysis/view_live.py"),
     "mujoco": (
         "schema/mjcf*.py",
         "schema/urdf.py",

@@ -1,0 +1,16 @@
+"""What all tests need before anything else is imported."""
+
+import os
+from contextlib import suppress
+
+from analysis.render import NoPictures, choose_engine
+
+# MuJoCo settles what draws when it is first imported, and some test or other imports
+# it first. Processes that tests start choose for themselves.
+_SETTING = os.environ.get("MUJOCO_GL")
+with suppress(NoPictures):
+    choose_engine()
+import mujoco  # noqa: E402, F401
+
+if _SETTING is None:
+    os.environ.pop("MUJOCO_GL", None)
