@@ -15,9 +15,12 @@ from tests.system.conftest import Stage
 pytestmark = pytest.mark.system
 
 
-@pytest.fixture
-def analysed(stage: Stage, undisturbed: Path, calm: Path) -> tuple[Path, str]:
+@pytest.fixture(scope="module")
+def analysed(
+    tmp_path_factory: pytest.TempPathFactory, undisturbed: Path, calm: Path
+) -> tuple[Path, str]:
     """Return the measures of an off-line run, an arena and two broken runs."""
+    stage = Stage(tmp_path_factory.mktemp("analysed"))
     for name, run in (("a", undisturbed), ("b", calm), ("c", undisturbed)):
         shutil.copytree(run, stage.folder / "runs" / name)
     (stage.folder / "runs" / "d").mkdir()
