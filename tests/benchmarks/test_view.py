@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -31,10 +31,10 @@ pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(900)]
 
 ROBOTS, HERTZ, ADVANCE_S = 30, 5, 5
 MINUTES = 3
-PAIRS = 3
+PAIRS = 1
 ARENA = """
 name = "watched"
-births = 18
+births = 45
 [selection]
 population = 12
 [arena]
@@ -125,52 +125,58 @@ def arena(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def start(folder: Path, *words: str) -> subprocess.Popen[bytes]:
+def start(folder: Path, core: int, *words: str) -> subprocess.Popen[bytes]:
+    """Start a command that stays, with its children, on one core."""
     top = str(Path(__file__).parents[2])
-    return subprocess.Popen(
+    process = subprocess.Popen(
         [sys.executable, "-m", "revolve", *words],
         cwd=folder,
         env={**os.environ, "PYTHONPATH": top},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
+    os.sched_setaffinity(process.pid, {core})
+    return process
 
 
 def run(folder: Path, out: str, *, is_watched: bool) -> float:
     """Return how long a run takes from its first birth on [s], viewer elsewhere."""
     cores = sorted(os.sched_getaffinity(0))
     words = ("watched.toml", "--seed", "2", "--quiet", "--out", out)
-    process = start(folder, "run", *words, "--workers", "1", "--threads", "1")
-    os.sched_setaffinity(process.pid, {cores[0]})
+    listen = ("--listen", "tcp/127.0.0.1:0")
+    crew = [start(folder, cores[0], "coordinator", *words, *listen)]
+    address = folder / out / "address"
+    wait_for(address.exists)
+    connect = ("--connect", address.read_text().strip())
+    recording = folder / f"{out}.rrd"
     viewer: subprocess.Popen[bytes] | None = None
-    journal, address = folder / out / "journal.bin", folder / out / "address"
-    for _ in ticks():
-        if address.exists():
-            break
     if is_watched:
-        connect = address.read_text().strip()
-        file = f"{out}.rrd"
-        viewer = start(folder, "view", "--connect", connect, "--save", file)
-        os.sched_setaffinity(viewer.pid, {cores[-1]})
-    for _ in ticks():
-        if journal.exists() and journal.stat().st_size > 20_000:
-            break
+        viewer = start(folder, cores[-1], "view", *connect, "--save", recording.name)
+        wait_for(recording.exists)
+    crew += [
+        start(folder, cores[0], role, *connect, "--processes", "1")
+        for role in ("worker", "analyzer")
+    ]
+    journal = folder / out / "journal.bin"
+    wait_for(lambda: journal.stat().st_size > 10_000)
     began = time.perf_counter()
-    assert process.wait(300) == 0
+    assert crew[0].wait(300) == 0
     took_s = time.perf_counter() - began
+    for process in crew[1:]:
+        process.send_signal(signal.SIGINT)
+        process.wait(60)
     if viewer is not None:
-        viewer.send_signal(signal.SIGINT)
-        viewer.wait(60)
-        assert (folder / f"{out}.rrd").stat().st_size > 100_000
+        assert viewer.wait(60) == 0
+        assert recording.stat().st_size > 100_000
     return took_s
 
 
-def ticks() -> Iterator[None]:
+def wait_for(condition: Callable[[], bool]) -> None:
+    """Return once a condition holds."""
     deadline = time.monotonic() + 120.0
-    while time.monotonic() < deadline:
-        yield
-        time.sleep(0.002)
-    raise AssertionError("the run never got going")
+    while not condition():
+        assert time.monotonic() < deadline, "the run never got going"
+        time.sleep(0.002)  # the interval of looking
 
 
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="needs two cores")

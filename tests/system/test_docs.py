@@ -123,6 +123,21 @@ def test_the_archipelagos_of_the_islands_page(tmp_path: Path) -> None:
         assert done.returncode == 0, f"{line}\n{done.stderr}"
 
 
+def test_the_campaign_of_the_campaigns_page(tmp_path: Path) -> None:
+    (block,) = _blocks(TOP / "docs" / "campaigns.md", "sh")
+    for line in block.splitlines():
+        done = subprocess.run(
+            [sys.executable, "-m", *line.split()],
+            cwd=tmp_path,
+            env=_environment(),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, f"{line}\n{done.stderr}"
+    assert "4 of 4 runs are finished already" in done.stderr
+
+
 def test_every_command_that_a_page_names_exists() -> None:
     named = {
         word
