@@ -1,6 +1,7 @@
 """The command ``revolve``: names the rooms' commands, nothing else."""
 
 import sys
+from collections.abc import Iterable
 from importlib import import_module
 
 _COORDINATOR = "coordinator.__main__"
@@ -18,7 +19,7 @@ COMMANDS = {
     "robot render": ("analysis.__main__", "draw the robot of a file"),
     "robot simulate": ("worker.robot_command", "judge the robot of a file"),
     "view": ("analysis.__main__", "watch a run, live or again"),
-    "analyze": ("analysis.__main__", "draw what the tables say"),
+    "analyze": ("analysis.__main__", "tables to measures, figures and a report"),
     "bench": ("worker.bench", "measure this machine"),
     "bench dispatch": (_COORDINATOR, "measure how far a coordinator reaches"),
 }
@@ -63,18 +64,30 @@ def main(arguments: list[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
+    finally:
+        if words[1:] in (["-h"], ["--help"]):
+            print(_also(words[0]), end="")
+
+
+def _also(command: str) -> str:
+    """Return the lines on commands of two words that begin with this one."""
+    names = [name for name in COMMANDS if name.startswith(f"{command} ")]
+    return f"\nalso:\n{_lines(names)}\n" if names else ""
+
+
+def _lines(names: Iterable[str]) -> str:
+    width = max(map(len, COMMANDS))
+    return "\n".join(f"  {name:{width}}  {COMMANDS[name][1]}" for name in names)
 
 
 def _overview() -> str:
-    width = max(map(len, COMMANDS))
-    lines = [f"  {name:{width}}  {what}" for name, (_, what) in COMMANDS.items()]
     return "\n".join(
         [
             "Evolve robots, bodies and brains, on one machine or on many.",
             "",
             "usage: revolve COMMAND ...    (revolve COMMAND --help explains one)",
             "",
-            *lines,
+            _lines(COMMANDS),
             "",
             "for example: revolve run scenario1 --seed 1 --births 600",
         ]
