@@ -45,7 +45,6 @@ def conclude(
     write_robot(robot, folder / BEST, space)
     motors = sum(space[part.kind].outputs for part in robot.parts)
     where = f" of island {best.birth.island}" if len(islands) > 1 else ""
-    has_arena = any(isinstance(island, Arena) for island in islands.values())
     lines = [
         f"{births} births; mean fitness of the last population {mean:.4f}",
         (
@@ -56,9 +55,8 @@ def conclude(
         f"its file:   {folder / BEST}",
         tables,
         "try next:",
-        f"  revolve robot show {folder / BEST}",
-        f"  revolve analyze {folder}"
-        if has_arena
-        else "  revolve run no-selection --seed 1 --births 600",
+        f"  revolve robot render {folder / BEST} best.gif",
+        f"  revolve view {folder}",
+        f"  revolve analyze {folder}",
     ]
     return "\n".join(lines)
