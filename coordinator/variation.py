@@ -4,7 +4,7 @@ Source: Hupkes 2016, sections 4.4.3 to 4.4.6; facts of the original, sections 4.
 4.6. The analyzer's verdict, which ends a mating attempt, is asked for elsewhere.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -52,16 +52,29 @@ def mate(
     """
     draws = Draws(rng)
     types = body_space(experiment.space)
-    root = thaw(first, types)
-    if not crossover(draws, root, thaw(second, types), experiment):
-        return None
-    mutate(draws, root, gene_ids(birth), experiment)
-    branches = preorder(root)
-    if not any(branch.outputs for branch in branches):
-        return None
-    if experiment.space.planar:
-        level(branches)
-    return freeze(branches)
+    root, donor = thaw(first, types), thaw(second, types)
+    thawed = [*preorder(root), *preorder(donor)]
+    child: Genome | None = None
+    if crossover(draws, root, donor, experiment):
+        mutate(draws, root, gene_ids(birth), experiment)
+        branches = preorder(root)
+        if any(branch.outputs for branch in branches):
+            if experiment.space.planar:
+                level(branches)
+            child = freeze(branches)
+        _let_go(branches)
+    _let_go(thawed)
+    return child
+
+
+def _let_go(branches: Iterable[Branch]) -> None:
+    """Free branches at once, with whatever was cut off them.
+
+    Parents and children name each other: they would wait for the garbage collector,
+    which was a twentieth of the coordinator's time.
+    """
+    for branch in branches:
+        branch.parent = None
 
 
 def crossover(
