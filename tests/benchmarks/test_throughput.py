@@ -1,7 +1,5 @@
 """What a birth costs the coordinator, and what a second worker brings."""
 
-import os
-import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -20,7 +18,9 @@ from coordinator.events import (
     Evaluated,
     IslandCommand,
     IslandEvent,
+    Joined,
     Journalled,
+    Left,
     Started,
 )
 from coordinator.fleet import Fleet
@@ -54,6 +54,7 @@ NULL_PER_S = 1000
 SECOND_WORKER = 1.85
 TURNS = 12
 TURN_S = 2.0
+SETTLING_S = 0.3
 
 
 class Judged(Island):
@@ -106,13 +107,11 @@ class Figures:
 
 @dataclass(frozen=True, slots=True)
 class Bench:
-    """A run on its way: its loop, what it has evaluated, and its workers."""
+    """A run on its way: its agents, its loop, and what it has evaluated."""
 
-    island: Island
     fleet: Fleet
     loop: Loop
     journal: Counted
-    workers: Crew
 
     def go_on(self, is_enough: Callable[[], bool]) -> Figures:
         """Step until it is enough; return what that took."""
@@ -125,6 +124,11 @@ class Bench:
         cpu_s = time.process_time() - cpu_s
         done = self.journal.evaluations - before
         return Figures(done / wall_s, cpu_s / max(1, done))
+
+    def go_on_for(self, seconds: float) -> Figures:
+        """Step for so long; return what that took."""
+        end_s = time.monotonic() + seconds
+        return self.go_on(lambda: time.monotonic() >= end_s)
 
 
 @contextmanager
@@ -141,7 +145,7 @@ def started(
         vetters = Agent("analyzer", "analyzer", network.address)
         stack.enter_context(Crew(analyzer.service.process, (vetters,), size=1))
         agent = Agent("worker", "worker", network.address)
-        crew = stack.enter_context(Crew(body, (agent,), size=workers))
+        stack.enter_context(Crew(body, (agent,), size=workers))
         journal = Counted(stack.enter_context(Journal.open(folder)))
         fleet = Fleet(network)
         loop = Loop(
@@ -153,7 +157,7 @@ def started(
             vault=Snapshots(folder),
         )
         loop.start([])
-        bench = Bench(island, fleet, loop, journal, crew)
+        bench = Bench(fleet, loop, journal)
         bench.go_on(
             lambda: (
                 journal.evaluations >= 40 and fleet.dispatch.agents("worker") == workers
@@ -210,9 +214,11 @@ def test_second_worker(tmp_path: Path) -> None:
     share the machine; scenario 1's children of random founders, each vetted, bred
     and evaluated. Two things differ from a run of scenario 1: the brood does not
     end while it is measured, so that no worker waits for its last child, and 60
-    births are in flight. One of two workers is stopped and continued in turn: the
-    machine's speed drifts, and both halves of the comparison must see the same of
-    it. While it is stopped the second core serves coordinator and analyzer alone.
+    births are in flight. One of two workers leaves and joins in turn: the machine's
+    speed drifts, and both halves of the comparison must see the same of it. Whoever
+    leaves gives its jobs to the other, so that births go on being committed and each
+    half bears the breeding and vetting of its own births; what it had begun it ends,
+    idle thereafter, before the turn is counted.
     """
     experiment = _experiment(10_000, 9_000)
     wide = replace(experiment.selection, window=60)
@@ -222,13 +228,14 @@ def test_second_worker(tmp_path: Path) -> None:
     rates: dict[int, list[float]] = {1: [], 2: []}
     cpu_s = []
     with started(tmp_path / "run", island, experiment, 2, body) as bench:
-        second = bench.workers.pids[1]
+        name = bench.fleet.dispatch.names("worker")[1]
+        platform = bench.fleet.dispatch.platform(name)
         for turn in range(2 * TURNS):
             workers = 1 + turn % 2
-            # Shorter than the lease: a stopped one does not count as gone.
-            os.kill(second, signal.SIGSTOP if workers == 1 else signal.SIGCONT)
-            end_s = time.monotonic() + TURN_S
-            found = bench.go_on(lambda: time.monotonic() >= end_s)  # noqa: B023
+            joins = Joined(name, "worker", 1, platform)
+            bench.fleet.tell(Left(name) if workers == 1 else joins)
+            bench.go_on_for(SETTLING_S)
+            found = bench.go_on_for(TURN_S)
             rates[workers].append(found.per_s)
             cpu_s.append(found.cpu_s)
     one, two = np.mean(rates[1]), np.mean(rates[2])
