@@ -19,7 +19,7 @@ from rich.table import Table
 from analysis.benchmarks import read_benchmarks
 from analysis.comparison import Outcomes, comparison, findings
 from analysis.load import LeftOut, Run, read_runs
-from analysis.outputs import schema
+from analysis.outputs import OUTPUTS, schema
 from analysis.plates import draw_figures
 from analysis.progression import progression
 from analysis.render_command import Simulate
@@ -72,6 +72,9 @@ def analyze(
         schema("left_out"),
     )
     (options.out / MEASURES).mkdir(parents=True, exist_ok=True)
+    for name in OUTPUTS:
+        if name not in tables:  # of an analysis before
+            (options.out / MEASURES / f"{name}.parquet").unlink(missing_ok=True)
     for name, table in tables.items():
         pq.write_table(table, options.out / MEASURES / f"{name}.parquet")
     page = report(tables, drawn, _making(words))

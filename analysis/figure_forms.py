@@ -9,7 +9,7 @@ import plotnine as p9
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.figure_style import broken, in_order, paper, scales
+from analysis.figure_style import broken, in_order, label, paper, scales
 from schema.errors import RevolveError
 
 Tables = Mapping[str, pa.Table]
@@ -68,17 +68,48 @@ def over_runs(tables: Tables, *panels: Panel) -> p9.ggplot:
         stroke=0.3,
         show_legend=False,
     )
-    feet = [broken(name) for name in experiments]
+    reach = _reach(tables["outcomes"], experiments)
+    if len(panels) > 1:
+        return figure + _in_panels(len(panels), experiments, reach)
+    feet = [
+        f"{broken(name)}\n{reach[name]}" if reach else broken(name)
+        for name in experiments
+    ]
     figure += p9.scale_x_discrete(limits=experiments, labels=feet)
-    if len(panels) == 1:
-        look = paper(3.6) + p9.theme(legend_position="none")
-        return figure + p9.labs(x="", y=panels[0].text) + look
-    bare = p9.theme(
-        axis_text_x=p9.element_blank(), axis_ticks_major_x=p9.element_blank()
+    look = paper(3.6) + p9.theme(legend_position="none")
+    return figure + p9.labs(x="", y=panels[0].text) + look
+
+
+def _reach(outcomes: pa.Table, experiments: list[str]) -> dict[str, str]:
+    """Return at how many births each experiment is shown, if they are not the same."""
+    known = dict(
+        zip(
+            outcomes["experiment"].to_pylist(),
+            outcomes["births"].to_pylist(),
+            strict=True,
+        )
     )
-    look = paper(3.4 if len(panels) <= _NARROW else 6.0) + bare
-    rows = p9.facet_wrap("panel", scales="free_y", ncol=min(len(panels), _NARROW))
-    return figure + rows + p9.labs(x="", y="") + look
+    said = {name: f"{known[name]} births" for name in experiments}
+    return said if len(set(said.values())) > 1 else {}
+
+
+def _in_panels(count: int, experiments: list[str], reach: dict[str, str]) -> list[Any]:
+    """Return what sets panels side by side, below them at how many births they are."""
+    at = [
+        f"{births}: {', '.join(label(name) for name in reach if reach[name] == births)}"
+        for births in dict.fromkeys(reach.values())
+    ]
+    return [
+        p9.scale_x_discrete(limits=experiments),
+        p9.facet_wrap("panel", scales="free_y", ncol=min(count, _NARROW)),
+        p9.labs(x="; ".join(at), y=""),
+        paper(3.4 if count <= _NARROW else 6.0),
+        p9.theme(
+            axis_text_x=p9.element_blank(),
+            axis_ticks_major_x=p9.element_blank(),
+            axis_title_x=p9.element_text(size=8),
+        ),
+    ]
 
 
 def stacked(table: pa.Table, panels: Sequence[Panel]) -> pa.Table:
@@ -204,11 +235,15 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
     sure = table.filter(pc.field("runs") >= BAND_RUNS)
     if sure.num_rows:
         ends = p9.aes(ymin="low", ymax="high", fill="experiment")
-        figure += p9.geom_ribbon(ends, data=sure.to_pandas(), alpha=0.18)
+        low = pc.max_element_wise(sure["low"], 0.0)
+        place = sure.schema.get_field_index("low")
+        band = sure.set_column(place, "low", low)
+        figure += p9.geom_ribbon(ends, data=band.to_pandas(), alpha=0.18)
     figure += p9.geom_line(p9.aes(colour="experiment"), size=0.9)
     names = table["experiment"].to_pylist()
     figure = figure + scales(names, is_filled=sure.num_rows > 0) + paper(3.8)
-    # An interval of few runs may reach far below what is possible.
+    # An interval of few runs may reach far beyond what is possible.
     top = float(pc.max(table["greatest"]).as_py())
     window = p9.coord_cartesian(ylim=(0, 1.02 * top or 1.0))
-    return figure + window + p9.labs(x="births", y=text)
+    rooms = p9.scale_y_continuous(expand=(0.03, 0, 0, 0))
+    return figure + window + rooms + p9.labs(x="births", y=text)

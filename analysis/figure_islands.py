@@ -8,8 +8,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.figure_forms import NothingToDraw, Tables
-from analysis.figure_style import in_order, label, paper, scales
+from analysis.figure_style import OTHERS, in_order, label, paper, scales, whole
 
+_PAIRS = {"within islands": "within", "between islands": "between"}
+_IN_A_ROW = 12
 _NO_ISLANDS = "no run has several islands"
 
 
@@ -35,11 +37,13 @@ def fitness_by_island(tables: Tables) -> p9.ggplot:
     shown = rows.select(["experiment", "births", "fitness"])
     shown = shown.append_column("line", lines).append_column("island", islands)
     names = sorted(set(islands.to_pylist()), key=int)
+    hues = OTHERS * -(-len(names) // len(OTHERS))
     return (
         p9.ggplot(shown.to_pandas(), p9.aes("births", "fitness"))
         + p9.geom_line(p9.aes(colour="island", group="line"), size=0.7, alpha=0.85)
         + p9.facet_wrap("experiment", labeller=label)
-        + p9.scale_colour_discrete(limits=names)
+        + p9.scale_colour_manual(hues[: len(names)], limits=names)
+        + p9.guides(colour=p9.guide_legend(nrow=-(-len(names) // _IN_A_ROW)))
         + p9.expand_limits(y=0)
         + p9.labs(x="births on the island", y="mean fitness [m/s]", colour="island")
         + paper(3.8)
@@ -60,17 +64,17 @@ def between(tables: Tables) -> p9.ggplot:
     if not rows:
         raise NothingToDraw(_NO_ISLANDS)
     pieces = []
-    for name in ("within", "between"):
+    for said, name in _PAIRS.items():
         known = rows.filter(rows[name].is_valid())
         grouped = known.group_by(["experiment", "births"]).aggregate([(name, "mean")])
         renamed = grouped.rename_columns(["experiment", "births", "distance"])
-        pairs = pa.repeat(pa.scalar(f"{name} islands"), renamed.num_rows)
+        pairs = pa.repeat(pa.scalar(said), renamed.num_rows)
         pieces.append(renamed.append_column("pairs", pairs))
     shown = pa.concat_tables(pieces)
     return (
         p9.ggplot(shown.to_pandas(), p9.aes("births", "distance"))
         + p9.geom_line(p9.aes(colour="experiment", linetype="pairs"), size=0.8)
-        + p9.scale_linetype_manual({"within islands": "-", "between islands": "--"})
+        + p9.scale_linetype_manual(["-", "--"], limits=list(_PAIRS))
         + scales(rows["experiment"].to_pylist(), is_filled=False)
         + p9.expand_limits(y=0)
         + p9.labs(x="births on each island", y="mean tree edit distance", linetype="")
@@ -117,8 +121,9 @@ def migration_graph(tables: Tables) -> p9.ggplot:
         + p9.geom_point(p9.aes("x", "y"), data=nodes, size=9, fill="white", stroke=0.6)
         + p9.geom_text(p9.aes("x", "y", label="island"), data=nodes, size=9)
         + p9.facet_wrap("experiment", labeller=label)
-        + p9.scale_size_continuous(range=(0.5, 2.0), name="migrants")
-        + p9.scale_colour_gradient("#C6DBEF", "#084594", limits=(0, 1), name="lines")
+        + p9.scale_size_continuous(range=(0.5, 2.0), breaks=whole, name="migrants")
+        + p9.scale_colour_gradient("#C6DBEF", "#084594", limits=(0, 1),
+                                   name="share that\nleft a line")
         + p9.coord_fixed(xlim=(-1.25, 1.25), ylim=(-1.25, 1.25))
         + paper(4.6)
         + p9.theme_void()
@@ -132,10 +137,7 @@ Spot = tuple[float, float]
 def _spots(rows: pa.Table, experiment: str) -> dict[int, Spot]:
     """Return where an experiment's islands stand: on a circle, from its top."""
     mine = rows.filter(pc.field("experiment") == experiment)
-    numbers = pa.concat_arrays(
-        [chunk for name in ("island", "to") for chunk in mine[name].chunks]
-    )
-    islands = sorted(set(numbers.to_pylist()))
+    islands = sorted({*mine["island"].to_pylist(), *mine["to"].to_pylist()})
     angles = 2 * math.pi * np.arange(len(islands)) / len(islands)
     return {
         island: (math.sin(angle), math.cos(angle))

@@ -127,8 +127,9 @@ def _hang(
         )
     )  # fmt: skip
     axes.text(
-        x, y - 0.03, said, ha="center", va="top", fontsize=6.5, color=_INK, zorder=4
-    )
+        x, y - 0.03, said, ha="center", va="top", fontsize=6.5, color=_INK, zorder=4,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+    )  # fmt: skip
 
 
 def _line(axes: Axes, child: Spot, parent: Spot) -> None:
@@ -145,7 +146,9 @@ def _line(axes: Axes, child: Spot, parent: Spot) -> None:
         )
         return
     end = (parent[0], parent[1] + _HEIGHT)
-    bend = 0.25 if end[0] < start[0] else -0.25
+    # Flat enough to stay below the row above.
+    away = max(abs(end[0] - start[0]), abs(end[1] - start[1]))
+    bend = min(0.25, 0.45 / max(away, 1.0)) * (1 if end[0] < start[0] else -1)
     axes.add_patch(
         ConnectionPatch(
             start, end, "data", "data", linestyle=":", linewidth=0.9, zorder=1,

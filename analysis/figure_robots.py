@@ -5,11 +5,14 @@ import plotnine as p9
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from analysis.census import Numbers
 from analysis.figure_forms import BAND_RUNS, NothingToDraw, Tables
-from analysis.figure_style import in_order, label, paper, scales
+from analysis.figure_style import in_order, label, paper, scales, whole
 from analysis.statistics import t_quantile
 
 _MEANT = {"final": "last populations", "born": "all ever judged"}
+_ASIDE = 0.13
+"""From one experiment to the next, by the distance of two numbers of extremities."""
 _VERDICTS = {
     "reproduced": "#0072B2",
     "undecided": "#9A9A9A",
@@ -47,7 +50,9 @@ def variability(tables: Tables) -> p9.ggplot:
         )
         + scales(rows["experiment"].to_pylist())
         + p9.coord_cartesian(xlim=(0, 1))
-        + p9.labs(x="range of a robot's fitness by its contemporaries'", y="density")
+        + p9.labs(
+            x="range of a robot's fitness / range of its contemporaries'", y="density"
+        )
         + paper(3.6)
     )
 
@@ -76,8 +81,11 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     # Arrow divides by the number of runs, an estimate by one less.
     error = np.asarray(made["fitness_stddev"]) / np.sqrt(np.maximum(runs - 1, 1))
     half = error * np.array([t_quantile(max(count - 1, 1)) for count in runs.tolist()])
-    half[runs < BAND_RUNS] = 0.0
-    places = np.asarray(made["bin"], np.float64) + (0.05 if by == "per_part" else 0.0)
+    half[runs < BAND_RUNS] = np.nan
+    width = 1.0 if by == "count" else 0.1
+    places = np.asarray(made["bin"], np.float64) + (0.0 if by == "count" else 0.05)
+    experiments = made["experiment"].to_pylist()
+    places += _ASIDE * width * _aside(experiments)
     titles = [_MEANT[name] for name in made["population"].to_pylist()]
     panel = pa.DictionaryArray.from_arrays(
         pc.index_in(pa.array(titles), pa.array(list(_MEANT.values()))),
@@ -96,23 +104,37 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     axis = "extremities" if by == "count" else "extremities per part"
     return (
         p9.ggplot(shown.to_pandas(), p9.aes("at", "fitness"))
-        + p9.geom_ribbon(p9.aes(ymin="low", ymax="high", fill="experiment"), alpha=0.15)
-        + p9.geom_line(p9.aes(colour="experiment"), size=0.8)
-        + p9.geom_point(p9.aes(colour="experiment"), size=1.2)
+        + p9.geom_linerange(
+            p9.aes(ymin="low", ymax="high", colour="experiment"),
+            data=shown.filter(
+                pc.greater_equal(made["fitness_count"], BAND_RUNS)
+            ).to_pandas(),
+            size=0.5,
+            alpha=0.6,
+            show_legend=False,
+        )
+        + p9.geom_line(p9.aes(colour="experiment"), size=0.6)
+        + p9.geom_point(p9.aes(colour="experiment"), size=1.3)
         + p9.facet_wrap("panel", ncol=2)
-        + scales(made["experiment"].to_pylist())
+        + scales(experiments, is_filled=False)
         + p9.coord_cartesian(ylim=(0, 1.3 * float(mean.max()) or 1.0))
         + p9.labs(x=axis, y="mean fitness [m/s]")
         + paper(3.6)
     )
 
 
+def _aside(experiments: list[str]) -> Numbers:
+    """Return how far from the middle each row stands, so that none hides another."""
+    names = in_order(experiments)
+    spots = [names.index(name) - (len(names) - 1) / 2 for name in experiments]
+    return np.array(spots, np.float64)
+
+
 def lineages(tables: Tables) -> p9.ggplot:
     """Return all ancestors of the best robots, by when they were born and their rank.
 
     Args:
-        tables: ``lineage``: ``experiment``, ``order`` (of birth), ``rank``, ``parents``
-            (list of orders); the best robot's row is an experiment's last.
+        tables: ``lineage``, as ``analysis.kin.LINEAGE``.
 
     Raises:
         NothingToDraw: nobody who lives has parents.
@@ -128,24 +150,25 @@ def lineages(tables: Tables) -> p9.ggplot:
     for row in people:
         for parent in row["parents"]:
             above = known[row["experiment"], parent]
-            ends = {"to": above["order"], "to_rank": above["rank"]}
+            ends = {"to": above["number"], "to_rank": above["rank"]}
             lines.append({**row, **ends})
     names = [label(name) for name in in_order(rows["experiment"].to_pylist())]
     return (
-        p9.ggplot(rows.select(["experiment", "order", "rank"]).to_pandas())
+        p9.ggplot(rows.select(["experiment", "number", "rank"]).to_pandas())
         + p9.geom_segment(
-            p9.aes("order", "rank", xend="to", yend="to_rank", colour="experiment"),
+            p9.aes("number", "rank", xend="to", yend="to_rank", colour="experiment"),
             data=pa.Table.from_pylist(lines).drop_columns("parents").to_pandas(),
             size=0.3,
             alpha=0.5,
             show_legend=False,
         )
         + p9.geom_point(
-            p9.aes("order", "rank", colour="experiment"),
+            p9.aes("number", "rank", colour="experiment"),
             size=0.8,
             show_legend=len(names) > 1,
         )
         + scales(rows["experiment"].to_pylist(), is_filled=False)
+        + p9.scale_y_continuous(breaks=whole)
         + p9.labs(x="number of birth", y="rank")
         + paper(4.2)
     )

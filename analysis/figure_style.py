@@ -8,6 +8,7 @@ import plotnine as p9
 from matplotlib import pyplot as plt
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 WIDTH_IN = 7.0
 DPI = 160
@@ -19,7 +20,8 @@ _THESIS = {
     "no-reproduction": "#7F7F7F",
     "no-selection": "#CC79A7",
 }
-_OTHERS = ("#D55E00", "#56B4E9", "#8C6D31", "#5254A3", "#000000", "#B2DF8A", "#E7298A")
+OTHERS = ("#D55E00", "#56B4E9", "#8C6D31", "#5254A3", "#000000", "#B2DF8A", "#E7298A")
+"""Colours of what has none of its own."""
 _INK, _FAINT = "#333333", "#E6E6E6"
 # Numbers of glyphs, not outlines, so that text in a PDF stays text.
 _SETTINGS: dict[Any, Any] = {"pdf.fonttype": 42, "savefig.facecolor": "white"}
@@ -45,7 +47,7 @@ def colours(experiments: Iterable[str]) -> dict[str, str]:
     """
     names = in_order(experiments)
     others = [name for name in names if name not in _THESIS]
-    spare = {name: _OTHERS[i % len(_OTHERS)] for i, name in enumerate(others)}
+    spare = {name: OTHERS[i % len(OTHERS)] for i, name in enumerate(others)}
     return {name: _THESIS.get(name) or spare[name] for name in names}
 
 
@@ -78,6 +80,11 @@ def scales(experiments: Iterable[str], *, is_filled: bool = True) -> list[Any]:
     }
     lines = [p9.scale_colour_manual(**said)]
     return [*lines, p9.scale_fill_manual(**said)] if is_filled else lines
+
+
+def whole(limits: tuple[float, float]) -> list[float]:
+    """Return where a scale has its numbers if only whole ones mean something."""
+    return list(MaxNLocator(nbins=6, integer=True).tick_values(*limits))
 
 
 def paper(height_in: float, width_in: float = WIDTH_IN) -> Any:  # noqa: ANN401 - untyped

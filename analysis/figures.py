@@ -21,8 +21,12 @@ _SPREAD = (
     "Points are finished runs, boxes (of fewer than five runs: bars at the median) sum "
     "them up, and violins show the robots of all their last populations."
 )
+THE_BIRTHS = "the runs' births"
+"""A source that is no table of measures."""
+_BENCHMARK = "the benchmark's file"
 _COURSE = (
-    "Lines are means over runs, bands their 95 % intervals where there are three runs."
+    "Lines are means over runs, bands their 95 % intervals where there are three runs, "
+    "as far as the axis goes."
 )
 
 
@@ -65,7 +69,7 @@ FIGURES: tuple[Figure, ...] = (
            "Simulated over wall time of random robots in one arena: points are "
            "repetitions, the line joins their means, the dashed one is the thesis's "
            "fit of its own machine; above the thin line is faster than real time.",
-           ("benchmark",), arena_speed),
+           (_BENCHMARK,), arena_speed),
     _spread("6.2", "Fitness at the end", Panel("fitness", "fitness [m/s]")),
     _course("6.3", "Fitness over births", "fitness", "mean fitness [m/s]"),
     _spread("6.4", "Unique ancestors per robot of the last population",
@@ -82,21 +86,22 @@ FIGURES: tuple[Figure, ...] = (
            ("variability",), variability),
     _spread("6.9", "Parts at the end", Panel("parts", "parts")),
     _spread("6.11", "Joints at the end",
-            Panel("active_joints", "active"), Panel("passive_joints", "passive"),
-            Panel("joints", "both")),
+            Panel("active_joints", "active joints"),
+            Panel("passive_joints", "passive joints"), Panel("joints", "all joints")),
     _spread("6.12", "Joints per part at the end",
-            Panel("active_joints_per_part", "active"),
-            Panel("passive_joints_per_part", "passive"),
-            Panel("joints_per_part", "both")),
+            Panel("active_joints_per_part", "active joints per part"),
+            Panel("passive_joints_per_part", "passive joints per part"),
+            Panel("joints_per_part", "all joints per part")),
     _spread("6.13", "Extremities at the end",
             Panel("extremities", "extremities"),
             Panel("extremities_per_part", "extremities per part")),
     Figure("6.14a", "Fitness by the number of extremities",
-           "Lines are means over the runs that have such robots, bands their 95 % "
-           "intervals; left the last populations, right all who were ever judged.",
+           "Points are means over the runs that have such robots, bars their 95 % "
+           "intervals where there are three runs, as far as the axis goes; left the "
+           "last populations, right all who were ever judged.",
            ("extremities",), partial(extremities_and_fitness, by="count")),
     Figure("6.14b", "Fitness by extremities per part",
-           "As before, in bins of 0.1.",
+           "As before, in bins of 0.1 whose middles the points are at.",
            ("extremities",), partial(extremities_and_fitness, by="per_part")),
     _spread("6.15", "Touch sensors at the end",
             Panel("touch_sensors", "touch sensors"),
@@ -106,12 +111,13 @@ FIGURES: tuple[Figure, ...] = (
             Panel("hidden_per_part", "hidden neurons per part")),
     Figure("6.17", "All ancestors of the best robots",
            "Each point is an ancestor of the fittest robot of an experiment's last "
-           "populations, each line leads to a parent.",
-           ("lineage",), lineages),
+           "populations, by its number of birth on its island; each line leads to a "
+           "parent.",
+           (THE_BIRTHS,), lineages),
     Figure("7.1", "Speed of an arena of spiders by its population",
            "Simulated over wall time of equal spiders on a grid: points are "
            "repetitions, the line joins their means.",
-           ("benchmark",), spider_speed),
+           (_BENCHMARK,), spider_speed),
     _spread("A", "Connections at the end",
             Panel("connections", "connections"),
             Panel("connections_per_part", "connections per part")),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.ancestry import ancestors, parents_of
+from analysis.ancestry import ancestors, parents_first, parents_of
 from analysis.census import names, rows_of
 
 LEVELS = 5
@@ -17,11 +17,13 @@ LINEAGE = pa.schema(
     [
         pa.field("experiment", pa.string()),
         pa.field("order", pa.int64()),
+        pa.field("number", pa.int64()),
         pa.field("rank", pa.int64()),
         pa.field("parents", pa.list_(pa.int64())),
     ]
 )
-"""Ancestors of an experiment's best robot: number of birth, rank, parents' numbers."""
+"""Ancestors of an experiment's best robot: births row, number of birth on its island,
+rank, parents' births rows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +125,7 @@ def _founders(bodies: pa.ListArray, parents: list[list[int]]) -> dict[int, int]:
 
 
 def lineage(births: pa.Table, experiment: str, row: int) -> pa.Table:
-    """Return a robot and all its ancestors, in the order of birth, as ``LINEAGE``.
+    """Return a robot and all its ancestors, as ``LINEAGE``; itself last.
 
     Args:
         births: of its run.
@@ -132,12 +134,12 @@ def lineage(births: pa.Table, experiment: str, row: int) -> pa.Table:
     """
     parents = parents_of(births)
     line = ancestors(parents)[row] | 1 << row
-    rows = [order for order in range(row + 1) if line >> order & 1]
-    ranks = births["rank"].take(pa.array(rows)).to_pylist()
+    rows = [order for order in parents_first(parents) if line >> order & 1]
+    known = births.select(["birth", "rank"]).take(pa.array(rows)).to_pylist()
     people = [
-        {"experiment": experiment, "order": order, "rank": rank,
-         "parents": parents[order]}
-        for order, rank in zip(rows, ranks, strict=True)
+        {"experiment": experiment, "order": order, "number": one["birth"],
+         "rank": one["rank"], "parents": parents[order]}
+        for order, one in zip(rows, known, strict=True)
     ]  # fmt: skip
     return pa.Table.from_pylist(people, LINEAGE)
 

@@ -12,7 +12,7 @@ from rich.progress import Progress
 from analysis.figure_forms import NothingToDraw
 from analysis.figure_pictures import FOUNDERS, family_tree, gaits
 from analysis.figure_style import PICTURE_ENDING, in_order, label, save
-from analysis.figures import FIGURES
+from analysis.figures import FIGURES, THE_BIRTHS
 from analysis.graphviz import NoDot, ordered_by_dot
 from analysis.kin import LINEAGE, Best, best_robots, ordered
 from analysis.load import LeftOut, Run
@@ -33,8 +33,10 @@ class Plates:
     """The figures drawn so far, and those that could not be."""
 
     def __init__(self, folder: Path) -> None:
-        """Draw into a folder that is there."""
+        """Draw into a folder that is there; of before are its trees of experiments."""
         self._folder = folder
+        for path in folder.glob(f"figure-{_tree_of('*')}.p??"):
+            path.unlink()
         self._drawn: list[Drawn] = []
         self.left_out: list[LeftOut] = []
 
@@ -67,6 +69,11 @@ class Plates:
     def drawn(self) -> list[Drawn]:
         """The figures in the order of the thesis, then ours."""
         return sorted(self._drawn, key=lambda one: _place(one.number))
+
+
+def _tree_of(name: str) -> str:
+    """Return the number of the tree of an experiment that the thesis has not."""
+    return f"G-{name}"
 
 
 def _place(number: str) -> tuple[bool, list[int], str]:
@@ -163,7 +170,8 @@ def _add_gaits(
         "middle of its evaluation on. Colours tell from which founder a part comes; "
         "white parts came by mutation."
     )
-    plates.add(number, title, caption, ("robots",), partial(gaits, portraits))
+    source = ("robots", THE_BIRTHS)
+    plates.add(number, title, caption, source, partial(gaits, portraits))
 
 
 def _add_tree(
@@ -174,7 +182,7 @@ def _add_tree(
     robots: pa.Table,
 ) -> None:
     """Draw one experiment's best robot and its family, or note why not."""
-    number = _TREES.get(name, f"G-{name}")
+    number = _TREES.get(name, _tree_of(name))
     if not portraits:
         why = problems.get(name, f"no robot of {name} was judged")
         plates.leave_out(number, why)
@@ -205,6 +213,6 @@ def _add_tree(
         number,
         f"Ancestry of the best robot of {label(name)}",
         caption,
-        ("robots",),
+        ("robots", THE_BIRTHS),
         partial(family_tree, one, levels, fitness),
     )

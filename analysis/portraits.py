@@ -23,8 +23,11 @@ FRAMES = 6
 EVERY_S = 0.5
 """Pictures of a gait, and from one to the next [s]."""
 _LARGE, _SMALL = (400, 300), (300, 225)
-_WIDE, _CLOSE = (0.15, 0.0), (0.2, 0.1)
-"""What is cut off at each edge: of the height, of the width. Robots are flat."""
+_WIDE, _CLOSE = (0.15, 0.15, 0.0), (0.26, 0.14, 0.1)
+"""What is cut off: of the height above and below, of the width at each side.
+
+Robots are flat, and what is near stands below the middle.
+"""
 NOBODYS = (0.93, 0.93, 0.93)
 """Colour of parts that came by mutation."""
 
@@ -124,10 +127,11 @@ def _studio(robot: Robot, settings: Experiment, size: tuple[int, int]) -> Studio
     return Studio(robot, space, settings.simulation, size=size)
 
 
-def _cut(picture: Picture, share: tuple[float, float]) -> Picture:
+def _cut(picture: Picture, share: tuple[float, float, float]) -> Picture:
     high, wide = picture.shape[:2]
-    top, left = round(share[0] * high), round(share[1] * wide)
-    return picture[top : high - top, left : wide - left]
+    top, below = round(share[0] * high), round(share[1] * high)
+    left = round(share[2] * wide)
+    return picture[top : high - below, left : wide - left]
 
 
 def _gait(

@@ -140,11 +140,20 @@ def _runs(runs: Sequence[Mapping[str, object]]) -> str:
         births = sorted({int(str(row["births"])) for row in mine})
         reach = f"{births[0]}" if len(births) == 1 else f"{births[0]} to {births[-1]}"
         islands = max(int(str(row["islands"])) for row in mine)
-        seeds = ", ".join(sorted({str(row["seed"]) for row in mine}))
-        cells = (label(name), ", ".join(counts), f"{reach}", islands, seeds)
+        cells = (label(name), ", ".join(counts), f"{reach}", islands, _seeds(mine))
         rows.append([_cell(value) for value in cells])
     heads = ("experiment", "runs", "births of a run", "islands", "seeds")
     return _table(heads, rows) if rows else ""
+
+
+def _seeds(runs: Sequence[Mapping[str, object]]) -> str:
+    """Return the seeds of an experiment's runs, and which repeats of each."""
+    said = []
+    for seed in dict.fromkeys(row["seed"] for row in runs):
+        repeats = sorted(int(str(row["run"])) for row in runs if row["seed"] == seed)
+        which = f": repeats {', '.join(map(str, repeats))}" if any(repeats) else ""
+        said.append(f"{seed}{which}")
+    return "; ".join(said)
 
 
 def _findings(rows: Sequence[Mapping[str, object]]) -> str:
@@ -188,7 +197,7 @@ def _findings(rows: Sequence[Mapping[str, object]]) -> str:
 
 def _figure(one: Drawn) -> str:
     picture = base64.b64encode(one.picture.read_bytes()).decode()
-    tables = ", ".join(f"<code>{escape(name)}</code>" for name in one.source)
+    tables = ", ".join(map(_source, one.source))
     name = f"Figure {one.number}. {one.title}."
     return (
         f'<figure id="figure-{escape(one.number)}">'
@@ -196,6 +205,12 @@ def _figure(one: Drawn) -> str:
         f"<figcaption><b>{escape(name)}</b> {escape(one.caption)} "
         f"Rows of {tables}.</figcaption></figure>"
     )
+
+
+def _source(name: str) -> str:
+    """Return a source: measures by their file's name, others in words."""
+    said = escape(name)
+    return f"<code>{said}</code>" if name in OUTPUTS else said
 
 
 def _left_out(rows: Sequence[Mapping[str, object]]) -> str:

@@ -58,7 +58,7 @@ def test_founders_are_those_whose_parts_live_on(people: pa.Table) -> None:
     assert found.paint == {10: 0, 20: 1, 21: 1, 30: 2}
 
 
-def test_lineage_is_all_ancestors_in_order(people: pa.Table) -> None:
+def test_lineage_is_all_ancestors_parents_first(people: pa.Table) -> None:
     found = lineage(people, "x", 4)
     assert found["order"].to_pylist() == [0, 1, 3, 4]
     assert found["rank"].to_pylist() == [1, 1, 2, 3]
@@ -67,8 +67,23 @@ def test_lineage_is_all_ancestors_in_order(people: pa.Table) -> None:
     lines = next(
         layer._data for layer in shown.layers if "segment" in type(layer.geom).__name__
     )
-    ends = zip(lines["order"], lines["to"], strict=True)
+    ends = zip(lines["number"], lines["to"], strict=True)
     assert sorted(ends) == [(3, 0), (3, 1), (4, 1), (4, 3)]
+
+
+def test_a_lineage_over_islands_has_those_whose_rows_stand_behind() -> None:
+    # 0:1 is a child of 0:0 and of 1:0, a migrant whose row comes later.
+    family = births(((0, 0), []), ((0, 1), [(0, 0), (1, 0)]), ((1, 0), []),
+                    rank=[1, 2, 1])  # fmt: skip
+    found = lineage(family, "x", 1)
+    assert found["order"].to_pylist() == [0, 2, 1]
+    assert found["number"].to_pylist() == [0, 0, 1]
+    shown = lineages({"lineage": found})
+    lines = next(
+        layer._data for layer in shown.layers if "segment" in type(layer.geom).__name__
+    )
+    assert list(zip(lines["number"], lines["to"], strict=True)) == [(1, 0), (1, 0)]
+    shown.draw()
 
 
 def test_the_best_is_the_fittest_of_the_last() -> None:

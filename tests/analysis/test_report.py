@@ -48,9 +48,11 @@ def tables() -> dict[str, pa.Table]:
     rows = {
         "runs": [
             {"experiment": "scenario1", "state": "finished", "births": 60, "seed": 7,
-             "islands": 1},
+             "islands": 1, "run": 0},
             {"experiment": "scenario1", "state": "stopped", "births": 45, "seed": 7,
-             "islands": 1},
+             "islands": 1, "run": 2},
+            {"experiment": "b", "state": "finished", "births": 30, "seed": 8,
+             "islands": 1, "run": 0},
         ],
         "findings": [
             {"figure": "6.2", "claim": "a <b> fitter", "expected": ">", "runs_a": 2,
@@ -71,7 +73,7 @@ def tables() -> dict[str, pa.Table]:
 def read(tmp_path: Path) -> Reader:
     (tmp_path / "one.png").write_bytes(PICTURE)
     figures = [
-        Drawn(number, f"Title {number}", "What & why.", ("outcomes",),
+        Drawn(number, f"Title {number}", "What & why.", ("outcomes", "<a> file"),
               tmp_path / "one.png")
         for number in ("6.2", "6.10")
     ]  # fmt: skip
@@ -91,7 +93,9 @@ def test_pictures_are_inside_and_nothing_is_loaded(read: Reader) -> None:
         assert base64.b64decode(source.removeprefix(prefix)) == PICTURE
     assert read.links == []
     assert read.names == ["figure-6.2", "figure-6.10"]
-    assert "Figure 6.10. Title 6.10. What & why. Rows of outcomes ." in read.text
+    assert (
+        "Figure 6.10. Title 6.10. What & why. Rows of outcomes , <a> file." in read.text
+    )
 
 
 def test_findings_stand_with_numbers_and_count(read: Reader) -> None:
@@ -101,8 +105,9 @@ def test_findings_stand_with_numbers_and_count(read: Reader) -> None:
 
 
 def test_what_was_read_and_left_out_and_how_is_told(read: Reader) -> None:
-    assert "2 runs, 105 births; written 2020-01-01" in read.text
-    assert "scenario 1 1 finished, 1 stopped 45 to 60 1 7" in read.text
+    assert "3 runs, 135 births; written 2020-01-01" in read.text
+    assert "scenario 1 1 finished, 1 stopped 45 to 60 1 7: repeats 0, 2" in read.text
+    assert "b 1 finished 30 1 8 Findings" in read.text
     assert "figure 6.1 no benchmark run runs/x broken & gone" in read.text
     assert "revolve analyze runs what version numpy 9.9" in read.text
 
