@@ -61,6 +61,8 @@ def main(arguments: list[str], simulate: Simulate) -> int:
     if not is_film and out.suffix.lower() != PICTURE_ENDING:
         allowed = f"{PICTURE_ENDING}, {FILM_ENDING}"
         raise NoPictures(f"{out}: must end in one of {allowed}, got {out.suffix!r}")
+    if is_film and options.gait:
+        raise NoPictures(f"{out}: --gait is for a {PICTURE_ENDING}")
     named = options.experiment
     settings = settings_of(read_experiment(named) if named else None)
     space, world = body_space(settings.space), settings.simulation
@@ -83,7 +85,7 @@ def main(arguments: list[str], simulate: Simulate) -> int:
 
 
 def _draw_motion(
-    studio: Studio, poses: list[Floats], gait: int, out: Path, world: Simulation
+    studio: Studio, poses: list[Floats], gait: int | None, out: Path, world: Simulation
 ) -> None:
     """Write a film of all poses, or a strip of some."""
     if out.suffix.lower() == FILM_ENDING:
@@ -107,6 +109,17 @@ def _drawn(
     return [studio.picture(pose, look_at=look_at) for pose in shown]
 
 
+def _from(least: int) -> Callable[[str], int]:
+    """Return what reads a whole number of a flag."""
+
+    def read(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            raise argparse.ArgumentTypeError(f"must be {least} or more, got {text!r}")
+        return int(text)
+
+    return read
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="revolve robot render",
@@ -118,11 +131,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("out", type=Path, metavar="OUT.png|OUT.gif")
     parser.add_argument(
         "--gait",
-        type=int,
-        default=0,
+        type=_from(1),
         metavar="N",
         help="N pictures, one per tick of the brain, in rows of five",
     )
-    parser.add_argument("--width", type=int, default=640, metavar="PIXELS")
+    parser.add_argument("--width", type=_from(16), default=640, metavar="PIXELS")
     parser.add_argument("--experiment", metavar="NAME|FILE.toml")
     return parser

@@ -43,6 +43,13 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
+def _whole(text: str) -> int:
+    """Return a number of a flag, 0 or more."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"must be 0, 1, 2, ..., got {text!r}")
+    return int(text)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="revolve robot random",
@@ -50,8 +57,8 @@ def _parser() -> argparse.ArgumentParser:
         epilog="example: revolve robot random some.yaml --seed 7 --count 3",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=".yaml, .pb, .xml, ...")
-    parser.add_argument("--seed", type=int, default=1, metavar="N")
-    parser.add_argument("--count", type=int, default=1, metavar="N")
+    parser.add_argument("--seed", type=_whole, default=1, metavar="N")
+    parser.add_argument("--count", type=_whole, default=1, metavar="N")
     parser.add_argument("--experiment", default="scenario1", metavar="NAME|FILE.toml")
     return parser
 

@@ -138,16 +138,17 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
 
     Raises:
         InvalidRobot: a slot that a part does not have, a number that a part type
-            does not allow, a neuron that is not there.
+            does not allow, a neuron or its part that is not there.
     """
     body = _Body()
     body.add(theirs.root, (-1, -1, -1), 0, 0)
     neurons, index = _neurons(theirs, body, space)
+    ends = (end for *pair, _ in theirs.weights for end in pair)
+    for name, number in (*theirs.kinds, *ends):
+        if (name, number) not in index:
+            raise InvalidRobot(f"{where}: no neuron {number} on part {name!r}")
     connections = []
     for source, target, weight in theirs.weights:
-        for end in (source, target):
-            if end not in index:
-                raise InvalidRobot(f"{where}: no neuron {end[1]} on part {end[0]!r}")
         # RoboGen takes connections to an oscillator off: it does not listen.
         if neurons[index[target]].kind != "Oscillator":
             connections.append(Connection(index[source], index[target], weight))

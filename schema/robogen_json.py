@@ -6,6 +6,7 @@ Source: RoboGen's published sources of 2018.
 import json
 from typing import Any, NoReturn, TypeVar
 
+from schema.brain import LAYERS
 from schema.errors import InvalidRobot
 from schema.parts import BodySpace
 from schema.robogen import (
@@ -51,6 +52,9 @@ def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
         end = (_get(neuron, "bodyPartId", str, at), _get(neuron, "ioId", int, at))
         ends[_get(neuron, "id", str, at)] = end
         layer = _get(neuron, "layer", str, at)
+        if layer not in LAYERS:
+            allowed = ", ".join(LAYERS)
+            raise InvalidRobot(f"{at}.layer: must be one of {allowed}, got {layer!r}")
         if layer == "hidden":
             theirs.hidden.append(end)
         if layer != "input":

@@ -40,7 +40,7 @@ from schema.yaml_node import Table, compose
 VERSION = 1
 SHORT: dict[Layer, str] = {"input": "in", "output": "out", "hidden": "hidden"}
 _WRITTEN: tuple[Layer, ...] = ("output", "hidden")
-_INDEXED = re.compile(r"(?:body\.parts|brain\.neurons|brain\.connections)\[\d+\]")
+_INDEXED = re.compile(r"(?:body\.parts|brain\.(?:neurons|connections))\[\d+\](\.\w+)?")
 
 
 def robot_to_yaml(robot: Robot, space: BodySpace) -> str:
@@ -163,7 +163,8 @@ class _Reader:
     def _place(self, message: str) -> str:
         """Return ``file:line`` of what a message of ``check_robot`` is about."""
         found = _INDEXED.search(message)
-        line = self._lines.get(found.group()) if found else None
+        at = found.group() if found else ""
+        line = self._lines.get(at) or self._lines.get(at.rpartition(".")[0])
         return self._file if line is None else f"{self._file}:{line}"
 
     def _read_part(self, table: Table, parent: int, parent_slot: int) -> None:
@@ -177,7 +178,7 @@ class _Reader:
         if name in self._part_index:
             table.refuse("id", f"second part named {name!r}")
         self._part_index[name] = index
-        self._lines[f"body.parts[{index}]"] = table.line
+        self._lines |= _lines(table, f"body.parts[{index}]")
         part = Part(
             kind=kind.name,
             parent=parent,
@@ -208,7 +209,7 @@ class _Reader:
         neurons = (*names.values(), *(neuron for neuron, _ in written))
         defaults = neuron_names(Brain(neurons), ids)[len(names) :]
         for (neuron, item), default in zip(written, defaults, strict=True):
-            self._lines[f"brain.neurons[{len(names)}]"] = item.line
+            self._lines |= _lines(item, f"brain.neurons[{len(names)}]")
             name = item.text("id", default)
             if name in names:
                 item.refuse("id", f"second neuron named {name!r}")
@@ -234,11 +235,17 @@ class _Reader:
         edges = []
         for number, table in enumerate(tables):
             table.refuse_others("source", "target", "weight")
-            self._lines[f"brain.connections[{number}]"] = table.line
+            self._lines |= table.lines(f"brain.connections[{number}]")
             source, target = (table.word(end, index) for end in ("source", "target"))
             weight = table.number("weight")
             edges.append(Connection(index[source], index[target], weight))
         return tuple(edges)
+
+
+def _lines(table: Table, name: str) -> dict[str, int]:
+    """Return the lines of a mapping, its keys, and those of its ``params``."""
+    inner = table.table("params").lines(name) if table.has("params") else {}
+    return inner | table.lines(name)
 
 
 def _values(table: Table, parameters: tuple[Parameter, ...]) -> tuple[float, ...]:

@@ -62,6 +62,11 @@ class Table:
         """Return its keys as they are written, in their order."""
         return tuple(self._values)
 
+    def lines(self, name: str) -> dict[str, int]:
+        """Return the mapping's line, called so, and its keys', called ``name.key``."""
+        keys = {f"{name}.{key}": line for key, line in self._key_lines.items()}
+        return {name: self.line, **keys}
+
     def has(self, key: str) -> bool:
         """Return whether it has a key."""
         return key in self._values

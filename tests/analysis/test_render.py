@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from analysis.render import (
     save_film,
     save_picture,
 )
+from analysis.render_command import main
 from schema.brain import INPUT, Brain, Neuron
 from schema.experiment import Simulation
 from schema.parts import BUILT_IN
@@ -93,3 +95,29 @@ def test_files_open_again(tmp_path: Path) -> None:
         assert film.info["duration"] == 120
     with pytest.raises(NoPictures, match="cannot be written"):
         save_picture(pictures[0], tmp_path / "no" / "one.png")
+
+
+def simulate(*_: object, **__: object) -> NoReturn:
+    """Fail: what is wrong with the words is told before anything is done."""
+    raise AssertionError("words come first")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--gait", "0"), "--gait: must be 1 or more, got '0'"),
+        (("--width", "-5"), "--width: must be 16 or more, got '-5'"),
+    ],
+)
+def test_words_that_cannot_be_are_refused(
+    words: tuple[str, str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["robot render", "a.yaml", "a.png", *words], simulate)
+    assert end.value.code == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_film_is_no_strip() -> None:
+    with pytest.raises(NoPictures, match=r"--gait is for a \.png"):
+        main(["robot render", "a.yaml", "a.gif", "--gait", "5"], simulate)

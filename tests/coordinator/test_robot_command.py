@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from coordinator.robot_command import main
 from schema.robot_file import read_robot
 
@@ -14,3 +16,14 @@ def test_files_hold_different_robots_and_the_same_ones_again(tmp_path: Path) -> 
     assert all(len(robot.parts) >= 3 for robot in robots)
     assert main(["robot random", str(tmp_path / "one.pb"), "--seed", "7"]) == 0
     assert read_robot(tmp_path / "one.pb") == robots[0]
+
+
+@pytest.mark.parametrize(("flag", "value"), [("--seed", "-1"), ("--count", "1.5")])
+def test_numbers_that_cannot_be_are_refused(
+    flag: str, value: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["robot random", str(tmp_path / "r.yaml"), flag, value])
+    assert end.value.code == 2
+    assert f"{flag}: must be 0, 1, 2, ..., got '{value}'" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
