@@ -10,9 +10,9 @@ from analysis.view_again import Simulators, move_again
 from analysis.view_blueprint import layout
 from analysis.view_body import figure
 from analysis.view_live import LiveSource
-from analysis.view_motion import Motion, chosen, show_motion
-from analysis.view_output import HOST, PORT, Output, ViewerError, Window, linger
-from analysis.view_recording import Recording
+from analysis.view_motion import Motion, chosen, name_of, show_motion
+from analysis.view_output import HOST, PORT, Output, Window, linger
+from analysis.view_recording import Recording, ViewerError
 from analysis.view_replay import (
     CHUNK_S,
     Span,
@@ -52,9 +52,13 @@ def main(arguments: list[str], simulators: Simulators) -> int:
     output = Output.of(options.save, options.serve)
     if (options.run is None) == (options.connect is None):
         raise ViewerError("name a run folder, or a coordinator by --connect: one")
+    if options.ancestry and not options.robot:
+        raise ViewerError("--ancestry: of whom? --robot best, or --robot ISLAND:BIRTH")
     if options.run is not None:
         _replay(options, output, simulators)
         return 0
+    if options.robot or (options.start, options.until) != (None, None):
+        raise ViewerError("--robot, --from and --until: of a run's folder only")
     stop = stop_on_signals()
     with LiveSource(options.connect, options.fleet, tls_of(options)) as source:
         watch(source, output, options.follow, stop)
@@ -68,6 +72,8 @@ def _replay(
     folder: Path = options.run
     scene = stage(read_experiment(folder))
     news = read_news(folder)
+    born = {one.birth for one in news.births}
+    _check(options, born, is_online=scene.is_online)
     motions = _motions(options, simulators)
     blueprint = layout(
         scene.islands,
@@ -93,6 +99,15 @@ def _replay(
             show_motion(recording, motion, drawn, None if scene.is_online else lane)
         stop = stop_on_signals()
         linger(output, Window(output), recording, stop)
+
+
+def _check(options: argparse.Namespace, born: set[BirthId], *, is_online: bool) -> None:
+    """Refuse flags that this run gives nothing for."""
+    if not is_online and (options.start, options.until) != (None, None):
+        raise ViewerError("--from and --until: this run has no arena, and no poses")
+    if options.follow and options.follow[1] not in born:
+        birth = options.follow[1]
+        raise ViewerError(f"--follow {name_of(birth)}: nobody of that name was born")
 
 
 def _motions(options: argparse.Namespace, simulators: Simulators) -> list[Motion]:

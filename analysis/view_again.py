@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.view_motion import Motion, name_of
-from analysis.view_output import ViewerError
+from analysis.view_recording import ViewerError
 from schema.arena_codec import Rebuild
 from schema.birth import BirthId
 from schema.codec import decode_genome

@@ -10,8 +10,7 @@ import pyarrow.compute as pc
 
 from analysis.view_body import Figure, place_rows
 from analysis.view_entries import Moves, When, motion_path
-from analysis.view_output import ViewerError
-from analysis.view_recording import Recording
+from analysis.view_recording import Recording, ViewerError
 from schema.birth import BirthId
 from schema.live import individual
 from schema.run_tables import read_table

@@ -1,5 +1,6 @@
 """Where a recording goes: a file, viewers that come, or a window that is opened."""
 
+import contextlib
 import socket
 import subprocess
 import sys
@@ -7,17 +8,13 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
-from analysis.view_recording import Recording
-from schema.errors import RevolveError
+from analysis.view_recording import Recording, ViewerError
 from schema.service import tell_user
 
 HOST, PORT = "127.0.0.1", 9876
+_ENDING = ".rrd"
 _WINDOW_S = 3.0
 _POLL_S = 0.2
-
-
-class ViewerError(RevolveError):
-    """The viewer cannot be opened, or there is nothing to show."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,8 +37,10 @@ class Output:
 
         Raises:
             ViewerError: an address that is none or in use; a folder that is not
-                there.
+                there, or a file that no viewer would take for a recording.
         """
+        if save is not None and save.suffix != _ENDING:
+            raise ViewerError(f"--save {save}: must end in {_ENDING}")
         if save is not None and not save.absolute().parent.is_dir():
             raise ViewerError(f"--save {save}: there is no folder {save.parent}")
         if serve is not None:
@@ -72,29 +71,31 @@ class Window:
             if output.url:
                 tell_user(f"serving; to look: rerun --connect {output.url}")
             return
-        command = [sys.executable, "-m", "rerun", "--connect", output.url]
+        # Its own server, which nothing here needs, stays on this machine.
+        command = [sys.executable, "-m", "rerun", "--bind", HOST, "--connect"]
         self._process = subprocess.Popen(  # noqa: S603 - our own interpreter
-            command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            [*command, output.url],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
         )
-        try:
+        with contextlib.suppress(subprocess.TimeoutExpired):
             self._process.wait(_WINDOW_S)
-        except subprocess.TimeoutExpired:
-            return
-        if self._process.returncode:
+        _ = self.was_closed
+
+    @property
+    def was_closed(self) -> bool:
+        """A window was opened and has been closed.
+
+        Raises:
+            ViewerError: it never opened, which a slow machine may tell late.
+        """
+        ended = None if self._process is None else self._process.poll()
+        if ended is not None and ended > 0:
             raise ViewerError(
                 "the viewer cannot open a window: without a screen use --save FILE, or "
                 "--serve and look from another machine"
             )
-
-    @property
-    def is_open(self) -> bool:
-        """A window was opened and has not been closed."""
-        return self._process is not None and self._process.poll() is None
-
-    @property
-    def was_closed(self) -> bool:
-        """A window was opened and has been closed."""
-        return self._process is not None and self._process.poll() is not None
+        return ended is not None
 
 
 def linger(

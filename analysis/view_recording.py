@@ -17,6 +17,7 @@ import rerun as rr
 from analysis.view_body import Figure, Singles
 from analysis.view_entries import Kin, Moves, When, island_path
 from schema.birth import BirthId
+from schema.errors import RevolveError
 
 APPLICATION = "revolve"
 SIMULATED = "sim_time"
@@ -27,6 +28,10 @@ _DEAD = (150, 150, 155)
 _WALL = (190, 190, 195)
 _LINES = ((40, 110, 190), (225, 120, 40))
 _MEMORY = "512MiB"
+
+
+class ViewerError(RevolveError):
+    """The viewer cannot be opened, or there is nothing to show."""
 
 
 class Recording:
@@ -47,6 +52,9 @@ class Recording:
             blueprint: how it is to be shown.
             file: to write to.
             serve: host and port for viewers to come to; it never waits for them.
+
+        Raises:
+            ViewerError: the file cannot be written, or nothing served there.
         """
         kept = "".join(c if c.isalnum() or c in "_-" else "-" for c in name)
         self._stream = rr.RecordingStream(APPLICATION, recording_id=kept)
@@ -59,7 +67,10 @@ class Recording:
             )
         if file is not None:
             sinks.append(rr.FileSink(file))
-        self._stream.set_sinks(*sinks, default_blueprint=blueprint)
+        try:
+            self._stream.set_sinks(*sinks, default_blueprint=blueprint)
+        except RuntimeError as error:
+            raise ViewerError(f"nothing can be recorded: {error}") from None
 
     def __enter__(self) -> Self:
         return self

@@ -111,8 +111,11 @@ def _details(folder: Path) -> dict[str, Any]:
     try:
         details: dict[str, Any] = json.loads((folder / _DETAILS).read_text("utf-8"))
         return {"name": str(details["name"]), "document": str(details["document"])}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise RunFolderError(f"{folder}: no run is there: {error}") from None
+    except OSError as error:
+        why = f"{_DETAILS}: {error.strerror}"
+    except (ValueError, KeyError, TypeError) as error:
+        why = f"{_DETAILS}: {error}"
+    raise RunFolderError(f"{folder}: no run is there: {why}")
 
 
 def _within(folder: Path, span: Span) -> pa.Table:

@@ -1,7 +1,10 @@
 """What a viewer makes of what it is told, without network and screen."""
 
+import os
+import threading
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -11,7 +14,8 @@ from analysis.view_figures import Figures
 from analysis.view_gallery import Gallery, spot_place
 from analysis.view_lineage import Lineage
 from analysis.view_live import Sequel
-from analysis.view_output import Output, ViewerError
+from analysis.view_output import Output, Window, linger
+from analysis.view_recording import ViewerError
 from analysis.view_stage import stage
 from schema.birth import BirthId
 from schema.experiment import Arena, Experiment, Simulation
@@ -124,6 +128,31 @@ def test_an_output_is_a_window_unless_told_otherwise(tmp_path: Path) -> None:
     assert Output.of(None, None).has_window
     assert Output.of(file, None) == Output(file, None, has_window=False)
     assert Output.of(None, "127.0.0.1:0").url == "rerun+http://127.0.0.1:0/proxy"
+
+
+def test_a_file_that_no_viewer_would_open_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ViewerError, match=r"must end in \.rrd"):
+        Output.of(tmp_path / "a.txt", None)
+    with pytest.raises(ViewerError, match="there is no folder"):
+        Output.of(tmp_path / "no" / "a.rrd", None)
+
+
+def test_a_window_that_fails_late_is_told_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / "python"
+    program.write_text(f"#!/bin/sh\nread -r _ < {tmp_path}/go\nexit 1\n")
+    program.chmod(0o755)
+    os.mkfifo(tmp_path / "go")
+    monkeypatch.setattr("sys.executable", str(program))
+    monkeypatch.setattr("analysis.view_output._WINDOW_S", 0.1)
+    output = Output(None, ("127.0.0.1", 1), has_window=True)
+    window = Window(output)
+    assert not window.was_closed
+    (tmp_path / "go").write_text("now\n")
+    recorded: Any = Recorded()
+    with pytest.raises(ViewerError, match="cannot open a window"):
+        linger(output, window, recorded, threading.Event())
 
 
 @pytest.mark.parametrize("text", ["9876", "127.0.0.1:", "127.0.0.1:99999", ":x"])
