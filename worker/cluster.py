@@ -25,28 +25,24 @@ class Track:
     """A cluster's states at K moments of a stretch of time, one row each.
 
     Attributes:
-        state: (K, Q + V) positions, then velocities.
-        qpos, qvel: the same apart, (K, Q) and (K, V).
-        xpos, xmat: frames of all bodies, (K, N, 3) and (K, N, 9).
+        state: (K, W) all of a moment as ``Cluster.live`` has it.
+        qpos, qvel: positions and velocities of it, (K, Q) and (K, V).
         warnings: how often the engine had given each of its own.
         touching: the pairs of members in contact, if they are kept.
     """
 
-    def __init__(self, data: mujoco.MjData, count: int) -> None:
-        """Make room for moments of a state."""
-        live = (data.qpos, data.qvel, data.xpos, data.xmat)
-        size = len(data.qpos)
-        self.state = np.zeros((count, size + len(data.qvel)))
-        self.qpos, self.qvel = self.state[:, :size], self.state[:, size:]
-        self.xpos = np.zeros((count, *data.xpos.shape))
-        self.xmat = np.zeros((count, *data.xmat.shape))
-        rows = (self.qpos, self.qvel, self.xpos, self.xmat)
-        self._complaints: Indices = data.warning.number
+    def __init__(self, cluster: "Cluster", count: int) -> None:
+        """Make room for moments of a cluster."""
+        self.state = np.zeros((count, sum(cluster.sizes)))
+        ends = np.cumsum(cluster.sizes).tolist()
+        parts = np.split(self.state, ends[:-1], axis=1)
+        self.qpos, self.qvel = parts[:2]
+        self._complaints: Indices = cluster.data.warning.number
         self.warnings = np.zeros((count, len(self._complaints)), dtype=np.intp)
         self.touching: list[list[tuple[int, int]]] = [[] for _ in range(count)]
         # Views of bytes: what is copied many times a second is copied by them.
-        self._live = [_bytes(array) for array in live]
-        self._rows = [[_bytes(array[k]) for array in rows] for k in range(count)]
+        self._live = [_bytes(array) for array in cluster.live]
+        self._rows = [[_bytes(array[k]) for array in parts] for k in range(count)]
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -64,6 +60,9 @@ class Cluster:
     Attributes:
         members: whose seats they are, ascending.
         seats: in that order.
+        live: its state just now, views: positions, velocities, places of all
+            bodies and their rotations, as of the last step, each in one row.
+        sizes: of these four.
         track: states at the moments of the last stretch of time.
         cost: of a step, in arbitrary units; decides who is dealt first.
         is_shared: by several robots.
@@ -94,7 +93,10 @@ class Cluster:
         self._owners = np.full(model.ngeom, -1, dtype=np.intp)
         self.qpos: Floats = self.data.qpos
         self.qvel: Floats = self.data.qvel
-        self.track = Track(self.data, 0)
+        frames = self.data.xpos.reshape(-1), self.data.xmat.reshape(-1)
+        self.live: tuple[Floats, ...] = (self.qpos, self.qvel, *frames)
+        self.sizes = tuple(len(array) for array in self.live)
+        self.track = Track(self, 0)
         self.cost = int(model.nv + 4 * model.ngeom)
         self.failure, self.failed_at = "", NEVER
         self.touched: frozenset[int] = frozenset()
@@ -118,7 +120,7 @@ class Cluster:
             first: moment to begin with; those before are kept as they are.
         """
         if len(self.track) < len(plan):
-            self.track = Track(self.data, len(plan))
+            self.track = Track(self, len(plan))
         model, data, keep = self.model, self.data, self.track.keep
         for moment in range(first, len(plan)):
             try:
@@ -135,7 +137,7 @@ class Cluster:
     def keep(self, moments: range) -> None:
         """Take the present state for that of some moments."""
         if len(self.track) < moments.stop:
-            self.track = Track(self.data, moments.stop)
+            self.track = Track(self, moments.stop)
         for moment in moments:
             self.track.keep(moment)
             self.track.touching[moment] = self.touching()

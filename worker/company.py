@@ -11,13 +11,12 @@ import mujoco
 import numpy as np
 
 from schema.birth import BirthId
-from schema.evaluation import Floats
 from schema.settings import ArenaSettings
 from worker.cluster import Cluster
 from worker.groups import Group, across, components
 from worker.inhabitant import Inhabitant
 from worker.layout import Layout, Roster
-from worker.proximity import Proximity
+from worker.proximity import Pairs, Proximity, Scene
 from worker.shop import Shop
 from worker.stride import Stride
 
@@ -65,11 +64,8 @@ class Company:
     def add(self, newcomers: Iterable[Inhabitant]) -> None:
         """Take robots in, each in its own home."""
         added = sorted(newcomers, key=lambda one: one.birth)
-        self._anchor()
         everybody = sorted((*self.everybody, *added), key=lambda one: one.birth)
         self.roster = Roster(everybody)
-        for one in added:
-            self.proximity.insert(self.roster.rows[one.birth])
         homes = [one.body.home for one in added]
         self._settle([*self.clusters, *homes])
 
@@ -78,8 +74,6 @@ class Company:
         gone = sorted(births)
         if not gone:
             return
-        self._anchor()
-        self.proximity.remove([self.roster.rows[birth] for birth in gone])
         homes: dict[Group, Cluster] = {}
         for birth in gone:
             cluster = self._cluster_of[birth]
@@ -90,16 +84,22 @@ class Company:
         for members in homes:
             rest = tuple(birth for birth in members if birth not in gone)
             if rest:
-                kept.append(self._move(rest))
+                home = self._move(rest)
+                mujoco.mj_kinematics(home.model, home.data)
+                kept.append(home)
         for birth in gone:
             self.shop.forget(birth)
         self._settle(kept)
 
-    def begin(self, plan: Sequence[int]) -> Stride:
-        """Look, from now on, at a stretch that all clusters have gone through."""
-        self.stride = Stride(tuple(plan))
+    def begin(self, plan: Sequence[int], looks: Sequence[bool]) -> Stride:
+        """Look, from now on, at a stretch that all clusters have gone through.
+
+        Args:
+            plan: steps to each moment from the one before.
+            looks: whether it is looked then who may touch whom.
+        """
+        self.stride = Stride(tuple(plan), tuple(looks))
         self.stride.read(self.layout)
-        self.stride.measure(self.layout, self.proximity.anchor, 0)
         return self.stride
 
     def catch_up(self) -> None:
@@ -111,7 +111,6 @@ class Company:
             cluster.run(stride.plan, stride.moment + 1)
         self._new = []
         stride.read(self.layout)
-        stride.measure(self.layout, self.proximity.anchor, stride.moment + 1)
 
     def end(self) -> None:
         """Have looked at all of the stretch: now is its last moment."""
@@ -119,16 +118,10 @@ class Company:
 
     def look(self) -> None:
         """Join those who may touch before the next look."""
-        stride, layout, proximity = self.stride, self.layout, self.proximity
-        if stride is None:
-            state = layout.read()
-            bounds = layout.bounds(np.abs(state - proximity.anchor))
+        if self.stride is None:
+            pairs = self.proximity.meetings(self._present())[0]
         else:
-            state = stride.state
-            bounds = stride.bounds[stride.moment]
-        is_anchored, pairs = proximity.look(layout, state, bounds, self._balls)
-        if is_anchored and stride is not None:
-            stride.measure(layout, proximity.anchor, stride.moment)
+            pairs = self._meetings(self.stride)
         if pairs:
             births = [one.birth for one in self.everybody]
             links = [(births[first], births[second]) for first, second in pairs]
@@ -138,9 +131,11 @@ class Company:
     def part(self) -> None:
         """Let clusters fall into those parts that have drifted apart."""
         groups: list[Group] = []
-        for cluster in self.clusters:
-            groups += self._parts(cluster) if len(cluster.members) > 1 else ()
-        if groups:
+        shared = [cluster for cluster in self.clusters if cluster.is_shared]
+        if shared:
+            scene = self._present()
+            for cluster in shared:
+                groups += self._parts(cluster, scene)
             alone = [c.members for c in self.clusters if len(c.members) == 1]
             self.regroup([*alone, *groups])
 
@@ -154,14 +149,10 @@ class Company:
             if members in present:
                 settled.append(present[members])
                 continue
-            if not changed:
-                self._anchor()
             changed = True
             before = sorted({self._cluster_of[birth].members for birth in members})
             self.merges += len(before) - 1
             torn += before if len(before) == 1 else ()
-            rows = [self.roster.rows[birth] for birth in members]
-            self.proximity.join(rows)
             settled.append(self._move(members))
         self.splits += len(torn) - len(set(torn))
         if changed:
@@ -194,7 +185,6 @@ class Company:
         self.layout = Layout(self.clusters, self.roster)
         self.by_cost = sorted(self.clusters, key=lambda cluster: -cluster.cost)
         if self.stride is None:
-            self.proximity.gather(self.layout, self.layout.read())
             return
         moment, count = self.stride.moment, len(self.stride.plan)
         for cluster in self.clusters:
@@ -202,18 +192,21 @@ class Company:
                 cluster.keep(range(moment, count))
                 self._new.append(cluster)
         self.stride.read(self.layout)
-        self.proximity.gather(self.layout, self.stride.state.copy())
-        self.stride.measure(self.layout, self.proximity.anchor, moment)
 
-    def _anchor(self) -> None:
-        """Note how far all have moved, before they stand elsewhere in the layout."""
-        if self.stride is not None:
-            self.proximity.settle(self.stride.bounds[self.stride.moment, 0])
-            return
-        differences = np.abs(self.layout.read() - self.proximity.anchor)
-        self.proximity.settle(self.layout.bounds(differences)[0])
+    def _meetings(self, stride: Stride) -> Pairs:
+        """Return who is to meet at this look; find it out for all that follow."""
+        if stride.moment not in stride.meetings:
+            looks = stride.looks_ahead()
+            scene = Scene(self.layout, stride.states[looks])
+            found = self.proximity.meetings(scene)
+            stride.meetings = dict(zip(looks, found, strict=True))
+        return stride.meetings[stride.moment]
 
-    def _parts(self, cluster: Cluster) -> list[Group]:
+    def _present(self) -> Scene:
+        """Return where all are now, between two stretches."""
+        return Scene(self.layout, self.layout.read()[np.newaxis])
+
+    def _parts(self, cluster: Cluster, scene: Scene) -> list[Group]:
         """Return the parts of a cluster, one if it holds together."""
         alone = [(birth,) for birth in cluster.members]
         touching = [
@@ -224,24 +217,6 @@ class Company:
             return groups
         pairs = across([[self.roster.rows[b] for b in group] for group in groups])
         births = [one.birth for one in self.everybody]
-        near = self.proximity.near(pairs, self._balls)
+        near = self.proximity.near(scene, pairs)
         links = [(births[first], births[second]) for first, second in near]
-        groups = components(groups, links)
-        for group in groups:
-            self.proximity.join([self.roster.rows[birth] for birth in group])
-        return groups
-
-    def _balls(self, row: int) -> Floats:
-        """Return the spheres that cover a robot, (3, B), world frame [m]."""
-        one = self.everybody[row]
-        reach, seat = one.body.reach, one.seat
-        xpos, xmat = seat.xpos, seat.xmat
-        if self.stride is not None:
-            track, moment = self._cluster_of[one.birth].track, self.stride.moment
-            xpos, xmat = (
-                track.xpos[moment, seat.bodies],
-                track.xmat[moment, seat.bodies],
-            )
-        turned = xmat[reach.bodies] * reach.centres
-        moved = turned[:, 0::3] + turned[:, 1::3] + turned[:, 2::3]
-        return np.asarray((moved + xpos[reach.bodies]).T)
+        return components(groups, links)

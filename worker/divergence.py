@@ -10,13 +10,11 @@ from schema.birth import BirthId
 from schema.evaluation import Floats
 from worker.cluster import Cluster
 from worker.company import Company
-from worker.stride import Stride
+from worker.stride import PLAUSIBLE, Stride
 
 FASTEST_CORE = 20.0
 """A core faster than this has broken the physics [m/s]; a fall from the thesis's
 0.25 m ends at 2.2."""
-_PLAUSIBLE = 1e6
-"""Beyond this a coordinate or a velocity is none."""
 
 
 def diverged(
@@ -37,6 +35,8 @@ def diverged(
     if not is_quiet:
         velocities = np.abs(stride.state[company.layout.velocities])
         is_quiet = _is_quiet(float(velocities.max(initial=0.0)))
+    if is_quiet and not looks_closely and not stride.has_failures:
+        return []
     moment = stride.moment
     found: list[Casualty] = []
     for cluster in company.clusters:
@@ -75,7 +75,7 @@ def _reason(positions: Floats, velocities: Floats) -> str:
     if not (np.isfinite(velocities).all() and np.isfinite(positions).all()):
         return "state not finite"
     largest = max(float(np.abs(velocities).max()), float(np.abs(positions).max()))
-    if largest > _PLAUSIBLE:
+    if largest > PLAUSIBLE:
         return f"state as large as {largest:.3g}"
     speed = math.hypot(*velocities[:3].tolist())
     if speed > FASTEST_CORE:

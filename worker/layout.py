@@ -15,6 +15,8 @@ from worker.reach import Indices
 
 _FREE, _FREE_DOFS = 7, 6
 """Numbers of a free joint's position, place and quaternion; and of its velocity."""
+_PARTS = 4
+"""Parts of a cluster's state."""
 
 
 class Roster:
@@ -26,8 +28,10 @@ class Roster:
         islands, numbers: (R,) names.
         sizes: (R,) numbers of each one's position.
         joint_counts: (R,) how many joint angles each has.
-        radius: of a sphere about each one's core that holds all of it [m].
-        radii: (B, 1) of the spheres that cover each [m].
+        body_counts: (R,) how many bodies each has.
+        first_bodies: (R,) the first of each among the N of all.
+        hulls: (4, N) as ``Reach.hulls``.
+        weights: of the absolute velocities of all, as ``Reach.weights``.
     """
 
     def __init__(self, everybody: Sequence[Inhabitant]) -> None:
@@ -38,28 +42,31 @@ class Roster:
         self.islands = np.array([birth.island for birth in births], dtype=np.int32)
         self.numbers = np.array([birth.number for birth in births], dtype=np.int64)
         reaches = [one.body.reach for one in everybody]
-        self.radius = [reach.radius for reach in reaches]
-        self.radii = [reach.radii[:, None] for reach in reaches]
-        self.shifts = [reach.shifts for reach in reaches]
-        self.weights = [reach.weights for reach in reaches]
-        self.sizes = np.array([len(shifts) for shifts in self.shifts], dtype=np.intp)
+        self.weights = _joined([reach.weights for reach in reaches])
+        hulls = np.concatenate([np.zeros((0, 4)), *(reach.hulls for reach in reaches)])
+        self.hulls = np.ascontiguousarray(hulls.T)
+        degrees = [len(reach.weights) for reach in reaches]
+        self.sizes = np.array(degrees, dtype=np.intp) + (_FREE - _FREE_DOFS)
         self.joint_counts = (self.sizes - _FREE).astype(np.int32)
+        bodies = [len(reach.hulls) for reach in reaches]
+        self.body_counts = np.array(bodies, dtype=np.intp)
+        self.first_bodies = np.cumsum(self.body_counts) - self.body_counts
 
 
 class Layout:
     """Indices into the states of R robots in their clusters.
 
-    The row has N numbers: of each cluster all positions, then all velocities.
+    The row has W numbers: of each cluster all of ``Cluster.live``.
 
     Attributes:
         roster: the robots; its ``islands``, ``numbers`` and ``joint_counts``.
         clusters: in the order of the row.
-        positions, velocities: which of the numbers are what.
         homes: (R,) which of the clusters each one lives in.
         starts, dofs: (R,) where each one's position and velocity begin.
         roots: (R, 7) where place and quaternion stand.
         motions: (R, 6) where velocity and turning of the core stand.
         joints: where the joint angles stand, robot by robot.
+        velocities: where the velocities stand, robot by robot.
     """
 
     def __init__(self, clusters: Sequence[Cluster], roster: Roster) -> None:
@@ -74,76 +81,101 @@ class Layout:
         self.joint_counts = roster.joint_counts
         self.clusters = tuple(clusters)
         rows = [roster.rows[birth] for cluster in clusters for birth in cluster.members]
-        own = [(s.joints, s.dofs) for cluster in clusters for s in cluster.seats]
-        sizes = [size for c in clusters for size in (len(c.qpos), len(c.qvel))]
-        ends = np.cumsum(sizes, dtype=np.intp)
-        # Where each cluster's positions and velocities begin, for each of its seats.
-        blocks = (ends - np.array(sizes, dtype=np.intp)).reshape(-1, 2)
+        own = [seat.offsets for cluster in clusters for seat in cluster.seats]
+        sizes = np.array([c.sizes for c in clusters], dtype=np.intp).reshape(-1)
+        # Where each cluster's four parts begin, for each of its seats.
+        blocks = (np.cumsum(sizes) - sizes).reshape(-1, _PARTS)
         counts = [len(cluster.members) for cluster in clusters]
-        begins = np.repeat(blocks, counts, axis=0) + np.array(own, np.intp).reshape(
-            -1, 2
-        )
+        begins = np.repeat(blocks, counts, axis=0)
+        begins += np.array(own, dtype=np.intp).reshape(-1, _PARTS)
         order = np.argsort(np.array(rows, dtype=np.intp))
-        self.starts, self.dofs = begins[order].T
+        self.starts, self.dofs, self._places, self._turns = begins[order].T
         self.homes: Indices = np.repeat(np.arange(len(counts)), counts)[order]
-        self._set_sums(begins.T.reshape(-1), rows, order)
-        are_positions = np.repeat(np.arange(len(sizes)) % 2 == 0, sizes)
-        self.positions: Indices = are_positions.nonzero()[0]
-        self.velocities: Indices = (~are_positions).nonzero()[0]
         self.roots = self.starts[:, None] + np.arange(_FREE)
         self.motions = self.dofs[:, None] + np.arange(_FREE_DOFS)
-        angles = roster.sizes - _FREE
-        first = np.repeat(self.starts + (_FREE - np.cumsum(angles) + angles), angles)
-        self.joints = first + np.arange(len(first))
-
-    def _set_sums(self, begins: Indices, rows: list[int], order: Indices) -> None:
-        """Prepare the sums of ``bounds``.
-
-        Args:
-            begins: (2 R,) where positions and then velocities begin, seat by seat.
-            rows: of the seats.
-            order: of the seats by row.
-        """
-        sequence = np.argsort(begins)
-        self._edges = begins[sequence]
-        places = np.empty_like(sequence)
-        places[sequence] = np.arange(len(sequence))
-        self._order = np.concatenate([places[order], places[len(rows) + order]])
-        shifts, weights = self.roster.shifts, self.roster.weights
-        terms = [shifts[row] for row in rows] + [weights[row] for row in rows]
-        self._weights = _joined([terms[number] for number in sequence.tolist()])
+        self.joints = _runs(self.starts + _FREE, roster.sizes - _FREE)
+        degrees = roster.sizes - (_FREE - _FREE_DOFS)
+        self.velocities = _runs(self.dofs, degrees)
+        self._first_velocities = np.cumsum(degrees) - degrees
+        places = _runs(self._places, roster.body_counts, 3)
+        turns = _runs(self._turns, roster.body_counts, 9)
+        # Of x and y: the origin, and the row of the rotation.
+        self._origins = places + np.arange(2)[:, None]
+        self._rows = turns + np.arange(6).reshape(2, 3, 1)
 
     def read(self) -> Floats:
         """Return all numbers in a row: a copy."""
-        return _joined([part for c in self.clusters for part in (c.qpos, c.qvel)])
+        return _joined([part for cluster in self.clusters for part in cluster.live])
 
     def history(self, count: int) -> Floats:
-        """Return the same at the moments of a stretch, (count, N)."""
+        """Return the same at the moments of a stretch, (count, W)."""
         if not self.clusters:
             return np.zeros((count, 0))
         states = [cluster.track.state[:count] for cluster in self.clusters]
         return np.concatenate(states, axis=1)
 
-    def bounds(self, differences: Floats) -> Floats:
-        """Return how far robots moved and how fast they are at most, (..., 2, R).
-
-        The first bounds how far any point of a robot is from where it was [m], the
-        second the speed of its fastest point [m/s].
+    def speeds(self, states: Floats) -> Floats:
+        """Return how fast each robot's fastest point is at most, (L, R) [m/s].
 
         Args:
-            differences: (..., N) of positions from what they were, and velocities,
-                all absolute.
+            states: (L, W).
         """
-        shape = (*differences.shape[:-1], 2, len(self.starts))
-        if not len(self._edges):
-            return np.zeros(shape)
-        sums = np.add.reduceat(differences * self._weights, self._edges, axis=-1)
-        return np.asarray(sums[..., self._order].reshape(shape))
+        if not len(self._first_velocities):
+            return np.zeros((len(states), 0))
+        terms = np.abs(states.take(self.velocities, axis=1))
+        terms *= self.roster.weights
+        return np.asarray(np.add.reduceat(terms, self._first_velocities, axis=1))
+
+    def boxes(self, states: Floats) -> tuple[Floats, Floats]:
+        """Return the least and the greatest x and y of robots, (2, R) each [m].
+
+        They hold all that covers a robot in all of some states.
+
+        Args:
+            states: (L, W).
+        """
+        roster = self.roster
+        if not len(roster.first_bodies):
+            return np.zeros((2, 0)), np.zeros((2, 0))
+        terms = states.take(self._rows, axis=1)
+        terms *= roster.hulls[:3]
+        centres = terms[:, :, 0] + terms[:, :, 1]
+        centres += terms[:, :, 2]
+        centres += states.take(self._origins, axis=1)
+        low = centres.min(axis=0) - roster.hulls[3]
+        high = centres.max(axis=0) + roster.hulls[3]
+        return (
+            np.minimum.reduceat(low, roster.first_bodies, axis=1),
+            np.maximum.reduceat(high, roster.first_bodies, axis=1),
+        )
+
+    def balls(self, states: Floats, row: int) -> Floats:
+        """Return the centres of the spheres that cover a robot, (L, 3, B) [m].
+
+        Args:
+            states: (L, W).
+            row: of the robot.
+        """
+        reach, count = self.roster.everybody[row].body.reach, len(states)
+        bodies, place, turn = len(reach.hulls), self._places[row], self._turns[row]
+        xpos = states[:, place : place + 3 * bodies].reshape(count, bodies, 3)
+        xmat = states[:, turn : turn + 9 * bodies].reshape(count, bodies, 9)
+        turned = xmat.take(reach.bodies, axis=1)
+        turned *= reach.centres
+        moved = turned[..., 0::3] + turned[..., 1::3] + turned[..., 2::3]
+        moved += xpos.take(reach.bodies, axis=1)
+        return moved.transpose(0, 2, 1)
 
     def part(self, row: int) -> slice:
         """Return where a robot's configuration stands."""
         start = int(self.starts[row])
         return slice(start, start + int(self.roster.sizes[row]))
+
+
+def _runs(starts: Indices, counts: Indices, stride: int = 1) -> Indices:
+    """Return the numbers of some runs, each from its start on, one after another."""
+    first: Indices = np.repeat(starts - stride * (np.cumsum(counts) - counts), counts)
+    return first + stride * np.arange(len(first))
 
 
 def _joined(parts: Sequence[Floats]) -> Floats:

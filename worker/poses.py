@@ -17,18 +17,19 @@ class Poses:
     def __init__(self, timestep_s: float) -> None:
         """Start without samples; a step of the arena takes ``timestep_s``."""
         self._timestep_s = timestep_s
-        self._samples: list[tuple[int, Layout, Floats]] = []
+        self._samples: list[tuple[int, Layout, Floats, Floats]] = []
 
-    def add(self, step: int, layout: Layout, positions: Floats) -> None:
+    def add(self, step: int, layout: Layout, state: Floats) -> None:
         """Keep a sample.
 
         Args:
             step: the arena's.
             layout: of its robots then.
-            positions: of all clusters in a row, not changed any more.
+            state: of all clusters in a row.
         """
         if len(layout.numbers):
-            self._samples.append((step, layout, positions))
+            roots, angles = state[layout.roots], state[layout.joints]
+            self._samples.append((step, layout, roots, angles))
 
     def columns(self) -> bytes:
         """Return all samples as an Arrow IPC stream; no bytes for no samples.
@@ -38,13 +39,13 @@ class Poses:
         """
         if not self._samples:
             return b""
-        layouts = [layout for _, layout, _ in self._samples]
-        roots = np.concatenate([q[layout.roots] for _, layout, q in self._samples])
-        angles = np.concatenate([q[layout.joints] for _, layout, q in self._samples])
+        layouts = [layout for _, layout, _, _ in self._samples]
+        roots = np.concatenate([roots for _, _, roots, _ in self._samples])
+        angles = np.concatenate([angles for _, _, _, angles in self._samples])
         times = np.concatenate(
             [
                 np.full(len(layout.numbers), step * self._timestep_s)
-                for step, layout, _ in self._samples
+                for step, layout, _, _ in self._samples
             ]
         )
         counts = np.concatenate([layout.joint_counts for layout in layouts])

@@ -1,14 +1,12 @@
 """Who may touch whom before anybody looks again.
 
-Of every pair of robots that live apart it is known how far they were apart at
-least when they were last measured, and how far each can have moved since; only
-pairs for which that says too little are measured. Two robots are to meet when the
-distance is less than ``merge_distance_m`` and what both may move until the next
-look: that grows with their speed, so that the falling meet in time.
+Two robots are to meet when the distance between the spheres that cover them is less
+than ``merge_distance_m`` and what both may move until the next look: that grows with
+their speed, so that the falling meet in time. Boxes about robots tell of almost all
+pairs that they are too far apart; only the others are measured.
 """
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -18,179 +16,114 @@ from worker.layout import Layout
 
 FASTEST = 10.0
 """What is faster has broken the physics, and does not gather others [m/s]."""
-_FAR_M = 0.1
-"""Beyond this gap of their whole spheres a pair is not measured more closely."""
+_ROUNDING_M = 1e-9
+"""What sums of distances may be off by, and more."""
 
-Balls = Callable[[int], Floats]
-"""Row of a robot to the (3, B) centres of its spheres, world frame [m]."""
+Pairs = list[tuple[int, int]]
+"""Rows of robots, the lesser first."""
+
+
+class Scene:
+    """Where R robots are at L moments, as far as it matters to who meets whom.
+
+    Attributes:
+        speeds: (L, R) of the fastest point of each at most [m/s].
+    """
+
+    def __init__(self, layout: Layout, states: Floats) -> None:
+        """Look at some states.
+
+        Args:
+            layout: where robots stand in them.
+            states: (L, W).
+        """
+        self._layout, self._states = layout, states
+        self._balls: dict[int, Floats] = {}
+        self.speeds = layout.speeds(states)
+
+    def apart(self, here: int, there: int) -> Floats:
+        """Return how far the spheres of two robots are apart, (L,) [m]."""
+        everybody = self._layout.roster.everybody
+        for row in (here, there):
+            if row not in self._balls:
+                self._balls[row] = self._layout.balls(self._states, row)
+        first, second = self._balls[here], self._balls[there]
+        difference = first[:, :, :, None] - second[:, :, None, :]
+        np.multiply(difference, difference, out=difference)
+        distance = difference[:, 0] + difference[:, 1]
+        distance += difference[:, 2]
+        np.sqrt(distance, out=distance)
+        distance -= everybody[here].body.reach.radii[:, None]
+        distance -= everybody[there].body.reach.radii
+        return np.asarray(distance.min(axis=(1, 2)))
+
+    def neighbours(self, margins: Floats) -> tuple[list[int], list[int]]:
+        """Return those pairs that live apart and may be near each other.
+
+        Args:
+            margins: (R,) within which each robot keeps at every moment, besides its
+                spheres [m].
+
+        Returns:
+            Rows of the first and of the second, ascending by both.
+        """
+        homes = self._layout.homes
+        low, high = self._layout.boxes(self._states)
+        low -= margins
+        high += margins
+        is_near = low[0][:, None] <= high[0]
+        is_beside = low[1][:, None] <= high[1]
+        is_near &= is_beside
+        is_near &= is_near.T.copy()
+        is_near &= homes[:, None] != homes
+        first, second = is_near.nonzero()
+        is_once = first < second
+        return first[is_once].tolist(), second[is_once].tolist()
 
 
 class Proximity:
-    """Distances between R robots, row by row in the order of their births.
-
-    How far a point of a robot can have moved is bounded by how its configuration
-    differs from one that is kept, its anchor; a robot that is measured is anchored
-    anew, and what it had moved until then adds to its travel.
-
-    Attributes:
-        travel: (R,) how far each can have moved up to its anchor [m].
-        slack: (R, R) upper triangle: distance at the last measurement plus both
-            travels then [m]; infinite for pairs that live together.
-        anchor: positions that the present ones are compared with, in the layout's
-            order, and zeros for the velocities.
-    """
+    """What an arena's settings say of when robots are to live together."""
 
     def __init__(self, settings: ArenaSettings) -> None:
-        """Start with nobody.
-
-        Args:
-            settings: distances and intervals.
-        """
+        """Take distances and intervals."""
         arena, clock = settings.arena, settings.simulation
         self._merge_m = arena.merge_distance_m
         self._split_m = max(arena.split_distance_m, arena.merge_distance_m)
         # Frames of bodies are those before the last step: one step older.
         self._ahead_s = (arena.proximity_steps + 1) * clock.timestep_s
-        self.travel = np.zeros(0)
-        self.slack = np.zeros((0, 0))
-        self.anchor = np.zeros(0)
-        self._margins = np.zeros(0)
-        self._nearest = np.zeros(0)
-        self._radius: list[float] = []
-        self._radii: list[Floats] = []
 
-    def insert(self, row: int) -> None:
-        """Make room for a newcomer, whose distance to nobody is known."""
-        self.travel = np.insert(self.travel, row, 0.0)
-        count = len(self.travel)
-        slack = np.full((count, count), np.inf)
-        slack[:row, :row] = self.slack[:row, :row]
-        slack[:row, row + 1 :] = self.slack[:row, row:]
-        slack[row + 1 :, row + 1 :] = self.slack[row:, row:]
-        slack[:row, row] = slack[row, row + 1 :] = -np.inf
-        self.slack = slack
+    def meetings(self, scene: Scene) -> list[Pairs]:
+        """Return of each moment of a scene who is to live with whom from then on.
 
-    def remove(self, rows: Sequence[int]) -> None:
-        """Forget robots."""
-        kept = np.ones(len(self.travel), dtype=np.bool_)
-        kept[list(rows)] = False
-        self.travel = self.travel[kept]
-        self.slack = self.slack[kept][:, kept]
-
-    def gather(self, layout: Layout, state: Floats) -> None:
-        """Anchor all robots where they are now.
-
-        Args:
-            layout: where they stand.
-            state: of all clusters in a row, not used otherwise.
+        What is found at one moment holds for later ones as long as nobody moves.
         """
-        self._radius, self._radii = layout.roster.radius, layout.roster.radii
-        self.anchor = state
-        self.anchor[layout.velocities] = 0.0
-        self.refresh()
-
-    def refresh(self) -> None:
-        """Find for each robot the pair that says least, after pairs were changed."""
-        self._nearest = self.slack.min(axis=1, initial=np.inf)
-
-    def look(
-        self,
-        layout: Layout,
-        state: Floats,
-        bounds: Floats,
-        balls: Balls,
-    ) -> tuple[bool, list[tuple[int, int]]]:
-        """Return whether anybody was measured, and who is to live with whom now.
-
-        Args:
-            layout: where robots stand in the state.
-            state: of all clusters in a row.
-            bounds: (2, R) how far each moved from its anchor, and how fast it is.
-            balls: gives spheres, those that are needed.
-
-        Returns:
-            If anybody was anchored anew; and pairs of rows.
-        """
-        moved, speeds = bounds
-        margins = np.minimum(speeds, FASTEST) * self._ahead_s
-        self._margins = margins
-        bound = self.travel + moved + (margins + 0.5 * self._merge_m)
-        # Of few robots only may a pair be due, and few pairs are.
-        rows = (self._nearest < bound + bound.max(initial=0.0)).nonzero()[0]
-        if not len(rows):
-            return False, []
-        first, second = np.nonzero(self.slack[rows] < bound[rows, None] + bound)
-        # Few, as a rule: plain numbers are faster than arrays.
-        due = list(zip(rows[first].tolist(), second.tolist(), strict=True))
-        if not due:
-            return False, []
-        ends = sorted({row for pair in due for row in pair})
-        for row in ends:
-            self.travel[row] += moved[row]
-            part = layout.part(row)
-            self.anchor[part] = state[part]
-        roots = state[layout.roots[ends, :3]].tolist()
-        found = self._measured(due, dict(zip(ends, roots, strict=True)), balls)
-        for row in sorted({a for a, _ in due}):
-            self._nearest[row] = self.slack[row].min()
-        return True, found
-
-    def _measured(
-        self,
-        due: Sequence[tuple[int, int]],
-        places: Mapping[int, Sequence[float]],
-        balls: Balls,
-    ) -> list[tuple[int, int]]:
-        """Measure pairs; return those that may touch before the next look."""
-        found, cache = [], dict[int, Floats]()
-        margins, travel = self._margins.tolist(), self.travel.tolist()
-        for a, b in due:
-            meet = margins[a] + margins[b] + self._merge_m
-            apart = math.dist(places[a], places[b]) - self._radius[a] - self._radius[b]
-            if apart < meet + _FAR_M:
-                apart = self._distance(a, b, balls, cache)
-            self.slack[a, b] = apart + travel[a] + travel[b]
-            if apart < meet:
-                found.append((a, b))
+        margins = self._margins(scene)
+        most = margins.max(axis=0, initial=0.0) + (0.5 * self._merge_m + _ROUNDING_M)
+        found: list[Pairs] = [[] for _ in margins]
+        first, second = scene.neighbours(most)
+        meet = margins[:, first] + margins[:, second] + self._merge_m
+        pairs = zip(first, second, strict=True)
+        for number, (here, there) in enumerate(pairs):
+            is_met = scene.apart(here, there) < meet[:, number]
+            for moment in is_met.nonzero()[0].tolist():
+                found[moment].append((here, there))
         return found
 
-    def settle(self, moved: Floats) -> None:
-        """Add to all travels what robots moved; they are anchored anew."""
-        self.travel = self.travel + moved
-
-    def near(
-        self, pairs: Sequence[tuple[int, int]], balls: Balls
-    ) -> list[tuple[int, int]]:
+    def near(self, scene: Scene, pairs: Sequence[tuple[int, int]]) -> Pairs:
         """Return which of some pairs that live together are to go on doing so.
 
-        Asked right after a look; the others are measured again at the next.
+        Args:
+            scene: of one moment.
+            pairs: rows.
         """
-        found, cache = [], dict[int, Floats]()
-        for a, b in pairs:
-            moves = float(self._margins[a] + self._margins[b])
-            if self._distance(a, b, balls, cache) < moves + self._split_m:
-                found.append((a, b))
-            self.slack[a, b] = -np.inf
-        self.refresh()
-        return found
+        margins = self._margins(scene)[0].tolist()
+        return [
+            (here, there)
+            for here, there in pairs
+            if scene.apart(here, there)[0]
+            < margins[here] + margins[there] + self._split_m
+        ]
 
-    def join(self, rows: Sequence[int]) -> None:
-        """Stop measuring the pairs of robots that live together."""
-        ordered = sorted(rows)
-        for number, row in enumerate(ordered):
-            self.slack[row, ordered[number + 1 :]] = np.inf
-        self.refresh()
-
-    def _distance(
-        self, here: int, there: int, balls: Balls, cache: dict[int, Floats]
-    ) -> float:
-        """Return how far two robots are apart at least, from their spheres."""
-        for row in (here, there):
-            if row not in cache:
-                cache[row] = balls(row)
-        difference = cache[here][:, :, None] - cache[there][:, None, :]
-        np.multiply(difference, difference, out=difference)
-        distance = np.sqrt(difference[0] + difference[1] + difference[2])
-        distance -= self._radii[here]
-        distance -= self._radii[there].T
-        return float(distance.min())
+    def _margins(self, scene: Scene) -> Floats:
+        """Return how far each may move until the next look, (L, R) [m]."""
+        return np.asarray(np.minimum(scene.speeds, FASTEST) * self._ahead_s)

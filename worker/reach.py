@@ -34,19 +34,17 @@ class Reach:
         centres: (B, 9) in the frames of their bodies, thrice over, to be
             multiplied with the rows of rotations [m].
         radii: (B,) [m].
-        radius: of a sphere about the core's centre that holds all of it [m].
+        hulls: (N, 4) centres, in the frames of its N bodies, and radii of spheres
+            that hold all spheres of a body each [m].
         weights: (V,) of the absolute velocities of its degrees of freedom in a
             bound on the speed of its fastest point.
-        shifts: (Q,) of the absolute differences of its coordinates in a bound on
-            how far any point of it is from where it was.
     """
 
     bodies: Indices
     centres: Floats
     radii: Floats
-    radius: float
+    hulls: Floats
     weights: Floats
-    shifts: Floats
 
 
 def reach_of(model: mujoco.MjModel) -> Reach:
@@ -77,20 +75,25 @@ def reach_of(model: mujoco.MjModel) -> Reach:
     for joint in range(1, model.njnt):
         body = int(model.jnt_bodyid[joint]) - root
         weights[int(model.jnt_dofadr[joint])] = far[body]
-    # Turning a unit quaternion by a chord d moves a point at radius r by 2 r d at
-    # most.
-    turn = np.full(4, 2.0 * far[0])
-    shifts = np.concatenate([weights[:3], turn, weights[6:]])
     counts = [len(cover) for cover in covers]
     balls = [ball for cover in covers for ball in cover]
     return Reach(
         np.repeat(np.arange(len(covers)), counts),
         np.tile([centre for centre, _ in balls], 3),
         np.array([radius for _, radius in balls]),
-        far[0],
+        np.array([_hull(cover) for cover in covers]),
         weights,
-        shifts,
     )
+
+
+def _hull(cover: list[_Ball]) -> list[float]:
+    """Return the centre and the radius of a sphere that holds some spheres."""
+    if not cover:
+        return [0.0, 0.0, 0.0, 0.0]
+    centres = np.array([centre for centre, _ in cover])
+    centre = 0.5 * (centres.min(axis=0) + centres.max(axis=0))
+    radius = max(float(np.linalg.norm(c - centre)) + r for c, r in cover)
+    return [*centre.tolist(), radius]
 
 
 def _cut(model: mujoco.MjModel, geom: int) -> list[_Ball]:

@@ -36,6 +36,7 @@ class Seat:
         xpos, xmat: frames of its bodies as of the last step, (N, 3) and (N, 9).
         joints, dofs: where its part of qpos and of qvel starts in the cluster's.
         bodies: which of the cluster's are its own.
+        offsets: where its part of each of ``Cluster.live`` starts.
         geoms: first and last + 1 of its geoms.
         motors: (M, 5) as ``Servos.motors``, addresses counted from its first angle.
     """
@@ -63,6 +64,7 @@ class Seat:
         self.bodies = slice(first, first + solo.nbody - root)
         self.joints = int(model.jnt_qposadr[free])
         self.dofs = int(model.jnt_dofadr[free])
+        self.offsets = (self.joints, self.dofs, 3 * first, 9 * first)
         geom = int(model.body_geomadr[first])
         self.geoms = (geom, geom + solo.ngeom - int(solo.body_geomadr[root]))
         self.senses = Senses(

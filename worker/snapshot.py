@@ -1,9 +1,10 @@
 """The whole state of an arena as bytes, and back.
 
 MessagePack of fixed fields; arrays are little-endian float64. Nothing is executed
-when it is read. What is not here is a function of what is: models, contacts,
-frames of bodies. Touch tallies and samples of poses are handed over at the end of
-each advance, so between two of them there are none.
+when it is read. What is not here is a function of what is, models, contacts, frames
+of bodies, or spares work only: distances that were measured. Touch tallies and
+samples of poses are handed over at the end of each advance, so between two of them
+there are none.
 """
 
 import hashlib
@@ -16,7 +17,7 @@ from schema.errors import MalformedMessage
 from schema.evaluation import Floats
 from schema.settings import ArenaSettings
 
-FORMAT = 1
+FORMAT = 2
 """Goes up when the meaning of a field changes."""
 
 
@@ -53,7 +54,6 @@ class ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tru
         settings: SHA-256 of the settings it goes with.
         robots: by birth.
         clusters: who lives together, as indices into the robots.
-        travel, slack, anchor: of ``worker.proximity``.
         casualties: not yet told.
     """
 
@@ -62,9 +62,6 @@ class ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tru
     step: int
     robots: list[RobotState]
     clusters: list[list[int]]
-    travel: bytes
-    slack: bytes
-    anchor: bytes
     casualties: list[CasualtyState]
 
 

@@ -5,7 +5,6 @@ import numpy as np
 from schema.arena import Casualty
 from schema.birth import BirthId
 from schema.codec import decode_robot
-from schema.evaluation import Floats
 from schema.settings import ArenaSettings
 from worker.arrival import inhabitant
 from worker.company import Company
@@ -39,8 +38,6 @@ def write(
         casualties: not yet told.
     """
     rows = {one.birth: row for row, one in enumerate(company.everybody)}
-    proximity = company.proximity
-    upper = np.triu_indices(len(rows), 1)
     return encode_state(
         ArenaState(
             format=FORMAT,
@@ -48,9 +45,6 @@ def write(
             step=step,
             robots=[_robot_state(one) for one in company.everybody],
             clusters=[[rows[b] for b in c.members] for c in company.clusters],
-            travel=pack_floats(proximity.travel),
-            slack=pack_floats(proximity.slack[upper]),
-            anchor=pack_floats(_anchor(company)),
             casualties=[
                 CasualtyState(_name(c.birth), c.step, c.reason, c.place)
                 for c in casualties
@@ -80,24 +74,9 @@ def read(
     births = [one.birth for one in company.everybody]
     company.regroup([tuple(births[row] for row in g) for g in state.clusters])
     company.merges = company.splits = 0
-    proximity, count = company.proximity, len(births)
-    proximity.travel = unpack_floats(state.travel, count)
-    proximity.slack[np.triu_indices(count, 1)] = unpack_floats(
-        state.slack, count * (count - 1) // 2
-    )
-    layout = company.layout
-    anchor = unpack_floats(state.anchor, *proximity.anchor.shape)
-    proximity.anchor[layout.positions] = anchor[: len(layout.positions)]
-    proximity.refresh()
     return state.step, tuple(
         Casualty(BirthId(*c.birth), c.step, c.reason, c.place) for c in state.casualties
     )
-
-
-def _anchor(company: Company) -> Floats:
-    """Return the anchor with all positions before all velocities, which are 0."""
-    layout, anchor = company.layout, company.proximity.anchor
-    return np.concatenate([anchor[layout.positions], anchor[layout.velocities]])
 
 
 def _name(birth: BirthId) -> tuple[int, int]:

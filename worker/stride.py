@@ -8,47 +8,58 @@ import numpy as np
 
 from schema.evaluation import Floats
 from worker.layout import Layout
+from worker.proximity import Pairs
+
+PLAUSIBLE = 1e6
+"""Beyond this a coordinate or a velocity is none."""
 
 
 class Stride:
-    """States of all clusters at K moments, and what bounds R robots then.
+    """States of all clusters at K moments.
 
     Attributes:
         plan: steps to each moment from the one before.
         moment: the one that is being looked at.
-        states: (K, N) as the layout puts them.
-        bounds: (K, 2, R) how far any point is at most from where it was measured
-            [m], and the speed of the fastest point at most [m/s].
-        loudest: no velocity of all is greater; not a number if one is none.
+        states: (K, W) as the layout puts them.
+        loudest: greatest velocity of all; not a number if one is none.
+        has_failures: the engine may have given up on a cluster.
+        meetings: pairs of rows to join, by moment of a look, as far as that has been
+            found out.
     """
 
-    def __init__(self, plan: tuple[int, ...]) -> None:
-        """Begin with the first moment; nothing is known of any."""
-        self.plan = plan
+    def __init__(self, plan: tuple[int, ...], looks: tuple[bool, ...]) -> None:
+        """Begin with the first moment; nothing is known of any.
+
+        Args:
+            plan: steps to each moment from the one before.
+            looks: whether it is looked at each who may touch whom.
+        """
+        self.plan, self._looks = plan, looks
         self.moment = 0
         self.states = np.zeros((len(plan), 0))
-        self.bounds = np.zeros((len(plan), 2, 0))
         self.loudest = 0.0
+        self.has_failures = False
+        self.meetings: dict[int, Pairs] = {}
 
     @property
     def state(self) -> Floats:
-        """What all are like at this moment, (N,)."""
+        """What all are like at this moment, (W,)."""
         return np.asarray(self.states[self.moment])
 
-    def read(self, layout: Layout) -> None:
-        """Read all states, from this moment on; they are to be measured anew."""
-        self.states = layout.history(len(self.plan))
-        self.bounds = np.zeros((len(self.plan), 2, len(layout.starts)))
+    def looks_ahead(self) -> list[int]:
+        """Return the moments of looks from this one on.
 
-    def measure(self, layout: Layout, anchor: Floats, first: int) -> None:
-        """Compare the states from a moment on with an anchor.
-
-        Args:
-            layout: where everybody is.
-            anchor: positions, and zeros for the velocities, (N,).
-            first: the moment.
+        Where physics breaks on the way, only this one.
         """
-        if first < len(self.plan):
-            differences = np.abs(self.states[first:] - anchor)
-            self.loudest = float(differences.max(initial=0.0))
-            self.bounds[first:] = layout.bounds(differences)
+        if not np.abs(self.states).max(initial=0.0) <= PLAUSIBLE:
+            return [self.moment]
+        moments = range(self.moment, len(self.plan))
+        return [moment for moment in moments if self._looks[moment]]
+
+    def read(self, layout: Layout) -> None:
+        """Read all states; what was found out of them holds no longer."""
+        self.states = layout.history(len(self.plan))
+        velocities = np.abs(self.states.take(layout.velocities, axis=1))
+        self.loudest = float(velocities.max(initial=0.0))
+        self.has_failures = any(cluster.failure for cluster in layout.clusters)
+        self.meetings = {}

@@ -166,7 +166,8 @@ class World:
         """Let all clusters go through a stretch of time, then look at its moments."""
         plan = [b - a for a, b in itertools.pairwise((self.step, *moments))]
         self._run(plan)
-        stride = self.company.begin(plan)
+        looks = [self._schedule.is_look(step) for step in moments]
+        stride = self.company.begin(plan, looks)
         for moment, step in enumerate(moments):
             self.step, stride.moment = step, moment
             self._arrive(stride, watch)
