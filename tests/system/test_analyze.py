@@ -2,6 +2,7 @@
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import duckdb
 import polars as pl
@@ -10,23 +11,25 @@ import pytest
 
 from analysis.figures import FIGURES
 from analysis.outputs import OUTPUTS, schema
-from tests.system.conftest import Stage
+from tests.system.stage import Stage
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 
-@pytest.fixture(scope="module")
-def analysed(
-    tmp_path_factory: pytest.TempPathFactory, undisturbed: Path, calm: Path
-) -> tuple[Path, str]:
+@pytest.fixture(scope="session")
+def analysed(once: Any, undisturbed: Path, calm: Path) -> tuple[Path, str]:  # noqa: ANN401 - the fixture
     """Return the measures of an off-line run, an arena and two broken runs."""
-    stage = Stage(tmp_path_factory.mktemp("analysed"))
-    for name, run in (("a", undisturbed), ("b", calm), ("c", undisturbed)):
-        shutil.copytree(run, stage.folder / "runs" / name)
-    (stage.folder / "runs" / "d").mkdir()
-    (stage.folder / "runs" / "d" / "run.json").write_text("{")
-    told = stage.run("analyze", "runs", "--out", "report")
-    return stage.folder / "report", told
+
+    def make(stage: Stage) -> None:
+        for name, run in (("a", undisturbed), ("b", calm), ("c", undisturbed)):
+            shutil.copytree(run, stage.folder / "runs" / name)
+        (stage.folder / "runs" / "d").mkdir()
+        (stage.folder / "runs" / "d" / "run.json").write_text("{")
+        told = stage.run("analyze", "runs", "--out", "report")
+        (stage.folder / "told").write_text(told)
+
+    folder: Path = once("analysed", make)
+    return folder / "report", (folder / "told").read_text()
 
 
 def test_runs_are_measured_and_what_is_left_out_is_named(

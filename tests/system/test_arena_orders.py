@@ -26,7 +26,7 @@ def test_pause_list_insert_remove_snapshot_resume(
 ) -> None:
     folder = arena_stage.folder / "run"
     words = ("crowd.toml", "--seed", "4", "--quiet", "--out", "run")
-    flags = ("--workers", "1", "--speed", "40", "--listen", "tcp/127.0.0.1:0")
+    flags = ("--workers", "1", "--speed", "8", "--listen", "tcp/127.0.0.1:0")
     coordinator = arena_stage.start("run", *words, *flags)
     until((folder / "address").exists, "the coordinator listens")
     address = (folder / "address").read_text().strip()

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ Process = subprocess.Popen[str]
 Until = Callable[[Callable[[], bool], str], None]
 
 DT = 0.005
-SNAPSHOT_STEPS = 6000
+SNAPSHOT_STEPS = 2000
 
 
 def words(out: str) -> tuple[str, ...]:
@@ -42,11 +43,10 @@ def size(folder: Path) -> int:
 
 def advances(folder: Path) -> list[Advanced]:
     """Return the advances of a journal, which may be growing."""
-    copied = folder.with_suffix(".copy")
-    copied.mkdir(exist_ok=True)
-    shutil.copy(folder / NAME, copied / NAME)
-    with Journal.open(copied) as journal:
-        return [event for event in journal.replay() if isinstance(event, Advanced)]
+    with TemporaryDirectory() as copied:
+        shutil.copy(folder / NAME, copied)
+        with Journal.open(Path(copied)) as journal:
+            return [event for event in journal.replay() if isinstance(event, Advanced)]
 
 
 def newest(folder: Path, table: str) -> int:
@@ -195,13 +195,20 @@ def test_killed_in_a_cluster_a_snapshot_and_a_segment_change(
     folder = arena_stage.folder / "run"
 
     def reached(step: int) -> Callable[[], bool]:
-        return lambda: any(e.advance.step >= step for e in advances(folder))
+        looked_at = 0
+
+        def is_there() -> bool:
+            nonlocal looked_at
+            if size(folder) <= max(looked_at, 1000):
+                return False
+            looked_at = size(folder)
+            return any(each.advance.step >= step for each in advances(folder))
+
+        return is_there
 
     touching = sorted(round(each / DT) for each in tally.touching)
     before = max(step for step in tally.steps if step < touching[len(touching) // 3])
-    resume_until(
-        arena_stage, until, lambda: size(folder) > 1000 and reached(before)(), "touch"
-    )
+    resume_until(arena_stage, until, reached(before), "touch")
     tally.note("coordinator", folder)
     due = next(
         step for step, following in zip(tally.steps, tally.steps[1:], strict=False)

@@ -11,7 +11,7 @@ import pytest
 from coordinator.compare import compare
 from schema.run_tables import read_table
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 SHORT = """
 name = "short-bridge"

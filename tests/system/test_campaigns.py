@@ -1,10 +1,7 @@
 """Campaigns as a user runs them: interrupted, killed, adopted, shared."""
 
-import os
 import signal
 import socket
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -16,10 +13,10 @@ from coordinator.compare import compare
 from coordinator.folder import RunDetails, RunFolder, read_state
 from schema.experiment_file import experiment_text, read_experiment
 from schema.network import hub_config
+from tests.system.stage import Stage
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Stage = Any
 Until = Callable[[Callable[[], bool], str], None]
 
 SHORT = """
@@ -50,18 +47,15 @@ def _words(out: str, *more: str) -> tuple[str, ...]:
             *more)  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+@pytest.fixture(scope="session")
+def whole(once: Any) -> Path:  # noqa: ANN401 - the fixture
     """Return a campaign that ran in one process, to which nothing happened."""
-    folder = tmp_path_factory.mktemp("whole")
-    _write(folder)
-    subprocess.run(
-        [sys.executable, "-m", "revolve", *_words("all", "--in-process", "--quiet")],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
-        check=True,
-        stdout=subprocess.DEVNULL,
-    )
+
+    def make(stage: Stage) -> None:
+        _write(stage.folder)
+        stage.run(*_words("all", "--in-process", "--quiet"))
+
+    folder: Path = once("campaign", make)
     return folder / "all"
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from coordinator.compare import compare
 
-pytestmark = pytest.mark.system
+pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 Stage = Any
 Until = Callable[[Callable[[], bool], str], None]

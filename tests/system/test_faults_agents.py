@@ -40,7 +40,7 @@ def singles(births: int) -> tuple[str, ...]:
     return ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
 
 
-HAMLET = ("hamlet.toml", "--seed", "4", "--speed", "20", "--quiet")
+HAMLET = ("hamlet.toml", "--seed", "4", "--speed", "10", "--quiet")
 
 
 def test_a_worker_is_frozen_and_comes_back(

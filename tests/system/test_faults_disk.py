@@ -25,14 +25,14 @@ Until = Callable[[Callable[[], bool], str], None]
 
 @pytest.fixture
 def half(stage: Stage, undisturbed: Path, births: int, until: Until) -> Path:
-    """Return the journal of a run that was killed halfway."""
+    """Return the journal of a run that was killed on its way."""
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
     run = stage.start("run", *words, "--in-process", "--out", "run")
     journal: Path = stage.folder / "run" / NAME
     whole = (undisturbed / NAME).stat().st_size
     until(
-        lambda: journal.exists() and journal.stat().st_size > whole // 2,
-        "half of the run",
+        lambda: journal.exists() and journal.stat().st_size > whole // 3,
+        "a third of the run",
     )
     run.send_signal(signal.SIGKILL)
     run.wait()

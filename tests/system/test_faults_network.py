@@ -135,7 +135,7 @@ def test_a_worker_is_cut_off_and_comes_back(
 def test_an_arena_moves_when_its_holder_is_cut_off(
     hamlet_stage: Stage, quiet_hamlet: Path, distant: Distant
 ) -> None:
-    words = ("hamlet.toml", "--seed", "4", "--speed", "20", "--quiet")
+    words = ("hamlet.toml", "--seed", "4", "--speed", "10", "--quiet")
     fleet, flags = distant.fleet(hamlet_stage, *words)
     whole = (quiet_hamlet / NAME).stat().st_size
     share = np.random.default_rng(32).uniform(0.1, 0.5)

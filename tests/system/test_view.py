@@ -2,7 +2,6 @@
 
 import signal
 import subprocess
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,6 +15,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from coordinator.compare import compare
+from coordinator.journal import NAME
 from schema.run_tables import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
@@ -101,26 +101,11 @@ def check_curves(file: Path, folder: Path) -> None:
 
 
 @pytest.fixture(scope="session")
-def replayed(quiet_hamlet: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def replayed(once: Any, quiet_hamlet: Path) -> Path:  # noqa: ANN401 - the fixture
     """Return a recording of a run's tables."""
-    file = tmp_path_factory.mktemp("replay") / "run.rrd"
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "revolve",
-            "view",
-            str(quiet_hamlet),
-            "--save",
-            str(file),
-        ],
-        cwd=Path(__file__).parents[2],
-        check=False,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    return file
+    words = ("view", str(quiet_hamlet), "--save", "run.rrd")
+    folder: Path = once("replay", lambda stage: stage.run(*words))
+    return folder / "run.rrd"
 
 
 def test_a_replay_has_each_pose_of_each_robot(
@@ -192,7 +177,7 @@ def test_who_watches_changes_nothing_and_is_told_all(
 ) -> None:
     """One viewer sees all of a run; one is killed, one frozen while it lives."""
     stage = hamlet_stage
-    fleet = fleet_of(stage, *WORDS)
+    fleet = fleet_of(stage, *WORDS, "--speed", "10")
     viewers = {}
     for name in ("whole", "killed", "frozen"):
         words = ("view", "--connect", fleet.address, "--save", f"{name}.rrd")
@@ -201,7 +186,8 @@ def test_who_watches_changes_nothing_and_is_told_all(
         until(file.exists, f"the viewer {name} has been told of the run")
     fleet.join("w", "worker")
     fleet.begin(1)
-    fleet.wait_for(30_000)
+    fleet.wait_for(0.4 * (quiet_hamlet / NAME).stat().st_size)
+    assert not fleet.is_over
     viewers["killed"].kill()
     viewers["frozen"].send_signal(signal.SIGSTOP)
     fleet.finish()

@@ -4,6 +4,7 @@ Needs a Vulkan driver (Debian: mesa-vulkan-drivers) and is skipped without one.
 """
 
 import io
+import socket
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -26,7 +27,6 @@ Fleet = Callable[..., Any]
 Until = Callable[[Callable[[], bool], str], None]
 Floats = npt.NDArray[np.float64]
 
-PORT, SERVED = 9898, 9899
 SEEN_S = 12.0
 """A time at which all founders live."""
 FIELD_OF_VIEW = np.radians(55.0)
@@ -34,12 +34,20 @@ EYE = 1.2 * 1.3 * 0.4 * np.array([0.35, -1.0, 0.8])
 """Where the camera is in an arena of 0.4 m, if the layout is as it says."""
 
 
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
 @pytest.fixture
 def viewer() -> Iterator[ViewerClient]:
     program = str(Path(sys.executable).parent / "rerun")
     try:
         client = ViewerClient.spawn(
-            headless=True, port=PORT, hide_welcome_screen=True, executable_path=program
+            headless=True,
+            port=free_port(),
+            hide_welcome_screen=True,
+            executable_path=program,
         )
         client.take_screenshot()
     except Exception as error:  # noqa: BLE001 - the library tells it in many ways
@@ -116,13 +124,14 @@ def test_a_live_view_shows_robots_where_they_are(
     viewer: ViewerClient, hamlet_stage: Stage, fleet_of: Fleet, until: Until
 ) -> None:
     fleet = fleet_of(hamlet_stage, "hamlet.toml", "--seed", "4", "--quiet")
-    words = ("--serve", f"127.0.0.1:{SERVED}", "--save", "live.rrd")
+    served = f"127.0.0.1:{free_port()}"
+    words = ("--serve", served, "--save", "live.rrd")
     hamlet_stage.start("view", "--connect", fleet.address, *words)
     until((hamlet_stage.folder / "live.rrd").exists, "the viewer has been told")
     fleet.join("w", "worker")
     fleet.begin(1)
     fleet.finish()
-    picture = look(viewer, f"rerun+http://127.0.0.1:{SERVED}/proxy")
+    picture = look(viewer, f"rerun+http://{served}/proxy")
     check_robots(picture, fleet.folder)
 
 
