@@ -12,7 +12,7 @@ BIRTHS ?= 1500
 DEMO = $(BIN)/revolve run scenario1 --seed $(SEED) --births $(BIRTHS) \
 	--out runs/demo-$$(date +%Y%m%d-%H%M%S)-$$$$
 
-.PHONY: help demo test bench lint format check proto constraints clean
+.PHONY: help demo compiled test bench lint format check proto constraints clean
 
 help:
 	@echo 'make demo         evolve robots for about a minute'
@@ -28,14 +28,18 @@ help:
 demo: $(STAMP)
 	@$(DEMO)
 
-# Many small tests share the cores; those that start processes have the machine to
-# themselves.
-test: $(STAMP)
+# Tests start hundreds of processes, each of which would compile all of it again where
+# Python is told to write no bytecode.
+compiled: $(STAMP)
+	@$(BIN)/python -m compileall -q schema coordinator worker analyzer analysis revolve.py
+
+# Many small tests, then those that start processes and wait for them: two at a time.
+test: compiled
 	$(BIN)/python -m pytest -q -n 2 -m 'not system and not benchmark'
-	$(BIN)/python -m pytest -q -m 'system'
+	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m 'system'
 
 # Holds the speed promises to their figures: for a machine with nothing else to do.
-bench: $(STAMP)
+bench: compiled
 	$(BIN)/python -m pytest -q -s -m benchmark
 
 lint: $(STAMP)
