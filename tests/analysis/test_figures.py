@@ -1,12 +1,7 @@
 """What figures show, read back from what would be drawn."""
 
-from typing import Any
-
-import plotnine as p9
-import pyarrow as pa
 import pytest
 
-from analysis.figure_bench import arena_speed
 from analysis.figure_forms import (
     NothingToDraw,
     Panel,
@@ -14,18 +9,9 @@ from analysis.figure_forms import (
     over_runs,
     stacked,
 )
-from analysis.figure_islands import fitness_by_island, migration_graph
-from analysis.figure_robots import extremities_and_fitness
 from analysis.figure_style import colours, in_order, label
 from analysis.figures import FIGURES
-from analysis.outputs import schema
-
-Row = dict[str, Any]
-
-
-def table(name: str, rows: list[Row]) -> pa.Table:
-    """Return a table of measures; what rows do not say is null."""
-    return pa.Table.from_pylist(rows, schema(name))
+from tests.analysis.drawn import Row, layers, table
 
 
 def outcomes(experiment: str, *fitness: float) -> list[Row]:
@@ -54,16 +40,6 @@ def course(experiment: str, runs: int, *mean: float) -> list[Row]:
          "greatest": value + 0.05}
         for n, value in enumerate(mean, 1)
     ]  # fmt: skip
-
-
-def layers(figure: p9.ggplot) -> dict[str, Row]:
-    """Return the columns that each layer shows, by its form."""
-    return {
-        type(layer.geom).__name__: (
-            figure.data if layer._data is None else layer._data
-        ).to_dict("list")
-        for layer in figure.layers
-    }
 
 
 FITNESS = Panel("fitness", "fitness [m/s]")
@@ -126,80 +102,6 @@ def test_an_interval_does_not_reach_below_what_is_possible() -> None:
     rows = table("progression", course("b", 3, 0.05, 0.4))
     shown = layers(over_births({"progression": rows}, "fitness", "f"))
     assert shown["geom_ribbon"]["low"] == pytest.approx([0.0, 0.3])
-
-
-def test_fitness_by_extremities_has_bars_where_three_runs_are() -> None:
-    rows = [
-        {"experiment": name, "folder": f"{name}{run}", "population": "final",
-         "by": "count", "bin": extremities, "fitness": fitness}
-        for name, extremities, values in (
-            ("a", 4.0, (0.1, 0.2, 0.3)), ("a", 5.0, (0.1, 0.2)), ("b", 4.0, (0.7,))
-        )
-        for run, fitness in enumerate(values)
-    ]  # fmt: skip
-    figure = extremities_and_fitness(
-        {"extremities": table("extremities", rows)}, "count"
-    )
-    shown = layers(figure)
-    # The mean of three runs, Student's t of two degrees of freedom, at the left of 4.
-    error = 4.302653 * 0.1 / 3**0.5
-    assert shown["geom_linerange"]["low"] == pytest.approx([max(0.2 - error, 0.0)])
-    assert shown["geom_linerange"]["high"] == pytest.approx([0.2 + error])
-    assert shown["geom_linerange"]["at"] == pytest.approx([3.935])
-    points = dict(
-        zip(shown["geom_point"]["at"], shown["geom_point"]["fitness"], strict=True)
-    )
-    assert points == pytest.approx({3.935: 0.2, 4.935: 0.15, 4.065: 0.7})
-    figure.draw()
-
-
-def test_arrows_go_from_island_to_island_as_often_as_migrants_went() -> None:
-    went = [(0, 1, 2), (0, 1, 0), (1, 0, 0), (2, 0, 1)]
-    rows = [
-        {"experiment": "ring", "island": island, "to": to, "living": living}
-        for island, to, living in went
-    ]
-    figure = migration_graph({"migrants": table("migrants", rows)})
-    arrows = figure.data.sort_values(["island", "to"])
-    assert arrows["line_count"].tolist() == [2, 1, 1]
-    assert arrows["line_mean"].tolist() == [0.5, 0.0, 1.0]
-    # Island 0 is on top, 1 at the lower right, 2 at the lower left.
-    assert (arrows["yend"] - arrows["y"] > 0).tolist() == [False, True, True]
-    assert (arrows["xend"] - arrows["x"] > 0).tolist() == [True, False, True]
-    figure.draw()
-
-
-def test_islands_have_their_lines() -> None:
-    rows = [
-        {"experiment": "ring", "folder": "f", "island": island, "births": births,
-         "fitness": 0.1 * island + births}
-        for island in range(2)
-        for births in (15, 30)
-    ]  # fmt: skip
-    runs = [{"folder": "f", "islands": 2}]
-    figure = fitness_by_island(
-        {"runs": table("runs", runs), "populations": table("populations", rows)}
-    )
-    assert figure.data["island"].tolist() == ["0", "0", "1", "1"]
-    assert figure.data["fitness"].tolist() == pytest.approx([15, 30, 15.1, 30.1])
-    figure.draw()
-    alone = {"runs": table("runs", [{"folder": "f", "islands": 1}])}
-    with pytest.raises(NothingToDraw, match="several islands"):
-        fitness_by_island({**alone, "populations": table("populations", rows)})
-
-
-def test_a_speed_is_drawn_beside_the_thesiss() -> None:
-    rows = [
-        {"benchmark": "arena", "population": size, "factor": factor}
-        for size, factor in ((5, 8.0), (5, 10.0), (10, 4.0))
-    ] + [{"benchmark": "spider", "population": 5, "factor": 99.0}]
-    figure = arena_speed({"benchmark": pa.Table.from_pylist(rows)})
-    means = dict(zip(figure.data["population"], figure.data["factor"], strict=True))
-    assert means == {5: 9.0, 10: 4.0}
-    fit = figure.layers[-1]._data
-    # The thesis's formula at 5 and 10 robots.
-    assert fit["factor"].iloc[[0, -1]].tolist() == pytest.approx([7.5124, 3.4221])
-    figure.draw()
 
 
 def test_course_has_bands_only_where_runs_are_enough() -> None:
