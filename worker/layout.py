@@ -30,6 +30,7 @@ class Roster:
         joint_counts: (R,) how many joint angles each has.
         body_counts: (R,) how many bodies each has.
         first_bodies: (R,) the first of each among the N of all.
+        spans: of each robot, which of the N are its own.
         hulls: (4, N) as ``Reach.hulls``.
         weights: of the absolute velocities of all, as ``Reach.weights``.
     """
@@ -51,6 +52,8 @@ class Roster:
         bodies = [len(reach.hulls) for reach in reaches]
         self.body_counts = np.array(bodies, dtype=np.intp)
         self.first_bodies = np.cumsum(self.body_counts) - self.body_counts
+        firsts = zip(self.first_bodies.tolist(), bodies, strict=True)
+        self.spans = [slice(first, first + count) for first, count in firsts]
 
 
 class Layout:
@@ -126,28 +129,18 @@ class Layout:
         terms *= self.roster.weights
         return np.asarray(np.add.reduceat(terms, self._first_velocities, axis=1))
 
-    def boxes(self, states: Floats) -> tuple[Floats, Floats]:
-        """Return the least and the greatest x and y of robots, (2, R) each [m].
-
-        They hold all that covers a robot in all of some states.
+    def hulls(self, states: Floats) -> Floats:
+        """Return x and y of the centres of all bodies' hulls, (L, 2, N) [m].
 
         Args:
             states: (L, W).
         """
-        roster = self.roster
-        if not len(roster.first_bodies):
-            return np.zeros((2, 0)), np.zeros((2, 0))
         terms = states.take(self._rows, axis=1)
-        terms *= roster.hulls[:3]
+        terms *= self.roster.hulls[:3]
         centres = terms[:, :, 0] + terms[:, :, 1]
         centres += terms[:, :, 2]
         centres += states.take(self._origins, axis=1)
-        low = centres.min(axis=0) - roster.hulls[3]
-        high = centres.max(axis=0) + roster.hulls[3]
-        return (
-            np.minimum.reduceat(low, roster.first_bodies, axis=1),
-            np.maximum.reduceat(high, roster.first_bodies, axis=1),
-        )
+        return centres
 
     def balls(self, states: Floats, row: int) -> Floats:
         """Return the centres of the spheres that cover a robot, (L, 3, B) [m].

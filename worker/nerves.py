@@ -56,6 +56,7 @@ class Nerves:
         self._seats = seats
         self._controls = [seat.ctrl for seat in seats]
         self._alone = [seats[row] for row in self._others]
+        self._cores = [seats[row].senses for row in self._simple.tolist()]
         self._turns = layout.roots[self._simple, 3:]
         self._motions = layout.motions[self._simple]
         self._angles = layout.starts[self._motor_rows] + self._motor_offsets
@@ -111,6 +112,8 @@ class Nerves:
         self._others = sorted(set(range(len(seats))).difference(simple))
         self._padded = [row for row in simple if seats[row].senses.pads]
         self._simple = np.array(simple, dtype=np.intp)
+        before = [seats[row].senses.velocities[0] for row in simple]
+        self._velocities: Floats = np.array(before).reshape(-1, 3)
         cores = [seats[row].senses.core_imu for row in simple]
         self._places = self._simple * self._width.inputs + np.array(cores, np.intp)
         counts = np.array([len(seat.ctrl) for seat in seats], dtype=np.intp)
@@ -124,13 +127,13 @@ class Nerves:
 
     def _feel_cores(self, state: Floats) -> None:
         """Read the imus at cores' centres from the free joints' states."""
-        simple = [self._seats[row].senses for row in self._simple.tolist()]
-        if not simple:
+        if not self._cores:
             return
         w, x, y, z = state[self._turns].T
         motions = state[self._motions]
-        before = np.array([senses.velocities[0] for senses in simple])
-        ax, ay, az = ((motions[:, :3] - before) / self._tick_s).T
+        velocities = motions[:, :3]
+        ax, ay, az = ((velocities - self._velocities) / self._tick_s).T
+        self._velocities = velocities
         az = az + self._gravity
         cells, places = self.readings.reshape(-1), self._places
         # These three are the columns of the core's rotation: world into core frame.
@@ -151,5 +154,5 @@ class Nerves:
         )
         for axis in range(3):
             cells[places + 3 + axis] = motions[:, 3 + axis]
-        for senses, (vx, vy, vz) in zip(simple, motions[:, :3].tolist(), strict=True):
+        for senses, (vx, vy, vz) in zip(self._cores, velocities.tolist(), strict=True):
             senses.velocities[0] = (vx, vy, vz)

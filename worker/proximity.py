@@ -38,6 +38,7 @@ class Scene:
             states: (L, W).
         """
         self._layout, self._states = layout, states
+        self._hulls = layout.hulls(states)
         self._balls: dict[int, Floats] = {}
         self.speeds = layout.speeds(states)
 
@@ -57,6 +58,20 @@ class Scene:
         distance -= everybody[there].body.reach.radii
         return np.asarray(distance.min(axis=(1, 2)))
 
+    def is_near(self, here: int, there: int, within_m: float) -> bool:
+        """Return whether the spheres of two robots may be as near as that.
+
+        At one of the moments, and as far as the hulls of their bodies tell from
+        above.
+        """
+        roster = self._layout.roster
+        first, second = roster.spans[here], roster.spans[there]
+        gaps = self._hulls[:, :, first, None] - self._hulls[:, :, None, second]
+        gaps *= gaps
+        radii = roster.hulls[3]
+        reach = (radii[first, None] + within_m) + radii[second]
+        return bool((gaps[:, 0] + gaps[:, 1] <= reach * reach).any())
+
     def neighbours(self, margins: Floats) -> tuple[list[int], list[int]]:
         """Return those pairs that live apart and may be near each other.
 
@@ -67,8 +82,13 @@ class Scene:
         Returns:
             Rows of the first and of the second, ascending by both.
         """
-        homes = self._layout.homes
-        low, high = self._layout.boxes(self._states)
+        homes, roster = self._layout.homes, self._layout.roster
+        if not len(homes):
+            return [], []
+        low = self._hulls.min(axis=0) - roster.hulls[3]
+        high = self._hulls.max(axis=0) + roster.hulls[3]
+        low = np.minimum.reduceat(low, roster.first_bodies, axis=1)
+        high = np.maximum.reduceat(high, roster.first_bodies, axis=1)
         low -= margins
         high += margins
         is_near = low[0][:, None] <= high[0]
@@ -100,13 +120,12 @@ class Proximity:
         margins = self._margins(scene)
         most = margins.max(axis=0, initial=0.0) + (0.5 * self._merge_m + _ROUNDING_M)
         found: list[Pairs] = [[] for _ in margins]
-        first, second = scene.neighbours(most)
-        meet = margins[:, first] + margins[:, second] + self._merge_m
-        pairs = zip(first, second, strict=True)
-        for number, (here, there) in enumerate(pairs):
-            is_met = scene.apart(here, there) < meet[:, number]
-            for moment in is_met.nonzero()[0].tolist():
-                found[moment].append((here, there))
+        for here, there in zip(*scene.neighbours(most), strict=True):
+            if scene.is_near(here, there, float(most[here] + most[there])):
+                meet = margins[:, here] + margins[:, there] + self._merge_m
+                is_met = scene.apart(here, there) < meet
+                for moment in is_met.nonzero()[0].tolist():
+                    found[moment].append((here, there))
         return found
 
     def near(self, scene: Scene, pairs: Sequence[tuple[int, int]]) -> Pairs:
