@@ -62,13 +62,10 @@ def reach_of(model: mujoco.MjModel) -> Reach:
             balls += _cut(model, geom)
         covers.append(_merged(balls))
     # Of each body: how far anything beyond its joint may be from its origin.
-    far = [
-        max((float(np.linalg.norm(c)) + r for c, r in cover), default=0.0)
-        for cover in covers
-    ]
+    far = [max((_length(c) + r for c, r in cover), default=0.0) for cover in covers]
     for body in range(model.nbody - 1, root, -1):
         parent = int(model.body_parentid[body]) - root
-        arm = float(np.linalg.norm(model.body_pos[body]))
+        arm = _length(model.body_pos[body])
         far[parent] = max(far[parent], arm + far[body - root])
     weights = np.empty(model.nv)
     weights[:3], weights[3:6] = 1.0, far[0]
@@ -92,14 +89,14 @@ def _hull(cover: list[_Ball]) -> list[float]:
         return [0.0, 0.0, 0.0, 0.0]
     centres = np.array([centre for centre, _ in cover])
     centre = 0.5 * (centres.min(axis=0) + centres.max(axis=0))
-    radius = max(float(np.linalg.norm(c - centre)) + r for c, r in cover)
+    radius = max(_length(c - centre) + r for c, r in cover)
     return [*centre.tolist(), radius]
 
 
 def _cut(model: mujoco.MjModel, geom: int) -> list[_Ball]:
     """Return spheres that cover a box, in its body's frame."""
     size = 2.0 * model.geom_size[geom]
-    middle = float(np.sort(size)[1])
+    middle = sorted(size.tolist())[1]
     pieces = [max(1, math.ceil(edge / (SLENDERNESS * middle))) for edge in size]
     if min(pieces) == max(pieces) == 1 and float(np.min(size)) * 2 <= middle * 1.01:
         # A flat box: its width is what makes its sphere large.
@@ -108,7 +105,7 @@ def _cut(model: mujoco.MjModel, geom: int) -> list[_Ball]:
     cell = size / pieces
     rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
-    radius = 0.5 * float(np.linalg.norm(cell))
+    radius = 0.5 * _length(cell)
     found = []
     for index in product(*map(range, pieces)):
         local = (np.array(index) + 0.5) * cell - 0.5 * size
@@ -129,7 +126,7 @@ def _merged(balls: list[_Ball]) -> list[_Ball]:
         largest = GROWTH * radius
         rest: list[_Ball] = []
         for other, other_radius in left:
-            apart = float(np.linalg.norm(other - centre))
+            apart = _length(other - centre)
             if apart + other_radius <= radius:
                 continue
             joint = 0.5 * (apart + radius + other_radius)
@@ -141,3 +138,8 @@ def _merged(balls: list[_Ball]) -> list[_Ball]:
         kept.append((centre, radius))
         left = rest
     return kept
+
+
+def _length(vector: Floats) -> float:
+    """Return what ``np.linalg.norm`` does, sooner."""
+    return math.sqrt(vector.dot(vector))
