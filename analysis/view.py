@@ -73,22 +73,22 @@ def _replay(
     scene = stage(read_experiment(folder))
     news = read_news(folder)
     born = {one.birth for one in news.births}
-    _check(options, born, is_online=scene.is_online)
+    _check(options, born, is_online=bool(scene.arenas))
     motions = _motions(options, simulators)
     blueprint = layout(
         scene.islands,
         extent_m=scene.extent_m,
-        is_online=scene.is_online,
+        arenas=scene.arenas,
         follow=options.follow,
         motions=[each.birth for each in motions],
     )
     name = f"{news.experiment}-{folder.name}"
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         for island, walls in zip(scene.islands, scene.walls, strict=True):
-            recording.island(island, walls)
+            recording.island(island, walls, is_alone=len(scene.islands) == 1)
         show = Show(recording, scene.space)
         show.tell(news)
-        if scene.is_online:
+        if scene.arenas:
             _replay_poses(folder, _span(options, folder), show)
         bodies = {one.birth: one.body for one in news.births}
         recording.upright("motion")
@@ -96,7 +96,8 @@ def _replay(
             body = bodies[motion.birth]
             assert body is not None
             drawn = figure(body, scene.space, is_plain=False)
-            show_motion(recording, motion, drawn, None if scene.is_online else lane)
+            is_there = motion.birth.island in scene.arenas
+            show_motion(recording, motion, drawn, None if is_there else lane)
         stop = stop_on_signals()
         linger(output, Window(output), recording, stop)
 

@@ -1,6 +1,7 @@
 """How the viewer is laid out: arenas side by side, curves, log, ancestry, workers."""
 
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -18,7 +19,7 @@ def layout(
     islands: Sequence[int],
     *,
     extent_m: float,
-    is_online: bool,
+    arenas: AbstractSet[int],
     follow: tuple[int, BirthId] | None = None,
     motions: Sequence[BirthId] = (),
 ) -> rrb.Blueprint:
@@ -27,13 +28,20 @@ def layout(
     Args:
         islands: their numbers.
         extent_m: how far from its middle an arena or a gallery reaches [m].
-        is_online: robots live in arenas, in simulated time.
+        arenas: those on which robots live together, in simulated time.
         follow: island and name of the robot that the camera follows there.
         motions: robots that are shown by themselves, moving.
     """
-    kind = "Arena" if is_online else "Population of island"
-    scenes = [_scene(each, f"{kind} {each}", extent_m, follow) for each in islands]
-    if motions and not is_online:
+    scenes = [
+        _scene(
+            each,
+            f"Arena {each}" if each in arenas else f"Population of island {each}",
+            extent_m,
+            follow,
+        )
+        for each in islands
+    ]
+    if motions and not arenas:
         # Time alone is not the births' time: nothing else could be seen at once.
         return _framed(_motion(motions, is_online=False), SIMULATED)
     if motions:
@@ -50,7 +58,9 @@ def layout(
         row_shares=[3, 2, 4],
     )
     whole = rrb.Horizontal(rrb.Grid(*scenes), told, column_shares=[5, 3])
-    return _framed(whole, SIMULATED if is_online else BIRTHS)
+    # Off-line populations change by births alone.
+    is_timed = bool(motions) or arenas >= set(islands)
+    return _framed(whole, SIMULATED if is_timed else BIRTHS)
 
 
 def _framed(root: rrb.Horizontal | rrb.Spatial3DView, timeline: str) -> rrb.Blueprint:

@@ -63,15 +63,16 @@ def chosen(
 
 def _best(folder: Path) -> BirthId:
     """Return the fittest of all that a run has judged, the first of equals."""
-    for table in ("evaluations", "fitness"):
-        rows = read_table(folder, table)
-        if table == "fitness":
-            rows = rows.filter(rows["is_mature"])
-        best = pc.max(rows["fitness"]).as_py()
-        if best is not None:
-            row = rows.filter(pc.equal(rows["fitness"], best)).slice(0, 1).to_pylist()
-            return individual(row[0])
-    raise ViewerError(f"{folder}: nobody has been judged yet")
+    alone = read_table(folder, "evaluations")
+    together = read_table(folder, "fitness")
+    judged = (alone, together.filter(together["is_mature"]))
+    found = [(pc.max(rows["fitness"]).as_py(), rows) for rows in judged]
+    known = [(best, rows) for best, rows in found if best is not None]
+    if not known:
+        raise ViewerError(f"{folder}: nobody has been judged yet")
+    best, rows = max(known, key=lambda one: one[0])
+    (row,) = rows.filter(pc.equal(rows["fitness"], best)).slice(0, 1).to_pylist()
+    return individual(row)
 
 
 def show_motion(

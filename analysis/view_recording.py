@@ -27,6 +27,11 @@ _ALIVE = (70, 160, 90)
 _DEAD = (150, 150, 155)
 _WALL = (190, 190, 195)
 _LINES = ((40, 110, 190), (225, 120, 40))
+_HUES = (
+    (0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 167),
+    (213, 94, 0), (86, 180, 233), (240, 228, 66), (150, 150, 150),
+)  # fmt: skip
+"""Of islands side by side. Source: Okabe and Ito, 2008."""
 _MEMORY = "512MiB"
 
 
@@ -91,20 +96,32 @@ class Recording:
 
     # --- arenas and robots --------------------------------------------------
 
-    def island(self, island: int, walls: Sequence[tuple[Singles, Singles]]) -> None:
+    def island(
+        self,
+        island: int,
+        walls: Sequence[tuple[Singles, Singles]],
+        *,
+        is_alone: bool,
+    ) -> None:
         """Tell which way is up on an island, and what stands around it.
 
         Args:
             island: its number.
             walls: centre, attitude (7,) and half sizes (3,) of each.
+            is_alone: there is no other one whose curves stand beside its.
         """
         path = island_path(island)
         self.upright(path)
-        names = rr.SeriesLines(names=["mean", "best"], colors=_LINES)
-        self._stream.log(f"{path}/fitness", names, static=True)
-        self._stream.log(
-            f"{path}/size", rr.SeriesLines(names="alive", colors=_ALIVE), static=True
+        hue = _HUES[island % len(_HUES)]
+        pale = tuple((each + 255) // 2 for each in hue)
+        own = "" if is_alone else f"{island}: "
+        fitness = rr.SeriesLines(
+            names=[f"{own}mean", f"{own}best"],
+            colors=_LINES if is_alone else (hue, pale),
         )
+        size = rr.SeriesLines(names=f"{own}alive", colors=_ALIVE if is_alone else hue)
+        self._stream.log(f"{path}/fitness", fitness, static=True)
+        self._stream.log(f"{path}/size", size, static=True)
         if walls:
             places = np.array([place for place, _ in walls])
             self._stream.log(

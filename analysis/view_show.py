@@ -134,6 +134,11 @@ class Show:
     def _clock(self, island: int) -> _Clock:
         return self._clocks.setdefault(island, _Clock())
 
+    def _at(self, island: int, time_s: float) -> When:
+        """Return a moment of an arena, with its births until then."""
+        births = self._clock(island).births_at(np.array([time_s]))
+        return When(time_s, int(births[0]))
+
     def _settle(
         self, arena: int, birth: BirthId, times_s: npt.NDArray[np.float64]
     ) -> str:
@@ -142,7 +147,7 @@ class Show:
         first_s, last_s = float(times_s[0]), float(times_s[-1])
         resident = self._residents.get(key)
         if resident is None or first_s - resident.drawn_s >= _REPEAT_S:
-            when = When(first_s, int(self._clock(arena).births_at(times_s[:1])[0]))
+            when = self._at(arena, first_s)
             self._recording.born(path, self._figures[birth], when)
             was_gone = resident is not None and resident.is_gone
             self._residents[key] = _Resident(path, first_s, last_s, was_gone)
@@ -157,8 +162,8 @@ class Show:
                 self._leave(self._gone[key])
             elif key[1] not in shown:
                 resident = self._residents.pop(key)
-                births = self._clock(arena).births_at(np.array([resident.seen_s]))
-                when = When(resident.seen_s + _BLINK_S, int(births[0]))
+                births = self._at(arena, resident.seen_s).births
+                when = When(resident.seen_s + _BLINK_S, births)
                 self._recording.died(resident.path, when)
             if key in self._residents and key[1] not in shown:
                 del self._residents[key]
@@ -168,7 +173,8 @@ class Show:
         resident = self._residents.get((gone.island, gone.birth))
         if resident is not None and not resident.is_gone:
             resident.is_gone = True
-            when = When(gone.sim_time_s, gone.births)
+            # As many births as its last pose has: who is born then counts already.
+            when = self._at(gone.island, gone.sim_time_s)
             self._recording.died(resident.path, when)
 
     def _born(self, one: Newborn) -> None:
@@ -222,14 +228,15 @@ def _coarse(numbers: Singles, grains: float) -> Singles:
 
 
 def _in_order(news: News) -> list[Newborn | Level | Departed]:
-    """Return births, levels and deaths as they came, by births on their island."""
+    """Return births and levels as they came, by births on their island, then deaths.
+
+    Who is born at the instant of a death counts as born by then.
+    """
     births = [((one.births, 0), one) for one in news.births]
     levels = [((level.births, 1), level) for level in news.levels]
-    deaths = [((gone.births, 2), gone) for gone in news.deaths]
-    keyed: list[tuple[tuple[int, int], Newborn | Level | Departed]] = [
-        *births, *levels, *deaths
-    ]  # fmt: skip
-    return [each for _, each in sorted(keyed, key=lambda pair: pair[0])]
+    keyed: list[tuple[tuple[int, int], Newborn | Level]] = [*births, *levels]
+    came = [each for _, each in sorted(keyed, key=lambda pair: pair[0])]
+    return [*came, *sorted(news.deaths, key=lambda gone: gone.births)]
 
 
 def _crew(workers: tuple[Crewman, ...]) -> str:

@@ -20,14 +20,14 @@ class Stage:
 
     Attributes:
         islands: their numbers.
-        is_online: robots live in arenas, in simulated time.
+        arenas: those on which robots live together, in simulated time.
         extent_m: how far from its middle an arena or a gallery reaches [m].
         space: the part types.
         walls: of each island: place and attitude (7,) and half sizes (3,) of each.
     """
 
     islands: tuple[int, ...]
-    is_online: bool
+    arenas: frozenset[int]
     extent_m: float
     space: BodySpace
     walls: tuple[tuple[tuple[Singles, Singles], ...], ...]
@@ -44,7 +44,7 @@ def stage(experiment: Experiment) -> Stage:
     reaches = [_reach(arena) if arena else _GALLERY_M for arena in arenas]
     return Stage(
         islands,
-        any(arena is not None for arena in arenas),
+        frozenset(each for each in islands if arenas[each] is not None),
         max(reaches),
         body_space(experiment.space),
         tuple(_ring_wall(arena) if arena else () for arena in arenas),

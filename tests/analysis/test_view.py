@@ -8,21 +8,27 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import pyarrow as pa
 import pytest
 
+from analysis.view_blueprint import layout
+from analysis.view_entries import Moves, When
 from analysis.view_figures import Figures
 from analysis.view_gallery import Gallery, spot_place
 from analysis.view_lineage import Lineage
 from analysis.view_live import Sequel
 from analysis.view_output import Output, Window, linger
 from analysis.view_recording import ViewerError
+from analysis.view_show import Show
 from analysis.view_stage import stage
 from schema.birth import BirthId
 from schema.experiment import Arena, Experiment, Simulation
-from schema.live import Level, Newborn, News
+from schema.experiment_file import read_experiment
+from schema.live import Departed, Level, Newborn, News
 from schema.mjcf import add_ring_wall
 from schema.parts import BUILT_IN
 from schema.robot import Part, Robot
+from schema.tables import TABLES
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
 WHOLE = News("run", 1, 4, is_whole=True, experiment="e")
@@ -121,6 +127,39 @@ def test_the_lineage_is_drawn_every_ten_births_and_knows_the_living() -> None:
     assert isinstance(kin, list)
     # The last one was born since.
     assert [each.birth.number for each in kin if each.is_alive] == [3, 10, 11]
+
+
+def test_who_dies_vanishes_with_as_many_births_as_its_last_pose_has() -> None:
+    recorded: Any = Recorded()
+    show = Show(recorded, BUILT_IN)
+    first, second = (Newborn(BirthId(0, n), (), 1, n + 1, 10.0 * n, CORE)
+                     for n in range(2))  # fmt: skip
+    # At 10 s the second is born and the first dies: one birth, says the table.
+    death = Departed(0, first.birth, 1, 10.0, "cull")
+    show.tell(replace(WHOLE, births=(first, second), deaths=(death,)))
+    rows = [
+        {"record": n, "island": 0, "birth": 0, "sim_time_s": 9.0 + n, "angles": [],
+         "x": 0.0, "y": 0.0, "z": 0.0, "qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0}
+        for n in range(2)
+    ]  # fmt: skip
+    show.move(0, pa.Table.from_pylist(rows, TABLES["poses"]))
+    (moves,) = [told[2] for told in recorded.told if told[0] == "moved"]
+    assert isinstance(moves, Moves)
+    assert moves.births is not None
+    assert moves.births.tolist() == [1, 2]
+    (gone,) = [told[2] for told in recorded.told if told[0] == "died"]
+    assert gone == When(10.0, 2)
+
+
+def test_islands_of_a_mixed_archipelago_are_called_what_they_are() -> None:
+    scene = stage(read_experiment("archipelago-mixed"))
+    assert scene.islands == (0, 1, 2, 3, 4, 5)
+    assert scene.arenas == {4, 5}
+    blueprint: Any = layout(scene.islands, extent_m=2.0, arenas=scene.arenas)
+    scenes, _ = blueprint.root_container.contents
+    names = [view.name for view in scenes.contents]
+    assert names == [*(f"Population of island {n}" for n in range(4)),
+                     "Arena 4", "Arena 5"]  # fmt: skip
 
 
 def test_an_output_is_a_window_unless_told_otherwise(tmp_path: Path) -> None:

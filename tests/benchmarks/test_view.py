@@ -103,7 +103,7 @@ def test_an_arena_of_thirty_costs_the_viewer_a_fifth_of_a_core_at_most(
     messages = [message(poses) for poses in tables]
     file = tmp_path / "watched.rrd"
     space = body_space(Space())
-    blueprint = layout((0,), extent_m=2.6, is_online=True)
+    blueprint = layout((0,), extent_m=2.6, arenas={0})
     with Recording("watched", blueprint, file=file) as recording:
         spectator = Spectator(Show(recording, space), "run")
         spectator.tell([told])

@@ -50,17 +50,30 @@ def poses(file: Path, path: str) -> dict[int, Any]:
     return found
 
 
-def clears(file: Path, path: str) -> set[int]:
-    """Return when a robot was taken away [ns]."""
+def clears(file: Path, path: str) -> dict[int, int]:
+    """Return when a robot was taken away [ns], and the births by then."""
     return {
-        time.value
+        time.value: births.as_py()
         for batch, _ in batches(file, path)
         if "Clear:is_recursive" in batch.schema.names
-        for time, row in zip(
-            batch["sim_time"], batch["Clear:is_recursive"], strict=True
+        for time, births, row in zip(
+            batch["sim_time"],
+            batch["births"],
+            batch["Clear:is_recursive"],
+            strict=True,
         )
         if row.is_valid
     }
+
+
+def last_births(file: Path, path: str) -> int:
+    """Return the births by a robot's last pose."""
+    columns = [
+        pa.chunked_array([batch["births"]])
+        for batch, _ in batches(file, path)
+        if CENTRES in batch.schema.names
+    ]
+    return max(int(pc.max(column).as_py()) for column in columns)
 
 
 def curves(file: Path, name: str) -> dict[int, tuple[float, ...]]:
@@ -135,10 +148,14 @@ def test_who_died_is_cleared_then_and_nobody_stays_for_ever(
     }
     assert deaths
     robots = [path for path in paths(replayed) if "/robots/" in path]
+    assert len(robots) == read_table(quiet_hamlet, "births").num_rows
     for path in robots:
         number = int(path.rpartition("-")[2])
         if number in deaths:
-            assert deaths[number] in clears(replayed, path)
+            cleared = clears(replayed, path)
+            assert deaths[number] in cleared
+            # On the time line of births, too, no pose comes after it.
+            assert cleared[deaths[number]] >= last_births(replayed, path)
         assert not any(is_static for _, is_static in batches(replayed, path))
 
 
@@ -247,6 +264,9 @@ def test_a_record_that_is_not_what_happens_is_told(
         (("view", "nowhere", "--serve", "9876"), "must be HOST:PORT"),
         (("view", "nowhere", "--follow", "7"), "must be ISLAND:BIRTH"),
         (("view", "nowhere", "--save", "no/such/a.rrd"), "there is no folder no/such"),
+        (("view", "nowhere", "--save", "a.txt"), "must end in .rrd"),
+        (("view", "nowhere", "--ancestry"), "of whom?"),
+        (("view", "--connect", "tcp/127.0.0.1:1", "--robot", "best"), "folder only"),
     ],
 )
 def test_bad_words_are_told_in_one_line(

@@ -117,7 +117,11 @@ def test_a_replay_shows_robots_where_they_were(
     viewer: ViewerClient, stage: Stage, quiet_hamlet: Path
 ) -> None:
     stage.run("view", str(quiet_hamlet), "--save", "run.rrd")
-    check_robots(look(viewer, str(stage.folder / "run.rrd")), quiet_hamlet)
+    picture = look(viewer, str(stage.folder / "run.rrd"))
+    check_robots(picture, quiet_hamlet)
+    # Robots on the wrong side are noticed.
+    with pytest.raises(AssertionError):
+        check_robots(picture[:, ::-1], quiet_hamlet)
 
 
 def test_a_live_view_shows_robots_where_they_are(
