@@ -45,8 +45,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="revolve robot",
         description="Check, convert or show a robot file. Read are .yaml, .yml, .pb, "
         ".xml (MJCF), and RoboGen's .txt and .json; written are .yaml, .yml, .pb, .xml "
-        "and .urdf. More: revolve robot random, revolve robot render, revolve robot "
-        "simulate.",
+        "and .urdf.",
         epilog="example: revolve robot convert spider.yaml spider.pb",
     )
     commands = parser.add_subparsers(dest="command", required=True)
