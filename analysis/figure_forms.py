@@ -60,6 +60,8 @@ def over_runs(tables: Tables, *panels: Panel) -> p9.ggplot:
     for layer in (*violins, *_sums(runs, panels)):
         figure += layer
     figure = figure + scales(experiments) + p9.expand_limits(y=0)
+    for nothing in _nothings(runs, panels):
+        figure += nothing
     figure += p9.geom_point(
         p9.aes(fill="experiment"),
         position=p9.position_jitter(width=0.06, height=0, random_state=1),
@@ -78,6 +80,19 @@ def over_runs(tables: Tables, *panels: Panel) -> p9.ggplot:
     figure += p9.scale_x_discrete(limits=experiments, labels=feet)
     look = paper(3.6) + p9.theme(legend_position="none")
     return figure + p9.labs(x="", y=panels[0].text) + look
+
+
+def _nothings(runs: pa.Table, panels: Sequence[Panel]) -> list[Any]:
+    """Return an unseen layer by which panels of zeros reach from 0 to 1."""
+    greatest = runs.group_by("panel").aggregate([("value", "max")])
+    flat = greatest.filter(pc.equal(greatest["value_max"], 0.0))["panel"]
+    empty = runs.filter(pc.is_in(runs["panel"], flat.combine_chunks()))
+    if not empty.num_rows:
+        return []
+    place = empty.schema.get_field_index("value")
+    ones = pa.repeat(pa.scalar(1.0), empty.num_rows)
+    unseen = empty.set_column(place, "value", ones)
+    return [p9.geom_blank(data=_frame(unseen, panels))]
 
 
 def _reach(outcomes: pa.Table, experiments: list[str]) -> dict[str, str]:

@@ -106,9 +106,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
         p9.ggplot(shown.to_pandas(), p9.aes("at", "fitness"))
         + p9.geom_linerange(
             p9.aes(ymin="low", ymax="high", colour="experiment"),
-            data=shown.filter(
-                pc.greater_equal(made["fitness_count"], BAND_RUNS)
-            ).to_pandas(),
+            na_rm=True,
             size=0.5,
             alpha=0.6,
             show_legend=False,

@@ -12,8 +12,9 @@ from analysis.trees import Integers
 def progression(populations: pa.Table) -> pa.Table:
     """Return how populations change as births go by, over runs.
 
-    A run of several islands counts with their mean. A run counts at every number of
-    births that its own populations were recorded at.
+    A run of several islands counts with their mean, at numbers of births that all of
+    them have a value at: islands are not recorded equally often. A run counts at every
+    number of births that its own populations were recorded at.
 
     Args:
         populations: of several runs, as ``analysis.outputs`` names its columns.
@@ -31,7 +32,12 @@ def progression(populations: pa.Table) -> pa.Table:
     pieces = []
     for measure in POPULATION:
         known = populations.filter(populations[measure].is_valid())
-        by_run = known.group_by([*keys, "folder"]).aggregate([(measure, "mean")])
+        by_run = _whole_runs(
+            known.group_by([*keys, "folder"]).aggregate(
+                [(measure, "mean"), (measure, "count")]
+            ),
+            f"{measure}_count",
+        )
         totals = by_run.group_by(keys).aggregate(
             [
                 (f"{measure}_mean", kind)
@@ -44,6 +50,16 @@ def progression(populations: pa.Table) -> pa.Table:
         measures = pa.repeat(pa.scalar(measure), named.num_rows)
         pieces.append(named.append_column("measure", measures))
     return _with_intervals(pa.concat_tables(pieces)).cast(schema("progression"))
+
+
+def _whole_runs(by_run: pa.Table, count: str) -> pa.Table:
+    """Return rows at which all islands of a run have a value."""
+    islands = np.asarray(by_run[count], np.int64)
+    folders = by_run["folder"].combine_chunks().dictionary_encode().indices
+    runs = np.asarray(folders, np.int64)
+    most = np.zeros(len(runs), np.int64)
+    np.maximum.at(most, runs, islands)
+    return by_run.filter(pa.array(islands == most[runs]))
 
 
 def _with_intervals(table: pa.Table) -> pa.Table:

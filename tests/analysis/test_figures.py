@@ -104,6 +104,16 @@ def test_an_interval_does_not_reach_below_what_is_possible() -> None:
     assert shown["geom_ribbon"]["low"] == pytest.approx([0.0, 0.3])
 
 
+def test_panels_of_zeros_begin_at_zero() -> None:
+    rows = [{"experiment": "x", "births": 60, "parts": 7.0, "hidden": 0.0}]
+    panels = Panel("parts", "z"), Panel("hidden", "a")
+    figure = over_runs({"outcomes": table("outcomes", rows)}, *panels).draw()
+    lows, highs = zip(*(axes.get_ylim() for axes in figure.axes), strict=True)
+    assert min(lows) > -1.0
+    assert max(highs[1], 1.0) == highs[1]
+    assert lows[1] > -0.1
+
+
 def test_course_has_bands_only_where_runs_are_enough() -> None:
     rows = [*course("a", 2, 0.1, 0.2), *course("b", 3, 0.3, 0.4)]
     shown = layers(

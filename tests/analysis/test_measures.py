@@ -397,6 +397,20 @@ def test_progression_of_two_runs_and_of_another_experiment() -> None:
     assert found[1]["low"] is None
 
 
+def test_progression_of_islands_is_where_all_of_them_are_recorded() -> None:
+    rows = [(0, 15, 0.2), (1, 15, 0.4), (1, 16, 0.9), (0, 30, 0.4), (1, 30, 0.8)]
+    names = ["island", "births", "fitness"]
+    made = pa.table(dict(zip(names, map(list, zip(*rows, strict=True)), strict=True)))
+    for name in ("experiment", "folder"):
+        made = made.append_column(name, pa.array(["a"] * len(rows)))
+    for name in OUTPUTS["populations"]:
+        if name not in made.column_names:
+            made = made.append_column(name, pa.nulls(len(rows), pa.float64()))
+    found = progression(made).to_pylist()
+    assert [row["births"] for row in found] == [15, 30]
+    assert [row["mean"] for row in found] == pytest.approx([0.3, 0.6])
+
+
 def test_a_population_with_somebody_unknown_is_left_out() -> None:
     born = births((A, []), (B, []))
     who = census(population((0, 1, {A: 1}), (0, 3, {B: 1, C: 2})), born)
