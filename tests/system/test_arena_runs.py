@@ -30,6 +30,7 @@ Until = Callable[[Callable[[], bool], str], None]
 
 DT = 0.005
 SNAPSHOT_STEPS = 2000
+MOST_KILLS = 4
 
 
 def words(out: str) -> tuple[str, ...]:
@@ -97,7 +98,8 @@ class Fleet:
         self.stage = stage
         self.folder = stage.folder / "run"
         listen = ("--listen", "tcp/127.0.0.1:0")
-        self.coordinator = stage.start("coordinator", *words("run"), *listen)
+        paced = (*words("run"), "--speed", "20")
+        self.coordinator = stage.start("coordinator", *paced, *listen)
         until((self.folder / "address").exists, "the coordinator listens")
         self.address = (self.folder / "address").read_text().strip()
         self.analyzer = stage.start("analyzer", "--connect", self.address)
@@ -135,7 +137,7 @@ def test_holder_killed_twice_while_another_stands_by(
     arena_stage: Stage, calm: Path, until: Until, draw: int
 ) -> None:
     tally, whole = Tally(calm), size(calm)
-    shares = np.sort(np.random.default_rng(draw).uniform(0.05, 0.95, 2))
+    shares = np.sort(np.random.default_rng(draw).uniform(0.05, 0.85, 2))
     fleet = Fleet(arena_stage, until)
     fleet.join("w0")
     for number, share in enumerate(shares, start=1):
@@ -190,7 +192,7 @@ def test_killed_coordinator_resumes_the_same_arena(
 def test_killed_in_a_cluster_a_snapshot_and_a_segment_change(
     arena_stage: Stage, calm: Path, until: Until
 ) -> None:
-    """Kills that wait for the moment that chance may miss."""
+    """Kills that wait for the moment that chance may miss, again if they miss it."""
     tally = Tally(calm)
     folder = arena_stage.folder / "run"
 
@@ -206,26 +208,35 @@ def test_killed_in_a_cluster_a_snapshot_and_a_segment_change(
 
         return is_there
 
-    touching = sorted(round(each / DT) for each in tally.touching)
-    before = max(step for step in tally.steps if step < touching[len(touching) // 3])
-    resume_until(arena_stage, until, reached(before), "touch")
-    tally.note("coordinator", folder)
-    due = next(
-        step for step, following in zip(tally.steps, tally.steps[1:], strict=False)
-        if step > before + SNAPSHOT_STEPS
-        and following // SNAPSHOT_STEPS > step // SNAPSHOT_STEPS
-    )  # fmt: skip
-    resume_until(arena_stage, until, reached(due), "a snapshot")
-    tally.note("coordinator", folder)
-    for _ in range(2):
+    def before_touch() -> Callable[[], bool]:
+        touching = sorted(round(each / DT) for each in tally.touching)
+        touch = touching[len(touching) // 3]
+        return reached(max(step for step in tally.steps if step < touch))
+
+    def before_snapshot() -> Callable[[], bool]:
+        last = max(each.advance.step for each in advances(folder))
+        pairs = zip(tally.steps, tally.steps[1:], strict=False)
+        return reached(
+            next(
+                step for step, following in pairs
+                if step > last
+                and following // SNAPSHOT_STEPS > step // SNAPSHOT_STEPS
+            )
+        )  # fmt: skip
+
+    def new_segment() -> Callable[[], bool]:
         known = {table: newest(folder, table) for table in ("poses", "fitness")}
-        resume_until(
-            arena_stage,
-            until,
-            lambda: any(newest(folder, table) > known[table] for table in known),  # noqa: B023
-            "a new segment",
-        )
-        tally.note("coordinator", folder)
+        return lambda: any(newest(folder, table) > known[table] for table in known)
+
+    for what, moment in (
+        ("merged cluster", before_touch),
+        ("snapshot", before_snapshot),
+        ("segment change", new_segment),
+    ):
+        for _ in range(MOST_KILLS):
+            resume_until(arena_stage, until, moment(), what)
+            if what in tally.note("coordinator", folder):
+                break
     assert {"merged cluster", "snapshot", "segment change"} <= set(tally.hits)
     arena_stage.run("resume", "run", "--workers", "1", "--quiet")
     assert compare(calm, folder) == []
