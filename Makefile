@@ -33,10 +33,10 @@ demo: $(STAMP)
 compiled: $(STAMP)
 	@$(BIN)/python -m compileall -q schema coordinator worker analyzer analysis revolve.py
 
-# Many small tests, then those that start processes and wait for them: two at a time.
+# Many small tests, two at a time; then those that start processes and often wait.
 test: compiled
 	$(BIN)/python -m pytest -q -n 2 -m 'not system and not benchmark'
-	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m 'system'
+	$(BIN)/python -m pytest -q -n 3 --dist worksteal -m 'system'
 
 # Holds the speed promises to their figures: for a machine with nothing else to do.
 bench: compiled
