@@ -1,5 +1,6 @@
 """The command ``revolve``: names the rooms' commands, nothing else."""
 
+import os
 import sys
 from collections.abc import Iterable
 from importlib import import_module
@@ -58,15 +59,33 @@ def main(arguments: list[str] | None = None) -> int:
     error_type = import_module("schema.errors").RevolveError
     try:
         room = import_module(COMMANDS[words[0]][0])
-        return int(room.main(words))
+        code = int(room.main(words))
+        sys.stdout.flush()
+    except BrokenPipeError:
+        if _is_heard():
+            raise
+        return 1
     except error_type as error:
         print(f"revolve: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
+    else:
+        return code
     finally:
         if words[1:] in (["-h"], ["--help"]):
             print(_also(words[0]), end="")
+
+
+def _is_heard() -> bool:
+    """Return whether whoever reads this output, ``head`` say, is still there."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # Or the interpreter would complain of it once more when it ends.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return False
+    return True
 
 
 def _also(command: str) -> str:

@@ -152,3 +152,12 @@ def test_full_disk_loses_nothing_of_an_arena(
     hamlet_stage.run("resume", "moved", "--quiet", *flags)
     said = hamlet_stage.run("compare", "moved", str(quiet_hamlet))
     assert "equal" in said
+
+
+def test_a_reader_that_leaves_early_is_no_error_to_tell_of(stage: Stage) -> None:
+    stage.run("robot", "random", "some.yaml")
+    process = stage.start("robot", "show", "some.yaml")
+    process.stdout.close()
+    process.stdout = None
+    _, told = process.communicate(timeout=60)
+    assert (process.returncode, told) == (1, "")
