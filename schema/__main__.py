@@ -4,13 +4,13 @@ import argparse
 import sys
 from pathlib import Path
 
+from schema.brain import neuron_names
 from schema.errors import RevolveError
 from schema.experiment import body_space
 from schema.experiment_file import read_experiment
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot import Robot
 from schema.robot_file import read_robot, settings_of, write_robot
-from schema.yaml_form import neuron_names
 
 
 def main(argv: list[str] | None = None) -> int:

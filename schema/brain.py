@@ -40,6 +40,7 @@ NEURON_TYPES: dict[str, tuple[Parameter, ...]] = {
 
 INPUT = "Input"
 """Type of every input neuron; it has no parameters."""
+_SHORT: dict[Layer, str] = {"input": "in", "output": "out", "hidden": "hidden"}
 _INPUT_TYPES: dict[str, tuple[Parameter, ...]] = {INPUT: ()}
 
 
@@ -127,6 +128,17 @@ def _neuron_problem(neuron: Neuron, part_count: int) -> str:
     if not all(map(math.isfinite, neuron.parameters)):
         return ".parameters: must be finite"
     return ""
+
+
+def neuron_names(brain: Brain, part_ids: list[str]) -> list[str]:
+    """Return a name for each neuron: ``<part>-in-k``, ``-out-k``, ``-hidden-k``."""
+    counts: dict[str, int] = {}
+    names = []
+    for neuron in brain.neurons:
+        stem = f"{part_ids[neuron.part]}-{_SHORT[neuron.layer]}"
+        counts[stem] = counts.get(stem, -1) + 1
+        names.append(f"{stem}-{counts[stem]}")
+    return names
 
 
 def _connection_problem(edge: Connection, brain: Brain) -> str:

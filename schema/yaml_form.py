@@ -26,21 +26,16 @@ is ``part-<index>`` and for neurons ``<part>-in-k``, ``<part>-out-k`` or
 named, never written. Floats are written so that they are read back bit for bit.
 """
 
-import re
 from typing import Any
 
 import yaml
 
-from schema.brain import INPUT, LAYERS, NEURON_TYPES, Brain, Connection, Layer, Neuron
-from schema.errors import InvalidRobot
+from schema.brain import NEURON_TYPES, neuron_names
 from schema.parts import BodySpace, Parameter
+from schema.revolve_yaml import RevolveReader, is_of_revolve
 from schema.robot import Part, Robot, check_robot
-from schema.yaml_node import Table, compose
-
-VERSION = 1
-SHORT: dict[Layer, str] = {"input": "in", "output": "out", "hidden": "hidden"}
-_WRITTEN: tuple[Layer, ...] = ("output", "hidden")
-_INDEXED = re.compile(r"(?:body\.parts|brain\.(?:neurons|connections))\[\d+\](\.\w+)?")
+from schema.yaml_node import compose
+from schema.yaml_reader import VERSION, Reader
 
 
 def robot_to_yaml(robot: Robot, space: BodySpace) -> str:
@@ -86,7 +81,7 @@ def robot_to_yaml(robot: Robot, space: BodySpace) -> str:
 
 
 def robot_from_yaml(text: str, file: str, space: BodySpace) -> Robot:
-    """Return the robot of a text.
+    """Return the robot of a text, in this form or in Revolve's own.
 
     Args:
         text: the document.
@@ -98,18 +93,9 @@ def robot_from_yaml(text: str, file: str, space: BodySpace) -> Robot:
             of a wrong type, a robot that is not well formed in this body space. The
             message names file, line and field.
     """
-    return _Reader(space, file).read(text)
-
-
-def neuron_names(brain: Brain, part_ids: list[str]) -> list[str]:
-    """Return a name for each neuron: ``<part>-in-k``, ``-out-k``, ``-hidden-k``."""
-    counts: dict[str, int] = {}
-    names = []
-    for neuron in brain.neurons:
-        stem = f"{part_ids[neuron.part]}-{SHORT[neuron.layer]}"
-        counts[stem] = counts.get(stem, -1) + 1
-        names.append(f"{stem}-{counts[stem]}")
-    return names
+    document = compose(text, file)
+    reader = RevolveReader if is_of_revolve(document) else Reader
+    return reader(space, file).read(document)
 
 
 def _part_entry(part: Part, index: int, space: BodySpace) -> dict[str, Any]:
@@ -128,130 +114,3 @@ def _named(
 ) -> dict[str, float]:
     pairs = zip(parameters, values, strict=True)
     return {parameter.name: float(value) for parameter, value in pairs}
-
-
-class _Reader:
-    """One reading of one document.
-
-    It remembers the line of all that it has read, so that a rule that is checked
-    on the finished robot can still say where it was broken.
-    """
-
-    def __init__(self, space: BodySpace, file: str) -> None:
-        self._space = space
-        self._file = file
-        self._parts: list[Part] = []
-        self._part_index: dict[str, int] = {}
-        self._lines: dict[str, int] = {}
-
-    def read(self, text: str) -> Robot:
-        document = compose(text, self._file)
-        document.refuse_others("revolve_robot", "body", "brain")
-        if document.has("revolve_robot"):
-            version = document.integer("revolve_robot")
-            if version != VERSION:
-                document.refuse("revolve_robot", f"must be {VERSION}, got {version}")
-        self._read_part(document.table("body"), -1, -1)
-        brain = document.table("brain") if document.has("brain") else None
-        robot = Robot(tuple(self._parts), self._read_brain(brain))
-        try:
-            check_robot(robot, self._space)
-        except InvalidRobot as error:
-            raise InvalidRobot(f"{self._place(str(error))}: {error}") from None
-        return robot
-
-    def _place(self, message: str) -> str:
-        """Return ``file:line`` of what a message of ``check_robot`` is about."""
-        found = _INDEXED.search(message)
-        at = found.group() if found else ""
-        line = self._lines.get(at) or self._lines.get(at.rpartition(".")[0])
-        return self._file if line is None else f"{self._file}:{line}"
-
-    def _read_part(self, table: Table, parent: int, parent_slot: int) -> None:
-        index = len(self._parts)
-        own = () if parent < 0 else ("slot",)
-        table.refuse_others(
-            *own, "id", "type", "orientation", "gene", "params", "children"
-        )
-        kind = self._space[table.word("type", self._space)]
-        name = table.text("id", f"part-{index}")
-        if name in self._part_index:
-            table.refuse("id", f"second part named {name!r}")
-        self._part_index[name] = index
-        self._lines |= _lines(table, f"body.parts[{index}]")
-        part = Part(
-            kind=kind.name,
-            parent=parent,
-            parent_slot=parent_slot,
-            slot=table.integer("slot") if own else -1,
-            orientation=table.integer("orientation", 0),
-            parameters=_values(table, kind.parameters),
-            gene=table.integer("gene", 0),
-        )
-        self._parts.append(part)
-        if table.has("children"):
-            children = table.table("children")
-            for slot in sorted(map(children.key_as_slot, children.keys)):
-                self._read_part(children.table(str(slot)), index, slot)
-
-    def _read_brain(self, table: Table | None) -> Brain:
-        ids = list(self._part_index)
-        names = {
-            f"{ids[index]}-in-{offset}": Neuron("input", INPUT, index)
-            for index, part in enumerate(self._parts)
-            for offset in range(self._space[part.kind].inputs)
-        }
-        if table is None:
-            return Brain(tuple(names.values()))
-        table.refuse_others("neurons", "connections")
-        written = [self._read_neuron(item) for item in table.tables("neurons")]
-        written.sort(key=lambda entry: (LAYERS.index(entry[0].layer), entry[0].part))
-        neurons = (*names.values(), *(neuron for neuron, _ in written))
-        defaults = neuron_names(Brain(neurons), ids)[len(names) :]
-        for (neuron, item), default in zip(written, defaults, strict=True):
-            self._lines |= _lines(item, f"brain.neurons[{len(names)}]")
-            name = item.text("id", default)
-            if name in names:
-                item.refuse("id", f"second neuron named {name!r}")
-            names[name] = neuron
-        return Brain(
-            neurons, self._read_connections(table.tables("connections"), list(names))
-        )
-
-    def _read_neuron(self, table: Table) -> tuple[Neuron, Table]:
-        table.refuse_others("id", "part", "layer", "type", "params")
-        layer: Layer = (
-            "output" if table.word("layer", _WRITTEN) == "output" else "hidden"
-        )
-        kind = table.word("type", NEURON_TYPES)
-        part = self._part_index[table.word("part", self._part_index)]
-        values = _values(table, NEURON_TYPES[kind])
-        return Neuron(layer, kind, part, values), table
-
-    def _read_connections(
-        self, tables: list[Table], names: list[str]
-    ) -> tuple[Connection, ...]:
-        index = {name: number for number, name in enumerate(names)}
-        edges = []
-        for number, table in enumerate(tables):
-            table.refuse_others("source", "target", "weight")
-            self._lines |= table.lines(f"brain.connections[{number}]")
-            source, target = (table.word(end, index) for end in ("source", "target"))
-            weight = table.number("weight")
-            edges.append(Connection(index[source], index[target], weight))
-        return tuple(edges)
-
-
-def _lines(table: Table, name: str) -> dict[str, int]:
-    """Return the lines of a mapping, its keys, and those of its ``params``."""
-    inner = table.table("params").lines(name) if table.has("params") else {}
-    return inner | table.lines(name)
-
-
-def _values(table: Table, parameters: tuple[Parameter, ...]) -> tuple[float, ...]:
-    """Return the values of ``params``, in the order of the parameters."""
-    if not table.has("params"):
-        return tuple(parameter.default for parameter in parameters)
-    params = table.table("params")
-    params.refuse_others(*(parameter.name for parameter in parameters))
-    return tuple(params.number(item.name, item.default) for item in parameters)

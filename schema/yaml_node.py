@@ -7,7 +7,8 @@ is meant once, and a document cannot hold itself.
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import NoReturn
 
 import yaml
@@ -71,6 +72,11 @@ class Table:
         """Return whether it has a key."""
         return key in self._values
 
+    def is_empty(self, key: str) -> bool:
+        """Return whether nothing stands at a key, or the key is not there."""
+        node = self._values.get(key)
+        return node is None or not node.value
+
     def refuse(self, key: str, message: str) -> NoReturn:
         """Raise ``InvalidRobot`` about a key."""
         self._fail(self._at(key), message, self._key_lines.get(key, self.line))
@@ -125,14 +131,24 @@ class Table:
             self.refuse(key, f"must be a word, got {_shown(node)}")
         return str(node.value)
 
-    def word(self, key: str, allowed: Iterable[str]) -> str:
+    def word(
+        self,
+        key: str,
+        allowed: Iterable[str],
+        also: Mapping[str, str] = MappingProxyType({}),
+    ) -> str:
         """Return the text of a key that must be one of some words.
+
+        Args:
+            key: where it stands.
+            allowed: the words.
+            also: other words that mean some of them.
 
         Raises:
             InvalidRobot: no such key, or another word; the nearest is named.
         """
         words = list(allowed)
-        word = self.text(key)
+        word = also.get(self.text(key), self.text(key))
         if word not in words:
             near = nearest(word, words)
             self.refuse(key, f"must be one of {', '.join(words)}, got {word!r}{near}")
