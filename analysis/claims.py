@@ -98,7 +98,8 @@ CLAIMS: tuple[Claim, ...] = (
     *_all("6.15", "fewer touch sensors than random robots have",
           "touch_sensors_change", "<"),
     *_all("6.16", "fewer hidden neurons than random robots have", "hidden_change", "<"),
-    Claim("6.16", "no-selection: fewer hidden neurons than random robots have", "hidden_change", _DRIFT, "<"),
+    Claim("6.16", "no-selection: fewer hidden neurons than random robots have",
+          "hidden_change", _DRIFT, "<"),
     *_of("6.16", "as many hidden neurons in {a} as in {b}", "hidden", "=",
          (_ONE, _DRIFT)),
 )  # fmt: skip
