@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import pytest
-from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 from msgspec.structs import replace
@@ -13,10 +12,6 @@ from schema.brain import NEURON_TYPES, Layer
 from schema.genome import ConnectionGene, Genome, NeuronGene, Node, develop
 from schema.parts import BUILT_IN, Parameter
 from schema.robot import ORIENTATIONS, Robot
-
-# The same examples every time: a test that fails by luck teaches nothing.
-settings.register_profile("fixed", derandomize=True, database=None, deadline=None)
-settings.load_profile("fixed")
 
 CHILD_TYPES = [kind for kind in BUILT_IN.values() if not kind.is_root]
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
