@@ -13,7 +13,7 @@ from worker.controller import Widths
 from worker.layout import Layout, Roster
 from worker.reach import Indices
 from worker.seat import Seat
-from worker.sensors import HIGHEST_OUTPUT, LOWEST_OUTPUT
+from worker.sensors import HIGHEST_OUTPUT, LOWEST_OUTPUT, into_frame
 
 
 class Nerves:
@@ -136,22 +136,9 @@ class Nerves:
         self._velocities = velocities
         az = az + self._gravity
         cells, places = self.readings.reshape(-1), self._places
-        # These three are the columns of the core's rotation: world into core frame.
-        cells[places] = (
-            (1 - 2 * (y * y + z * z)) * ax
-            + 2 * (x * y + w * z) * ay
-            + 2 * (x * z - w * y) * az
-        )
-        cells[places + 1] = (
-            2 * (x * y - w * z) * ax
-            + (1 - 2 * (x * x + z * z)) * ay
-            + 2 * (y * z + w * x) * az
-        )
-        cells[places + 2] = (
-            2 * (x * z + w * y) * ax
-            + 2 * (y * z - w * x) * ay
-            + (1 - 2 * (x * x + y * y)) * az
-        )
+        felt = into_frame((w, x, y, z), (ax, ay, az))
+        for axis in range(3):
+            cells[places + axis] = felt[axis]
         for axis in range(3):
             cells[places + 3 + axis] = motions[:, 3 + axis]
         for senses, (vx, vy, vz) in zip(self._cores, velocities.tolist(), strict=True):

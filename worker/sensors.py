@@ -6,7 +6,7 @@ is found in a model by the prefix of its names, so that many can share one.
 """
 
 from itertools import chain
-from typing import cast
+from typing import TypeVar, cast
 
 import mujoco
 import numpy as np
@@ -21,6 +21,7 @@ HIGHEST_OUTPUT = 0.99999
 """Outputs are clipped to these before they become target angles."""
 
 _Velocity = tuple[float, float, float]
+_Number = TypeVar("_Number", float, Floats)
 _GEOM = mujoco.mjtObj.mjOBJ_GEOM
 _SITE = mujoco.mjtObj.mjOBJ_SITE
 _JOINT = mujoco.mjtObj.mjOBJ_JOINT
@@ -175,22 +176,8 @@ class Senses:
         ay = (vy - uy) / interval_s
         az = (vz - uz) / interval_s + self._gravity
         row, place = self._cells, self.core_imu
-        # These three are the columns of the core's rotation: world into core frame.
-        row[place] = (
-            (1 - 2 * (y * y + z * z)) * ax
-            + 2 * (x * y + w * z) * ay
-            + 2 * (x * z - w * y) * az
-        )
-        row[place + 1] = (
-            2 * (x * y - w * z) * ax
-            + (1 - 2 * (x * x + z * z)) * ay
-            + 2 * (y * z + w * x) * az
-        )
-        row[place + 2] = (
-            2 * (x * z + w * y) * ax
-            + 2 * (y * z - w * x) * ay
-            + (1 - 2 * (x * x + y * y)) * az
-        )
+        felt = into_frame((w, x, y, z), (ax, ay, az))
+        row[place], row[place + 1], row[place + 2] = felt
         row[place + 3], row[place + 4], row[place + 5] = gx, gy, gz
 
     def _read_sites(
@@ -281,6 +268,32 @@ class Servos:
             elif command > fastest:
                 command = fastest
             commands[index] = command
+
+
+def into_frame(
+    turn: tuple[_Number, _Number, _Number, _Number],
+    vector: tuple[_Number, _Number, _Number],
+) -> tuple[_Number, _Number, _Number]:
+    """Return vectors of the world in the frames of turned bodies.
+
+    Args:
+        turn: w, x, y, z of unit quaternions, body into world; each a number or (N,).
+        vector: along the world's axes, likewise.
+    """
+    w, x, y, z = turn
+    ax, ay, az = vector
+    # The rows are the columns of the body's rotation.
+    return (
+        (1 - 2 * (y * y + z * z)) * ax
+        + 2 * (x * y + w * z) * ay
+        + 2 * (x * z - w * y) * az,
+        2 * (x * y - w * z) * ax
+        + (1 - 2 * (x * x + z * z)) * ay
+        + 2 * (y * z + w * x) * az,
+        2 * (x * z + w * y) * ax
+        + 2 * (y * z - w * x) * ay
+        + (1 - 2 * (x * x + y * y)) * az,
+    )
 
 
 def free_joint(model: mujoco.MjModel, prefix: str = "") -> int:
