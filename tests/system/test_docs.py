@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,20 @@ def _environment(*paths: Path) -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": found}
 
 
+def _python(
+    words: Sequence[str], folder: Path, *paths: Path
+) -> subprocess.CompletedProcess[str]:
+    """Run Python with these words to its end, as a reader would in a folder."""
+    return subprocess.run(
+        [sys.executable, *words],
+        cwd=folder,
+        env=_environment(*paths),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
 @pytest.mark.parametrize(
     ("page", "least"), [("tables.md", 5), ("analysis.md", 3), ("viewing.md", 0)]
 )
@@ -36,22 +51,15 @@ def test_python_of_the_pages_on_tables(
     page: str, least: int, undisturbed: Path, tmp_path: Path
 ) -> None:
     shutil.copytree(undisturbed, tmp_path / "runs" / "a")
-    commands = [[sys.executable, "-m", *block.split()]
+    commands = [["-m", *block.split()]
                 for block in _blocks(TOP / "docs" / page, "bash")]  # fmt: skip
     blocks = _blocks(TOP / "docs" / page, "python")
     assert len(blocks) >= least
     for words in [
         *commands,
-        *([sys.executable, "-W", "error", "-c", block] for block in blocks),
+        *(["-W", "error", "-c", block] for block in blocks),
     ]:
-        done = subprocess.run(
-            words,
-            cwd=tmp_path,
-            env=_environment(),
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        done = _python(words, tmp_path)
         assert done.returncode == 0, f"{words[-1]}\n{done.stderr}"
 
 
@@ -63,14 +71,11 @@ def test_experiments_of_the_experiments_page(tmp_path: Path) -> None:
     assert len(documents) >= 2
     for document in documents:
         (tmp_path / "mine.toml").write_text(document)
-        done = subprocess.run(
-            [sys.executable, "-m", "revolve", "run", "mine.toml", "--births", "20",
-             "--in-process", "--quiet", "--out", f"out-{len(document)}"],
-            cwd=tmp_path,
-            env=_environment(tmp_path),
-            capture_output=True,
-            text=True,
-            check=False,
+        done = _python(
+            ("-m", "revolve", "run", "mine.toml", "--births", "20",
+             "--in-process", "--quiet", "--out", f"out-{len(document)}"),
+            tmp_path,
+            tmp_path,
         )  # fmt: skip
         assert done.returncode == 0, f"{document}\n{done.stderr}"
         if "my_parts" not in document:
@@ -86,14 +91,7 @@ def test_commands_of_the_robots_page(tmp_path: Path) -> None:
     told: list[str] = []
     for line in (*block.splitlines(), own):
         words = line.partition("#")[0].split()
-        done = subprocess.run(
-            [sys.executable, "-m", *words],
-            cwd=tmp_path,
-            env=_environment(),
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        done = _python(("-m", *words), tmp_path)
         if "render" in words and "pictures need" in done.stderr:
             continue
         assert done.returncode == 0, f"{line}\n{done.stderr}"
@@ -112,28 +110,14 @@ def test_the_archipelagos_of_the_islands_page(tmp_path: Path) -> None:
     own = "revolve run mine.toml --births 24 --out mine"
     for line in (own, *block.splitlines()):
         words = line.split()
-        done = subprocess.run(
-            [sys.executable, "-m", *words],
-            cwd=tmp_path,
-            env=_environment(),
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        done = _python(("-m", *words), tmp_path)
         assert done.returncode == 0, f"{line}\n{done.stderr}"
 
 
 def test_the_campaign_of_the_campaigns_page(tmp_path: Path) -> None:
     (block,) = _blocks(TOP / "docs" / "campaigns.md", "sh")
     for line in block.splitlines():
-        done = subprocess.run(
-            [sys.executable, "-m", *line.split()],
-            cwd=tmp_path,
-            env=_environment(),
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        done = _python(("-m", *line.split()), tmp_path)
         assert done.returncode == 0, f"{line}\n{done.stderr}"
     assert "4 of 4 runs are finished already" in done.stderr
 

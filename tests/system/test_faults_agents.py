@@ -18,6 +18,7 @@ import pytest
 from coordinator.compare import compare
 from coordinator.events import Advanced
 from coordinator.journal import NAME, Journal
+from tests.system.fleet import Fleet
 
 pytestmark = [
     pytest.mark.system,
@@ -43,6 +44,17 @@ def singles(births: int) -> tuple[str, ...]:
 HAMLET = ("hamlet.toml", "--seed", "4", "--speed", "10", "--quiet")
 
 
+def freeze_and_finish(fleet: Fleet, frozen: int, quiet: Path, seed: int) -> None:
+    """Stop a process for a third of a run; the run is equal to a quiet one."""
+    share = np.random.default_rng(seed).uniform(0.1, 0.4)
+    fleet.wait_for(share * whole(quiet))
+    os.kill(frozen, signal.SIGSTOP)
+    fleet.wait_for((share + 0.3) * whole(quiet))
+    os.kill(frozen, signal.SIGCONT)
+    fleet.finish()
+    assert compare(quiet, fleet.folder) == []
+
+
 def test_a_worker_is_frozen_and_comes_back(
     stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:
@@ -50,13 +62,7 @@ def test_a_worker_is_frozen_and_comes_back(
     frozen = fleet.join("one")
     fleet.join("two")
     fleet.begin(workers=2)
-    share = np.random.default_rng(21).uniform(0.1, 0.4)
-    fleet.wait_for(share * whole(undisturbed))
-    os.kill(frozen, signal.SIGSTOP)
-    fleet.wait_for((share + 0.3) * whole(undisturbed))
-    os.kill(frozen, signal.SIGCONT)
-    fleet.finish()
-    assert compare(undisturbed, fleet.folder) == []
+    freeze_and_finish(fleet, frozen, undisturbed, seed=21)
 
 
 @pytest.mark.slow
@@ -68,13 +74,7 @@ def test_the_holder_of_an_arena_is_frozen_and_comes_back(
     frozen = fleet.join("one")
     fleet.join("two")
     fleet.begin(workers=2)
-    share = np.random.default_rng(22).uniform(0.1, 0.4)
-    fleet.wait_for(share * whole(quiet_hamlet))
-    os.kill(frozen, signal.SIGSTOP)
-    fleet.wait_for((share + 0.3) * whole(quiet_hamlet))
-    os.kill(frozen, signal.SIGCONT)
-    fleet.finish()
-    assert compare(quiet_hamlet, fleet.folder) == []
+    freeze_and_finish(fleet, frozen, quiet_hamlet, seed=22)
     with Journal.open(fleet.folder) as journal:
         events = journal.replay()
     holders = {
