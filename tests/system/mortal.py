@@ -62,7 +62,7 @@ def lives(document: str, kills: int, seed: int) -> None:
     whole_s = life(document, Path("whole"), 1000.0)
     assert whole_s is not None
     run, killed = 0, 0
-    while killed < kills or run < 2:  # noqa: PLR2004
+    while killed < kills or run < 2:
         folder = Path(f"run-{run}")
         while life(document, folder, rng.uniform(0.0, 0.5 * whole_s)) is None:
             killed += 1
