@@ -14,6 +14,7 @@ import numpy as np
 from schema.birth import BirthId
 from schema.evaluation import Floats
 from schema.robot import Robot
+from worker.groups import Group, components
 from worker.reach import Indices
 from worker.seat import Rules, Seat
 
@@ -90,7 +91,7 @@ class Cluster:
         self.members, self.prefixes = members, prefixes
         self.model, self.data = model, mujoco.MjData(model)
         self.seats: tuple[Seat, ...] = ()
-        self._owners = np.full(model.ngeom, -1, dtype=np.intp)
+        self._owners = [-1] * model.ngeom
         self.qpos: Floats = self.data.qpos
         self.qvel: Floats = self.data.qvel
         frames = self.data.xpos.reshape(-1), self.data.xmat.reshape(-1)
@@ -108,7 +109,8 @@ class Cluster:
         """Find the next member's place."""
         prefix = self.prefixes[len(self.seats)]
         seat = Seat(robot, solo, rules, (self.model, self.data, prefix))
-        self._owners[slice(*seat.geoms)] = len(self.seats)
+        for geom in range(*seat.geoms):
+            self._owners[geom] = len(self.seats)
         self.seats = (*self.seats, seat)
         self._has_pads |= bool(seat.senses.pads)
 
@@ -151,10 +153,18 @@ class Cluster:
         """Return the pairs of members in contact in the last step, ascending."""
         if not self.is_shared or not self.data.ncon:
             return []
-        owners = self._owners[self.data.contact.geom]
-        owners = np.sort(owners[(owners >= 0).all(axis=1)], axis=1)
-        pairs = {(a, b) for a, b in owners.tolist() if a != b}
-        return sorted(pairs)
+        owners = self._owners
+        # Plain numbers: contacts are few, and most of them with the ground.
+        geoms: list[list[int]] = self.data.contact.geom.tolist()
+        pairs = {(owners[first], owners[second]) for first, second in geoms}
+        return sorted({(min(p), max(p)) for p in pairs if p[0] != p[1] and min(p) >= 0})
+
+    def parts(self) -> list[Group]:
+        """Return the groups of members that hold together by contact."""
+        if not self.is_shared:
+            return [self.members]
+        links = [(self.members[a], self.members[b]) for a, b in self.touching()]
+        return components([(birth,) for birth in self.members], links)
 
     def _feel(self) -> None:
         """Note what pads may feel while the engine's contacts are at hand."""

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from schema.birth import BirthId
+from schema.evaluation import Floats
 from schema.settings import ArenaSettings
 from worker.cluster import Cluster
 from worker.groups import Group, across, components
@@ -119,25 +120,32 @@ class Company:
     def look(self) -> None:
         """Join those who may touch before the next look."""
         if self.stride is None:
-            pairs = self.proximity.meetings(self._present())[0]
+            scene = Scene(self.layout, self.layout.read()[np.newaxis])
+            pairs = self.proximity.meetings(scene)[0]
         else:
             pairs = self._meetings(self.stride)
         if pairs:
-            births = [one.birth for one in self.everybody]
-            links = [(births[first], births[second]) for first, second in pairs]
             old = [cluster.members for cluster in self.clusters]
-            self.regroup(components(old, links))
+            self.regroup(components(old, self._links(pairs)))
 
-    def part(self) -> None:
-        """Let clusters fall into those parts that have drifted apart."""
+    def part(self, state: Floats) -> None:
+        """Let clusters fall into those parts that have drifted apart.
+
+        Args:
+            state: what all are like now, (W,) as the layout puts them.
+        """
         groups: list[Group] = []
-        shared = [cluster for cluster in self.clusters if cluster.is_shared]
-        if shared:
-            scene = self._present()
-            for cluster in shared:
-                groups += self._parts(cluster, scene)
-            alone = [c.members for c in self.clusters if len(c.members) == 1]
-            self.regroup([*alone, *groups])
+        pairs: Pairs = []
+        for cluster in self.clusters:
+            parts = cluster.parts()
+            groups += parts
+            if len(parts) > 1:
+                rows = self.roster.rows
+                pairs += across([[rows[birth] for birth in part] for part in parts])
+        if pairs:
+            scene = Scene(self.layout, state[np.newaxis])
+            near = self.proximity.near(scene, pairs)
+            self.regroup(components(groups, self._links(near)))
 
     def regroup(self, groups: Iterable[Group]) -> None:
         """Have exactly these groups live together, each ascending by birth."""
@@ -202,21 +210,7 @@ class Company:
             stride.meetings = dict(zip(looks, found, strict=True))
         return stride.meetings[stride.moment]
 
-    def _present(self) -> Scene:
-        """Return where all are now, between two stretches."""
-        return Scene(self.layout, self.layout.read()[np.newaxis])
-
-    def _parts(self, cluster: Cluster, scene: Scene) -> list[Group]:
-        """Return the parts of a cluster, one if it holds together."""
-        alone = [(birth,) for birth in cluster.members]
-        touching = [
-            (cluster.members[a], cluster.members[b]) for a, b in cluster.touching()
-        ]
-        groups = components(alone, touching)
-        if len(groups) == 1:
-            return groups
-        pairs = across([[self.roster.rows[b] for b in group] for group in groups])
+    def _links(self, pairs: Pairs) -> list[tuple[BirthId, BirthId]]:
+        """Return the names of pairs of rows."""
         births = [one.birth for one in self.everybody]
-        near = self.proximity.near(scene, pairs)
-        links = [(births[first], births[second]) for first, second in near]
-        return components(groups, links)
+        return [(births[here], births[there]) for here, there in pairs]

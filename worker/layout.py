@@ -32,6 +32,10 @@ class Roster:
         first_bodies: (R,) the first of each among the N of all.
         spans: of each robot, which of the N are its own.
         hulls: (4, N) as ``Reach.hulls``.
+        ball_counts: (R,) how many spheres cover each.
+        first_balls: (R,) the first of each among all spheres.
+        balls: which of the N each sphere is fixed to.
+        centres, radii: of all spheres, as in ``Reach``.
         weights: of the absolute velocities of all, as ``Reach.weights``.
     """
 
@@ -54,6 +58,14 @@ class Roster:
         self.first_bodies = np.cumsum(self.body_counts) - self.body_counts
         firsts = zip(self.first_bodies.tolist(), bodies, strict=True)
         self.spans = [slice(first, first + count) for first, count in firsts]
+        self.ball_counts = np.array([len(r.radii) for r in reaches], dtype=np.intp)
+        self.first_balls = np.cumsum(self.ball_counts) - self.ball_counts
+        fixed = [np.zeros(0, dtype=np.intp), *(reach.bodies for reach in reaches)]
+        self.balls: Indices = np.concatenate(fixed)
+        self.balls += np.repeat(self.first_bodies, self.ball_counts)
+        centres = [np.zeros((0, 9)), *(reach.centres for reach in reaches)]
+        self.centres: Floats = np.concatenate(centres)
+        self.radii = _joined([reach.radii for reach in reaches])
 
 
 class Layout:
@@ -92,19 +104,19 @@ class Layout:
         begins = np.repeat(blocks, counts, axis=0)
         begins += np.array(own, dtype=np.intp).reshape(-1, _PARTS)
         order = np.argsort(np.array(rows, dtype=np.intp))
-        self.starts, self.dofs, self._places, self._turns = begins[order].T
+        self.starts, self.dofs, first_places, first_turns = begins[order].T
         self.homes: Indices = np.repeat(np.arange(len(counts)), counts)[order]
         self.roots = self.starts[:, None] + np.arange(_FREE)
         self.motions = self.dofs[:, None] + np.arange(_FREE_DOFS)
-        self.joints = _runs(self.starts + _FREE, roster.sizes - _FREE)
+        self.joints = runs(self.starts + _FREE, roster.sizes - _FREE)
         degrees = roster.sizes - (_FREE - _FREE_DOFS)
-        self.velocities = _runs(self.dofs, degrees)
+        self.velocities = runs(self.dofs, degrees)
         self._first_velocities = np.cumsum(degrees) - degrees
-        places = _runs(self._places, roster.body_counts, 3)
-        turns = _runs(self._turns, roster.body_counts, 9)
+        self._places = runs(first_places, roster.body_counts, 3)
+        self._turns = runs(first_turns, roster.body_counts, 9)
         # Of x and y: the origin, and the row of the rotation.
-        self._origins = places + np.arange(2)[:, None]
-        self._rows = turns + np.arange(6).reshape(2, 3, 1)
+        self._origins = self._places + np.arange(2)[:, None]
+        self._rows = self._turns + np.arange(6).reshape(2, 3, 1)
 
     def read(self) -> Floats:
         """Return all numbers in a row: a copy."""
@@ -142,21 +154,20 @@ class Layout:
         centres += states.take(self._origins, axis=1)
         return centres
 
-    def balls(self, states: Floats, row: int) -> Floats:
-        """Return the centres of the spheres that cover a robot, (L, 3, B) [m].
+    def balls(self, states: Floats, wanted: Indices) -> Floats:
+        """Return the centres of spheres that cover robots, (L, 3, B) [m].
 
         Args:
             states: (L, W).
-            row: of the robot.
+            wanted: (B,) which of all spheres, as ``Roster`` numbers them.
         """
-        reach, count = self.roster.everybody[row].body.reach, len(states)
-        bodies, place, turn = len(reach.hulls), self._places[row], self._turns[row]
-        xpos = states[:, place : place + 3 * bodies].reshape(count, bodies, 3)
-        xmat = states[:, turn : turn + 9 * bodies].reshape(count, bodies, 9)
-        turned = xmat.take(reach.bodies, axis=1)
-        turned *= reach.centres
-        moved = turned[..., 0::3] + turned[..., 1::3] + turned[..., 2::3]
-        moved += xpos.take(reach.bodies, axis=1)
+        bodies = self.roster.balls[wanted]
+        turns = self._turns[bodies][:, None] + np.arange(9)
+        turned = states.take(turns, axis=1)
+        turned *= self.roster.centres[wanted]
+        moved: Floats = turned[..., 0::3] + turned[..., 1::3]
+        moved += turned[..., 2::3]
+        moved += states.take(self._places[bodies][:, None] + np.arange(3), axis=1)
         return moved.transpose(0, 2, 1)
 
     def part(self, row: int) -> slice:
@@ -165,8 +176,14 @@ class Layout:
         return slice(start, start + int(self.roster.sizes[row]))
 
 
-def _runs(starts: Indices, counts: Indices, stride: int = 1) -> Indices:
-    """Return the numbers of some runs, each from its start on, one after another."""
+def runs(starts: Indices, counts: Indices, stride: int = 1) -> Indices:
+    """Return the numbers of some runs, each from its start on, one after another.
+
+    Args:
+        starts: (R,) of the runs.
+        counts: (R,) how many numbers each has.
+        stride: from one number of a run to the next.
+    """
     first: Indices = np.repeat(starts - stride * (np.cumsum(counts) - counts), counts)
     return first + stride * np.arange(len(first))
 

@@ -6,13 +6,14 @@ their speed, so that the falling meet in time. Boxes about robots tell of almost
 pairs that they are too far apart; only the others are measured.
 """
 
-from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from schema.evaluation import Floats
 from schema.settings import ArenaSettings
-from worker.layout import Layout
+from worker.layout import Layout, runs
 
 FASTEST = 10.0
 """What is faster has broken the physics, and does not gather others [m/s]."""
@@ -21,6 +22,8 @@ _ROUNDING_M = 1e-9
 
 Pairs = list[tuple[int, int]]
 """Rows of robots, the lesser first."""
+
+Mask = npt.NDArray[np.bool_]
 
 
 class Scene:
@@ -38,25 +41,36 @@ class Scene:
             states: (L, W).
         """
         self._layout, self._states = layout, states
-        self._hulls = layout.hulls(states)
-        self._balls: dict[int, Floats] = {}
         self.speeds = layout.speeds(states)
 
-    def apart(self, here: int, there: int) -> Floats:
-        """Return how far the spheres of two robots are apart, (L,) [m]."""
-        everybody = self._layout.roster.everybody
-        for row in (here, there):
-            if row not in self._balls:
-                self._balls[row] = self._layout.balls(self._states, row)
-        first, second = self._balls[here], self._balls[there]
-        difference = first[:, :, :, None] - second[:, :, None, :]
-        np.multiply(difference, difference, out=difference)
-        distance = difference[:, 0] + difference[:, 1]
-        distance += difference[:, 2]
-        np.sqrt(distance, out=distance)
-        distance -= everybody[here].body.reach.radii[:, None]
-        distance -= everybody[there].body.reach.radii
-        return np.asarray(distance.min(axis=(1, 2)))
+    @cached_property
+    def _hulls(self) -> Floats:
+        return self._layout.hulls(self._states)
+
+    def apart(self, pairs: Pairs) -> Floats:
+        """Return how far the spheres of P > 0 pairs of robots are apart, (L, P) [m].
+
+        Each sphere of the one is measured against each of the other.
+        """
+        roster = self._layout.roster
+        rows = sorted({row for pair in pairs for row in pair})
+        counts = roster.ball_counts[rows]
+        wanted = runs(roster.first_balls[rows], counts)
+        balls, radii = self._layout.balls(self._states, wanted), roster.radii[wanted]
+        ends = np.cumsum(counts).tolist()
+        spans = dict(zip(rows, map(slice, [0, *ends], ends), strict=False))
+        found = np.empty((len(balls), len(pairs)))
+        for number, (here, there) in enumerate(pairs):
+            first, second = spans[here], spans[there]
+            difference = balls[:, :, first, None] - balls[:, :, None, second]
+            np.multiply(difference, difference, out=difference)
+            distance = difference[:, 0] + difference[:, 1]
+            distance += difference[:, 2]
+            np.sqrt(distance, out=distance)
+            distance -= radii[first, None]
+            distance -= radii[second]
+            found[:, number] = distance.min(axis=(1, 2))
+        return found
 
     def is_near(self, here: int, there: int, within_m: float) -> bool:
         """Return whether the spheres of two robots may be as near as that.
@@ -119,30 +133,36 @@ class Proximity:
         """
         margins = self._margins(scene)
         most = margins.max(axis=0, initial=0.0) + (0.5 * self._merge_m + _ROUNDING_M)
-        found: list[Pairs] = [[] for _ in margins]
-        for here, there in zip(*scene.neighbours(most), strict=True):
-            if scene.is_near(here, there, float(most[here] + most[there])):
-                meet = margins[:, here] + margins[:, there] + self._merge_m
-                is_met = scene.apart(here, there) < meet
-                for moment in is_met.nonzero()[0].tolist():
-                    found[moment].append((here, there))
-        return found
+        pairs = [
+            (here, there)
+            for here, there in zip(*scene.neighbours(most), strict=True)
+            if scene.is_near(here, there, float(most[here] + most[there]))
+        ]
+        if not pairs:
+            return [[] for _ in margins]
+        is_met = _are_near(scene, margins, pairs, self._merge_m)
+        return [
+            [pair for pair, is_one in zip(pairs, row, strict=True) if is_one]
+            for row in is_met.tolist()
+        ]
 
-    def near(self, scene: Scene, pairs: Sequence[tuple[int, int]]) -> Pairs:
+    def near(self, scene: Scene, pairs: Pairs) -> Pairs:
         """Return which of some pairs that live together are to go on doing so.
 
         Args:
             scene: of one moment.
-            pairs: rows.
+            pairs: rows, one pair at least.
         """
-        margins = self._margins(scene)[0].tolist()
-        return [
-            (here, there)
-            for here, there in pairs
-            if scene.apart(here, there)[0]
-            < margins[here] + margins[there] + self._split_m
-        ]
+        margins = self._margins(scene)
+        is_near = _are_near(scene, margins, pairs, self._split_m)[0].tolist()
+        return [pair for pair, is_one in zip(pairs, is_near, strict=True) if is_one]
 
     def _margins(self, scene: Scene) -> Floats:
         """Return how far each may move until the next look, (L, R) [m]."""
         return np.asarray(np.minimum(scene.speeds, FASTEST) * self._ahead_s)
+
+
+def _are_near(scene: Scene, margins: Floats, pairs: Pairs, gap_m: float) -> Mask:
+    """Return whether P pairs may come within a gap before the next look, (L, P)."""
+    here, there = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
+    return np.asarray(scene.apart(pairs) < margins[:, here] + margins[:, there] + gap_m)

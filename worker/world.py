@@ -174,7 +174,7 @@ class World:
             self.company.catch_up()
         self.company.end()
         if self._schedule.is_parting(self.step):
-            self.company.part()
+            self.company.part(stride.state)
 
     def _run(self, plan: Sequence[int]) -> None:
         clusters = self.company.by_cost

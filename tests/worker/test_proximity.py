@@ -25,7 +25,7 @@ def measured(world: World, scene: Scene, gap_m: float) -> Pairs:
         for second, there in enumerate(births)
         if first < second
         and company.cluster_of(here) is not company.cluster_of(there)
-        and scene.apart(first, second)[0] < moves[first] + moves[second] + gap_m
+        and scene.apart([(first, second)])[0, 0] < moves[first] + moves[second] + gap_m
     ]
 
 
