@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from schema.agent_command import Flags, at_least_one
 from schema.errors import RevolveError
+from schema.flags import Flags, whole_number
 
 
 class MissingExtra(RevolveError):  # noqa: N818 - reads as what it says
@@ -62,7 +62,7 @@ def _flags() -> Flags:
     )
     flags.add_argument(
         "--processes",
-        type=at_least_one,
+        type=whole_number(),
         default=os.cpu_count() or 1,
         metavar="N",
         help="runs measured at a time (default: the cores)",

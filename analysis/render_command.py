@@ -18,6 +18,7 @@ from analysis.render import (
 from schema.evaluation import Floats, Track
 from schema.experiment import Simulation, Space, body_space
 from schema.experiment_file import read_experiment
+from schema.flags import Flags, whole_number
 from schema.robot import Robot
 from schema.robot_file import read_robot, settings_of
 
@@ -109,19 +110,8 @@ def _drawn(
     return [studio.picture(pose, look_at=look_at) for pose in shown]
 
 
-def _from(least: int) -> Callable[[str], int]:
-    """Return what reads a whole number of a flag."""
-
-    def read(text: str) -> int:
-        if not text.isdecimal() or int(text) < least:
-            raise argparse.ArgumentTypeError(f"must be {least} or more, got {text!r}")
-        return int(text)
-
-    return read
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Flags(
         prog="revolve robot render",
         description="Draw a robot: standing, as a strip of consecutive pictures, or "
         "(.gif) as a film of its life.",
@@ -131,10 +121,10 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("out", type=Path, metavar="OUT.png|OUT.gif")
     parser.add_argument(
         "--gait",
-        type=_from(1),
+        type=whole_number(1),
         metavar="N",
         help="N pictures, one per tick of the brain, in rows of five",
     )
-    parser.add_argument("--width", type=_from(16), default=640, metavar="PIXELS")
+    parser.add_argument("--width", type=whole_number(16), default=640, metavar="PIXELS")
     parser.add_argument("--experiment", metavar="NAME|FILE.toml")
     return parser

@@ -24,9 +24,10 @@ from analysis.view_replay import (
 from analysis.view_show import Show
 from analysis.view_stage import stage
 from analysis.view_watch import watch
-from schema.agent_command import Flags, add_network_flags, tls_of
+from schema.agent_command import add_network_flags, tls_of
 from schema.birth import BirthId
 from schema.crew import stop_on_signals
+from schema.flags import Flags, number
 from schema.service import tell_user
 
 LAST_S = 600.0
@@ -207,9 +208,9 @@ def _flags() -> Flags:
         help="and its first parent, and so on, back to the founder",
     )  # fmt: skip
     flags.add_argument(
-        "--from", dest="start", type=float, metavar="S",
+        "--from", dest="start", type=number, metavar="S",
         help=f"poses of a replay from there on [s]; default: the last {LAST_S:g} s",
     )  # fmt: skip
-    flags.add_argument("--until", type=float, metavar="S", help="and to there [s]")
+    flags.add_argument("--until", type=number, metavar="S", help="and to there [s]")
     add_network_flags(flags)
     return flags

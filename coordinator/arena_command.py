@@ -7,9 +7,10 @@ from uuid import uuid4
 
 from coordinator.client_service import ask_coordinators
 from coordinator.status_command import ask_status
-from schema.agent_command import Flags, add_network_flags, tls_of
+from schema.agent_command import add_network_flags, tls_of
 from schema.birth import BirthId
 from schema.errors import InvalidRobot, NetworkError
+from schema.flags import Flags, number, whole_number
 from schema.operator_codec import (
     BrainWish,
     InsertWish,
@@ -125,12 +126,12 @@ def _parser() -> argparse.ArgumentParser:
             name, help=what, description=what, allow_abbrev=False
         )
         if name in ("remove", "brain"):
-            action.add_argument("birth", type=int, help="its number")
+            action.add_argument("birth", type=whole_number(0), help="its number")
         if name in ("insert", "brain"):
             action.add_argument("file", help="robot: .yaml, .yml or .pb")
         if name == "insert":
             action.add_argument(
-                "--place", type=float, nargs=2, metavar=("X", "Y"),
+                "--place", type=number, nargs=2, metavar=("X", "Y"),
                 help="where [m]; drawn as for a birth if not given",
             )  # fmt: skip
         action.add_argument(
@@ -141,6 +142,8 @@ def _parser() -> argparse.ArgumentParser:
             "--run", default="", metavar="NAME",
             help="end of its folder's name, where there are several",
         )  # fmt: skip
-        action.add_argument("--island", type=int, default=0, help="default: 0")
+        action.add_argument(
+            "--island", type=whole_number(0), default=0, help="default: 0"
+        )
         add_network_flags(action)
     return parser

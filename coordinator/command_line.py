@@ -1,11 +1,11 @@
 """What may be said on the command line of the coordinator's commands."""
 
 import argparse
-import math
 
 from coordinator.campaign import shipped_campaigns
-from schema.agent_command import Flags, add_cpu_limit, add_network_flags
+from schema.agent_command import add_cpu_limit, add_network_flags
 from schema.experiment_file import shipped_experiments
+from schema.flags import Flags, positive_number, share, whole_number
 
 LISTEN = "tcp/127.0.0.1:7447"
 """Where ``revolve coordinator`` listens unless it is told."""
@@ -54,19 +54,22 @@ def parser(command: str) -> argparse.ArgumentParser:
 def _add_bench(flags: argparse.ArgumentParser) -> None:
     flags.add_argument(
         "--seconds",
-        type=_speed,
+        type=positive_number,
         default=5.0,
         metavar="S",
         help="of each measurement through the network (default: 5)",
     )
     flags.add_argument(
         "--workers",
-        type=_count,
+        type=whole_number(),
         default=8,
         help="that take 40 ms, and no processor time, for an evaluation (default: 8)",
     )
     flags.add_argument(
-        "--births", type=_count, default=1500, help="without physics (default: 1500)"
+        "--births",
+        type=whole_number(),
+        default=1500,
+        help="without physics (default: 1500)",
     )
 
 
@@ -79,15 +82,15 @@ def _add_science(flags: argparse.ArgumentParser) -> None:
         metavar="experiment",
         help=f"a .toml file, or one of {names}; several are a campaign",
     )
-    flags.add_argument("--seed", type=_whole, default=0, help="default: 0")
+    flags.add_argument("--seed", type=whole_number(0), default=0, help="default: 0")
     flags.add_argument(
         "--repeats",
-        type=_count,
+        type=whole_number(),
         metavar="N",
         help="do each experiment so often, all in one campaign",
     )
     flags.add_argument(
-        "--births", type=_count, help="instead of each experiment's number"
+        "--births", type=whole_number(), help="instead of each experiment's number"
     )
     flags.add_argument(
         "--out",
@@ -103,13 +106,13 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     else:
         flags.add_argument(
             "--workers",
-            type=_whole,
+            type=whole_number(0),
             help="worker processes to start here; default: one per core, none with "
             "--connect",
         )
         flags.add_argument(
             "--threads",
-            type=_count,
+            type=whole_number(),
             help="threads of each worker that advance one arena together; default: "
             "one per core for an arena, else 1",
         )
@@ -133,7 +136,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     add_network_flags(flags)
     flags.add_argument(
         "--speed",
-        type=_speed,
+        type=positive_number,
         metavar="X",
         help="for watching an arena: at most X simulated seconds per second",
     )
@@ -143,7 +146,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     add_cpu_limit(flags)
     flags.add_argument(
         "--audit",
-        type=_share,
+        type=share,
         default=0.0,
         metavar="SHARE",
         help="have this share of evaluations, from 0 to 1, done by two workers; the "
@@ -160,31 +163,3 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     flags.add_argument(
         "--fsync", action="store_true", help="survive power loss too; slower"
     )
-
-
-def _whole(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"must be >= 0, got {value}")
-    return value
-
-
-def _count(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"must be >= 1, got {value}")
-    return value
-
-
-def _speed(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"must be > 0 and finite, got {value}")
-    return value
-
-
-def _share(text: str) -> float:
-    value = float(text)
-    if not 0.0 <= value <= 1.0:
-        raise argparse.ArgumentTypeError(f"must be from 0 to 1, got {text!r}")
-    return value

@@ -9,6 +9,7 @@ from coordinator.seeding import Purpose, stream
 from schema.birth import BirthId
 from schema.experiment import body_space
 from schema.experiment_file import read_experiment
+from schema.flags import Flags, whole_number
 from schema.genome import develop
 from schema.robot_file import settings_of, write_robot
 
@@ -43,22 +44,15 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _whole(text: str) -> int:
-    """Return a number of a flag, 0 or more."""
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"must be 0, 1, 2, ..., got {text!r}")
-    return int(text)
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Flags(
         prog="revolve robot random",
         description="Make up a robot as an experiment makes up its founders.",
         epilog="example: revolve robot random some.yaml --seed 7 --count 3",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help=".yaml, .pb, .xml, ...")
-    parser.add_argument("--seed", type=_whole, default=1, metavar="N")
-    parser.add_argument("--count", type=_whole, default=1, metavar="N")
+    parser.add_argument("--seed", type=whole_number(0), default=1, metavar="N")
+    parser.add_argument("--count", type=whole_number(0), default=1, metavar="N")
     parser.add_argument("--experiment", default="scenario1", metavar="NAME|FILE.toml")
     return parser
 

@@ -13,8 +13,9 @@ from coordinator.folder import DETAILS
 from coordinator.folder_status import folder_status, unbegun_status
 from coordinator.running import ADDRESS
 from coordinator.wording import about_arenas, best_of, duration
-from schema.agent_command import Flags, add_network_flags, tls_of
+from schema.agent_command import add_network_flags, tls_of
 from schema.errors import NetworkError, RunFolderError
+from schema.flags import Flags
 from schema.operator_codec import (
     OperatorRequest,
     StatusWish,

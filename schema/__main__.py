@@ -8,6 +8,7 @@ from schema.brain import neuron_names
 from schema.errors import RevolveError
 from schema.experiment import body_space
 from schema.experiment_file import read_experiment
+from schema.flags import Flags
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot import Robot
 from schema.robot_file import read_robot, settings_of, write_robot
@@ -41,7 +42,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Flags(
         prog="revolve robot",
         description="Check, convert or show a robot file. Read are .yaml, .yml, .pb, "
         ".xml (MJCF), and RoboGen's .txt and .json; written are .yaml, .yml, .pb, .xml "

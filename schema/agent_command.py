@@ -5,29 +5,20 @@ starts those again that are killed, and ends all on Ctrl-C.
 """
 
 import argparse
-import math
 import re
 import socket
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import NoReturn
 
 from schema.crew import Crew, stop_on_signals, stop_with_input
 from schema.errors import NetworkError, RevolveError
+from schema.flags import Flags, positive_number, whole_number
 from schema.network import DEFAULT_FLEET, Agent, Tls, client_config
 from schema.supervision import CPU_LIMIT_S, Death, Post
 from schema.topics import Role, check_name
 
 _POLL_S = 0.5
-
-
-class Flags(argparse.ArgumentParser):
-    """A parser whose complaints are one line (argparse is made for this override)."""
-
-    def error(self, message: str) -> NoReturn:
-        """Say what is wrong and where help is; end with status 2."""
-        self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 
 def add_network_flags(flags: argparse.ArgumentParser) -> None:
@@ -46,7 +37,7 @@ def add_cpu_limit(flags: argparse.ArgumentParser) -> None:
     """Add how much CPU time a job may take before its process is ended."""
     flags.add_argument(
         "--cpu-limit",
-        type=_seconds,
+        type=positive_number,
         default=CPU_LIMIT_S,
         metavar="S",
         help="CPU seconds after which a job counts as one that never ends "
@@ -151,7 +142,7 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
     )
     flags.add_argument(
         "--processes",
-        type=at_least_one,
+        type=whole_number(),
         default=processes,
         metavar="N",
         help=f"how many at a time (default: {processes})",
@@ -169,23 +160,9 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
     if role == "worker":
         flags.add_argument(
             "--threads",
-            type=at_least_one,
+            type=whole_number(),
             metavar="N",
             help="of each process, to advance one arena together (default: 1)",
         )
     add_network_flags(flags)
     return flags
-
-
-def at_least_one(text: str) -> int:
-    """Return a flag's value as a whole number >= 1."""
-    if not (text.isascii() and text.isdigit() and int(text) >= 1):
-        raise argparse.ArgumentTypeError(f"must be a whole number >= 1, got {text!r}")
-    return int(text)
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"must be > 0 and finite, got {text!r}")
-    return value

@@ -19,6 +19,7 @@ from schema.errors import ExperimentError
 from schema.evaluation import Report
 from schema.experiment import Experiment, body_space
 from schema.experiment_file import read_experiment
+from schema.flags import whole_number
 from schema.genome import develop
 from schema.plugin import load
 from schema.robot import Robot
@@ -55,12 +56,34 @@ def add_commands(kinds: Any) -> None:  # noqa: ANN401 - argparse hides its type
         ("spider", "spiders on a grid, thesis figure 7.1", 5, 20),
     ):
         parser = kinds.add_parser(name, help=text)
-        parser.add_argument("experiment", nargs="?", default="scenario3")
-        parser.add_argument("--sizes", type=int, nargs="+", default=SIZES)
-        parser.add_argument("--seconds", type=int, default=seconds)
-        parser.add_argument("--repetitions", type=int, default=repetitions)
-        parser.add_argument("--threads", type=int, default=1)
-        parser.add_argument("--seed", type=int, default=1)
+        parser.add_argument(
+            "experiment",
+            nargs="?",
+            default="scenario3",
+            help="whose settings to use, a .toml file or a shipped one "
+            "(default: %(default)s)",
+        )
+        parser.add_argument(
+            "--sizes",
+            type=whole_number(),
+            nargs="+",
+            default=SIZES,
+            metavar="N",
+            help="numbers of robots (default: 5 10 ... 50)",
+        )
+        for option, least, default, help_text in (
+            ("--seconds", 1, seconds, "simulated in each repetition"),
+            ("--repetitions", 1, repetitions, "of each size"),
+            ("--threads", 1, 1, "that advance the arena together"),
+            ("--seed", 0, 1, "of the robots and their places"),
+        ):
+            parser.add_argument(
+                option,
+                type=whole_number(least),
+                default=default,
+                metavar="N",
+                help=f"{help_text} (default: %(default)s)",
+            )
         parser.add_argument("--out", type=Path, help="Parquet file for the results")
 
 

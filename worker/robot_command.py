@@ -6,6 +6,7 @@ from pathlib import Path
 
 from schema.experiment import body_space
 from schema.experiment_file import read_experiment
+from schema.flags import Flags
 from schema.mjcf_file import read_mjcf
 from schema.robot import Robot
 from schema.robot_file import MJCF_ENDING, read_robot, settings_of
@@ -54,7 +55,7 @@ def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Flags(
         prog="revolve robot simulate",
         description="Simulate a robot alone, and judge it as an experiment does.",
         epilog="example: revolve robot simulate best.yaml --experiment scenario1",

@@ -105,8 +105,8 @@ def simulate(*_: object, **__: object) -> NoReturn:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--gait", "0"), "--gait: must be 1 or more, got '0'"),
-        (("--width", "-5"), "--width: must be 16 or more, got '-5'"),
+        (("--gait", "0"), "--gait: must be a whole number >= 1, got '0'"),
+        (("--width", "-5"), "--width: must be a whole number >= 16, got '-5'"),
     ],
 )
 def test_words_that_cannot_be_are_refused(

@@ -170,7 +170,7 @@ def test_status_of_all_who_share_a_hub(stage: Stage, until: Until) -> None:
         (("status",), "either a folder or --connect"),
         (("status", "nowhere"), "no run and no campaign"),
         (("run", "thesis", "scenario1"), "names of their own"),
-        (("run", "scenario1", "--repeats", "0"), "must be >= 1"),
+        (("run", "scenario1", "--repeats", "0"), "must be a whole number >= 1"),
         (("run", "scenario1", "--connect", HUB, "--listen", HUB), "here or elsewhere"),
         (("run", "scenario1", "--connect", "tcp/127.0.0.1:9"), "no hub"),
     ],
