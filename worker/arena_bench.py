@@ -5,7 +5,8 @@ Source: Hupkes 2016, figures 6.1 and 7.1; facts of the original, section 9.
 
 import argparse
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, cast
 
@@ -15,7 +16,7 @@ import pyarrow.parquet as pq
 from msgspec.structs import replace
 
 from schema.birth import BirthId
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, RevolveError
 from schema.evaluation import Report
 from schema.experiment import Experiment, body_space
 from schema.experiment_file import read_experiment
@@ -95,26 +96,48 @@ def run(options: argparse.Namespace) -> int:
 
     Returns:
         0.
+
+    Raises:
+        ExperimentError: one that is none, or off-line.
+        RevolveError: a file for the results that cannot be written.
     """
     experiment = read_experiment(options.experiment)
     source = _spiders if options.what == "spider" else _random
     rows: list[Row] = []
-    for size in options.sizes:
-        rows += [
-            _row(options, number, found)
-            for number, found in enumerate(source(experiment, size, options))
-        ]
-        factors = [row["factor"] for row in rows if row["population"] == size]
-        _say(_line(size, factors, options.what))
+    with _kept(options.out) as keep:
+        for size in options.sizes:
+            timings = source(experiment, size, options)
+            new = [_row(options, number, each) for number, each in enumerate(timings)]
+            keep(new)
+            rows += new
+            factors = [row["factor"] for row in new]
+            _say(_line(size, factors, options.what))
     if options.what == "arena" and len(options.sizes) >= len(THESIS):
         found = timing.quadratic_fit(
             [row["population"] for row in rows], [row["factor"] for row in rows]
         )
         _say(f"fit:    {_formula(found)}", f"thesis: {_formula(THESIS)}")
     if options.out is not None:
-        pq.write_table(pa.Table.from_pylist(rows, schema=RESULTS), options.out)
         _say(f"{len(rows)} rows in {options.out}")
     return 0
+
+
+@contextmanager
+def _kept(path: Path | None) -> Iterator[Callable[[Sequence[Row]], None]]:
+    """Give what writes rows to a file, if there is to be one, as they come.
+
+    Raises:
+        RevolveError: the file cannot be written; better said before the minutes.
+    """
+    if path is None:
+        yield lambda _rows: None
+        return
+    try:
+        file = path.open("wb")
+    except OSError as error:
+        raise RevolveError(f"{path}: cannot be written: {error.strerror}") from None
+    with file, pq.ParquetWriter(file, RESULTS) as writer:
+        yield lambda rows: writer.write(pa.Table.from_pylist(rows, schema=RESULTS))
 
 
 def arena_settings_of(experiment: Experiment) -> ArenaSettings:

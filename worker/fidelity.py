@@ -12,7 +12,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from schema.codec import decode_genome
-from schema.errors import ExperimentError, SimulationDiverged
+from schema.errors import ExperimentError, RunFolderError, SimulationDiverged
 from schema.evaluation import Floats
 from schema.experiment import Experiment, Simulation, body_space
 from schema.experiment_file import experiment_from_text
@@ -62,8 +62,10 @@ def read_population(folder: Path) -> Population:
         RunFolderError: no such folder, or not a run's.
         MalformedMessage: a genome that is none.
     """
-    text = read_table(folder, "runs")["document"][0].as_py()
-    experiment = experiment_from_text(text)
+    runs = read_table(folder, "runs")
+    if not runs.num_rows:
+        raise RunFolderError(f"{folder}: no run is there, or none that has begun")
+    experiment = experiment_from_text(runs["document"][0].as_py())
     space = body_space(experiment.space)
     births = read_table(folder, "births").select(["island", "birth", "genome"])
     genomes = {

@@ -6,6 +6,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from schema.errors import RevolveError
 from schema.experiment import Simulation
 from schema.mjcf import solo_model
 from schema.parts import BUILT_IN
@@ -51,6 +52,15 @@ def test_a_benchmark_writes_a_row_per_repetition(
     assert ("thesis: factor = -0.26 +34.78 / p +20.41 / p^2" in said) is (
         what == "arena"
     )
+
+
+def test_a_file_that_cannot_be_written_is_told_before_the_minutes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "nowhere" / "results.parquet")
+    with pytest.raises(RevolveError, match="results.parquet: cannot be written: No "):
+        bench.main(["bench", "arena", "--out", out])
+    assert capsys.readouterr().out == ""
 
 
 class Sleeper:

@@ -1,18 +1,20 @@
 """The fidelity study's own arithmetic."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 from scipy.stats import spearmanr
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, RunFolderError
 from schema.experiment import Experiment, Simulation
 from schema.robot import Robot
 from worker.fidelity import (
     compare,
     finer,
+    read_population,
     sample_thirds,
     spearman,
     winners,
@@ -50,6 +52,11 @@ def test_a_finer_world_lasts_as_long() -> None:
     assert world.timestep_s == pytest.approx(0.001)
     assert (world.brain_steps, world.pose_steps) == (125, 200)
     assert (world.window_steps, world.warmup_steps) == (12_000, 3000)
+
+
+def test_a_folder_without_a_run_is_told(tmp_path: Path) -> None:
+    with pytest.raises(RunFolderError, match="no run is there"):
+        read_population(tmp_path)
 
 
 def test_the_same_world_agrees_and_a_wild_one_counts_nothing(turtle: Robot) -> None:
