@@ -129,6 +129,7 @@ def _deployment(
         view=options.view,
         cpu_limit_s=options.cpu_limit,
         caution=Caution(options.audit, options.on_quarantine == "pause"),
+        allows_drift=options.allow_drift,
     )
 
 

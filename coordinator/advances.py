@@ -5,17 +5,19 @@ rebuild its state. Nothing here decides what happens in an arena.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Protocol
 
 from coordinator.events import (
     Advanced,
     AdvanceShard,
+    Record,
     Returned,
 )
 from coordinator.fleet import Fleet
 from coordinator.pose_columns import place_poses
 from coordinator.shards import Accept, Came, GiveUp, Hand
+from schema.arena import Advance, Casualty
 from schema.arena_codec import (
     AdvanceAnswer,
     AdvanceRequest,
@@ -24,8 +26,10 @@ from schema.arena_codec import (
     decode_advance_answer,
     encode_advance_request,
 )
+from schema.birth import BirthId
 from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
 from schema.evaluation import Provenance
+from schema.parts import Vector
 from schema.plugin_source import plugins_of
 
 
@@ -59,20 +63,73 @@ class Terms:
     settings: Mapping[int, bytes]
 
 
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """A shard went on by a worker of another platform.
+
+    Attributes:
+        island: whose shard.
+        step: the first that it reached there.
+        before, after: the platforms.
+        worker: who it was.
+    """
+
+    island: int
+    step: int
+    before: str
+    after: str
+    worker: str
+
+    @property
+    def record(self) -> Record:
+        """Its row."""
+        return Record("drifts", asdict(self))
+
+    def __str__(self) -> str:
+        return (
+            f"arena {self.island}: goes on to step {self.step} by {self.worker} on "
+            f"{self.after}, before that on {self.before}: from here on this run is "
+            "another one than on one platform"
+        )
+
+
 @dataclass(slots=True)
 class _Past:
     """What became of a shard.
 
     Its state at ``step`` is that of the newest snapshot, at ``base`` (0 is the empty
-    arena), after ``history``.
+    arena), after ``history``. ``platform`` is that of the last advance, empty before
+    the first; ``places`` tells who lived after it, and where.
     """
 
     step: int = 0
+    platform: str = ""
     digest: bytes = b""
     base: int = 0
     history: list[PastAdvance] = field(default_factory=list)
+    places: dict[BirthId, Vector] = field(default_factory=dict)
     asked: AdvanceShard | None = None
     wants_snapshot: bool = False
+
+    def drifts_to(self, platform: str) -> bool:
+        """Return whether a platform is another than that of the last advance."""
+        return self.platform not in ("", platform)
+
+    def completed(self, advance: Advance) -> Advance:
+        """Return the first advance after a drift, with those who did not outlive it.
+
+        What lived there and comes to its end on the way here is told of by nobody.
+        """
+        assert self.asked is not None
+        told = {one.birth for one in advance.judgements}
+        told.update(one.birth for one in advance.casualties)
+        told.update(self.asked.changes.removals)
+        lost = tuple(
+            Casualty(birth, self.step, "lost in a drift between platforms", place)
+            for birth, place in self.places.items()
+            if birth not in told
+        )
+        return replace(advance, casualties=lost + advance.casualties)
 
 
 class Advances:
@@ -142,8 +199,11 @@ class Advances:
         """Have the state kept at the end of the next advance that is handed out."""
         self._past(shard).wants_snapshot = True
 
-    def take(self, event: Advanced) -> None:
+    def take(self, event: Advanced) -> Drift | None:
         """Remember what an advance came to, now that the journal has it.
+
+        Returns:
+            The drift, if it was made on another platform than the one before.
 
         Raises:
             UnexpectedEvent: no such advance was asked for.
@@ -154,11 +214,17 @@ class Advances:
             raise UnexpectedEvent(f"no such advance was asked for: {event}")
         past.asked = None
         past.step, past.digest = advance.step, advance.digest
+        before, past.platform = past.platform, event.provenance.platform
         past.history.append(PastAdvance(asked.changes, asked.until, advance.digest))
+        past.places = {one.birth: one.place for one in advance.judgements}
         if self._vault.has(event.island, past.step):
             past.base, past.history = past.step, []
             self._vault.drop_before(event.island, past.step)
-        self._fleet.place(self._number(event.island), event.provenance.platform)
+        self._fleet.place(self._number(event.island), past.platform)
+        if before in ("", past.platform):
+            return None
+        agent = event.provenance.agent
+        return Drift(event.island, advance.step, before, past.platform, agent)
 
     def come(self) -> list[Advanced]:
         """Return the advances that were done since the last call.
@@ -205,13 +271,16 @@ class Advances:
         shard = self._islands[command.shard]
         past = self._past(shard)
         assert past.asked is not None
-        wants_snapshot = past.asked.wants_snapshot or past.wants_snapshot
+        is_drift = past.drifts_to(self._fleet.shards.platform(command.agent))
+        # From a drift on, nothing of before it is ever done again.
+        wants_snapshot = past.asked.wants_snapshot or past.wants_snapshot or is_drift
         past.wants_snapshot = False
         past.asked = replace(past.asked, wants_snapshot=wants_snapshot)
         rebuild: Rebuild | None = None
         if command.is_whole:
             base = past.base and self._vault.read(shard, past.base)
-            rebuild = Rebuild(base or b"", tuple(past.history))
+            living = tuple(past.places) if is_drift else None
+            rebuild = Rebuild(base or b"", tuple(past.history), living)
         return encode_advance_request(
             AdvanceRequest(
                 run=self._terms.run,
@@ -279,6 +348,8 @@ class Advances:
         assert advance is not None
         if answer.snapshot:
             self._vault.write(shard, advance.step, answer.snapshot)
-        platform = self._fleet.dispatch.platform(agent)
+        platform = self._fleet.shards.platform(agent)
+        if self._past(shard).drifts_to(platform):
+            advance = self._past(shard).completed(advance)
         signed = Provenance(agent, platform, answer.wall_s)
         return Advanced(shard, asked.number, advance, rows, signed)

@@ -159,6 +159,12 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         help="what a run does when a robot's evaluation has ended its own process "
         "three times: it counts as failed either way (default: go-on)",
     )
+    flags.add_argument(
+        "--allow-drift",
+        action="store_true",
+        help="let an arena go on by a worker of another platform, after half a minute "
+        "without one of its own; this is recorded and makes it another run",
+    )
     flags.add_argument("--quiet", action="store_true", help="show no progress")
     flags.add_argument(
         "--fsync", action="store_true", help="survive power loss too; slower"

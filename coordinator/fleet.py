@@ -89,11 +89,16 @@ class Fleet:
         shards: who holds which arena; its numbers are this process's own.
     """
 
-    def __init__(self, agents: Agents) -> None:
-        """Share out agents; nobody has asked for anything yet."""
+    def __init__(self, agents: Agents, *, allows_drift: bool = False) -> None:
+        """Share out agents; nobody has asked for anything yet.
+
+        Args:
+            agents: what leads to them.
+            allows_drift: an arena may go on by another platform where its own is gone.
+        """
         self._numbers = count(1)
         self.dispatch = Dispatch()
-        self.shards = ShardDispatch(self._numbers)
+        self.shards = ShardDispatch(self._numbers, allows_drift=allows_drift)
         self._agents = agents
         self._shard_numbers = count()
         self._askers: dict[int, Asker] = {}

@@ -300,8 +300,9 @@ class Loop:
         """
         machine = self.islands.get(number)
         if isinstance(machine, Arena):
-            if isinstance(event, Advanced):
-                self.advances.take(event)
+            if isinstance(event, Advanced) and (drift := self.advances.take(event)):
+                _LOG.warning("%s", drift)
+                self._rows.write(drift.record)
             if not isinstance(event, Evaluated | EvaluationFailed):
                 return machine.handle(event)
         elif machine is not None and not isinstance(event, Advanced | Commanded):

@@ -126,7 +126,7 @@ class Display:
             for shard, platform in waiting.items():
                 self._console.print(
                     f"waiting: no worker of platform {platform} is there to go on "
-                    f"with {shard}; others would come to other results",
+                    f"with {shard}; others would come to other results (--allow-drift)",
                     soft_wrap=True,
                 )
 

@@ -72,6 +72,7 @@ class Deployment:
         view: a viewer is to be opened; the run does not wait for it.
         cpu_limit_s: CPU time of a job after which its process here is ended [s].
         caution: what to look out for.
+        allows_drift: an arena may go on by another platform where its own is gone.
     """
 
     workers: int
@@ -88,6 +89,7 @@ class Deployment:
     view: bool = False
     cpu_limit_s: float = CPU_LIMIT_S
     caution: Caution = CARELESS
+    allows_drift: bool = False
 
 
 def start(
@@ -223,7 +225,7 @@ def _conduct(
         is_campaign_run = len(planned) > 1
         conductor = Conductor(
             planned,
-            Fleet(agents),
+            Fleet(agents, allows_drift=deployment.allows_drift),
             open_run=lambda held, is_watched: ActiveRun(
                 held,
                 conductor.fleet,

@@ -3,7 +3,8 @@
 A shard's state lives in one worker, and its advances go there. If that worker is
 gone, errs or does not have the state after all, the advance goes, with all that is
 needed to rebuild the state, to another one of an equal platform: the one with the
-fewest shards, ties break on the name. Where none is there the shard waits.
+fewest shards, ties break on the name. Where none is there the shard waits; for ever,
+unless the user allows a drift: then one of another platform gets it after a while.
 """
 
 from collections.abc import Iterator
@@ -16,6 +17,8 @@ from schema.errors import UnexpectedEvent
 MAX_ERRORS = 3
 REST_S = 0.05
 LONGEST_REST_S = 3.2
+DRIFT_S = 30.0
+"""A shard waits so long for its own platform before it may drift to another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,18 +135,21 @@ class _Shard:
     lost: tuple[int, ...] = ()
     killed: dict[str, str] = field(default_factory=dict)
     rests_until_s: float | None = None
+    drifts_at_s: float | None = None
 
 
 class ShardDispatch:
     """The machine; ``handle`` is its only door."""
 
-    def __init__(self, numbers: Iterator[int]) -> None:
+    def __init__(self, numbers: Iterator[int], *, allows_drift: bool = False) -> None:
         """Know nobody.
 
         Args:
             numbers: of jobs, each used once.
+            allows_drift: a shard may go to another platform where its own is gone.
         """
         self._numbers = numbers
+        self._allows_drift = allows_drift
         self._shards: dict[int, _Shard] = {}
         self._workers: dict[str, Joined] = {}
         self._out: dict[int, int] = {}
@@ -152,8 +158,9 @@ class ShardDispatch:
     @property
     def wake_s(self) -> float | None:
         """When the next ``Ticked`` can change something [s]; None: no need."""
-        rests = [shard.rests_until_s for shard in self._shards.values()]
-        return min((until for until in rests if until is not None), default=None)
+        shards = self._shards.values()
+        wakes = [*(s.rests_until_s for s in shards), *(s.drifts_at_s for s in shards)]
+        return min((wake for wake in wakes if wake is not None), default=None)
 
     @property
     def waiting(self) -> dict[int, str]:
@@ -168,6 +175,11 @@ class ShardDispatch:
         """Return which worker holds a shard; empty if none does."""
         known = self._shards.get(shard)
         return known.holder if known else ""
+
+    def platform(self, agent: str) -> str:
+        """Return what a worker's machine is; empty once it has left."""
+        worker = self._workers.get(agent)
+        return worker.platform if worker else ""
 
     def has_out(self, number: int) -> bool:
         """Return whether a job of this number is out."""
@@ -239,6 +251,15 @@ class ShardDispatch:
         for shard in self._shards.values():
             if shard.rests_until_s is not None and shard.rests_until_s <= now_s:
                 shard.rests_until_s = None
+            self._wait(shard)
+
+    def _wait(self, shard: _Shard) -> None:
+        """Note since when a shard has been without a worker of its platform."""
+        is_alone = shard.is_wanted and bool(shard.platform) and not self._equal(shard)
+        if not (self._allows_drift and is_alone):
+            shard.drifts_at_s = None
+        elif shard.drifts_at_s is None:
+            shard.drifts_at_s = self._now_s + DRIFT_S
 
     def _came(self, event: Came) -> list[ShardCommand]:
         number = self._out.pop(event.number, None)
@@ -302,6 +323,7 @@ class ShardDispatch:
             if not shard.holder:
                 shard.holder = self._choice(shard)
             if shard.holder:
+                shard.drifts_at_s = None
                 shard.number = next(self._numbers)
                 shard.is_whole = not shard.has_state
                 self._out[shard.number] = number
@@ -309,6 +331,13 @@ class ShardDispatch:
 
     def _fit(self, shard: _Shard) -> list[str]:
         """Return the workers that may hold a shard, by name."""
+        fit = self._equal(shard)
+        if fit or shard.drifts_at_s is None or self._now_s < shard.drifts_at_s:
+            return fit
+        return sorted(self._workers)
+
+    def _equal(self, shard: _Shard) -> list[str]:
+        """Return the workers of a shard's platform, by name."""
         return [
             name
             for name, worker in sorted(self._workers.items())

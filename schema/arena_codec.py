@@ -8,9 +8,12 @@ from schema.arena_messages import (
     DIGEST_BYTES,
     advance_from_message,
     advance_to_message,
+    birth_from_message,
+    birth_to_message,
     changes_from_message,
     changes_to_message,
 )
+from schema.birth import BirthId
 from schema.codec import decoded
 from schema.errors import MalformedMessage
 from schema.messages import finite
@@ -32,10 +35,13 @@ class Rebuild:
     Attributes:
         snapshot: of the shard; empty for an arena in which nothing has happened.
         history: the advances since, oldest first.
+        living: who must be there at the end, if all this happened on another
+            platform: what comes of it here need not be the same.
     """
 
     snapshot: bytes
     history: tuple[PastAdvance, ...]
+    living: tuple[BirthId, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +137,9 @@ def encode_advance_request(request: AdvanceRequest, plugins: str = "") -> bytes:
                 until=past.until,
                 digest=past.digest,
             )
+        if request.rebuild.living is not None:
+            message.is_drift = True
+            message.living.extend(map(birth_to_message, request.rebuild.living))
     return message.SerializeToString(deterministic=True)
 
 
@@ -205,7 +214,12 @@ def _request(message: pb.AdvanceRequest) -> AdvanceRequest:
         raise MalformedMessage(
             f"until: must be >= from_step = {message.from_step}, got {message.until}"
         )
-    rebuild = Rebuild(message.snapshot, tuple(map(_past, message.history)))
+    living = tuple(map(birth_from_message, message.living))
+    rebuild = Rebuild(
+        message.snapshot,
+        tuple(map(_past, message.history)),
+        living if message.is_drift else None,
+    )
     if not message.is_rebuild and rebuild != Rebuild(b"", ()):
         raise MalformedMessage("advance: a state to rebuild, and no word to do so")
     return AdvanceRequest(

@@ -341,7 +341,7 @@ class PastAdvance(_message.Message):
     def __init__(self, changes: _Optional[_Union[Changes, _Mapping]] = ..., until: _Optional[int] = ..., digest: _Optional[bytes] = ...) -> None: ...
 
 class AdvanceRequest(_message.Message):
-    __slots__ = ("run", "epoch", "number", "settings", "shard", "from_step", "from_digest", "changes", "until", "wants_snapshot", "snapshot", "history", "is_rebuild", "plugins")
+    __slots__ = ("run", "epoch", "number", "settings", "shard", "from_step", "from_digest", "changes", "until", "wants_snapshot", "snapshot", "history", "is_rebuild", "plugins", "is_drift", "living")
     RUN_FIELD_NUMBER: _ClassVar[int]
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     NUMBER_FIELD_NUMBER: _ClassVar[int]
@@ -356,6 +356,8 @@ class AdvanceRequest(_message.Message):
     HISTORY_FIELD_NUMBER: _ClassVar[int]
     IS_REBUILD_FIELD_NUMBER: _ClassVar[int]
     PLUGINS_FIELD_NUMBER: _ClassVar[int]
+    IS_DRIFT_FIELD_NUMBER: _ClassVar[int]
+    LIVING_FIELD_NUMBER: _ClassVar[int]
     run: str
     epoch: int
     number: int
@@ -370,7 +372,9 @@ class AdvanceRequest(_message.Message):
     history: _containers.RepeatedCompositeFieldContainer[PastAdvance]
     is_rebuild: bool
     plugins: str
-    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., settings: _Optional[bytes] = ..., shard: _Optional[int] = ..., from_step: _Optional[int] = ..., from_digest: _Optional[bytes] = ..., changes: _Optional[_Union[Changes, _Mapping]] = ..., until: _Optional[int] = ..., wants_snapshot: _Optional[bool] = ..., snapshot: _Optional[bytes] = ..., history: _Optional[_Iterable[_Union[PastAdvance, _Mapping]]] = ..., is_rebuild: _Optional[bool] = ..., plugins: _Optional[str] = ...) -> None: ...
+    is_drift: bool
+    living: _containers.RepeatedCompositeFieldContainer[BirthName]
+    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., settings: _Optional[bytes] = ..., shard: _Optional[int] = ..., from_step: _Optional[int] = ..., from_digest: _Optional[bytes] = ..., changes: _Optional[_Union[Changes, _Mapping]] = ..., until: _Optional[int] = ..., wants_snapshot: _Optional[bool] = ..., snapshot: _Optional[bytes] = ..., history: _Optional[_Iterable[_Union[PastAdvance, _Mapping]]] = ..., is_rebuild: _Optional[bool] = ..., plugins: _Optional[str] = ..., is_drift: _Optional[bool] = ..., living: _Optional[_Iterable[_Union[BirthName, _Mapping]]] = ...) -> None: ...
 
 class AdvanceAnswer(_message.Message):
     __slots__ = ("epoch", "number", "wall_s", "advance", "needs_state", "snapshot")

@@ -240,6 +240,26 @@ AUDITS = _table(
 Which evaluations are audited is a flag, so nothing here repeats.
 """
 
+DRIFTS = _table(
+    "drifts",
+    *(
+        _column(name, kind, is_repeatable=False)
+        for name, kind in (
+            ("island", pa.int32()),
+            ("step", pa.int64()),
+            ("before", pa.string()),
+            ("after", pa.string()),
+            ("worker", pa.string()),
+        )
+    ),
+    is_repeatable=False,
+)
+"""One row per arena that a worker of another platform went on with.
+
+``step`` is the first that it reached; ``before`` and ``after`` are platforms. From
+there on the run is another one than on a single platform: this is allowed by a flag.
+"""
+
 _INSTANT = pa.timestamp("ms", tz="UTC")
 
 RUNS = _table(
@@ -271,6 +291,7 @@ TABLES: dict[str, pa.Schema] = {
     "touches": TOUCHES,
     "migrations": MIGRATIONS,
     "audits": AUDITS,
+    "drifts": DRIFTS,
     "runs": RUNS,
 }
 """Schemas by table name."""

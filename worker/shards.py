@@ -7,7 +7,7 @@ every step of that with what it was when it happened first.
 
 import time
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol, Self
@@ -17,10 +17,12 @@ from schema.arena_codec import (
     AdvanceAnswer,
     AdvanceRequest,
     Live,
+    PastAdvance,
     Rebuild,
     decode_advance_request,
     encode_advance_answer,
 )
+from schema.birth import BirthId
 from schema.errors import StateDiffers
 from schema.experiment import body_space
 from schema.robot import check_robot
@@ -46,6 +48,10 @@ class World(Protocol):
     @property
     def step(self) -> int:
         """Physics steps since it began."""
+
+    @property
+    def births(self) -> tuple[BirthId, ...]:
+        """The names of the living."""
 
     def apply(self, changes: Changes) -> None:
         """Remove, insert, replace."""
@@ -116,14 +122,16 @@ class Shards:
         settings = read_arena_settings(job.settings)
         _check_robots(job.changes, settings)
         # Out of our hands until it is whole again: whatever fails below leaves none.
-        held = self._taken(job)
+        held, changes = self._taken(job), job.changes
         if held is None and job.rebuild is not None:
             held = _Held(self._rebuilt(job, job.rebuild), job.settings, job.from_digest)
+            if job.rebuild.living is not None:
+                changes = _possible(changes, held.world)
         advance: Advance | None = None
         snapshot = b""
         if held is not None:
             with _closed_on_error(held.world) as world:
-                world.apply(job.changes)
+                world.apply(changes)
                 advance = world.advance(job.until)
                 snapshot = world.snapshot() if job.wants_snapshot else b""
             held.digest = advance.digest
@@ -164,16 +172,17 @@ class Shards:
         else:
             world = self._world(settings, self._threads)
         with _closed_on_error(world):
-            for past in rebuild.history:
-                world.apply(past.changes)
-                digest = world.advance(past.until).digest
-                _check_digest(world.step, digest, past.digest)
+            if rebuild.living is None:
+                _repeat(world, rebuild.history)
+            else:
+                _imitate(world, rebuild.history, rebuild.living)
             if world.step != job.from_step:
                 raise StateDiffers(
                     f"shard {job.shard}: rebuilt to step {world.step}, must be "
                     f"{job.from_step}"
                 )
-            if not rebuild.history and job.from_digest:
+            is_as_it_came = not rebuild.history and rebuild.living is None
+            if is_as_it_came and job.from_digest:
                 _check_digest(world.step, world.digest(), job.from_digest)
         return world
 
@@ -192,6 +201,41 @@ def _check_robots(changes: Changes, settings: ArenaSettings) -> None:
     space = body_space(settings.space)
     for insertion in changes.insertions:
         check_robot(insertion.robot, space)
+
+
+def _repeat(world: World, history: Sequence[PastAdvance]) -> None:
+    """Do all again, to the last bit.
+
+    Raises:
+        StateDiffers: at the first advance that comes to something else.
+    """
+    for past in history:
+        world.apply(past.changes)
+        digest = world.advance(past.until).digest
+        _check_digest(world.step, digest, past.digest)
+
+
+def _imitate(
+    world: World, history: Sequence[PastAdvance], living: Sequence[BirthId]
+) -> None:
+    """Do again what happened on another platform, as nearly as it goes here.
+
+    Who fell there and not here goes at the end; who fell here only stays away.
+    """
+    for past in history:
+        world.apply(_possible(past.changes, world))
+        world.advance(past.until)
+    world.apply(Changes(tuple(sorted(set(world.births) - set(living)))))
+
+
+def _possible(changes: Changes, world: World) -> Changes:
+    """Return changes without those of robots that are not there."""
+    there = {*world.births, *(each.birth for each in changes.insertions)}
+    return Changes(
+        tuple(birth for birth in changes.removals if birth in there),
+        changes.insertions,
+        tuple(change for change in changes.brains if change.birth in there),
+    )
 
 
 def _check_digest(step: int, digest: bytes, expected: bytes) -> None:

@@ -112,7 +112,11 @@ class Run:
         shards = other.pop("shards", None) or Shards(FakeWorld)
         agents = {"analyzer": analyzer.jobs.answer, "worker": shards.answer}
         self.arena = Arena(EXPERIMENT, DETAILS.seed, DETAILS.run)
-        self.fleet = Fleet(other.pop("agents", LocalAgents)(agents, "any"))
+        platform = other.pop("platform", "any")
+        self.fleet = Fleet(
+            other.pop("agents", LocalAgents)(agents, platform),
+            allows_drift=other.pop("allows_drift", False),
+        )
         self.loop = Loop(
             {0: self.arena},
             question=Question.of("resume", folder.epoch, EXPERIMENT),
@@ -336,3 +340,23 @@ def test_snapshot_that_went_missing_is_named(tmp_path: Path) -> None:
     assert again.read(0, 9) == b"nine"
     with pytest.raises(RunFolderError, match=r"island-0-5\.bin"):
         again.read(0, 5)
+
+
+def test_another_platform_goes_on_where_that_is_allowed(
+    tmp_path: Path, calm: Path
+) -> None:
+    """Recorded once, whatever comes then; nobody's end is forgotten."""
+    path = tmp_path / "run"
+    assert not run(path, Fuse(60))
+    other: dict[str, Any] = {"platform": "other", "allows_drift": True}
+    lives = 0
+    while not run(path, Fuse(100), shards=Shards(OddWorld), **other):
+        lives += 1
+    assert lives > 1
+    (drift,) = read_table(path, "drifts").drop_columns("record").to_pylist()
+    assert drift.pop("step") > 0
+    words = {"before": "any", "after": "other", "worker": "local-worker"}
+    assert drift == {"island": 0, **words}
+    births = read_table(path, "births")["birth"].to_pylist()
+    assert sorted(births) == list(range(EXPERIMENT.births))
+    assert "births" in {line.partition(":")[0] for line in compare(calm, path)}

@@ -6,6 +6,7 @@ import pytest
 
 from coordinator.events import Joined, Left, Ticked
 from coordinator.shards import (
+    DRIFT_S,
     MAX_ERRORS,
     Accept,
     Came,
@@ -164,3 +165,43 @@ def test_wanted_twice_is_our_own_fault() -> None:
     dispatch.handle(Wanted(0))
     with pytest.raises(UnexpectedEvent, match="wanted already"):
         dispatch.handle(Wanted(0))
+
+
+def drifting(*, allows_drift: bool) -> ShardDispatch:
+    """Return one whose shard was advanced on a platform that is gone."""
+    dispatch = ShardDispatch(count(1), allows_drift=allows_drift)
+    dispatch.handle(Placed(0, "theirs"))
+    dispatch.handle(joined("b", "ours"))
+    dispatch.handle(joined("a", "ours"))
+    assert dispatch.handle(Wanted(0)) == []
+    assert dispatch.handle(Ticked(100.0)) == []
+    assert dispatch.waiting == {0: "theirs"}
+    return dispatch
+
+
+def test_another_platform_gets_a_shard_after_a_while_if_that_is_allowed() -> None:
+    dispatch = drifting(allows_drift=True)
+    assert dispatch.wake_s == 100.0 + DRIFT_S
+    assert dispatch.handle(Ticked(99.9 + DRIFT_S)) == []
+    whole = Hand(1, 0, "a", is_whole=True)
+    assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == [whole]
+    dispatch.handle(Came(1, "done"))
+    # It is at home there now.
+    dispatch.handle(joined("c", "theirs"))
+    assert dispatch.handle(Wanted(0)) == [Hand(2, 0, "a", is_whole=False)]
+
+
+def test_its_own_platform_comes_back_in_time() -> None:
+    dispatch = drifting(allows_drift=True)
+    assert dispatch.handle(joined("z", "theirs")) == [Hand(1, 0, "z", is_whole=True)]
+    dispatch.handle(Left("z"))
+    # The while begins anew.
+    dispatch.handle(Ticked(110.0))
+    assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == []
+    assert len(dispatch.handle(Ticked(110.0 + DRIFT_S))) == 1
+
+
+def test_nothing_drifts_that_is_not_allowed_to() -> None:
+    dispatch = drifting(allows_drift=False)
+    assert dispatch.wake_s is None
+    assert dispatch.handle(Ticked(1e9)) == []

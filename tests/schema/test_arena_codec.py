@@ -87,7 +87,9 @@ def changes_of(data: DataObject, robots: SearchStrategy[Robot]) -> Changes:
 def test_request_round_trip(robots: SearchStrategy[Robot], data: DataObject) -> None:
     changes = changes_of(data, robots)
     past = st.builds(PastAdvance, st.just(changes), U64, DIGEST)
-    rebuild = st.builds(Rebuild, SNAPSHOT, st.lists(past, max_size=2).map(tuple))
+    living = st.none() | st.lists(BIRTHS, max_size=2).map(tuple)
+    pasts = st.lists(past, max_size=2).map(tuple)
+    rebuild = st.builds(Rebuild, SNAPSHOT, pasts, living)
     steps = sorted(data.draw(st.tuples(U64, U64)))
     request = AdvanceRequest(
         run=data.draw(st.text()),

@@ -36,6 +36,10 @@ class FakeWorld:
         world.born = {BirthId(*name): step for *name, step in born}
         return world
 
+    @property
+    def births(self) -> tuple[BirthId, ...]:
+        return tuple(sorted(self.born))
+
     def apply(self, changes: Changes) -> None:
         for birth in changes.removals:
             del self.born[birth]

@@ -1,5 +1,7 @@
 """What a worker does with shards, in a world without physics."""
 
+from dataclasses import replace
+
 import pytest
 
 from schema.arena import Advance, Changes, Insertion
@@ -216,3 +218,19 @@ def test_those_who_watch_see_each_advance() -> None:
 def test_other_bytes_are_refused() -> None:
     with pytest.raises(MalformedMessage):
         Shards(FakeWorld).answer(b"\xff\xff")
+
+
+def test_what_was_elsewhere_is_done_again_as_nearly_as_it_goes() -> None:
+    """Who fell only here is not asked for, who fell only there does not stay."""
+    asker = lived(Shards(FakeWorld))
+    fallen = Changes(removals=(BirthId(0, 9),), insertions=insertion(2).insertions)
+    asker.history.append(PastAdvance(fallen, 300, b"\0" * 32))
+    asker.step, asker.digest = 300, b"\1" * 32
+    with pytest.raises(KeyError):
+        asker.ask(Shards(FakeWorld), 10, None, asker.whole())
+    rebuild = replace(asker.whole(), living=(BirthId(0, 0), BirthId(0, 7)))
+    gone = Changes(removals=(BirthId(0, 7),))
+    advance = asker.ask(Shards(FakeWorld), 10, gone, rebuild).advance
+    assert advance is not None
+    told = {one.birth for one in advance.judgements}
+    assert told | {one.birth for one in advance.casualties} == {BirthId(0, 0)}
