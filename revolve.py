@@ -55,7 +55,7 @@ def main(arguments: list[str] | None = None) -> int:
         )
         return 2
     # Before NumPy is first imported: a robot's arithmetic must not depend on cores.
-    import_module("schema.crew").one_thread_each()
+    import_module("schema.crew").prepare_process()
     error_type = import_module("schema.errors").RevolveError
     try:
         room = import_module(COMMANDS[words[0]][0])

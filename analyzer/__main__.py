@@ -2,7 +2,7 @@
 
 import sys
 
-from schema.crew import one_thread_each
+from schema.crew import prepare_process
 
 
 def main(arguments: list[str]) -> int:
@@ -14,7 +14,7 @@ def main(arguments: list[str]) -> int:
     Returns:
         0 after Ctrl-C or SIGTERM; 130 after a second Ctrl-C.
     """
-    one_thread_each()  # before anything imports numpy
+    prepare_process()  # before anything imports numpy
     from analyzer.service import process
     from schema.agent_command import run_crew
 

@@ -36,12 +36,12 @@ from coordinator.folder import RunFolder
 from coordinator.folder_status import unbegun_status
 from coordinator.service import Network
 from schema.codec import decode_answer
-from schema.crew import Crew, one_thread_each
+from schema.crew import Crew, prepare_process
 from schema.experiment_file import read_experiment
 from schema.network import Agent
 from schema.topics import unique_name
 
-one_thread_each()  # as the command does, before anybody opens a session
+prepare_process()  # as the command does, before anybody opens a session
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
 

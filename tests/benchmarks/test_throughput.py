@@ -35,7 +35,7 @@ from coordinator.rows import evaluation_record
 from coordinator.service import Network
 from coordinator.snapshots import Snapshots
 from schema.birth import BirthId
-from schema.crew import Crew, one_thread_each
+from schema.crew import Crew, prepare_process
 from schema.experiment import Experiment, body_space
 from schema.experiment_file import experiment_text, read_experiment
 from schema.genome import develop
@@ -44,7 +44,7 @@ from schema.robot import Robot
 from schema.supervision import Post
 from schema.topics import unique_name
 
-one_thread_each()  # as the command does, before anybody opens a session
+prepare_process()  # as the command does, before anybody opens a session
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
 

@@ -1,5 +1,6 @@
 """What one process asks of the system for itself and for all that it starts."""
 
+import os
 import subprocess
 import sys
 
@@ -8,9 +9,9 @@ import pytest
 _ASK = "import os; print(os.sched_getscheduler(0) == os.SCHED_{policy})"
 _START = (
     "import subprocess, sys\n"
-    "from schema.crew import one_thread_each\n"
+    "from schema.crew import prepare_process\n"
     "{before}\n"
-    "one_thread_each()\n"
+    "prepare_process()\n"
     "{ask}\n"
     "subprocess.run([sys.executable, '-c', {ask!r}], check=True)\n"
 )
@@ -36,3 +37,42 @@ def test_nobody_who_wakes_up_interrupts_who_computes() -> None:
 def test_a_policy_of_the_user_s_own_stays() -> None:
     idle = "import os; os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))"
     assert _said("IDLE", idle) == ["True", "True"]
+
+
+_FORGET = """
+import ctypes, os
+libc = ctypes.CDLL(None)
+libc.malloc.restype = ctypes.c_void_p
+libc.malloc.argtypes = [ctypes.c_size_t]
+libc.free.argtypes = [ctypes.c_void_p]
+def resident():
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGESIZE")
+libc.free(libc.malloc(8 << 20))  # from such a block a C library may learn
+before = resident()
+large = []
+for _ in range(50):
+    large.append(libc.malloc(1 << 20))
+    ctypes.memset(large[-1], 1, 1 << 20)
+    libc.malloc(1 << 10)  # stays, and so would what lies below it
+for block in large:
+    libc.free(block)
+print((resident() - before) >> 20)
+"""
+
+
+def test_a_child_gives_back_what_it_leaves() -> None:
+    """Of 50 MiB of models whose robots died, with what lives on between them."""
+    start = (
+        "import subprocess, sys\n"
+        "from schema.crew import prepare_process\n"
+        "prepare_process()\n"
+        f"subprocess.run([sys.executable, '-c', {_FORGET!r}], check=True)\n"
+    )
+    bare = {k: v for k, v in os.environ.items() if not k.startswith("MALLOC_")}
+    left_mib = [
+        int(subprocess.check_output([sys.executable, "-c", text], env=bare))
+        for text in (_FORGET, start)
+    ]
+    assert left_mib[0] > 40
+    assert left_mib[1] < 5

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from schema.crew import one_thread_each
+from schema.crew import prepare_process
 
-one_thread_each()
+prepare_process()
 
 import analyzer.service  # noqa: E402, F401 - before the first fork
 import worker.service  # noqa: E402, F401

@@ -13,7 +13,7 @@ from queue import Empty, SimpleQueue
 import zenoh
 
 from schema import revolve_pb2 as pb
-from schema.crew import one_thread_each
+from schema.crew import prepare_process
 from schema.network import Agent, client_config
 from schema.platform_tag import platform_tag, wire_version
 from schema.topics import Member, unique_name
@@ -23,7 +23,7 @@ GONE_S = 0.3
 
 def main(address: str, behaviour: str) -> None:
     """Serve until SIGTERM."""
-    one_thread_each()
+    prepare_process()
     from worker.jobs import answer  # noqa: PLC0415 - numpy comes with it
 
     stop = threading.Event()
