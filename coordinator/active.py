@@ -70,7 +70,9 @@ class ActiveRun:
         details = held.details
         with ExitStack() as stack:
             stack.callback(held.close)
-            self._journal = stack.enter_context(Journal.open(held.path, fsync=fsync))
+            self._journal = stack.enter_context(
+                Journal.open(held.path, epoch=held.epoch, fsync=fsync)
+            )
             if self._journal.dropped:
                 tell_user(
                     f"{held.path}: journal: dropped a cut record of "

@@ -140,7 +140,7 @@ class Conductor:
                 run.finish()
                 self._conclude(run)
         except RevolveError as error:
-            self._fail(self._places[run], run.held.details, error)
+            self._fail(self._places[run], run.held.details, _cause(run, error))
             self._dismiss(run)
             return
         if run.loop.is_finished:
@@ -197,3 +197,16 @@ class Conductor:
             analyzers=self.fleet.dispatch.agents("analyzer"),
             births_per_s=self._tempo.per_s,
         )
+
+
+def _cause(run: ActiveRun, error: RevolveError) -> RevolveError:
+    """Return why a run cannot go on.
+
+    Where another coordinator took it over while this one slept, whatever went wrong
+    here is of no interest.
+    """
+    try:
+        run.held.confirm()
+    except RevolveError as taken_over:
+        return taken_over
+    return error

@@ -1,8 +1,12 @@
 """The journal: every answer that a run was given, in the order it acted on them.
 
-All else is a function of experiment, seed and journal. A record is its sequence
-number, its length, a CRC32 of all three, and an ``Entry`` message. A record that a
-kill cut short can only be the last; it is dropped, for nobody has acted on it.
+All else is a function of experiment, seed and journal. A record is its number, its
+length, a CRC32 of all three, and an ``Entry`` message. A record that a kill cut short
+can only be the last; it is dropped, for nobody has acted on it.
+
+A number is that of the coordinator's epoch and that of the record. One that slept
+between finding the run its own and writing may write after another has taken the run
+over. What it writes is void: the other went on from where it found the journal.
 """
 
 import struct
@@ -23,6 +27,8 @@ MAGIC = b"revolve journal 1\n"
 _HEAD = struct.Struct("<QI")
 _CHECK = struct.Struct("<I")
 _FRAME = _HEAD.size + _CHECK.size
+_RECORDS = 1 << 40
+"""Records of one epoch have numbers below this; epochs count in multiples of it."""
 
 
 class Journal:
@@ -32,11 +38,12 @@ class Journal:
         dropped: bytes of a cut tail that opening took away.
     """
 
-    def __init__(self, path: Path, *, fsync: bool = False) -> None:
+    def __init__(self, path: Path, *, epoch: int = 0, fsync: bool = False) -> None:
         """Open a journal, or begin one.
 
         Args:
             path: the file.
+            epoch: of the coordinator that is to write, not less than any before it.
             fsync: survive power loss, too, and not only the death of the process.
 
         Raises:
@@ -49,6 +56,7 @@ class Journal:
             raise RunFolderError(f"{path}: cannot be read: {error}") from None
         payloads, end = _intact(path, data)
         self._history = [_event(path, payload) for payload in payloads]
+        self._epoch = epoch
         self._sequence = len(payloads)
         self._file = AppendedFile(path, fsync=fsync)
         self.dropped = len(data) - end
@@ -58,9 +66,9 @@ class Journal:
             self._file.append(MAGIC)
 
     @classmethod
-    def open(cls, folder: Path, *, fsync: bool = False) -> Self:
+    def open(cls, folder: Path, *, epoch: int = 0, fsync: bool = False) -> Self:
         """Open the journal of a run folder."""
-        return cls(folder / NAME, fsync=fsync)
+        return cls(folder / NAME, epoch=epoch, fsync=fsync)
 
     def replay(self) -> list[Journalled]:
         """Return what it held when it was opened, oldest first; only once."""
@@ -76,7 +84,8 @@ class Journal:
         sequence = self._sequence
         frames = []
         for event in events:
-            frames.append(_frame(sequence, encode_entry(event)))
+            number = self._epoch * _RECORDS + sequence
+            frames.append(_frame(number, encode_entry(event)))
             sequence += 1
         self._file.append(b"".join(frames))
         self._sequence = sequence
@@ -97,17 +106,17 @@ class Journal:
         self.close()
 
 
-def _frame(sequence: int, payload: bytes) -> bytes:
-    head = _HEAD.pack(sequence, len(payload))
+def _frame(number: int, payload: bytes) -> bytes:
+    head = _HEAD.pack(number, len(payload))
     return head + _CHECK.pack(crc32(payload, crc32(head))) + payload
 
 
 def _record_at(data: bytes, start: int) -> tuple[int, int] | None:
-    """Return sequence number and end of the intact record at ``start``, if any."""
+    """Return number and end of the intact record at ``start``, if any."""
     begin = start + _FRAME
     if begin > len(data):
         return None
-    sequence, length = _HEAD.unpack_from(data, start)
+    number, length = _HEAD.unpack_from(data, start)
     end: int = begin + length
     if end > len(data):
         return None
@@ -115,11 +124,11 @@ def _record_at(data: bytes, start: int) -> tuple[int, int] | None:
     (check,) = _CHECK.unpack_from(data, start + _HEAD.size)
     if crc32(data[begin:end], crc32(head)) != check:
         return None
-    return sequence, end
+    return number, end
 
 
 def _intact(path: Path, data: bytes) -> tuple[list[bytes], int]:
-    """Return the payloads of all records, and where the last of them ends.
+    """Return the payloads of all that counts, and where the last record ends.
 
     Raises:
         RunFolderError: not a journal, or damage with intact records behind it.
@@ -129,14 +138,22 @@ def _intact(path: Path, data: bytes) -> tuple[list[bytes], int]:
             return [], 0
         raise RunFolderError(f"{path}: not a journal of this version of Revolve")
     payloads: list[bytes] = []
-    position = len(MAGIC)
-    while position < len(data):
-        found = _record_at(data, position)
-        if found is None or found[0] != len(payloads):
-            _refuse_gap(path, data, position, len(payloads))
+    position, newest = len(MAGIC), 0
+    while found := _record_at(data, position):
+        (epoch, sequence), end = divmod(found[0], _RECORDS), found[1]
+        if epoch > newest and sequence <= len(payloads):
+            # What was written after this one had read the journal is void.
+            newest = epoch
+            del payloads[sequence:]
+        if epoch == newest:
+            if sequence != len(payloads):
+                break
+            payloads.append(data[position + _FRAME : end])
+        elif epoch > newest:
             break
-        payloads.append(data[position + _FRAME : found[1]])
-        position = found[1]
+        position = end
+    if position < len(data):
+        _refuse_gap(path, data, position, len(payloads))
     return payloads, position
 
 
@@ -147,8 +164,8 @@ def _refuse_gap(path: Path, data: bytes, position: int, sequence: int) -> None:
         if found is not None:
             raise RunFolderError(
                 f"{path}: damaged at byte {position} (record {sequence}), and record "
-                f"{found[0]} stands intact at byte {start}: put a sound copy of the "
-                "file in its place, or give up what follows the damage "
+                f"{found[0] % _RECORDS} stands intact at byte {start}: put a sound "
+                "copy of the file in its place, or give up what follows the damage "
                 f"('truncate -s {position} {path}') and resume; what is lost is "
                 "computed anew"
             )

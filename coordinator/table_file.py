@@ -172,9 +172,9 @@ def cut_chain(folder: Path, table: str, rows: int) -> None:
     try:
         for _, path in segments_of(folder, table):
             size = 0
-            for end, count in batch_ends(path, TABLES[table]):
-                if seen < rows:
-                    size, seen = end, seen + count
+            for end, numbers in batch_ends(path, TABLES[table]):
+                if numbers.start < rows:
+                    size, seen = end, max(seen, numbers.stop)
             if size:
                 os.truncate(path, size)
             else:

@@ -58,14 +58,20 @@ def read_segment(path: Path, schema: pa.Schema) -> list[pa.RecordBatch]:
     return [batch for _, batch in _batches(path, schema)]
 
 
-def batch_ends(path: Path, schema: pa.Schema) -> list[tuple[int, int]]:
-    """Return where each complete batch of a segment ends, and its number of rows.
+def batch_ends(path: Path, schema: pa.Schema) -> list[tuple[int, range]]:
+    """Return where each complete batch of a segment ends, and its rows' numbers.
 
     Raises:
         RunFolderError: the segment is of another version of its table, or the disk
             fails.
     """
-    return [(end, batch.num_rows) for end, batch in _batches(path, schema)]
+    return [(end, _numbers(batch)) for end, batch in _batches(path, schema)]
+
+
+def _numbers(batch: pa.RecordBatch) -> range:
+    """Return the numbers of a batch's rows; they ascend one by one."""
+    first = batch["record"][0].as_py() if batch.num_rows else 0
+    return range(first, first + batch.num_rows)
 
 
 def _batches(path: Path, schema: pa.Schema) -> Iterator[tuple[int, pa.RecordBatch]]:
@@ -153,15 +159,21 @@ def stored_rows(folder: Path, table: str) -> tuple[int, list[tuple[int, Path]]]:
 
 
 def _chain(folder: Path, table: str) -> Iterator[tuple[int, pa.RecordBatch | None]]:
-    """Yield index of the segment and batch; no batch where there is a gap."""
+    """Yield index of the segment and batch; no batch where there is a gap.
+
+    Rows that stand there twice come once: a coordinator that was frozen while another
+    took the run over may end what it was writing. Both are the journal's, so equal.
+    """
     rows = 0
     for index, (_, path) in enumerate(segments_of(folder, table)):
         for _, batch in _batches(path, TABLES[table]):
-            if batch.num_rows and batch["record"][0].as_py() != rows:
+            numbers = _numbers(batch)
+            if numbers.start > rows:
                 yield index, None
                 return
-            rows += batch.num_rows
-            yield index, batch
+            if new := max(0, numbers.stop - rows):
+                rows += new
+                yield index, batch.slice(batch.num_rows - new)
 
 
 def read_table(folder: Path, table: str) -> pa.Table:

@@ -16,7 +16,7 @@ from coordinator.compare import compare
 from coordinator.conductor import SLACK, Conductor, Planned
 from coordinator.events import DispatchEvent, Joined
 from coordinator.fleet import Agents, Fleet
-from coordinator.folder import RunDetails, RunFolder, read_state
+from coordinator.folder import LOCK, RunDetails, RunFolder, read_state
 from coordinator.folder_status import folder_status, unbegun_status
 from coordinator.local import LocalAgents
 from schema.errors import RevolveError, RunFolderError
@@ -109,6 +109,25 @@ def test_stopped_runs_go_on_and_finished_ones_are_not_begun(
         assert compare(path, tmp_path / path.name) == []
     finished = [replaced(each) for each in plan(tmp_path)]
     assert conductor_of(finished, local()).is_finished
+
+
+def test_whatever_fails_in_a_run_that_another_took_over_is_that(tmp_path: Path) -> None:
+    """It slept just after it had found the run its own."""
+    conductor = conductor_of(plan(tmp_path)[:1], local())
+    conduct(conductor, 30)
+    (run,) = conductor.active
+    (run.held.path / LOCK).unlink()
+    conduct(conductor_of(plan(tmp_path)[:1], local()))
+    with pytest.raises(RunFolderError):
+        run.do_chores()
+    conductor.guard(run, broken)
+    ((_, error),) = conductor.failed
+    assert "coordinator 2 has taken it over: stop" in str(error)
+    assert conductor.active == []
+
+
+def broken() -> None:
+    raise RunFolderError("finished with 15 rows, and more came")
 
 
 def replaced(planned: Planned) -> Planned:

@@ -174,6 +174,37 @@ def test_a_record_that_stands_twice_is_damage(tmp_path: Path) -> None:
         Journal.open(tmp_path)
 
 
+def test_what_one_writes_that_was_replaced_is_void(tmp_path: Path) -> None:
+    """It slept before it wrote; the other went on from what it had found."""
+    with Journal.open(tmp_path, epoch=1) as old:
+        old.append(EVENTS[:2])
+        with Journal.open(tmp_path, epoch=2) as new:
+            assert new.replay() == EVENTS[:2]
+            old.append(EVENTS[2:3])
+            new.append(EVENTS[3:5])
+            old.append(EVENTS[5:6])
+            new.append(EVENTS[6:7])
+            old.append(EVENTS[7:8])
+    kept = [*EVENTS[:2], *EVENTS[3:5], EVENTS[6]]
+    with Journal.open(tmp_path, epoch=3) as third:
+        assert third.replay() == kept
+        assert third.dropped == 0
+        third.append(EVENTS[8:9])
+    with Journal.open(tmp_path) as journal:
+        assert journal.replay() == [*kept, EVENTS[8]]
+
+
+def test_a_later_epoch_that_begins_too_late_is_damage(tmp_path: Path) -> None:
+    sizes = written(tmp_path)
+    path = tmp_path / NAME
+    with Journal.open(tmp_path, epoch=2) as journal:
+        journal.append(EVENTS[:1])
+    data = path.read_bytes()
+    path.write_bytes(data[: sizes[3]] + data[sizes[-1] :])
+    with pytest.raises(RunFolderError, match=f"damaged at byte {sizes[3]}"):
+        Journal.open(tmp_path)
+
+
 def test_a_full_disk_takes_a_whole_batch_or_nothing(
     tmp_path: Path, full_beyond: FullBeyond
 ) -> None:

@@ -75,6 +75,32 @@ def test_many_incarnations_write_what_one_does(
     check_complete(tmp_path, rows)
 
 
+@pytest.mark.parametrize("begun", [0, 10])
+def test_rows_of_one_that_was_replaced_count_once(
+    tmp_path: Path,
+    make_records: Make,
+    feed_rows: Feed,
+    check_complete: Check,
+    begun: int,
+) -> None:
+    """It slept with rows at hand, in a segment or before its first, and wakes up."""
+    rows = make_records(30)
+    old = feed_rows(tmp_path, rows[:begun])
+    for record in rows[begun:25]:
+        old.write(record)
+    new = feed_rows(tmp_path, rows[:40])
+    old.flush()
+    for record in rows[40:60]:
+        new.write(record)
+    new.flush()
+    old.close()
+    check_complete(tmp_path, rows[:60])
+    new.close()
+    third = feed_rows(tmp_path, rows)
+    third.finish()
+    check_complete(tmp_path, rows)
+
+
 def test_a_segment_cut_at_any_byte_gives_exactly_its_whole_batches(
     tmp_path: Path, make_records: Make
 ) -> None:
