@@ -22,6 +22,7 @@ from analysis.report import Drawn
 from schema.birth import BirthId
 from schema.errors import RevolveError
 from schema.experiment_file import experiment_from_text
+from schema.identity import Origin
 from schema.run_tables import read_table
 
 _TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
@@ -151,6 +152,7 @@ def _portrait(best: Best, runs: Mapping[Path, Run], simulate: Simulate) -> Portr
         experiment_from_text(run.document),
         simulate,
         FOUNDERS,
+        origin=Origin(seed=run.seed, run=run.number),
         has_family=best.experiment not in _BASELINES,
     )
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from schema.errors import RunFolderError
 from schema.evaluation import Floats
 from schema.experiment import Experiment, body_space, island_experiment
 from schema.genome import develop
+from schema.identity import Identity, Origin
 from schema.robot import Robot
 
 FRAMES = 6
@@ -64,6 +66,7 @@ def portrait(
     simulate: Simulate,
     colours: tuple[Colour, ...],
     *,
+    origin: Origin,
     has_family: bool,
 ) -> Portrait:
     """Return pictures of a robot, of how it moves, and of its family.
@@ -75,6 +78,7 @@ def portrait(
         simulate: the worker's.
         colours: of founders, those with the most parts first; the last is of all
             others.
+        origin: the run, as what noise was drawn by.
         has_family: whether its family is pictured, too.
 
     Raises:
@@ -107,7 +111,9 @@ def portrait(
     for who in sorted(set(people)) if has_family else ():
         with _studio(painted(who), settings, _SMALL) as studio:
             pictures[who] = _cut(studio.picture(), _CLOSE)
-    gait, times = _gait(painted(row), settings, simulate)
+    island = best.birth_island
+    own = Identity(replace(origin, island=island), BirthId(island, best.birth), 0)
+    gait, times = _gait(painted(row), settings, partial(simulate, identity=own))
     return Portrait(
         best,
         gait,

@@ -19,6 +19,7 @@ from schema.evaluation import Floats, Track
 from schema.experiment import Simulation, Space, body_space
 from schema.experiment_file import read_experiment
 from schema.flags import Flags, whole_number
+from schema.identity import NOBODY, Identity
 from schema.robot import Robot
 from schema.robot_file import read_robot, settings_of
 
@@ -35,6 +36,7 @@ class Simulate(Protocol):
         space: Space,
         simulation: Simulation,
         *,
+        identity: Identity = NOBODY,
         watch: Callable[[Any], None],
     ) -> Track:
         """Return its track; ``watch`` is shown the engine's state at each tick."""

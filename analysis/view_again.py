@@ -10,15 +10,18 @@ from typing import Protocol
 
 import pyarrow as pa
 import pyarrow.compute as pc
+from msgspec.structs import replace
 
 from analysis.view_motion import Motion, name_of
 from analysis.view_recording import ViewerError
+from analysis.view_replay import read_origin
 from schema.arena_codec import Rebuild
 from schema.birth import BirthId
 from schema.codec import decode_genome
 from schema.evaluation import Evaluation
 from schema.experiment import Experiment, body_space, island_experiment
 from schema.genome import develop
+from schema.identity import Identity
 from schema.platform_tag import platform_tag
 from schema.robot import Robot
 from schema.run_tables import read_table
@@ -58,12 +61,13 @@ class Simulators:
     """What does it again.
 
     Attributes:
-        alone: a robot, its settings and name to its evaluation and poses.
+        alone: a robot, its settings and which evaluation it is to that evaluation
+            and poses.
         history: run folder, island and time to settings and past of its arena.
         together: settings, past and robots to scenes.
     """
 
-    alone: Callable[[Robot, EvaluationSettings, BirthId], tuple[Evaluation, pa.Table]]
+    alone: Callable[[Robot, EvaluationSettings, Identity], tuple[Evaluation, pa.Table]]
     history: Callable[[Path, int, float], tuple[bytes, Rebuild]]
     together: Callable[[bytes, Rebuild, frozenset[BirthId]], Iterator[Scene]]
 
@@ -116,7 +120,9 @@ def _alone(
         settings = lasting(settings, steps)
     genome = _rows_of(folder, "births", birth)["genome"][0].as_py()
     robot = develop(decode_genome(genome), body_space(own.space))
-    evaluation, poses = simulators.alone(robot, settings, birth)
+    origin = replace(read_origin(folder), island=birth.island)
+    identity = Identity(origin, birth, recorded["trial"])
+    evaluation, poses = simulators.alone(robot, settings, identity)
     differing = [
         f"{name} {recorded[name]}, now {getattr(evaluation, name)}"
         for name in _COMPARED

@@ -13,6 +13,7 @@ import pyarrow.compute as pc
 from schema.errors import RunFolderError
 from schema.experiment import Experiment
 from schema.experiment_file import experiment_from_text
+from schema.identity import Origin
 from schema.live import News, departed, levels, migrant, newborn
 from schema.run_tables import FINISHED, campaign, read_table
 
@@ -70,6 +71,16 @@ def read_experiment(folder: Path) -> Experiment:
     return experiment_from_text(_details(folder)["document"])
 
 
+def read_origin(folder: Path) -> Origin:
+    """Return what the noise of a run was drawn by, on its island 0.
+
+    Raises:
+        RunFolderError: no run is there.
+    """
+    details = _details(folder)
+    return Origin(seed=details["seed"], run=details["run"])
+
+
 def last_time(folder: Path) -> float:
     """Return the newest simulated time of a run that its tables know of [s]."""
     times = [
@@ -110,7 +121,8 @@ def _details(folder: Path) -> dict[str, Any]:
     """
     try:
         details: dict[str, Any] = json.loads((folder / _DETAILS).read_text("utf-8"))
-        return {"name": str(details["name"]), "document": str(details["document"])}
+        texts = {key: str(details[key]) for key in ("name", "document")}
+        return {**texts, **{key: int(details[key]) for key in ("seed", "run")}}
     except OSError as error:
         why = f"{_DETAILS}: {error.strerror}"
     except (ValueError, KeyError, TypeError) as error:

@@ -86,7 +86,7 @@ class ActiveRun:
             rows = Overheard(self._recorder, self.feed) if self.feed else self._recorder
             self.loop = Loop(
                 archipelago(self.experiment, details.seed, details.run),
-                question=Question.of(run, held.epoch, self.experiment),
+                question=Question.of(run, held.epoch, self.experiment, details.origin),
                 fleet=fleet,
                 log=self._journal,
                 rows=rows,

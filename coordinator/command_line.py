@@ -82,7 +82,7 @@ def _add_science(flags: argparse.ArgumentParser) -> None:
         metavar="experiment",
         help=f"a .toml file, or one of {names}; several are a campaign",
     )
-    flags.add_argument("--seed", type=whole_number(0), default=0, help="default: 0")
+    flags.add_argument("--seed", type=_seed, default=0, help="default: 0")
     flags.add_argument(
         "--repeats",
         type=whole_number(),
@@ -169,3 +169,11 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     flags.add_argument(
         "--fsync", action="store_true", help="survive power loss too; slower"
     )
+
+
+def _seed(text: str) -> int:
+    """Return a seed that messages and tables have room for."""
+    value = whole_number(0)(text)
+    if value >> 64:
+        raise argparse.ArgumentTypeError(f"must be < 2^64, got {text!r}")
+    return value

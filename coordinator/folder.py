@@ -17,6 +17,7 @@ from typing import Literal, Self
 
 from coordinator.disk import replace_durably, storage_error
 from schema.errors import RunFolderError
+from schema.identity import Origin
 
 State = Literal["running", "stopped", "finished"]
 STATES: tuple[State, ...] = ("running", "stopped", "finished")
@@ -42,6 +43,11 @@ class RunDetails:
     run: int
     seed: int
     document: str
+
+    @property
+    def origin(self) -> Origin:
+        """The run, as what noise is drawn by; of its island 0."""
+        return Origin(seed=self.seed, run=self.run)
 
 
 class RunFolder:

@@ -37,7 +37,7 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
     """
     details = read_details(folder)
     experiment = experiment_from_text(details.document)
-    question = Question.of(str(folder), 0, experiment)
+    question = Question.of(str(folder), 0, experiment, details.origin)
     if island not in question.arena:
         raise RunFolderError(f"{folder}: island {island} has no arena")
     vault = _Vault(Snapshots(folder), steps_of(from_s, experiment.simulation))

@@ -1,8 +1,11 @@
 """Single robots' questions, to analyzers and workers, and what comes of them."""
 
+import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Self
+
+from msgspec import structs
 
 from coordinator.audits import Audits
 from coordinator.events import (
@@ -26,6 +29,7 @@ from schema.codec import Answer, decode_answer, encode_request, encode_robot
 from schema.errors import JobRefused, MalformedMessage
 from schema.evaluation import Evaluation, Provenance, Report
 from schema.experiment import Experiment, island_count, island_experiment
+from schema.identity import NOBODY, Identity, Origin
 from schema.plugin_source import plugins_of
 from schema.robot import Robot
 from schema.settings import arena_settings, evaluation_settings, vetting_settings
@@ -42,18 +46,20 @@ class Question:
 
     Attributes:
         run, epoch: of the coordinator.
+        origin: the run, as what noise is drawn by; the island is each request's.
         vetting: settings for analyzers, as JSON.
         evaluation, arena: settings for workers, as JSON, by island.
     """
 
     run: str
     epoch: int
+    origin: Origin
     vetting: bytes
     evaluation: Mapping[int, bytes]
     arena: Mapping[int, bytes] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, run: str, epoch: int, experiment: Experiment) -> Self:
+    def of(cls, run: str, epoch: int, experiment: Experiment, origin: Origin) -> Self:
         """Return what a run of an experiment asks with."""
         owns = {
             number: island_experiment(experiment, number)
@@ -62,9 +68,14 @@ class Question:
         return cls(
             run,
             epoch,
+            origin,
             vetting_settings(experiment),
             {number: evaluation_settings(own) for number, own in owns.items()},
-            {number: arena_settings(own) for number, own in owns.items() if own.arena},
+            {
+                number: arena_settings(own, structs.replace(origin, island=number))
+                for number, own in owns.items()
+                if own.arena
+            },
         )
 
 
@@ -108,9 +119,13 @@ class Questions:
                 # The eldest: no robot of an arena is ever evaluated.
                 del self._encoded[next(iter(self._encoded))]
             attempt, steps, settings = command.attempt, 0, asks.vetting
+            identity = NOBODY
         else:
             attempt, steps = command.trial, command.steps
-            settings = asks.evaluation[asker_of(command)]
+            asker = asker_of(command)
+            settings = asks.evaluation[asker]
+            origin = structs.replace(asks.origin, island=asker)
+            identity = Identity(origin, birth, attempt)
             self._encoded.pop(birth, None)
         kind: JobKind = "vet" if isinstance(command, Vet) else "evaluate"
         for number, twin in self._numbers(command):
@@ -121,6 +136,7 @@ class Questions:
                 settings=settings,
                 robot=robot,
                 steps=steps,
+                identity=identity,
                 plugins=plugins_of(settings),
             )
             self._open[number] = command
@@ -193,7 +209,7 @@ class Questions:
     def _dropped(self, event: Returned, reason: str) -> Returned:
         """Count an answer of no use and return it as the agent's error."""
         self.malformed += 1
-        return replace(event, outcome="error", answer=b"", reason=reason)
+        return dataclasses.replace(event, outcome="error", answer=b"", reason=reason)
 
     def _answered(self, command: Deliver, asker: int | None) -> Answered:
         """Return the island's event that a finished job comes to."""

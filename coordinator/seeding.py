@@ -15,7 +15,7 @@ class Purpose(IntEnum):
     """What a stream is for; the numbers are part of what a seed means.
 
     Of migration, the birth that names a stream is (island, epoch), of a place of
-    arrival (island, how many arrived before).
+    arrival (island, how many arrived before). 11 is the workers' (``worker.noise``).
     """
 
     GENERATE = 1

@@ -1,7 +1,8 @@
 """Evaluations that last a time of their own, and the living who are judged anew.
 
 Physics repeats: a robot that is judged anew does otherwise only where its evaluation
-lasts another time. How long is drawn for each trial of each robot by its name.
+lasts another time, or where there is noise. How long is drawn for each trial of each
+robot by its name.
 Source: Hupkes 2016, section 8.2, on what may lie between his scenarios 2 and 3.
 """
 

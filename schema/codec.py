@@ -15,10 +15,13 @@ from schema import revolve_pb2 as pb
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.evaluation import Evaluation, Report
 from schema.genome import Genome
+from schema.identity import NOBODY, Identity
 from schema.messages import (
     finite,
     genome_from_message,
     genome_to_message,
+    identity_from_message,
+    identity_to_message,
     robot_from_message,
     robot_to_message,
 )
@@ -40,6 +43,7 @@ class Request:
         settings: JSON of ``VettingSettings`` or ``EvaluationSettings``.
         robot: the robot in question.
         steps: of physics to simulate; 0: as the settings say.
+        identity: which evaluation it is; nobody's for an analyzer.
     """
 
     run: str
@@ -48,6 +52,7 @@ class Request:
     settings: bytes
     robot: Robot
     steps: int = 0
+    identity: Identity = NOBODY
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +111,7 @@ def encode_request(
     settings: bytes,
     robot: bytes,
     steps: int = 0,
+    identity: Identity = NOBODY,
     plugins: str = "",
 ) -> bytes:
     """Return the bytes of a request; ``robot`` is already encoded.
@@ -121,6 +127,8 @@ def encode_request(
         steps=steps,
         plugins=plugins,
     )
+    if identity is not NOBODY:
+        message.identity.CopyFrom(identity_to_message(identity))
     return message.SerializeToString(deterministic=True)
 
 
@@ -246,6 +254,7 @@ def _request_from_message(message: pb.Request) -> Request:
         settings=message.settings,
         robot=decode_robot(message.robot),
         steps=message.steps,
+        identity=identity_from_message(message.identity),
     )
 
 

@@ -133,6 +133,10 @@ class Vetting(Section, frozen=True):
     tolerance_m: NotNegative = 1e-6
 
 
+NoiseLevel = Annotated[float, Meta(ge=0, le=1e6)]
+"""A standard deviation; no robot's arithmetic overflows within these bounds."""
+
+
 class Simulation(Section, frozen=True):
     """The simulated world and its clocks, in physics steps.
 
@@ -143,6 +147,12 @@ class Simulation(Section, frozen=True):
 
     Off-line, ``evaluation_s`` [s] has every evaluation last a time of its own, drawn
     uniformly between the two, warm-up included; the window is its last part.
+
+    ``sensor_noise`` and ``actuator_noise`` are standard deviations of what is drawn
+    anew, from a normal distribution, at every tick of the brain: for each reading,
+    in the reading's own unit (m/s2 and rad/s of an imu, touch and light from 0 to
+    1), and for each output before it is clipped to [0, 1], the range of its joint.
+    The network's own memory is not touched. At 0 nothing is drawn.
     """
 
     timestep_s: Positive = 0.005
@@ -159,6 +169,8 @@ class Simulation(Section, frozen=True):
     contact_time_s: Positive = 0.01
     drop_m: NotNegative = 0.0
     evaluation_s: tuple[Positive, Positive] | None = None
+    sensor_noise: NoiseLevel = 0.0
+    actuator_noise: NoiseLevel = 0.0
 
 
 class Fitness(Section, frozen=True):

@@ -6,9 +6,11 @@
 import math
 
 from schema import revolve_pb2 as pb
+from schema.birth import BirthId
 from schema.brain import NEURON_TYPES, Brain, Connection, Layer, Neuron, check_brain
 from schema.errors import MalformedMessage
 from schema.genome import ConnectionGene, Genome, NeuronGene, Node, walk
+from schema.identity import Identity, Origin
 from schema.robot import Part, Robot, check_tree
 
 _LAYER_CODES: dict[Layer, pb.Layer] = {
@@ -140,6 +142,27 @@ def genome_from_message(message: pb.Genome) -> Genome:
             return node
         children[part.parent].append((part.parent_slot, node))
     raise MalformedMessage("genome: needs at least one node")
+
+
+def identity_to_message(identity: Identity) -> pb.Identity:
+    """Return which evaluation it is as a message."""
+    origin, birth = identity.origin, identity.birth
+    return pb.Identity(
+        seed=origin.seed,
+        run=origin.run,
+        island=origin.island,
+        birth=pb.BirthName(island=birth.island, number=birth.number),
+        trial=identity.trial,
+    )
+
+
+def identity_from_message(message: pb.Identity) -> Identity:
+    """Return which evaluation a message speaks of; unsaid, that of nobody."""
+    return Identity(
+        Origin(seed=message.seed, run=message.run, island=message.island),
+        BirthId(message.birth.island, message.birth.number),
+        message.trial,
+    )
 
 
 def _write_part(

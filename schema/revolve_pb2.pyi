@@ -110,8 +110,22 @@ class Genome(_message.Message):
     nodes: _containers.RepeatedCompositeFieldContainer[Node]
     def __init__(self, nodes: _Optional[_Iterable[_Union[Node, _Mapping]]] = ...) -> None: ...
 
+class Identity(_message.Message):
+    __slots__ = ("seed", "run", "island", "birth", "trial")
+    SEED_FIELD_NUMBER: _ClassVar[int]
+    RUN_FIELD_NUMBER: _ClassVar[int]
+    ISLAND_FIELD_NUMBER: _ClassVar[int]
+    BIRTH_FIELD_NUMBER: _ClassVar[int]
+    TRIAL_FIELD_NUMBER: _ClassVar[int]
+    seed: int
+    run: int
+    island: int
+    birth: BirthName
+    trial: int
+    def __init__(self, seed: _Optional[int] = ..., run: _Optional[int] = ..., island: _Optional[int] = ..., birth: _Optional[_Union[BirthName, _Mapping]] = ..., trial: _Optional[int] = ...) -> None: ...
+
 class Request(_message.Message):
-    __slots__ = ("run", "epoch", "number", "settings", "robot", "steps", "plugins")
+    __slots__ = ("run", "epoch", "number", "settings", "robot", "steps", "plugins", "identity")
     RUN_FIELD_NUMBER: _ClassVar[int]
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     NUMBER_FIELD_NUMBER: _ClassVar[int]
@@ -119,6 +133,7 @@ class Request(_message.Message):
     ROBOT_FIELD_NUMBER: _ClassVar[int]
     STEPS_FIELD_NUMBER: _ClassVar[int]
     PLUGINS_FIELD_NUMBER: _ClassVar[int]
+    IDENTITY_FIELD_NUMBER: _ClassVar[int]
     run: str
     epoch: int
     number: int
@@ -126,7 +141,8 @@ class Request(_message.Message):
     robot: bytes
     steps: int
     plugins: str
-    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., settings: _Optional[bytes] = ..., robot: _Optional[bytes] = ..., steps: _Optional[int] = ..., plugins: _Optional[str] = ...) -> None: ...
+    identity: Identity
+    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., settings: _Optional[bytes] = ..., robot: _Optional[bytes] = ..., steps: _Optional[int] = ..., plugins: _Optional[str] = ..., identity: _Optional[_Union[Identity, _Mapping]] = ...) -> None: ...
 
 class Vector(_message.Message):
     __slots__ = ("x", "y", "z")

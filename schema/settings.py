@@ -8,6 +8,7 @@ import msgspec
 
 from schema.errors import ExperimentError
 from schema.experiment import Arena, Experiment, Fitness, Simulation, Space, Vetting
+from schema.identity import Origin
 from schema.plugin import load
 from schema.section import Section
 
@@ -36,6 +37,7 @@ class ArenaSettings(Section, frozen=True):
     simulation: Simulation
     fitness: Fitness
     arena: Arena
+    origin: Origin = Origin()
 
 
 def vetting_settings(experiment: Experiment) -> bytes:
@@ -56,8 +58,12 @@ def evaluation_settings(experiment: Experiment) -> bytes:
     )
 
 
-def arena_settings(experiment: Experiment) -> bytes:
+def arena_settings(experiment: Experiment, origin: Origin) -> bytes:
     """Return the JSON that goes with every request about the experiment's arena.
+
+    Args:
+        experiment: the island's.
+        origin: the run and the island.
 
     Raises:
         ExperimentError: an off-line experiment.
@@ -66,6 +72,7 @@ def arena_settings(experiment: Experiment) -> bytes:
         raise ExperimentError(f"{experiment.name}: has no arena")
     return msgspec.json.encode(
         ArenaSettings(
+            origin=origin,
             space=experiment.space,
             simulation=experiment.simulation,
             fitness=experiment.fitness,

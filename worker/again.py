@@ -14,6 +14,7 @@ import pyarrow as pa
 from schema.arena_codec import Rebuild
 from schema.birth import BirthId
 from schema.evaluation import Evaluation
+from schema.identity import Identity
 from schema.robot import Robot
 from schema.settings import EvaluationSettings, read_arena_settings
 from schema.tables import POSES, read_columns
@@ -39,14 +40,14 @@ class Scene:
 
 
 def alone(
-    robot: Robot, settings: EvaluationSettings, birth: BirthId
+    robot: Robot, settings: EvaluationSettings, identity: Identity
 ) -> tuple[Evaluation, pa.Table]:
     """Return a robot's evaluation, and its poses at every tick of its brain.
 
     Args:
         robot: a checked robot.
         settings: as for ``evaluate``.
-        birth: its name, for the rows.
+        identity: which evaluation it is; the rows have its birth.
 
     Returns:
         The evaluation; rows of the poses table, without ``record``.
@@ -61,8 +62,10 @@ def alone(
         positions.append(data.qpos.copy())
         times.append(float(data.time))
 
-    simulate(robot, settings.space, settings.simulation, watch=watch)
-    return evaluate(robot, settings), _rows(birth, times, np.array(positions))
+    space, simulation = settings.space, settings.simulation
+    simulate(robot, space, simulation, identity=identity, watch=watch)
+    rows = _rows(identity.birth, times, np.array(positions))
+    return evaluate(robot, settings, identity), rows
 
 
 def together(

@@ -14,21 +14,26 @@ import numpy as np
 from schema.errors import FitnessUndefined, SimulationDiverged
 from schema.evaluation import Evaluation, Track
 from schema.experiment import Fitness, Simulation, Space, body_space
+from schema.identity import NOBODY, Identity
 from schema.mjcf import solo_model
 from schema.robot import Robot
 from schema.settings import EvaluationSettings, fitness_function
 from worker.controller import pack, widths
 from worker.fitness import FitnessFunction, path_velocity, straight_velocity
+from worker.noise import Noise, Source
 from worker.sensors import Senses, Servos
 from worker.solo import Solo
 
 
-def evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
+def evaluate(
+    robot: Robot, settings: EvaluationSettings, identity: Identity = NOBODY
+) -> Evaluation:
     """Return how a robot does: a pure function of the arguments.
 
     Args:
         robot: a robot that passes ``check_robot`` in the settings' body space.
         settings: the world, its clocks and what is maximised.
+        identity: which evaluation it is; nothing but noise depends on it.
 
     Raises:
         SimulationDiverged: the physics did; reason and simulated time.
@@ -37,7 +42,7 @@ def evaluate(robot: Robot, settings: EvaluationSettings) -> Evaluation:
             function that does not exist.
         InvalidRobot: more neurons than the limits.
     """
-    track = simulate(robot, settings.space, settings.simulation)
+    track = simulate(robot, settings.space, settings.simulation, identity=identity)
     value = judge(track, settings.fitness)
     clock = settings.simulation
     return Evaluation(
@@ -78,6 +83,7 @@ def simulate(
     simulation: Simulation,
     *,
     watch: Callable[[mujoco.MjData], None] | None = None,
+    identity: Identity = NOBODY,
 ) -> Track:
     """Return where a robot goes, alone, from the origin, its lowest point at 0.
 
@@ -90,6 +96,7 @@ def simulate(
         space: part types and limits.
         simulation: the world and its clocks.
         watch: is shown the state after each tick, before the steps that follow.
+        identity: which evaluation it is; nothing but noise depends on it.
 
     Raises:
         SimulationDiverged: a number that is none, or a warning of the engine.
@@ -98,7 +105,7 @@ def simulate(
     """
     silence_engine()
     model = solo_model(robot, body_space(space), simulation)
-    life = _Life(robot, space, simulation, model)
+    life = _Life(robot, space, simulation, model, identity=identity)
     start = simulation.warmup_steps
     end = start + simulation.window_steps
     positions: list[float] = []
@@ -133,6 +140,8 @@ class _Life:
         space: Space,
         simulation: Simulation,
         model: mujoco.MjModel,
+        *,
+        identity: Identity,
     ) -> None:
         types, width = body_space(space), widths(space)
         self.data = mujoco.MjData(model)
@@ -149,6 +158,11 @@ class _Life:
             pack(robot.brain, width), width, self._tick_s, ends // self._brain_steps + 1
         )
         self._senses.show(self._mind.readings)
+        source = Source(simulation, width, identity.origin)
+        self._is_noisy = not source.is_silent
+        self._noise = Noise(source, (identity.birth,), identity.trial)
+        inputs = sum(neuron.layer == "input" for neuron in robot.brain.neurons)
+        self._felt = self._mind.readings[:, :inputs]
 
     def tick(self, step: int) -> None:
         """Read, think and command; ``step`` counts from birth."""
@@ -160,7 +174,13 @@ class _Life:
             self._senses.read(self._model, self.data, self._tick_s)
         else:
             self._senses.start(self._model, self.data)
-        self._servos.drive(self.data, self._mind.step(step // self._brain_steps))
+        tick = step // self._brain_steps
+        if not self._is_noisy:
+            self._servos.drive(self.data, self._mind.step(tick))
+            return
+        self._felt[:] = self._noise.blur(tick, self._felt)
+        outputs = self._mind.step(tick)[np.newaxis]
+        self._servos.drive(self.data, self._noise.shake(tick, outputs)[0])
 
 
 def _check_warnings(data: mujoco.MjData, time_s: float) -> None:

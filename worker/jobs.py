@@ -59,7 +59,7 @@ def answer(request: bytes) -> bytes:
     check_types(job.robot, body_space(settings.space))
     result: Evaluation | str
     try:
-        result = evaluate(job.robot, lasting(settings, job.steps))
+        result = evaluate(job.robot, lasting(settings, job.steps), job.identity)
     except (SimulationDiverged, FitnessUndefined) as error:
         result = str(error)
     wall_s = time.perf_counter() - began

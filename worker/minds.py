@@ -9,22 +9,24 @@ from collections.abc import Sequence
 import numpy as np
 
 from schema.evaluation import Floats
-from schema.experiment import Simulation
-from worker.controller import Bank, Widths
+from worker.controller import Bank
 from worker.inhabitant import Inhabitant
+from worker.noise import Noise, Source
 
 
 class Minds:
     """One bank of networks, a row for each inhabitant, by birth."""
 
-    def __init__(self, width: Widths, simulation: Simulation) -> None:
+    def __init__(self, source: Source) -> None:
         """Start with nobody.
 
         Args:
-            width: of every network.
-            simulation: its clocks.
+            source: of noise; knows the width of every network, and the clocks.
         """
-        self._width = width
+        simulation = source.simulation
+        self._source = source
+        self._noise = Noise(source, ())
+        self._width = source.width
         self._tick_steps = simulation.brain_steps
         self._tick_s = simulation.brain_steps * simulation.timestep_s
         self._ages = np.zeros((0, 1))
@@ -42,6 +44,7 @@ class Minds:
             inhabitant.states = self._bank.states[row]
         since = [inhabitant.thinks_since for inhabitant in everybody]
         self._ages = np.array(since, dtype=np.float64)[:, None]
+        self._noise = Noise(self._source, [one.birth for one in everybody])
 
     def tick(self, step: int, readings: Floats) -> Floats:
         """Let all think of what they last felt.
@@ -51,16 +54,27 @@ class Minds:
             readings: (R, I) by birth.
 
         Returns:
-            (R, O) outputs of their networks, a view that the next tick overwrites.
+            (R, O) what goes to the motors, perhaps a view that the next tick
+            overwrites.
         """
         if self._bank is None:
             return np.zeros((0, self._width.outputs))
         ages = (step - self._ages) // self._tick_steps
-        return self._bank.step(readings, ages)
+        tick = step // self._tick_steps
+        outputs = self._bank.step(self._noise.blur(tick, readings), ages)
+        return self._noise.shake(tick, outputs)
 
-    def first_tick(self, inhabitant: Inhabitant) -> None:
-        """Let a newborn think alone, before it joins the bank."""
+    def first_tick(self, step: int, inhabitant: Inhabitant) -> None:
+        """Let a newborn think alone, before it joins the bank.
+
+        Args:
+            step: the arena's.
+            inhabitant: who.
+        """
         bank = Bank([inhabitant.network], self._width, self._tick_s)
-        outputs = bank.step(inhabitant.seat.senses.readings, 0.0)
+        noise = Noise(self._source, (inhabitant.birth,))
+        tick = step // self._tick_steps
+        readings = noise.blur(tick, inhabitant.seat.senses.readings)
+        outputs = noise.shake(tick, bank.step(readings, 0.0))
         inhabitant.states = bank.states[0]
         inhabitant.seat.drive(outputs[0])

@@ -27,6 +27,7 @@ from worker.inhabitant import Inhabitant
 from worker.judging import judge_all
 from worker.minds import Minds
 from worker.nerves import Nerves
+from worker.noise import Source
 from worker.pool import Pool
 from worker.poses import Poses
 from worker.schedule import Schedule
@@ -64,8 +65,9 @@ class World:
         """Begin anew, with nobody."""
         self.step = 0
         self.company = Company(self._settings)
-        self._minds = Minds(self.company.shop.width, self._clock)
-        self._nerves = Nerves(self.company.shop.width, self._clock)
+        width = self.company.shop.width
+        self._minds = Minds(Source(self._clock, width, self._settings.origin))
+        self._nerves = Nerves(width, self._clock)
         self._casualties: list[Casualty] = []
         self._touches = Touches(self._settings)
         self._poses = Poses(self._clock.timestep_s)
@@ -236,7 +238,7 @@ class World:
             one.seat.start()
         light.shine(self.company, newcomers)
         for one in newcomers:
-            self._minds.first_tick(one)
+            self._minds.first_tick(self.step, one)
         self.company.kinematics()
         self.company.look()
 

@@ -150,7 +150,7 @@ def started(
         fleet = Fleet(network)
         loop = Loop(
             {0: island},
-            question=Question.of(str(folder), held.epoch, experiment),
+            question=Question.of(str(folder), held.epoch, experiment, details.origin),
             fleet=fleet,
             log=journal,
             rows=recorder,

@@ -21,6 +21,7 @@ from schema.arena_codec import Live, decode_live, encode_live
 from schema.birth import BirthId
 from schema.experiment import Space, body_space
 from schema.experiment_file import read_experiment
+from schema.identity import NOBODY
 from schema.live import Newborn, News
 from schema.robot import Robot
 from schema.settings import EvaluationSettings
@@ -55,7 +56,7 @@ def crowd() -> tuple[News, list[pa.Table]]:
         fitness=experiment.fitness,
     )
     robot = spider()
-    _, motion = alone(robot, settings, BirthId(0, 0))
+    _, motion = alone(robot, settings, NOBODY)
     rng = np.random.default_rng(1)
     starts = rng.integers(0, motion.num_rows, ROBOTS)
     places = rng.uniform(-2.0, 2.0, (ROBOTS, 2)).astype(np.float32)

@@ -119,7 +119,7 @@ class Run:
         )
         self.loop = Loop(
             {0: self.arena},
-            question=Question.of("resume", folder.epoch, EXPERIMENT),
+            question=Question.of("resume", folder.epoch, EXPERIMENT, DETAILS.origin),
             fleet=self.fleet,
             log=Frail(journal, point, "append"),
             rows=Frail(self.rows, point, "store"),

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import pytest
+from msgspec.structs import replace
 
 from coordinator.events import (
     Answered,
@@ -27,9 +28,11 @@ from schema.birth import BirthId
 from schema.codec import Answer, decode_request, encode_answer
 from schema.errors import JobRefused
 from schema.evaluation import Evaluation, Provenance, Report
+from schema.identity import NOBODY, Identity, Origin
 from schema.robot import Part, Robot
 
 EPOCH = 3
+ORIGIN = Origin(seed=5, run=2)
 BIRTH = BirthId(0, 7)
 ROBOT = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),))
 JUDGED = Evaluation(0.25, 0.0, 0.05, 12.0)
@@ -39,12 +42,14 @@ VIABLE = Report(True, "", (), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.1, 1)
 class Desk:
     """Questions whose jobs are caught, with two workers and an analyzer."""
 
-    def __init__(self, evaluation: bytes = b"evaluation") -> None:
+    def __init__(self, evaluation: bytes = b"evaluation", audit: float = 0.0) -> None:
         self.sent: list[tuple[int, str, bytes]] = []
         self.cancelled: list[tuple[int, str]] = []
         self.fleet = Fleet(self)
-        question = Question("run", EPOCH, b"vetting", {0: evaluation})
-        self.questions = Questions(question, self.fleet)
+        question = Question(
+            "run", EPOCH, ORIGIN, b"vetting", {0: evaluation, 2: evaluation}
+        )
+        self.questions = Questions(question, self.fleet, audit)
         for name in ("one", "two"):
             self.tell(Joined(name, "worker", 1, f"platform-{name}"))
         self.tell(Joined("judge", "analyzer", 1, "platform"))
@@ -86,6 +91,27 @@ def test_a_request_carries_the_run_its_settings_and_the_robot(desk: Desk) -> Non
     assert (asked.run, asked.epoch, asked.number) == ("run", EPOCH, vet)
     assert (asked.settings, asked.robot) == (b"vetting", ROBOT)
     assert decode_request(evaluation).settings == b"evaluation"
+
+
+def test_noise_is_drawn_by_who_is_judged_for_whom_and_how_often(desk: Desk) -> None:
+    guest = BirthId(3, 9)
+    for question in (
+        Evaluate(BIRTH, ROBOT),
+        Evaluate(guest, ROBOT, trial=4, asker=2),
+        Vet(BIRTH, 1, ROBOT),
+    ):
+        desk.questions.ask(question)
+    found = [decode_request(payload).identity for _, _, payload in desk.sent]
+    there = replace(ORIGIN, island=2)
+    assert found == [Identity(ORIGIN, BIRTH, 0), Identity(there, guest, 4), NOBODY]
+
+
+def test_the_two_of_an_audit_draw_the_same_noise() -> None:
+    desk = Desk(audit=1.0)
+    desk.questions.ask(Evaluate(BIRTH, ROBOT, trial=1))
+    first, second = (decode_request(payload) for _, _, payload in desk.sent)
+    assert first.number != second.number
+    assert first.identity == second.identity == Identity(ORIGIN, BIRTH, 1)
 
 
 def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:

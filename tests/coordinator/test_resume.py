@@ -70,7 +70,7 @@ def run(path: Path, *, answers: int = 10**9) -> int:
         )
         loop = Loop(
             {0: Island(EXPERIMENT, DETAILS.seed, DETAILS.run)},
-            question=Question.of("resume", folder.epoch, EXPERIMENT),
+            question=Question.of("resume", folder.epoch, EXPERIMENT, DETAILS.origin),
             fleet=fleet,
             log=journal,
             rows=rows,

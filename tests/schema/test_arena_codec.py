@@ -107,6 +107,10 @@ def test_request_round_trip(robots: SearchStrategy[Robot], data: DataObject) -> 
     encoded = encode_advance_request(request)
     assert repr(decode_advance_request(encoded)) == repr(request)
     assert encode_advance_request(decode_advance_request(encoded)) == encoded
+    # Whoever hands it on knows nothing of arenas.
+    job = pb.Request.FromString(encoded)
+    asked = (request.run, request.epoch, request.number)
+    assert (job.run, job.epoch, job.number) == asked
 
 
 @given(answer=ANSWERS)

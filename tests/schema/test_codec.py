@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
 from schema import revolve_pb2 as pb
+from schema.birth import BirthId
 from schema.codec import (
     Answer,
     Request,
@@ -26,6 +27,7 @@ from schema.codec import (
 from schema.errors import MalformedMessage
 from schema.evaluation import Evaluation, Report
 from schema.genome import Genome, Node, develop
+from schema.identity import NOBODY, Identity, Origin
 from schema.parts import BUILT_IN
 from schema.robot import Robot
 
@@ -38,6 +40,12 @@ DECODERS: list[Callable[[bytes], object]] = [
 ]
 U64 = st.integers(0, 2**64 - 1)
 U32 = st.integers(0, 2**32 - 1)
+IDENTITIES = st.just(NOBODY) | st.builds(
+    Identity,
+    st.builds(Origin, seed=U64, run=U32, island=U32),
+    st.builds(BirthId, U32, U64),
+    U32,
+)
 NUMBER = st.floats(allow_nan=False, allow_infinity=False)
 VECTOR = st.tuples(NUMBER, NUMBER, NUMBER)
 EVALUATIONS = st.builds(Evaluation, NUMBER, NUMBER, NUMBER, NUMBER)
@@ -85,14 +93,18 @@ def test_request_round_trip(robots: SearchStrategy[Robot], data: DataObject) -> 
     robot = data.draw(robots)
     run, epoch, number = data.draw(st.tuples(st.text(), U64, U64))
     settings = data.draw(st.binary())
+    identity = data.draw(IDENTITIES)
     encoded = encode_request(
         run=run,
         epoch=epoch,
         number=number,
         settings=settings,
         robot=encode_robot(robot),
+        identity=identity,
     )
-    assert decode_request(encoded) == Request(run, epoch, number, settings, robot)
+    assert decode_request(encoded) == Request(
+        run, epoch, number, settings, robot, identity=identity
+    )
 
 
 @given(answer=ANSWERS)

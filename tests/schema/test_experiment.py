@@ -82,6 +82,17 @@ def test_window_may_be_narrower_than_a_brood() -> None:
         ("[generation]\nparts_mean = nan", "generation.parts_mean: "),
         ("[generation]\nparts_sd = inf", "generation.parts_sd: "),
         ("[simulation]\ntimestep_s = inf", "simulation.timestep_s: "),
+        ("[simulation]\nsensor_noise = -0.1", "simulation.sensor_noise: .*, got -0.1"),
+        ("[simulation]\nsensor_noise = inf", "simulation.sensor_noise: .*, got inf"),
+        (
+            "[simulation]\nactuator_noise = 2e6",
+            r"actuator_noise: .*<= 1.*, got 2000000",
+        ),
+        (
+            '[simulation]\nactuator_noise = "a"',
+            "simulation.actuator_noise: .*, got 'a'",
+        ),
+        ("[simulation]\nactor_noise = 1", "no such key; did you mean 'actuator_noise'"),
         ('[selection]\nparents = "rank"', r"selection.parents: .*'rank'"),
         ("space = 3", "space: must be a table"),
         ("[space]\npart_types = [1]", r"space.part_types\[0\]: .*, got 1"),

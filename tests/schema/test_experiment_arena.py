@@ -10,6 +10,7 @@ from schema.experiment_file import (
     parse_experiment,
     read_experiment,
 )
+from schema.identity import Origin
 from schema.settings import arena_settings, read_arena_settings
 
 
@@ -46,12 +47,14 @@ def test_off_line_is_the_default() -> None:
     assert parse("").arena is None
     assert parse("[arena]").arena is not None
     with pytest.raises(ExperimentError, match="has no arena"):
-        arena_settings(parse(""))
+        arena_settings(parse(""), Origin())
 
 
 def test_settings_and_text_round_trip() -> None:
     experiment = parse("[arena]\nlight = [0.0, 1.0, 2.5]\nrecord_touches = true")
-    settings = read_arena_settings(arena_settings(experiment))
+    origin = Origin(seed=5, run=2, island=3)
+    settings = read_arena_settings(arena_settings(experiment, origin))
+    assert settings.origin == origin
     assert settings.arena == experiment.arena
     assert settings.simulation == experiment.simulation
     assert experiment_from_text(experiment_text(experiment)) == experiment

@@ -57,6 +57,11 @@ def test_restriction_that_no_robot_meets_ends_the_run_with_its_reason(
     assert "space" in _refused(stage, "run", _document(stage, text), *words)
 
 
+def test_a_seed_that_no_message_can_hold(stage: Stage) -> None:
+    words = ("scenario1", "--seed", str(2**64), "--out", "x", "--quiet")
+    assert "--seed: must be < 2^64" in _refused(stage, "run", *words)
+
+
 def test_misspelt_command_and_experiment_get_the_nearest_name(stage: Stage) -> None:
     assert "'resume'" in _refused(stage, "resum", "x")
     assert "'scenario1'" in _refused(stage, "run", "senario1")

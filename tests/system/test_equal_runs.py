@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from coordinator.compare import compare
+from schema.run_tables import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -20,6 +21,16 @@ def _words(births: int, out: str) -> tuple[str, ...]:
     return (
         "scenario1", "--seed", "5", "--births", str(births), "--out", out, "--quiet",
     )  # fmt: skip
+
+
+NOISY = """name = "noisy"
+[simulation]
+sensor_noise = 0.1
+actuator_noise = 0.05
+evaluation_s = [12.0, 14.0]
+[selection.reevaluation]
+interval = 5
+"""
 
 
 def _size(folder: Path) -> int:
@@ -73,6 +84,26 @@ def test_killed_coordinator_resumes_to_the_same_births(
     first.wait()
     stage.run("resume", "killed", "--workers", "2", "--quiet")
     assert compare(undisturbed, folder) == []
+
+
+def test_noise_is_the_same_whoever_draws_it(stage: Stage) -> None:
+    """In one process, by two workers with audits, and when it is looked at again."""
+    (stage.folder / "noisy.toml").write_text(NOISY)
+    words = ("run", "noisy.toml", "--seed", "5", "--births", "30", "--quiet")
+    stage.run(*words, "--in-process", "--out", "one")
+    stage.run(*words, "--workers", "2", "--audit", "0.3", "--out", "two")
+    one, two = stage.folder / "one", stage.folder / "two"
+    assert compare(one, two) == []
+    agrees = read_table(two, "audits")["agrees"].to_pylist()
+    assert agrees
+    assert all(agrees)
+    trials = read_table(one, "evaluations").to_pylist()
+    again = {row["birth"] for row in trials if row["trial"]}
+    assert again
+    robots = ("--robot", "best", "--robot", f"0:{min(again)}")
+    out = stage.run("view", "one", *robots, "--save", "a.rrd")
+    assert out.count("moves again as recorded, to the last bit") == 2
+    assert "DIFFERS" not in out
 
 
 def test_second_coordinator_is_refused_with_the_holder(

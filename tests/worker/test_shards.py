@@ -20,13 +20,14 @@ from schema.birth import BirthId
 from schema.errors import InvalidRobot, MalformedMessage, StateDiffers
 from schema.experiment_file import read_experiment
 from schema.genome import Node, develop
+from schema.identity import Origin
 from schema.parts import BUILT_IN
 from schema.robot import Part, Robot
 from schema.settings import arena_settings
 from tests.worker.fake_world import FakeWorld, OddWorld
 from worker.shards import MOST_HELD, Shards
 
-SETTINGS = arena_settings(read_experiment("scenario3"))
+SETTINGS = arena_settings(read_experiment("scenario3"), Origin())
 EMPTY = Rebuild(b"", ())
 CORE = develop(Node("Core", -1, 0, (0.5, 0.5, 0.5)), BUILT_IN)
 
