@@ -130,7 +130,7 @@ def portrait(
 
 def _studio(robot: Robot, settings: Experiment, size: tuple[int, int]) -> Studio:
     space = body_space(settings.space)
-    return Studio(robot, space, settings.simulation, size=size)
+    return Studio(robot, space, settings.simulation, settings.environment, size=size)
 
 
 def _cut(picture: Picture, share: tuple[float, float, float]) -> Picture:
@@ -146,7 +146,8 @@ def _gait(
     """Return how a robot moves from the middle of its life on, by a standing camera."""
     poses: list[Floats] = []
     watch: Callable[[Any], None] = lambda data: poses.append(data.qpos.copy())  # noqa: E731
-    simulate(robot, settings.space, settings.simulation, watch=watch)
+    world = settings.environment
+    simulate(robot, settings.space, settings.simulation, world, watch=watch)
     tick_s = settings.simulation.brain_steps * settings.simulation.timestep_s
     step = max(1, round(EVERY_S / tick_s))
     first = len(poses) // 2

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
+from schema.environment import Environment
 from schema.errors import RevolveError
 from schema.evaluation import Floats
 from schema.experiment import Simulation
@@ -32,6 +33,7 @@ _FIELD_OF_VIEW = 45.0
 _FLOOR = ((0.93, 0.94, 0.95), (0.86, 0.88, 0.90))
 _SKY = (1.0, 1.0, 1.0)
 _TILE_M = 0.1
+_GROUND = ("ground", "rough")
 
 
 class NoPictures(RevolveError):  # noqa: N818 - reads as what it says
@@ -68,6 +70,7 @@ class Studio:
         robot: Robot,
         space: BodySpace,
         simulation: Simulation,
+        environment: Environment,
         *,
         size: tuple[int, int] = (640, 480),
     ) -> None:
@@ -77,6 +80,7 @@ class Studio:
             robot: a checked robot.
             space: its part types.
             simulation: the world's numbers.
+            environment: what it stands in.
             size: width and height of pictures [pixels].
 
         Raises:
@@ -88,7 +92,9 @@ class Studio:
         from schema.mjcf import solo_model  # noqa: PLC0415 - the same
 
         self._mujoco: Any = mujoco
-        self.model = solo_model(robot, space, simulation, scenery=_furnish(*size))
+        self.model = solo_model(
+            robot, space, simulation, environment, furnish=_furnish(*size)
+        )
         self._data = mujoco.MjData(self.model)
         try:
             self._renderer = mujoco.Renderer(self.model, size[1], size[0])
@@ -179,7 +185,9 @@ def _furnish(width: int, height: int) -> Callable[[Any], None]:
         floor.textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = "tiles"
         floor.texuniform = True
         floor.texrepeat = (0.5 / _TILE_M, 0.5 / _TILE_M)
-        spec.geom("ground").material = "floor"
+        for geom in spec.worldbody.geoms:
+            if geom.name in _GROUND:
+                geom.material = "floor"
         spec.worldbody.add_light(
             pos=(-0.5, -0.8, 3.0),
             dir=(0.15, 0.25, -1.0),

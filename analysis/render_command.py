@@ -15,6 +15,7 @@ from analysis.render import (
     save_film,
     save_picture,
 )
+from schema.environment import Environment
 from schema.evaluation import Floats, Track
 from schema.experiment import Simulation, Space, body_space
 from schema.experiment_file import read_experiment
@@ -35,6 +36,7 @@ class Simulate(Protocol):
         robot: Robot,
         space: Space,
         simulation: Simulation,
+        environment: Environment,
         *,
         identity: Identity = NOBODY,
         watch: Callable[[Any], None],
@@ -71,7 +73,7 @@ def main(arguments: list[str], simulate: Simulate) -> int:
     space, world = body_space(settings.space), settings.simulation
     robot = read_robot(options.file, space)
     size = (options.width, options.width * 3 // 4)
-    with Studio(robot, space, world, size=size) as studio:
+    with Studio(robot, space, world, settings.environment, size=size) as studio:
         if not is_film and not options.gait:
             save_picture(studio.picture(), out)
         else:
@@ -80,6 +82,7 @@ def main(arguments: list[str], simulate: Simulate) -> int:
                 robot,
                 settings.space,
                 world,
+                settings.environment,
                 watch=lambda data: poses.append(data.qpos.copy()),
             )
             _draw_motion(studio, poses, options.gait, out, world)

@@ -76,23 +76,24 @@ def _replay(
     born = {one.birth for one in news.births}
     _check(options, born, is_online=bool(scene.arenas))
     motions = _motions(options, simulators)
+    moving = [each.birth for each in motions]
     blueprint = layout(
         scene.islands,
         extent_m=scene.extent_m,
         arenas=scene.arenas,
         follow=options.follow,
-        motions=[each.birth for each in motions],
+        motions=moving,
     )
     name = f"{news.experiment}-{folder.name}"
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
-        for island, walls in zip(scene.islands, scene.walls, strict=True):
-            recording.island(island, walls, is_alone=len(scene.islands) == 1)
+        recording.stage(scene)
         show = Show(recording, scene.space)
         show.tell(news)
         if scene.arenas:
             _replay_poses(folder, _span(options, folder), show)
         bodies = {one.birth: one.body for one in news.births}
         recording.upright("motion")
+        recording.ground("motion", scene.below(moving))
         for lane, motion in enumerate(motions):
             body = bodies[motion.birth]
             assert body is not None

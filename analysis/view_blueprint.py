@@ -97,7 +97,7 @@ def _scene(
     return rrb.Spatial3DView(
         origin=f"/{path}",
         name=name,
-        contents=[f"/{path}/robots/**", f"/{path}/wall"],
+        contents=[f"/{path}/{what}" for what in ("robots/**", "wall", "ground/**")],
         background=_SKY,
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.5, color=_GRID),
         eye_controls=_eye(near, robot_path(*follow) if follow and followed else None),

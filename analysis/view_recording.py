@@ -16,6 +16,8 @@ import rerun as rr
 
 from analysis.view_body import Figure, Singles
 from analysis.view_entries import Kin, Moves, When, island_path
+from analysis.view_ground import Surface
+from analysis.view_stage import Stage
 from schema.birth import BirthId
 from schema.errors import RevolveError
 
@@ -96,7 +98,17 @@ class Recording:
 
     # --- arenas and robots --------------------------------------------------
 
-    def island(
+    def stage(self, stage: Stage) -> None:
+        """Tell of all islands of a run, before anything happens there."""
+        is_alone = len(stage.islands) == 1
+        grounds = zip(stage.islands, stage.walls, stage.surfaces, strict=True)
+        for island, walls, surfaces in grounds:
+            self._island(island, walls, is_alone=is_alone)
+            # Off-line populations hang side by side: no ground is below them.
+            if island in stage.arenas:
+                self.ground(island_path(island), surfaces)
+
+    def _island(
         self,
         island: int,
         walls: Sequence[tuple[Singles, Singles]],
@@ -134,6 +146,21 @@ class Recording:
                 ),
                 static=True,
             )
+
+    def ground(self, path: str, surfaces: Sequence[Surface]) -> None:
+        """Show what rises above a plane.
+
+        Args:
+            path: of the entity that it belongs to.
+            surfaces: of all of it.
+        """
+        for number, surface in enumerate(surfaces):
+            mesh = rr.Mesh3D(
+                vertex_positions=surface.corners.reshape(-1, 3),
+                vertex_normals=np.repeat(surface.normals, 3, axis=0),
+                albedo_factor=surface.colour,
+            )
+            self._stream.log(f"{path}/ground/{number}", mesh, static=True)
 
     def born(self, path: str, figure: Figure, when: When) -> None:
         """Give a robot its boxes, from a moment on."""

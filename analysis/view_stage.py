@@ -1,11 +1,14 @@
 """What a viewer needs to know of an experiment before anything happens in it."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import cos, pi, sin, tan
 
 import numpy as np
 
 from analysis.view_body import Singles
+from analysis.view_ground import Surface, surfaces
+from schema.birth import BirthId
 from schema.experiment import Arena, Experiment, body_space, island_count
 from schema.experiment import island_experiment as of_island
 from schema.parts import BodySpace
@@ -24,6 +27,7 @@ class Stage:
         extent_m: how far from its middle an arena or a gallery reaches [m].
         space: the part types.
         walls: of each island: place and attitude (7,) and half sizes (3,) of each.
+        surfaces: of each island: of what rises above its plane.
     """
 
     islands: tuple[int, ...]
@@ -31,16 +35,30 @@ class Stage:
     extent_m: float
     space: BodySpace
     walls: tuple[tuple[tuple[Singles, Singles], ...], ...]
+    surfaces: tuple[tuple[Surface, ...], ...]
+
+    def below(self, births: Iterable[BirthId]) -> tuple[Surface, ...]:
+        """Return the ground below robots, if they are shown where they were.
+
+        So are those of one arena, and one robot that was alone.
+        """
+        islands = [birth.island for birth in births]
+        is_one_place = len(set(islands)) == 1
+        if not is_one_place or (len(islands) > 1 and islands[0] not in self.arenas):
+            return ()
+        return self.surfaces[self.islands.index(islands[0])]
 
 
 def stage(experiment: Experiment) -> Stage:
     """Return where an experiment takes place.
 
     Raises:
-        ExperimentError: a part type of a plug-in that is not here.
+        ExperimentError: a part type of a plug-in that is not here, or scenery that
+            is none.
     """
     islands = tuple(range(island_count(experiment)))
-    arenas = [of_island(experiment, each).arena for each in islands]
+    settings = [of_island(experiment, each) for each in islands]
+    arenas = [each.arena for each in settings]
     reaches = [_reach(arena) if arena else _GALLERY_M for arena in arenas]
     return Stage(
         islands,
@@ -48,6 +66,7 @@ def stage(experiment: Experiment) -> Stage:
         max(reaches),
         body_space(experiment.space),
         tuple(_ring_wall(arena) if arena else () for arena in arenas),
+        tuple(surfaces(each.environment, each.simulation) for each in settings),
     )
 
 

@@ -57,8 +57,7 @@ def watch(
     )
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         window = Window(output)
-        for island, walls in zip(scene.islands, scene.walls, strict=True):
-            recording.island(island, walls, is_alone=len(scene.islands) == 1)
+        recording.stage(scene)
         spectator = Spectator(Show(recording, scene.space), news.run)
         spectator.tell([news, *rest])
         while not (stop.is_set() or spectator.has_ended or window.was_closed):

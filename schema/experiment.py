@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta, structs
 
+from schema.environment import FLAT, Environment
 from schema.errors import ExperimentError
 from schema.migration import Migration
 from schema.parts import BodySpace, Parameter, PartType
@@ -226,6 +227,7 @@ class Islands(Section, frozen=True):
     variation: Variation | None = None
     selection: Selection | None = None
     simulation: Simulation | None = None
+    environment: Environment | None = None
     fitness: Fitness | None = None
     arena: Arena | None = None
     migration: Migration | None = None
@@ -246,6 +248,7 @@ class Experiment(Section, frozen=True):
     selection: Selection = Selection()
     vetting: Vetting = Vetting()
     simulation: Simulation = Simulation()
+    environment: Environment = FLAT
     fitness: Fitness = Fitness()
     arena: Arena | None = None
     islands: tuple[Islands, ...] = ()

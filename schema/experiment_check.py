@@ -8,6 +8,7 @@ from schema.bridge_check import (
     duration_problem,
     reevaluation_problem,
 )
+from schema.environment import ground_problem
 from schema.errors import ExperimentError
 from schema.experiment import Experiment, body_space, island_experiment, steps_of
 from schema.migration_check import migration_problem
@@ -20,8 +21,8 @@ def check_experiment(experiment: Experiment, where: str) -> None:
         ExperimentError: a restriction that no robot can meet, a selection that
             cannot draw its parents, a window that ends between two samples, an
             arena too small or with clocks that do not meet, rules that an arena
-            has no use for, a plug-in that does not exist, a migration that can
-            never happen.
+            has no use for, rough ground that cannot be laid out, scenery that is
+            none, a plug-in that does not exist, a migration that can never happen.
     """
     checks: list[Callable[[Experiment], str]] = [
         _limits_problem,
@@ -30,6 +31,7 @@ def check_experiment(experiment: Experiment, where: str) -> None:
         reevaluation_problem,
         _clock_problem,
         duration_problem,
+        _environment_problem,
         _arena_problem,
         _arena_clock_problem,
     ]
@@ -104,6 +106,18 @@ def _clock_problem(experiment: Experiment) -> str:
             f"{clock.pose_steps}, got {clock.window_steps}"
         )
     return ""
+
+
+def _environment_problem(experiment: Experiment) -> str:
+    environment = experiment.environment
+    if problem := ground_problem(environment):
+        return problem
+    if not environment.scenery:
+        return ""
+    # The engine is loaded for scenery only: a coordinator has no other use.
+    from schema.mjcf_scenery import scenery_problem  # noqa: PLC0415
+
+    return scenery_problem(environment.scenery, experiment.simulation)
 
 
 def _arena_problem(experiment: Experiment) -> str:

@@ -10,6 +10,7 @@ from typing import Any, get_args
 import msgspec
 from msgspec import Struct
 
+from schema.environment import is_mjcf
 from schema.errors import ExperimentError
 from schema.experiment import Experiment
 from schema.experiment_check import check_experiment
@@ -57,7 +58,7 @@ def parse_experiment(text: str, where: str) -> Experiment:
 
     Args:
         text: the document.
-        where: its name, for messages.
+        where: its path, for messages and for scenery that is named beside it.
 
     Raises:
         ExperimentError: bad TOML, an unknown key (the nearest is named), a wrong
@@ -68,6 +69,7 @@ def parse_experiment(text: str, where: str) -> Experiment:
     except tomllib.TOMLDecodeError as error:
         raise ExperimentError(f"{where}: not TOML: {error}") from None
     _refuse_unknown(document, Experiment, where, "")
+    _read_scenery(document, where)
     document = _completed(document)
     try:
         experiment = msgspec.convert(document, type=Experiment)
@@ -75,6 +77,22 @@ def parse_experiment(text: str, where: str) -> Experiment:
         raise ExperimentError(f"{where}: {_explain(error, document)}") from None
     check_experiment(experiment, where)
     return experiment
+
+
+def _read_scenery(document: dict[str, Any], where: str) -> None:
+    """Put the text of scenery where its path stands, so that it goes along."""
+    for table in (document, *document.get("islands", ())):
+        environment = table.get("environment", {})
+        named = environment.get("scenery", "")
+        if not isinstance(named, str) or not named or is_mjcf(named):
+            continue
+        path = Path(where).parent / named
+        try:
+            environment["scenery"] = path.read_text(encoding="utf-8-sig")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ExperimentError(
+                f"{where}: environment.scenery: {named}: cannot be read: {error}"
+            ) from None
 
 
 def _completed(document: dict[str, Any]) -> dict[str, Any]:
@@ -135,6 +153,10 @@ def _refuse_unknown(
         inner = _section(fields[key].type)
         if inner is None:
             continue
+        if key == "islands" and isinstance(value, dict):
+            raise ExperimentError(
+                f"{where}: islands: must be [[islands]], got [islands]"
+            )
         if key == "islands" and isinstance(value, list):
             tables = {f"{prefix}{key}[{at}]": each for at, each in enumerate(value)}
         else:

@@ -17,7 +17,7 @@ import numpy as np
 from schema.codec import decode_robot, encode_robot
 from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
 from schema.experiment import body_space
-from schema.mjcf import solo_spec
+from schema.mjcf import solo_model, solo_spec
 from schema.robot import Robot, check_robot
 from schema.settings import EvaluationSettings, read_evaluation_settings
 
@@ -43,7 +43,7 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
     """
     space = body_space(settings.space)
     check_robot(robot, space)
-    spec = solo_spec(robot, space, settings.simulation)
+    spec = solo_spec(robot, space, settings.simulation, settings.environment)
     spec.modelname = "robot"
     for name, data in (
         (ROBOT, encode_robot(robot)),
@@ -80,7 +80,8 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
         check_robot(robot, space)
     except (MalformedMessage, ExperimentError, InvalidRobot) as error:
         raise InvalidRobot(f"{where}: {error}") from None
-    _check_body(model, solo_spec(robot, space, settings.simulation).compile(), where)
+    built = solo_model(robot, space, settings.simulation, settings.environment)
+    _check_body(model, built, where)
     return robot, settings
 
 

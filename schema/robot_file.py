@@ -47,6 +47,7 @@ def settings_of(experiment: Experiment | None) -> EvaluationSettings:
         space=experiment.space,
         simulation=experiment.simulation,
         fitness=experiment.fitness,
+        environment=experiment.environment,
     )
 
 

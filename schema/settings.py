@@ -6,6 +6,7 @@ from typing import TypeVar, cast
 
 import msgspec
 
+from schema.environment import FLAT, Environment
 from schema.errors import ExperimentError
 from schema.experiment import Arena, Experiment, Fitness, Simulation, Space, Vetting
 from schema.identity import Origin
@@ -28,6 +29,7 @@ class EvaluationSettings(Section, frozen=True):
     space: Space
     simulation: Simulation
     fitness: Fitness
+    environment: Environment = FLAT
 
 
 class ArenaSettings(Section, frozen=True):
@@ -37,6 +39,7 @@ class ArenaSettings(Section, frozen=True):
     simulation: Simulation
     fitness: Fitness
     arena: Arena
+    environment: Environment = FLAT
     origin: Origin = Origin()
 
 
@@ -54,6 +57,7 @@ def evaluation_settings(experiment: Experiment) -> bytes:
             space=experiment.space,
             simulation=experiment.simulation,
             fitness=experiment.fitness,
+            environment=experiment.environment,
         )
     )
 
@@ -76,6 +80,7 @@ def arena_settings(experiment: Experiment, origin: Origin) -> bytes:
             space=experiment.space,
             simulation=experiment.simulation,
             fitness=experiment.fitness,
+            environment=experiment.environment,
             arena=experiment.arena,
         )
     )

@@ -62,8 +62,8 @@ def alone(
         positions.append(data.qpos.copy())
         times.append(float(data.time))
 
-    space, simulation = settings.space, settings.simulation
-    simulate(robot, space, simulation, identity=identity, watch=watch)
+    space, simulation, world = settings.space, settings.simulation, settings.environment
+    simulate(robot, space, simulation, world, identity=identity, watch=watch)
     rows = _rows(identity.birth, times, np.array(positions))
     return evaluate(robot, settings, identity), rows
 

@@ -153,6 +153,7 @@ def arena_settings_of(experiment: Experiment) -> ArenaSettings:
         simulation=experiment.simulation,
         fitness=experiment.fitness,
         arena=experiment.arena,
+        environment=experiment.environment,
     )
 
 

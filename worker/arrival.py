@@ -79,8 +79,9 @@ def newborn(insertion: Insertion, company: Company, step: int) -> Inhabitant | C
         place = (*insertion.place, 0.0)
         return Casualty(insertion.birth, step, f"cannot be built: {error}", place)
     seat = body.home.seats[0]
-    put(seat, insertion.place, insertion.heading)
-    x, y, z = seat.qpos[:3].tolist()
+    x, y = insertion.place
+    z = company.shop.height(body, insertion.place, insertion.heading)
+    put(seat, (x, y, z), insertion.heading)
     window = Window(company.shop.settings.simulation, step)
     one = inhabitant(insertion.birth, insertion.robot, body, window, company)
     one.thinks_since, one.place = step, (x, y, z)

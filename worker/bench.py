@@ -102,6 +102,7 @@ def _commands(robot: Robot, settings: EvaluationSettings) -> list[Floats]:
         robot,
         settings.space,
         settings.simulation,
+        settings.environment,
         watch=lambda data: found.append(data.ctrl.copy()),
     )
     return found
@@ -112,7 +113,8 @@ def _replay(
 ) -> float:
     """Return the time of the engine's steps under recorded controls [s]."""
     clock = settings.simulation
-    model = solo_model(robot, body_space(settings.space), clock)
+    space = body_space(settings.space)
+    model = solo_model(robot, space, clock, settings.environment)
     data = mujoco.MjData(model)
     left = clock.warmup_steps + clock.window_steps
     start = time.thread_time()
@@ -218,6 +220,7 @@ def _evaluate(options: argparse.Namespace) -> int:
         space=experiment.space,
         simulation=experiment.simulation,
         fitness=experiment.fitness,
+        environment=experiment.environment,
     )
     timing = time_evaluations(robots, settings)
     each_s = timing.evaluation_s / timing.robots

@@ -11,6 +11,7 @@ from typing import cast
 import mujoco
 import numpy as np
 
+from schema.environment import Environment
 from schema.errors import FitnessUndefined, SimulationDiverged
 from schema.evaluation import Evaluation, Track
 from schema.experiment import Fitness, Simulation, Space, body_space
@@ -42,7 +43,9 @@ def evaluate(
             function that does not exist.
         InvalidRobot: more neurons than the limits.
     """
-    track = simulate(robot, settings.space, settings.simulation, identity=identity)
+    space, simulation = settings.space, settings.simulation
+    world = settings.environment
+    track = simulate(robot, space, simulation, world, identity=identity)
     value = judge(track, settings.fitness)
     clock = settings.simulation
     return Evaluation(
@@ -81,11 +84,12 @@ def simulate(
     robot: Robot,
     space: Space,
     simulation: Simulation,
+    environment: Environment,
     *,
     watch: Callable[[mujoco.MjData], None] | None = None,
     identity: Identity = NOBODY,
 ) -> Track:
-    """Return where a robot goes, alone, from the origin, its lowest point at 0.
+    """Return where a robot goes, alone, standing at the origin at first.
 
     Brain, sensors and commands change every ``brain_steps`` from birth on; the
     position of the core's centre is taken every ``pose_steps`` of the window,
@@ -94,7 +98,8 @@ def simulate(
     Args:
         robot: a checked robot.
         space: part types and limits.
-        simulation: the world and its clocks.
+        simulation: the world's numbers and its clocks.
+        environment: what it stands in.
         watch: is shown the state after each tick, before the steps that follow.
         identity: which evaluation it is; nothing but noise depends on it.
 
@@ -104,7 +109,7 @@ def simulate(
         InvalidRobot: more neurons than the limits.
     """
     silence_engine()
-    model = solo_model(robot, body_space(space), simulation)
+    model = solo_model(robot, body_space(space), simulation, environment)
     life = _Life(robot, space, simulation, model, identity=identity)
     start = simulation.warmup_steps
     end = start + simulation.window_steps

@@ -147,7 +147,10 @@ def compare(
 
 def _fitness(robot: Robot, experiment: Experiment, world: Simulation) -> float:
     settings = EvaluationSettings(
-        space=experiment.space, simulation=world, fitness=experiment.fitness
+        space=experiment.space,
+        simulation=world,
+        fitness=experiment.fitness,
+        environment=experiment.environment,
     )
     try:
         return evaluate(robot, settings).fitness

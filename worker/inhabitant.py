@@ -43,14 +43,14 @@ class Inhabitant:
     place: Vector
 
 
-def put(seat: Seat, place: tuple[float, float], heading: float) -> None:
-    """Move a robot at neutral pose to a place in the ground plane.
+def put(seat: Seat, place: Vector, heading: float) -> None:
+    """Move a robot at neutral pose to a place.
 
     Args:
         seat: where its state is.
         place: for the core's centre, world frame [m].
         heading: turn about z [rad].
     """
-    seat.qpos[:2] = place
+    seat.qpos[:3] = place
     if heading:
         seat.qpos[3:7] = np.cos(0.5 * heading), 0.0, 0.0, np.sin(0.5 * heading)

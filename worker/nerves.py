@@ -9,6 +9,7 @@ import numpy as np
 
 from schema.evaluation import Floats
 from schema.experiment import Simulation
+from schema.parts import Vector
 from worker.controller import Widths
 from worker.layout import Layout, Roster
 from worker.reach import Indices
@@ -23,16 +24,17 @@ class Nerves:
         readings: (R, I) what all last felt; each robot's seat looks at its row.
     """
 
-    def __init__(self, width: Widths, simulation: Simulation) -> None:
+    def __init__(self, width: Widths, simulation: Simulation, gravity: Vector) -> None:
         """Start with nobody.
 
         Args:
             width: of every network.
             simulation: its clocks.
+            gravity: of the world [m/s2].
         """
         self._width = width
         self._tick_s = simulation.brain_steps * simulation.timestep_s
-        self._gravity = simulation.gravity
+        self._gravity = np.array(gravity)
         self.readings = np.zeros((0, width.inputs))
         self._layout = Layout((), Roster(()))
         self._seats: list[Seat] = []
@@ -132,9 +134,9 @@ class Nerves:
         w, x, y, z = state[self._turns].T
         motions = state[self._motions]
         velocities = motions[:, :3]
-        ax, ay, az = ((velocities - self._velocities) / self._tick_s).T
+        change = (velocities - self._velocities) / self._tick_s
+        ax, ay, az = (change - self._gravity).T
         self._velocities = velocities
-        az = az + self._gravity
         cells, places = self.readings.reshape(-1), self._places
         felt = into_frame((w, x, y, z), (ax, ay, az))
         for axis in range(3):

@@ -32,7 +32,8 @@ def main(arguments: list[str]) -> int:
     """
     options = _parser().parse_args(arguments[1:])
     robot, settings = _read(options.file, options.experiment)
-    track = simulate(robot, settings.space, settings.simulation)
+    world = settings.environment
+    track = simulate(robot, settings.space, settings.simulation, world)
     clock = settings.simulation
     duration_s = (clock.warmup_steps + clock.window_steps) * clock.timestep_s
     for name, value, unit in (

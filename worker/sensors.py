@@ -33,7 +33,7 @@ class Senses:
 
     Acceleration is what an ideal sensor averages between two readings: change of
     velocity over time in the present sensor frame, less gravity; at rest it reads
-    +9.81 upward. A pad reads 1 while it touches anything but its own segment and
+    +9.81 against it. A pad reads 1 while it touches anything but its own segment and
     those joined to it.
 
     Attributes:
@@ -81,7 +81,8 @@ class Senses:
         self._qpos = int(model.jnt_qposadr[start])
         self._qvel = int(model.jnt_dofadr[start])
         root = int(model.jnt_bodyid[start])
-        self._gravity = -float(model.opt.gravity[2])
+        gx, gy, gz = model.opt.gravity.tolist()
+        self._gravity = (gx, gy, gz)
         place = 0
         for index, part in enumerate(robot.parts):
             for sensor in space[part.kind].sensors:
@@ -171,10 +172,11 @@ class Senses:
         w, x, y, z = self._pose.tolist()
         vx, vy, vz, gx, gy, gz = self._motion.tolist()
         ux, uy, uz = self.velocities[0]
+        fx, fy, fz = self._gravity
         self.velocities[0] = (vx, vy, vz)
-        ax = (vx - ux) / interval_s
-        ay = (vy - uy) / interval_s
-        az = (vz - uz) / interval_s + self._gravity
+        ax = (vx - ux) / interval_s - fx
+        ay = (vy - uy) / interval_s - fy
+        az = (vz - uz) / interval_s - fz
         row, place = self._cells, self.core_imu
         felt = into_frame((w, x, y, z), (ax, ay, az))
         row[place], row[place + 1], row[place + 2] = felt
@@ -191,7 +193,7 @@ class Senses:
             motion = _site_motion(model, data, site)
             rotation = data.site_xmat[site].reshape(3, 3)
             change = np.subtract(motion[3:], self.velocities[number]) / interval_s
-            change[2] += self._gravity
+            change -= self._gravity
             self.velocities[number] = _velocity_of(motion[3:])
             self._row[place : place + 3] = change @ rotation
             self._row[place + 3 : place + 6] = motion[:3] @ rotation

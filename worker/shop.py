@@ -9,7 +9,9 @@ from msgspec.structs import replace
 
 from schema.birth import BirthId
 from schema.experiment import body_space
-from schema.mjcf import Scenery, add_ring_wall, robot_spec, shared_model, solo_model
+from schema.mjcf import Furnish, robot_spec, shared_model, solo_model
+from schema.mjcf_footing import footprint, standing_height
+from schema.mjcf_world import add_ring_wall
 from schema.robot import Robot
 from schema.settings import ArenaSettings
 from worker.cluster import Cluster
@@ -57,17 +59,39 @@ class Shop:
         self._specs: dict[BirthId, mujoco.MjSpec] = {}
 
     def body(self, birth: BirthId, robot: Robot) -> Body:
-        """Return a robot at the origin, as high as the arena drops it.
+        """Return a robot at the origin, as high as the arena drops it there.
 
         Raises:
             ValueError: the engine cannot build it.
             ExperimentError: a sensor that the arena has nothing for.
         """
         types = self._rules.types
-        model = solo_model(robot, types, self._simulation, scenery=self._scenery)
+        model = solo_model(
+            robot,
+            types,
+            self._simulation,
+            self.settings.environment,
+            furnish=self._furnish,
+        )
         home = Cluster((birth,), ("",), model)
         home.seat(robot, model, self._rules)
         return Body(robot, reach_of(model), home)
+
+    def height(self, body: Body, place: tuple[float, float], heading: float) -> float:
+        """Return how high a robot's core is when the arena drops it [m].
+
+        Args:
+            body: the robot's.
+            place: of the core's centre in the ground plane, world frame [m].
+            heading: turn about z [rad].
+        """
+        environment, model = self.settings.environment, body.home.model
+        if environment.is_even:
+            return float(model.qpos0[2])
+        boxes = footprint(model)
+        return self._simulation.drop_m + standing_height(
+            boxes, self._simulation, environment, place, heading
+        )
 
     def cluster(self, births: Sequence[BirthId], bodies: Sequence[Body]) -> Cluster:
         """Return a cluster for robots, in an undefined state.
@@ -105,7 +129,8 @@ class Shop:
         model = shared_model(
             list(zip(prefixes, specs, strict=True)),
             self._simulation,
-            scenery=self._scenery,
+            self.settings.environment,
+            furnish=self._furnish,
         )
         tells = self.settings.arena.record_touches
         made = Cluster(members, prefixes, model, tells_touches=tells)
@@ -120,6 +145,6 @@ class Shop:
         return self._specs[birth]
 
     @property
-    def _scenery(self) -> Scenery:
+    def _furnish(self) -> Furnish:
         arena, simulation = self.settings.arena, self._simulation
         return lambda spec: add_ring_wall(spec, arena, simulation)

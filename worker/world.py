@@ -67,7 +67,8 @@ class World:
         self.company = Company(self._settings)
         width = self.company.shop.width
         self._minds = Minds(Source(self._clock, width, self._settings.origin))
-        self._nerves = Nerves(width, self._clock)
+        gravity = self._settings.environment.gravity_vector(self._clock.gravity)
+        self._nerves = Nerves(width, self._clock, gravity)
         self._casualties: list[Casualty] = []
         self._touches = Touches(self._settings)
         self._poses = Poses(self._clock.timestep_s)

@@ -18,6 +18,7 @@ from analysis.render import (
 )
 from analysis.render_command import main
 from schema.brain import INPUT, Brain, Neuron
+from schema.environment import FLAT
 from schema.experiment import Simulation
 from schema.parts import BUILT_IN
 from schema.robot import Part, Robot
@@ -37,7 +38,7 @@ ROBOT = Robot(
 def studio() -> Iterator[Studio]:
     try:
         choose_engine()
-        made = Studio(ROBOT, BUILT_IN, Simulation(), size=(160, 120))
+        made = Studio(ROBOT, BUILT_IN, Simulation(), FLAT, size=(160, 120))
     except NoPictures as error:
         pytest.skip(str(error))
     with made:

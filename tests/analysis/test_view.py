@@ -25,7 +25,7 @@ from schema.birth import BirthId
 from schema.experiment import Arena, Experiment, Simulation
 from schema.experiment_file import read_experiment
 from schema.live import Departed, Level, Newborn, News
-from schema.mjcf import add_ring_wall
+from schema.mjcf_world import add_ring_wall
 from schema.parts import BUILT_IN
 from schema.robot import Part, Robot
 from schema.tables import TABLES

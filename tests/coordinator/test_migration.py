@@ -15,6 +15,7 @@ from coordinator.events import (
 )
 from coordinator.island import Island
 from schema.birth import BirthId
+from schema.environment import Environment
 from schema.errors import UnexpectedEvent
 from schema.experiment import Experiment, Islands, Selection, Simulation
 from schema.experiment_check import check_experiment
@@ -135,10 +136,17 @@ def test_an_immigrant_is_judged_anew_where_the_island_says_so() -> None:
     assert fitness == 0.5
 
 
-def test_islands_that_judge_otherwise_judge_anew() -> None:
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"simulation": Simulation(window_steps=400)},
+        {"environment": Environment(slope_deg=5.0)},
+    ],
+)
+def test_islands_that_judge_otherwise_judge_anew(changes: dict[str, object]) -> None:
     document = sea(6, 6).experiment
     first, second = document.islands
-    other = msgspec.structs.replace(second, simulation=Simulation(window_steps=400))
+    other = msgspec.structs.replace(second, **changes)
     document = msgspec.structs.replace(document, islands=(first, other))
     lived = Sea(document, fit=rising).live()
     anew = [row for row in lived.rows("evaluations") if row["trial"]]

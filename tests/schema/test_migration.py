@@ -117,6 +117,7 @@ def test_what_cannot_be_is_one_clear_line(old: str, new: str, why: str) -> None:
         ('[migration]\ntopology = "ring"', "one island"),
         ("[migration]\nepoch = 30", "unconnected"),
         ("islands = 3", "must be a table"),
+        ("[islands]\ncount = 2", r"must be \[\[islands"),
         ("[[islands]]\n[islands.migration]\nepoch = 3", "how the islands"),
         ("[[islands]]\ncount = 0", "count"),
         (

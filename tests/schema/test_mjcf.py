@@ -7,8 +7,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from schema.environment import FLAT
 from schema.experiment import Simulation
-from schema.mjcf import add_ground, robot_spec, set_options, solo_model
+from schema.mjcf import robot_spec, solo_model
+from schema.mjcf_world import add_ground, set_options
 from schema.parts import BUILT_IN
 from schema.robot import Part, Robot
 
@@ -30,7 +32,7 @@ def on_core(kind: str, slot: int = 0, turn: int = 0, parent_slot: int = 2) -> Ro
 
 
 def model_of(robot: Robot, simulation: Simulation = WORLD) -> mujoco.MjModel:
-    return solo_model(robot, BUILT_IN, simulation)
+    return solo_model(robot, BUILT_IN, simulation, FLAT)
 
 
 def body_mass(model: mujoco.MjModel, name: str) -> float:
@@ -170,8 +172,8 @@ def test_one_spec_can_be_attached_to_a_world_twice() -> None:
     solo = model_of(robot)
     child = robot_spec(robot, BUILT_IN, WORLD)
     world = mujoco.MjSpec()
-    set_options(world, WORLD, is_single=False)
-    add_ground(world, WORLD)
+    set_options(world, WORLD, FLAT, is_single=False)
+    add_ground(world, WORLD, FLAT)
     for number, x in ((7, 0.0), (8, 1.0)):
         frame = world.worldbody.add_frame(pos=(x, 0.0, child.height))
         world.attach(child.spec, frame=frame, prefix=f"{number}:")

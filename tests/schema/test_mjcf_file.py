@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
+from msgspec.structs import replace
 
 from schema.brain import INPUT, Brain, Neuron
+from schema.environment import Environment, relief
 from schema.errors import InvalidRobot
 from schema.mjcf_file import robot_from_mjcf, robot_to_mjcf
 from schema.robot import Part, Robot
@@ -42,6 +44,26 @@ def test_it_is_a_model_of_its_own() -> None:
     assert model.body_subtreemass[0] == pytest.approx(0.1062, rel=1e-6)
     assert model.jnt_range[1].tolist() == pytest.approx([-1.0472, 1.0472], rel=1e-4)
     assert model.opt.timestep == 0.005
+
+
+def test_its_environment_goes_along() -> None:
+    """Lean of gravity, relief and scenery: in the model, and in what is read back."""
+    box = '<geom type="box" size="0.1 0.1 0.1" pos="0.5 0 0.1"/>'
+    environment = Environment(
+        slope_deg=30.0,
+        roughness_m=0.05,
+        extent_m=1.0,
+        scenery=f"<mujoco><worldbody>{box}</worldbody></mujoco>",
+    )
+    wild = replace(SETTINGS, environment=environment)
+    text = robot_to_mjcf(ARM, wild)
+    assert robot_from_mjcf(text, "it") == (ARM, wild)
+    model = mujoco.MjModel.from_xml_string(text)
+    gravity = [-9.81 * 0.5, 0.0, -9.81 * 0.75**0.5]
+    assert model.opt.gravity.tolist() == pytest.approx(gravity, rel=1e-5)
+    shares = model.hfield_data.reshape(21, 21)
+    assert shares == pytest.approx(relief(environment), abs=1e-5)
+    assert model.geom("scenery/0").pos.tolist() == [0.5, 0.0, 0.1]
 
 
 def test_an_edited_body_is_refused() -> None:

@@ -67,8 +67,10 @@ def test_experiments_of_the_experiments_page(tmp_path: Path) -> None:
     page = TOP / "docs" / "experiments.md"
     (module,) = _blocks(page, "python")
     (tmp_path / "my_parts.py").write_text(module)
+    (yard,) = _blocks(page, "xml")
+    (tmp_path / "yard.xml").write_text(yard)
     documents = _blocks(page, "toml")
-    assert len(documents) >= 2
+    assert len(documents) >= 3
     for document in documents:
         (tmp_path / "mine.toml").write_text(document)
         done = _python(
@@ -79,7 +81,7 @@ def test_experiments_of_the_experiments_page(tmp_path: Path) -> None:
         )  # fmt: skip
         assert done.returncode == 0, f"{document}\n{done.stderr}"
         if "my_parts" not in document:
-            parse_experiment(document, page.name)
+            parse_experiment(document, str(tmp_path / page.name))
 
 
 def test_commands_of_the_robots_page(tmp_path: Path) -> None:

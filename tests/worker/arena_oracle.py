@@ -76,7 +76,9 @@ class Oracle:
             for one in company.everybody
         ]
         self._model = shared_model(
-            list(zip(prefixes, specs, strict=True)), settings.simulation
+            list(zip(prefixes, specs, strict=True)),
+            settings.simulation,
+            settings.environment,
         )
         self._data = mujoco.MjData(self._model)
         root_of = self._model.body_rootid[self._model.geom_bodyid]

@@ -6,6 +6,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from schema.environment import FLAT
 from schema.errors import RevolveError
 from schema.experiment import Simulation
 from schema.mjcf import solo_model
@@ -21,7 +22,7 @@ def test_the_spider_is_the_thesis_s() -> None:
     """383 g, 8 servos, underside 2.25 cm below the core (facts, section 9)."""
     robot = spider()
     check_robot(robot, BUILT_IN)
-    model = solo_model(robot, BUILT_IN, Simulation())
+    model = solo_model(robot, BUILT_IN, Simulation(), FLAT)
     assert model.body_mass.sum() == pytest.approx(0.3832)
     assert model.nu == 8
     assert model.qpos0[2] == pytest.approx(0.0225)

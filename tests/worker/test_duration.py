@@ -7,6 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from schema.codec import decode_answer, decode_request, encode_request, encode_robot
+from schema.environment import FLAT
 from schema.errors import ExperimentError
 from schema.evaluation import Evaluation
 from schema.experiment import Experiment, Simulation
@@ -48,7 +49,7 @@ def test_the_last_window_of_a_longer_life_is_judged(turtle: Robot) -> None:
     assert found.simulated_s == pytest.approx(6.0)
     # All 6 s as one window, of which the last 2 s are the last 11 of 31 samples.
     whole = replace(WORLD, warmup_steps=0, window_steps=1200)
-    track = simulate(turtle, EXPERIMENT.space, whole).core_position[-11:]
+    track = simulate(turtle, EXPERIMENT.space, whole, FLAT).core_position[-11:]
     hops = [math.dist(a[:2], b[:2]) for a, b in pairwise(track)]
     assert found.path_velocity == pytest.approx(sum(hops) / 2.0, rel=1e-12)
     net = math.dist(track[0][:2], track[-1][:2])

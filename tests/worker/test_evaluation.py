@@ -15,6 +15,7 @@ from msgspec.structs import replace
 
 from schema.brain import INPUT, Brain, Neuron
 from schema.codec import decode_answer, encode_request, encode_robot
+from schema.environment import FLAT
 from schema.errors import (
     ExperimentError,
     FitnessUndefined,
@@ -36,7 +37,7 @@ SETTINGS = EvaluationSettings(space=Space(), simulation=WORLD, fitness=Fitness()
 
 
 def test_an_evaluation_is_the_fitness_of_the_track(turtle: Robot) -> None:
-    track = simulate(turtle, Space(), WORLD)
+    track = simulate(turtle, Space(), WORLD, FLAT)
     found = evaluate(turtle, SETTINGS)
     assert found.path_velocity == path_velocity(track) > 0
     assert found.straight_velocity == straight_velocity(track) > 0
@@ -45,7 +46,7 @@ def test_an_evaluation_is_the_fitness_of_the_track(turtle: Robot) -> None:
 
 
 def test_a_track_has_both_ends_of_its_window(turtle: Robot) -> None:
-    track = simulate(turtle, Space(), WORLD)
+    track = simulate(turtle, Space(), WORLD, FLAT)
     assert track.core_position.shape == (61, 3)
     assert track.interval_s == 0.2
     assert track.core_position[0] == pytest.approx([0, 0, 0.0225], abs=1e-12)
@@ -53,16 +54,16 @@ def test_a_track_has_both_ends_of_its_window(turtle: Robot) -> None:
 
 def test_the_window_begins_after_the_warm_up(turtle: Robot) -> None:
     """Dropped robots fall before the window, and the window is as long."""
-    whole = simulate(turtle, Space(), replace(WORLD, window_steps=2400 + 600))
-    late = simulate(turtle, Space(), replace(WORLD, warmup_steps=600))
+    whole = simulate(turtle, Space(), replace(WORLD, window_steps=2400 + 600), FLAT)
+    late = simulate(turtle, Space(), replace(WORLD, warmup_steps=600), FLAT)
     assert late.core_position.shape == (61, 3)
     assert late.core_position.tobytes() == whole.core_position[15:].tobytes()
 
 
 def test_clocks_need_not_divide_each_other(turtle: Robot) -> None:
     """A pose in the middle of a tick changes nothing of the motion."""
-    coarse = simulate(turtle, Space(), replace(WORLD, pose_steps=2400))
-    fine = simulate(turtle, Space(), replace(WORLD, pose_steps=32))
+    coarse = simulate(turtle, Space(), replace(WORLD, pose_steps=2400), FLAT)
+    fine = simulate(turtle, Space(), replace(WORLD, pose_steps=32), FLAT)
     assert coarse.core_position[-1].tobytes() == fine.core_position[-1].tobytes()
 
 
@@ -77,7 +78,7 @@ def test_the_physics_are_stepped_as_often_as_the_window_says(
         step(model, data, nstep=nstep)
 
     monkeypatch.setattr(mujoco, "mj_step", counted)
-    simulate(turtle, Space(), replace(WORLD, warmup_steps=7))
+    simulate(turtle, Space(), replace(WORLD, warmup_steps=7), FLAT)
     assert sum(steps) == 2407
 
 
@@ -97,25 +98,28 @@ def bits(track: Track) -> bytes:
 def test_the_same_robot_goes_the_same_way_again(robot_of: RobotOf) -> None:
     for seed in range(5):
         robot = robot_of(seed)
-        first = simulate(robot, Space(), WORLD)
-        assert bits(simulate(robot, Space(), WORLD)) == bits(first)
+        first = simulate(robot, Space(), WORLD, FLAT)
+        assert bits(simulate(robot, Space(), WORLD, FLAT)) == bits(first)
 
 
 def test_threads_do_not_change_the_way(robot_of: RobotOf) -> None:
     robots = [robot_of(seed) for seed in range(8)]
-    alone = [bits(simulate(robot, Space(), WORLD)) for robot in robots]
+    alone = [bits(simulate(robot, Space(), WORLD, FLAT)) for robot in robots]
     with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(lambda r: bits(simulate(r, Space(), WORLD)), robots))
+        found = list(
+            pool.map(lambda r: bits(simulate(r, Space(), WORLD, FLAT)), robots)
+        )
     assert found == alone
 
 
 ELSEWHERE = """
 import hashlib, sys
 from schema.codec import decode_robot
+from schema.environment import FLAT
 from schema.experiment import Simulation, Space
 from worker.evaluation import simulate
 for line in sys.stdin:
-    track = simulate(decode_robot(bytes.fromhex(line)), Space(), Simulation())
+    track = simulate(decode_robot(bytes.fromhex(line)), Space(), Simulation(), FLAT)
     print(hashlib.sha256(track.core_position.tobytes()).hexdigest())
 """
 
@@ -131,7 +135,7 @@ def test_another_process_goes_the_same_way(robot_of: RobotOf) -> None:
         cwd=Path(__file__).parents[2],
     ).stdout.split()
     assert found == [
-        hashlib.sha256(bits(simulate(robot, Space(), WORLD))).hexdigest()
+        hashlib.sha256(bits(simulate(robot, Space(), WORLD, FLAT))).hexdigest()
         for robot in robots
     ]
 
@@ -148,17 +152,17 @@ def test_a_robot_that_explodes_is_a_result_with_reason_and_time(
         WORLD, timestep_s=0.5, servo_armature=0.0, armature=0.0, servo_stiffness=1e9
     )
     with pytest.raises(SimulationDiverged, match=r"diverged by \d+\.\d{3} s: .*BADQ"):
-        simulate(robot_of(3), Space(), absurd)
+        simulate(robot_of(3), Space(), absurd, FLAT)
     assert capfd.readouterr() == ("", "")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_diverged_robot_does_not_harm_the_next(robot_of: RobotOf) -> None:
-    before = bits(simulate(robot_of(4), Space(), WORLD))
+    before = bits(simulate(robot_of(4), Space(), WORLD, FLAT))
     absurd = replace(WORLD, timestep_s=0.5, servo_armature=0.0, armature=0.0)
     with pytest.raises(SimulationDiverged):
-        simulate(robot_of(3), Space(), absurd)
-    assert bits(simulate(robot_of(4), Space(), WORLD)) == before
+        simulate(robot_of(3), Space(), absurd, FLAT)
+    assert bits(simulate(robot_of(4), Space(), WORLD, FLAT)) == before
 
 
 def test_a_light_sensor_in_a_world_without_light_is_refused() -> None:
@@ -170,12 +174,12 @@ def test_a_light_sensor_in_a_world_without_light_is_refused() -> None:
     inputs = tuple(Neuron("input", INPUT, part) for part in (0,) * 6 + (1,))
     space = Space(part_types=("schema.parts:CORE", "schema.parts:LIGHT_SENSOR"))
     with pytest.raises(ExperimentError, match="no light in this world"):
-        simulate(Robot(parts, Brain(inputs)), space, WORLD)
+        simulate(Robot(parts, Brain(inputs)), space, WORLD, FLAT)
 
 
 def test_a_brain_beyond_the_limits_is_refused(turtle: Robot) -> None:
     with pytest.raises(InvalidRobot, match="input neurons must be <= 6, got 8"):
-        simulate(turtle, Space(max_inputs=6), WORLD)
+        simulate(turtle, Space(max_inputs=6), WORLD, FLAT)
 
 
 def not_a_number(_track: Track, _fitness: Fitness) -> float:
@@ -213,5 +217,5 @@ def test_a_fitness_function_that_cannot_judge_is_a_result(
 
 
 def test_positions_are_those_of_the_core_not_of_the_mass(turtle: Robot) -> None:
-    track = simulate(turtle, Space(), replace(WORLD, window_steps=40))
+    track = simulate(turtle, Space(), replace(WORLD, window_steps=40), FLAT)
     assert np.abs(track.core_position[0, :2]).max() == 0.0

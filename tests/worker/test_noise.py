@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from schema.arena import Changes, Insertion
 from schema.birth import BirthId
 from schema.brain import Brain, Connection, Neuron
+from schema.environment import FLAT
 from schema.errors import MalformedMessage
 from schema.evaluation import Floats, Track
 from schema.experiment import Fitness, Simulation, Space
@@ -146,7 +147,7 @@ def test_without_noise_it_does_not_matter_who_asks(robot_of: Robots) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(np.random, "Philox", None)
         found = {
-            bits(simulate(robot_of(3), Space(), silent, identity=identity))
+            bits(simulate(robot_of(3), Space(), silent, FLAT, identity=identity))
             for identity in (NOBODY, IDENTITY, *OTHERS)
         }
     assert len(found) == 1
@@ -156,11 +157,11 @@ def test_noise_of_sensors_moves_only_those_who_listen(turtle: Robot) -> None:
     """The turtle's motors follow clocks; wired to its imu, they do not."""
     still = replace(LOUD, sensor_noise=0.0, actuator_noise=0.0)
     deaf = replace(LOUD, actuator_noise=0.0)
-    plain = bits(simulate(turtle, Space(), still))
-    assert bits(simulate(turtle, Space(), deaf, identity=IDENTITY)) == plain
+    plain = bits(simulate(turtle, Space(), still, FLAT))
+    assert bits(simulate(turtle, Space(), deaf, FLAT, identity=IDENTITY)) == plain
     listening = wired(turtle, [(0, 0.1)])
-    assert bits(simulate(listening, Space(), deaf, identity=IDENTITY)) != bits(
-        simulate(listening, Space(), still)
+    assert bits(simulate(listening, Space(), deaf, FLAT, identity=IDENTITY)) != bits(
+        simulate(listening, Space(), still, FLAT)
     )
 
 
@@ -185,7 +186,7 @@ def shares(robot: Robot, simulation: Simulation) -> Floats:
         target = data.ctrl / 0.9 + data.qpos[7:]
         found.append((target + np.pi / 4) / (np.pi / 2))
 
-    simulate(robot, Space(), simulation, identity=IDENTITY, watch=watch)
+    simulate(robot, Space(), simulation, FLAT, identity=IDENTITY, watch=watch)
     return np.array(found)
 
 
@@ -215,7 +216,7 @@ def test_outputs_are_clipped_after_the_noise(turtle: Robot) -> None:
 def test_the_loudest_noise_is_survived(robot_of: Robots) -> None:
     loudest = replace(LOUD, sensor_noise=1e6, actuator_noise=1e6)
     for seed in range(4):
-        track = simulate(robot_of(seed), Space(), loudest, identity=IDENTITY)
+        track = simulate(robot_of(seed), Space(), loudest, FLAT, identity=IDENTITY)
         assert np.isfinite(track.core_position).all()
 
 
@@ -229,10 +230,10 @@ def test_a_robot_alone_moves_as_it_does_off_line(robot_of: Robots) -> None:
         world.advance(600 + 800)
         simulation = replace(NOISY.simulation, drop_m=NOISY.arena.drop_m)
         identity = Identity(ORIGIN, A, 0)
-        track = simulate(robot_of(seed), Space(), simulation, identity=identity)
+        track = simulate(robot_of(seed), Space(), simulation, FLAT, identity=identity)
         own = world.company.find(A).window.track()
         assert np.array_equal(own.core_position, track.core_position)
-        calm = simulate(robot_of(seed), Space(), SETTINGS.simulation)
+        calm = simulate(robot_of(seed), Space(), SETTINGS.simulation, FLAT)
         assert not np.array_equal(
             own.core_position, calm.core_position[: len(own.core_position)]
         )

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from schema.environment import FLAT
 from schema.experiment import Simulation
-from schema.mjcf import add_ground, robot_spec, set_options, solo_model
+from schema.mjcf import robot_spec, solo_model
+from schema.mjcf_world import add_ground, set_options
 from schema.parts import BUILT_IN, CORE, BodySpace, PartType, Sensor
 from schema.robot import Part, Robot
 from worker.sensors import Senses, Servos, find, free_joint
@@ -30,15 +32,15 @@ def alone(
     robot: Robot, simulation: Simulation = WORLD, space: BodySpace = BUILT_IN
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Return model and data of one robot on the ground."""
-    model = solo_model(robot, space, simulation)
+    model = solo_model(robot, space, simulation, FLAT)
     return model, mujoco.MjData(model)
 
 
 def two(robots: tuple[Robot, Robot]) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Return model and data of two robots, ``1:`` and ``2:``, half a metre apart."""
     world = mujoco.MjSpec()
-    set_options(world, WORLD, is_single=False)
-    add_ground(world, WORLD)
+    set_options(world, WORLD, FLAT, is_single=False)
+    add_ground(world, WORLD, FLAT)
     for number, robot in enumerate(robots, start=1):
         child = robot_spec(robot, BUILT_IN, WORLD)
         turn = (math.cos(number / 2), 0.0, 0.0, math.sin(number / 2))
@@ -134,7 +136,7 @@ def test_an_imu_may_sit_in_a_limb() -> None:
     """It agrees with the engine's own gyroscope and velocimeter at that site."""
     space = _imu_in_a_brick()
     spec = robot_spec(HINGED, space, WORLD).spec
-    set_options(spec, WORLD, is_single=True)
+    set_options(spec, WORLD, FLAT, is_single=True)
     for name, kind in (("w", "mjSENS_GYRO"), ("v", "mjSENS_FRAMELINVEL")):
         spec.add_sensor(
             name=name,

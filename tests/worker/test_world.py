@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from schema.arena import BrainChange, Changes, Insertion
 from schema.birth import BirthId
 from schema.brain import Brain, Neuron
+from schema.environment import FLAT
 from schema.errors import UnexpectedEvent
 from schema.experiment import Space
 from schema.parts import LIGHT_SENSOR
@@ -65,7 +66,7 @@ def test_a_robot_alone_moves_as_it_does_off_line(turtle: Robot) -> None:
     world = inhabited(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
     advance = world.advance(600 + 2400)
     simulation = replace(SETTINGS.simulation, drop_m=SETTINGS.arena.drop_m)
-    track = simulate(turtle, SETTINGS.space, simulation)
+    track = simulate(turtle, SETTINGS.space, simulation, FLAT)
     own = world.company.find(A).window.track()
     assert np.array_equal(own.core_position, track.core_position)
     assert own.interval_s == track.interval_s
