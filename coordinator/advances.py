@@ -214,17 +214,19 @@ class Advances:
             raise UnexpectedEvent(f"no such advance was asked for: {event}")
         past.asked = None
         past.step, past.digest = advance.step, advance.digest
-        before, past.platform = past.platform, event.provenance.platform
+        agent, platform = event.provenance.agent, event.provenance.platform
+        drift: Drift | None = None
+        if past.drifts_to(platform):
+            before = past.platform
+            drift = Drift(event.island, advance.step, before, platform, agent)
+        past.platform = platform
         past.history.append(PastAdvance(asked.changes, asked.until, advance.digest))
         past.places = {one.birth: one.place for one in advance.judgements}
         if self._vault.has(event.island, past.step):
             past.base, past.history = past.step, []
             self._vault.drop_before(event.island, past.step)
-        self._fleet.place(self._number(event.island), past.platform)
-        if before in ("", past.platform):
-            return None
-        agent = event.provenance.agent
-        return Drift(event.island, advance.step, before, past.platform, agent)
+        self._fleet.place(self._number(event.island), platform)
+        return drift
 
     def come(self) -> list[Advanced]:
         """Return the advances that were done since the last call.

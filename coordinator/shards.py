@@ -251,12 +251,13 @@ class ShardDispatch:
         for shard in self._shards.values():
             if shard.rests_until_s is not None and shard.rests_until_s <= now_s:
                 shard.rests_until_s = None
-            self._wait(shard)
+            if self._allows_drift:
+                self._wait(shard)
 
     def _wait(self, shard: _Shard) -> None:
         """Note since when a shard has been without a worker of its platform."""
         is_alone = shard.is_wanted and bool(shard.platform) and not self._equal(shard)
-        if not (self._allows_drift and is_alone):
+        if not is_alone:
             shard.drifts_at_s = None
         elif shard.drifts_at_s is None:
             shard.drifts_at_s = self._now_s + DRIFT_S
