@@ -35,6 +35,27 @@ def whole_number(least: int = 1) -> Callable[[str], int]:
     return read
 
 
+def add_count(
+    flags: argparse.ArgumentParser, name: str, default: int, what: str, least: int = 1
+) -> None:
+    """Add a flag for a whole number.
+
+    Args:
+        flags: to add it to.
+        name: of the flag.
+        default: its value if it is not given.
+        what: it is the number of, for the help.
+        least: that is allowed; not negative.
+    """
+    flags.add_argument(
+        name,
+        type=whole_number(least),
+        default=default,
+        metavar="N",
+        help=f"{what} (default: %(default)s)",
+    )
+
+
 def number(text: str) -> float:
     """Return a flag's value as a finite number."""
     return _number(text, "a finite number", -math.inf, math.inf)

@@ -20,7 +20,7 @@ from schema.errors import ExperimentError, RevolveError
 from schema.evaluation import Report
 from schema.experiment import Experiment, body_space
 from schema.experiment_file import read_experiment
-from schema.flags import whole_number
+from schema.flags import add_count, whole_number
 from schema.genome import develop
 from schema.plugin import load
 from schema.robot import Robot
@@ -57,13 +57,7 @@ def add_commands(kinds: Any) -> None:  # noqa: ANN401 - argparse hides its type
         ("spider", "spiders on a grid, thesis figure 7.1", 5, 20),
     ):
         parser = kinds.add_parser(name, help=text)
-        parser.add_argument(
-            "experiment",
-            nargs="?",
-            default="scenario3",
-            help="whose settings to use, a .toml file or a shipped one "
-            "(default: %(default)s)",
-        )
+        add_experiment(parser, "scenario3")
         parser.add_argument(
             "--sizes",
             type=whole_number(),
@@ -72,20 +66,22 @@ def add_commands(kinds: Any) -> None:  # noqa: ANN401 - argparse hides its type
             metavar="N",
             help="numbers of robots (default: 5 10 ... 50)",
         )
-        for option, least, default, help_text in (
-            ("--seconds", 1, seconds, "simulated in each repetition"),
-            ("--repetitions", 1, repetitions, "of each size"),
-            ("--threads", 1, 1, "that advance the arena together"),
-            ("--seed", 0, 1, "of the robots and their places"),
-        ):
-            parser.add_argument(
-                option,
-                type=whole_number(least),
-                default=default,
-                metavar="N",
-                help=f"{help_text} (default: %(default)s)",
-            )
+        add_count(parser, "--seconds", seconds, "simulated in each repetition")
+        add_count(parser, "--repetitions", repetitions, "of each size")
+        add_count(parser, "--threads", 1, "that advance the arena together")
+        add_count(parser, "--seed", 1, "of the robots and their places", least=0)
         parser.add_argument("--out", type=Path, help="Parquet file for the results")
+
+
+def add_experiment(parser: argparse.ArgumentParser, default: str) -> None:
+    """Add the experiment that a benchmark takes its settings from."""
+    parser.add_argument(
+        "experiment",
+        nargs="?",
+        default=default,
+        help="whose settings to use, a .toml file or a shipped one "
+        "(default: %(default)s)",
+    )
 
 
 def run(options: argparse.Namespace) -> int:

@@ -23,7 +23,7 @@ from schema.errors import SimulationDiverged
 from schema.evaluation import Floats
 from schema.experiment import Experiment, Simulation, body_space
 from schema.experiment_file import parse_experiment, read_experiment
-from schema.flags import Flags, whole_number
+from schema.flags import Flags, add_count
 from schema.genome import Genome, develop
 from schema.mjcf import solo_model
 from schema.plugin import load
@@ -165,33 +165,15 @@ def _parser() -> argparse.ArgumentParser:
     timing = kinds.add_parser(
         "evaluate", help="time evaluations against the bare engine"
     )
-    timing.add_argument(
-        "experiment",
-        nargs="?",
-        default="scenario1",
-        help="whose settings to use, a .toml file or a shipped one "
-        "(default: %(default)s)",
-    )
-    timing.add_argument(
-        "--robots",
-        type=whole_number(),
-        default=30,
-        metavar="N",
-        help="random ones (default: 30)",
-    )
-    _add_seed(timing)
+    arena_bench.add_experiment(timing, "scenario1")
+    add_count(timing, "--robots", 30, "random ones")
+    add_count(timing, "--seed", 1, "of the robots that are drawn", least=0)
     study = kinds.add_parser(
         "fidelity", help="simulate a run's robots anew with another world"
     )
     study.add_argument("run", type=Path, help="folder of a run")
-    study.add_argument(
-        "--per-third",
-        type=whole_number(),
-        default=20,
-        metavar="N",
-        help="robots of each third of the fitness (default: 20)",
-    )
-    _add_seed(study)
+    add_count(study, "--per-third", 20, "robots of each third of the fitness")
+    add_count(study, "--seed", 1, "of the robots that are drawn", least=0)
     study.add_argument(
         "--against",
         action="append",
@@ -201,16 +183,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     arena_bench.add_commands(kinds)
     return parser
-
-
-def _add_seed(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--seed",
-        type=whole_number(0),
-        default=1,
-        metavar="N",
-        help="of the robots that are drawn (default: 1)",
-    )
 
 
 def _evaluate(options: argparse.Namespace) -> int:
