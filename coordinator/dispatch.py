@@ -1,9 +1,10 @@
 """Who gets which job: a pure machine between those who ask and those who do.
 
 Each requested job is delivered exactly once, whatever joins, leaves, dies, errs
-or answers late. An agent holds at most ``slots + 1`` jobs, so that the next one
-is always at hand. Lower numbers go first, and so what was lost goes first again;
-the agent with the least to do gets it, ties break on its name.
+or answers late. An agent holds ``slots + 1`` jobs, so that the next one is always
+at hand, and some more while many short ones wait, so that nobody need be asked for
+each of them. Lower numbers go first, and so what was lost goes first again; the agent
+with the least to do gets it, ties break on its name.
 
 An agent that erred or lost a job without leaving rests before it is given more,
 longer each time in a row, so that a broken one cannot eat the queue.
@@ -40,6 +41,8 @@ from schema.errors import UnexpectedEvent
 AGENT_OF: dict[JobKind, AgentKind] = {"vet": "analyzer", "evaluate": "worker"}
 MAX_ERRORS = 3
 MAX_DEATHS = 3
+VETS_AT_HAND = 16
+"""Vettings that an analyzer has beside the one it is at: some milliseconds' work."""
 
 
 class Dispatch:
@@ -47,7 +50,10 @@ class Dispatch:
 
     def __init__(self) -> None:
         self._jobs: dict[int, Pending] = {}
-        self._pools: dict[AgentKind, Pool] = {"worker": Pool(), "analyzer": Pool()}
+        self._pools: dict[AgentKind, Pool] = {
+            "worker": Pool(),
+            "analyzer": Pool(VETS_AT_HAND),
+        }
         self._kind_of: dict[str, AgentKind] = {}
         self._rests = Rests()
         self._stamps = count(1)
@@ -85,6 +91,11 @@ class Dispatch:
         """Return what an agent's machine is; empty once it has left."""
         kind = self._kind_of.get(agent)
         return self._pools[kind].agents[agent].joined.platform if kind else ""
+
+    @property
+    def leisure_s(self) -> float:
+        """How long no worker will want for a job whatever comes meanwhile [s]."""
+        return self._pools["worker"].leisure_s
 
     @property
     def wake_s(self) -> float | None:
@@ -175,6 +186,8 @@ class Dispatch:
             if event.outcome == "ok" and self._now_s is not None:
                 elapsed_s = self._now_s - pending.since_s
                 self._stragglers.learn(pending.job.kind, elapsed_s)
+                pool = self._pools[AGENT_OF[pending.job.kind]]
+                pool.learn(elapsed_s / pending.place)
             pending.holders.remove(event.agent)
             yield Deliver(pending.job, event.agent, event.answer, event.reason)
             yield from self._close(pending)
@@ -246,7 +259,9 @@ class Dispatch:
             pending.since_s = self._now_s or 0.0
         pending.holders.append(name)
         self._twins.note(job, name)
-        pool.agents[name].held[job.number] = None
+        agent = pool.agents[name]
+        agent.held[job.number] = None
+        pending.place = max(1.0, len(agent.held) / agent.joined.slots)
         pool.offer(name, next(self._stamps))
         return Assign(job, name)
 

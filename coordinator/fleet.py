@@ -48,8 +48,10 @@ class Agents(Protocol):
     def cancel(self, _agent: str, _payload: bytes, /) -> None:
         """Tell an agent that nobody waits for a job, by the job's own request."""
 
-    def receive(self, timeout_s: float) -> Sequence[DispatchEvent]:
-        """Return what happened, waiting at most ``timeout_s`` for the first."""
+    def receive(
+        self, timeout_s: float, pause_s: float = 0.0, /
+    ) -> Sequence[DispatchEvent]:
+        """Return what happened: during a pause, and if nothing did, thereafter."""
 
 
 class Asker(Protocol):
@@ -164,7 +166,9 @@ class Fleet:
             if wake_s is not None:
                 timeout_s = min(timeout_s, max(0.0, wake_s - now_s))
         self.tell(Ticked(now_s))
-        for event in self._agents.receive(timeout_s):
+        # Woken for each answer, one spends more on waking up than on answers.
+        pause_s = 0.0 if self._advancing else self.dispatch.leisure_s
+        for event in self._agents.receive(timeout_s, min(timeout_s, pause_s)):
             self.tell(event)
         news, self._news = list(self._news), {}
         return news

@@ -86,7 +86,9 @@ class _Nobody:
     def cancel(self, _agent: str, _payload: bytes, /) -> None:
         """Cancel nothing."""
 
-    def receive(self, _timeout_s: float, /) -> Sequence[DispatchEvent]:
+    def receive(
+        self, _timeout_s: float, _pause_s: float = 0.0, /
+    ) -> Sequence[DispatchEvent]:
         return ()
 
 

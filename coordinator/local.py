@@ -30,7 +30,9 @@ class LocalAgents:
     def cancel(self, _agent: str, _payload: bytes) -> None:
         """Do it all the same: of one worker's jobs there are no copies."""
 
-    def receive(self, timeout_s: float) -> Sequence[DispatchEvent]:
+    def receive(
+        self, timeout_s: float, _pause_s: float = 0.0, /
+    ) -> Sequence[DispatchEvent]:
         """Do the oldest job; the first call tells who is there."""
         news, self._news = self._news, []
         if self._asked:

@@ -6,6 +6,14 @@ from heapq import heapify, heappop, heappush
 
 from coordinator.events import Job, Joined
 
+MOST_AHEAD = 8
+"""Jobs more than the one that is always at hand."""
+AHEAD_S = 0.4
+"""What these may take together [s]: nobody else can have them meanwhile."""
+PAUSE_S = 0.1
+"""The coordinator looks away from agents that are well provided so long [s]."""
+_NEWEST_WEIGHT = 0.1
+
 
 @dataclass(slots=True)
 class Pending:
@@ -14,6 +22,7 @@ class Pending:
     Attributes:
         job: which.
         holders: who is at it: one, or two if the first is late.
+        place: it was to be done as the first, second, ... job of a slot of its holder.
         since_s: when the first of them was given it [s].
         errors: how often somebody could not do it.
         avoid: who failed at it.
@@ -22,6 +31,7 @@ class Pending:
 
     job: Job
     holders: list[str] = field(default_factory=list)
+    place: float = 1.0
     since_s: float = 0.0
     errors: int = 0
     avoid: tuple[str, ...] = ()
@@ -47,19 +57,31 @@ class AgentState:
 class Pool:
     """All agents of one kind and the jobs that wait for them.
 
-    ``free`` holds (load, name, stamp) of each agent with credit; entries with an
-    old stamp are dead and dropped when met.
+    Attributes:
+        at_hand: jobs beyond its slots that an agent has in any case.
+        agents: by their names.
+        free: (load, name, stamp) of each agent that does not rest, a heap; entries
+            with an old stamp are dead and dropped when met.
+        waiting: numbers of jobs, a heap.
+        job_s: how long a slot is at a job, typically [s]; 0 before one is done.
     """
 
+    at_hand: int = 1
     agents: dict[str, AgentState] = field(default_factory=dict)
     free: list[tuple[float, str, int]] = field(default_factory=list)
     waiting: list[int] = field(default_factory=list)
+    job_s: float = 0.0
+
+    def learn(self, duration_s: float) -> None:
+        """Note how long a slot was at a job [s]."""
+        known = self.job_s or duration_s
+        self.job_s = known + _NEWEST_WEIGHT * (duration_s - known)
 
     def offer(self, name: str, stamp: int) -> None:
-        """Note what an agent can take now; its earlier entry dies."""
+        """Note what an agent has to do now; its earlier entry dies."""
         agent = self.agents[name]
         agent.stamp = stamp
-        if agent.rests or len(agent.held) > agent.joined.slots:
+        if agent.rests:
             return
         if len(self.free) > 4 * len(self.agents) + 64:
             self.free = [entry for entry in self.free if self._is_live(entry)]
@@ -67,16 +89,47 @@ class Pool:
         heappush(self.free, (len(agent.held) / agent.joined.slots, name, stamp))
 
     def best(self) -> str:
-        """Return who has the least to do and credit left, empty if nobody has."""
+        """Return who has the least to do and may have more, empty if nobody may."""
+        name = self._least_busy()
+        return name if name and self._spare(name) < self._ahead() else ""
+
+    def _least_busy(self) -> str:
         while self.free:
             if self._is_live(self.free[0]):
                 return self.free[0][1]
             heappop(self.free)
         return ""
 
+    def _spare(self, name: str) -> int:
+        """Return how many jobs an agent has beyond what it must have at hand."""
+        agent = self.agents[name]
+        return len(agent.held) - agent.joined.slots - self.at_hand
+
+    def _ahead(self) -> int:
+        """Return how many jobs beyond that an agent may have: fewer near the end.
+
+        Half of what waits is shared out, so that the last jobs go to whoever is done
+        first.
+        """
+        if not self.job_s:
+            return 0
+        share = len(self.waiting) // (2 * len(self.agents))
+        return min(MOST_AHEAD, share, int(AHEAD_S / self.job_s))
+
+    @property
+    def leisure_s(self) -> float:
+        """How long nobody will want for a job, as far as one can tell [s].
+
+        Half of what the least busy agent has to spare: jobs differ.
+        """
+        if not (name := self._least_busy()):
+            return 0.0
+        spare = max(0, self._spare(name)) / self.agents[name].joined.slots
+        return min(PAUSE_S, spare * self.job_s / 2)
+
     def idle(self) -> list[str]:
         """Return who has nothing to do and does not rest, by name."""
-        if not self.best() or self.free[0][0] > 0.0:
+        if not self._least_busy() or self.free[0][0] > 0.0:
             return []
         return sorted(
             name

@@ -222,11 +222,12 @@ class Network:
             consolidation=_NOW,
         )
 
-    def receive(self, timeout_s: float) -> list[DispatchEvent]:
+    def receive(self, timeout_s: float, pause_s: float = 0.0, /) -> list[DispatchEvent]:
         """Return what happened, in order; empty if nothing did in time.
 
         Args:
-            timeout_s: how long to wait for the first event [s].
+            timeout_s: how long to wait for the first event, after the pause [s].
+            pause_s: how long to let events come before looking at them [s].
 
         Raises:
             NetworkError: another coordinator has taken this one's run over.
@@ -235,6 +236,7 @@ class Network:
         while self._ask_again and self._ask_again[0][0] <= now_s:
             self._ask_info(self._ask_again.pop(0)[1])
         events: list[DispatchEvent] = []
+        time.sleep(pause_s)
         try:
             news = self._inbox.get(timeout=timeout_s)
             while True:

@@ -59,8 +59,10 @@ class Watched:
         self.cancel = network.cancel
         self._network = network
 
-    def receive(self, timeout_s: float) -> Sequence[DispatchEvent]:
-        events = self._network.receive(timeout_s)
+    def receive(
+        self, timeout_s: float, pause_s: float = 0.0, /
+    ) -> Sequence[DispatchEvent]:
+        events = self._network.receive(timeout_s, pause_s)
         for event in events:
             if isinstance(event, Returned) and event.agent.startswith("worker"):
                 self.busy_s += decode_answer(event.answer).wall_s

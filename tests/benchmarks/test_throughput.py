@@ -54,7 +54,8 @@ NULL_PER_S = 1000
 SECOND_WORKER = 1.85
 TURNS = 12
 TURN_S = 2.0
-SETTLING_S = 0.3
+# What one that leaves had ahead is done by then: 0.4 s of work, AHEAD_S.
+SETTLING_S = 1.0
 
 
 class Judged(Island):

@@ -207,10 +207,10 @@ class Mortal(LocalAgents):
 
     left = 5
 
-    def receive(self, timeout_s: float) -> list[DispatchEvent]:
+    def receive(self, timeout_s: float, pause_s: float = 0.0, /) -> list[DispatchEvent]:
         """Let every fifth job of a worker be its last."""
         news: list[DispatchEvent] = []
-        for event in super().receive(timeout_s):
+        for event in super().receive(timeout_s, pause_s):
             if isinstance(event, Returned) and event.agent == "local-worker":
                 self.left -= 1
                 if self.left == 0:

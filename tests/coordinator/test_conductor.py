@@ -155,7 +155,9 @@ class Silent:
     def cancel(self, agent: str, payload: bytes, /) -> None:
         """Go on all the same."""
 
-    def receive(self, _timeout_s: float) -> list[DispatchEvent]:
+    def receive(
+        self, _timeout_s: float, _pause_s: float = 0.0, /
+    ) -> list[DispatchEvent]:
         news, self._news = self._news, []
         return news
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.dispatch import MAX_DEATHS, MAX_ERRORS, Dispatch
+from coordinator.dispatch import MAX_DEATHS, MAX_ERRORS, VETS_AT_HAND, Dispatch
 from coordinator.events import (
     AgentKind,
     Assign,
@@ -24,6 +24,7 @@ from coordinator.events import (
     Returned,
     Ticked,
 )
+from coordinator.pool import MOST_AHEAD, PAUSE_S
 from coordinator.rests import LONGEST_REST_S, REST_S
 from coordinator.stragglers import LEAST_S, PATIENCE
 from schema.birth import BirthId
@@ -78,6 +79,44 @@ def test_an_agent_holds_one_job_more_than_it_has_slots() -> None:
     ]
     assert dispatch.waiting("worker") == 2
     assert given_out(dispatch.handle(ok(1, "w"))) == [(3, "w")]
+
+
+def busy_pair(job_s: float) -> tuple[Dispatch, list[tuple[int, str]]]:
+    """Return two workers of whom one did the first of 30 jobs, and what it set off."""
+    dispatch = told(Ticked(0.0), worker("a"), worker("b"), *requests(*range(30)))
+    assert dispatch.waiting("worker") == 26  # how long they take is not known yet
+    assert dispatch.leisure_s == 0.0
+    dispatch.handle(Ticked(job_s))
+    return dispatch, given_out(dispatch.handle(ok(0, "a")))
+
+
+def test_short_jobs_are_given_ahead_while_many_wait() -> None:
+    dispatch, given = busy_pair(0.04)
+    # One for the one that is done; then 25 wait, and a quarter of what still waits
+    # may be ahead at each: 4 of 17.
+    assert given == list(zip(range(4, 13), "aabababab", strict=True))
+    # Each has four to spare; half of them take 80 ms.
+    assert dispatch.leisure_s == pytest.approx(0.08)
+    dispatch.handle(Left("a"))
+    # The other has 6, and half of the 23 that wait now may be ahead: at most 8.
+    assert len(dispatch._pools["worker"].agents["b"].held) == 2 + MOST_AHEAD
+    assert dispatch.leisure_s == PAUSE_S
+
+
+def test_nothing_is_given_ahead_near_the_end() -> None:
+    dispatch, _ = busy_pair(0.04)
+    agents = dispatch._pools["worker"].agents
+    while dispatch.waiting("worker"):
+        name = max(agents, key=lambda each: len(agents[each].held))
+        dispatch.handle(ok(next(iter(agents[name].held)), name))
+    assert [len(agent.held) for agent in agents.values()] == [2, 2]
+    assert dispatch.leisure_s == 0.0
+
+
+def test_long_jobs_are_not_given_ahead() -> None:
+    dispatch, given = busy_pair(0.5)
+    assert given == [(4, "a")]
+    assert dispatch.leisure_s == 0.0
 
 
 def test_the_agent_with_the_least_to_do_comes_first_then_the_name() -> None:
@@ -335,7 +374,9 @@ class World:
             kind: AgentKind = "analyzer" if command.job.kind == "vet" else "worker"
             assert self.agents[agent].kind == kind
             self.held[agent].append(number)
-            assert len(self.held[agent]) <= self.agents[agent].slots + 1
+            at_hand = VETS_AT_HAND if kind == "analyzer" else 1
+            most = self.agents[agent].slots + at_hand + MOST_AHEAD
+            assert len(self.held[agent]) <= most
         self.past.append(event)
         self.check()
 

@@ -49,6 +49,7 @@ class Agents:
 
     def __init__(self) -> None:
         self.sent: list[tuple[int, str, bytes]] = []
+        self.pauses_s: list[float] = []
         self.news: list[DispatchEvent] = [
             Joined("one", "worker", 1, "p"),
             Joined("two", "worker", 2, "p"),
@@ -60,7 +61,10 @@ class Agents:
     def cancel(self, _agent: str, _payload: bytes, /) -> None:
         """Do nothing: jobs end by themselves."""
 
-    def receive(self, _timeout_s: float) -> list[DispatchEvent]:
+    def receive(
+        self, _timeout_s: float, pause_s: float = 0.0, /
+    ) -> list[DispatchEvent]:
+        self.pauses_s.append(pause_s)
         news, self.news = self.news, []
         return news
 
@@ -159,3 +163,23 @@ def test_a_released_arena_leaves_room_for_another(fleet: Fleet, agents: Agents) 
     # What the released one had out comes back to nobody.
     agents.news = [Returned(agents.sent[1][0], freed, "ok", b"")]
     assert fleet.listen(0.0, 1.0) == []
+
+
+def test_it_pauses_while_all_workers_have_more_than_enough(
+    fleet: Fleet, agents: Agents
+) -> None:
+    asker = Asker()
+    numbers = [ask(fleet, asker) for _ in range(60)]
+    fleet.listen(0.2, 0.0)
+    assert agents.pauses_s[-1] == 0.0  # how long a job takes is not known yet
+    agents.news = [Returned(numbers[0], "one", "ok", b"x")]
+    fleet.listen(0.2, 0.02)
+    fleet.listen(0.2, 0.03)
+    # The least busy is the one with two slots: eight to spare are four jobs of 20 ms
+    # in each, and half of that is left alone.
+    assert agents.pauses_s[-1] == pytest.approx(0.04)
+    fleet.listen(0.01, 0.04)
+    assert agents.pauses_s[-1] == 0.01  # no longer than whoever asked wants to wait
+    fleet.advance(fleet.new_shard(Owner()))
+    fleet.listen(0.2, 0.05)
+    assert agents.pauses_s[-1] == 0.0  # an arena waits for each answer

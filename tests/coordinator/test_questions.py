@@ -61,7 +61,9 @@ class Desk:
     def cancel(self, agent: str, payload: bytes) -> None:
         self.cancelled.append((decode_request(payload).number, agent))
 
-    def receive(self, _timeout_s: float) -> list[DispatchEvent]:
+    def receive(
+        self, _timeout_s: float, _pause_s: float = 0.0, /
+    ) -> list[DispatchEvent]:
         return []
 
     def tell(self, event: DispatchEvent) -> list[Answered | Audited]:
