@@ -14,7 +14,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from analysis.view_turns import product, quaternion, rotated
-from schema.assembly import place_parts
+from schema.assembly import place_parts, shapes_of
 from schema.evaluation import Floats
 from schema.parts import BodySpace, Box
 from schema.robot import Robot
@@ -136,8 +136,8 @@ class _Builder:
 
     def __init__(self, robot: Robot, space: BodySpace, *, is_plain: bool) -> None:
         self.parts = robot.parts
-        self.shapes = [space[p.kind].shape(p.parameters) for p in robot.parts]
-        self.rotations, self.positions = place_parts(robot, space)
+        self.shapes = shapes_of(robot, space)
+        self.rotations, self.positions = place_parts(robot, self.shapes)
         self.is_plain = is_plain
         self.pairs: list[list[int]] = []
         self.parents = [-1]

@@ -2,14 +2,15 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
 
-from schema.assembly import place_parts
+from schema.assembly import place_parts, shapes_of
 from schema.evaluation import Floats
-from schema.parts import IDENTITY, BodySpace, Vector
+from schema.parts import IDENTITY, BodySpace, Shape, Vector
 from schema.robot import Robot
 
 Indices = npt.NDArray[np.intp]
@@ -20,19 +21,20 @@ class Boxes:
     """All boxes of a body, in the core's frame.
 
     Attributes:
-        part: (N,) index of the part that each box belongs to, ascending.
+        count: (P,) number of each part's boxes, which stand one after another.
         rotation: (N, 3, 3) box frame to core frame.
         centre: (N, 3) [m].
         half: (N, 3) half of the lengths along the box's own axes [m].
-        reach: (N, 3) half of the lengths of its axis-aligned hull [m].
+        lower, upper: (N, 3) corners of its axis-aligned hull [m].
         mass: of all boxes together [kg].
     """
 
-    part: Indices
+    count: Indices
     rotation: Floats
     centre: Floats
     half: Floats
-    reach: Floats
+    lower: Floats
+    upper: Floats
     mass: float
 
 
@@ -46,25 +48,57 @@ def place_boxes(robot: Robot, space: BodySpace) -> Boxes:
     Returns:
         Its boxes, part after part, in the order of each part's shape.
     """
-    rotations, positions = place_parts(robot, space)
-    shapes = [space[part.kind].shape(part.parameters).boxes for part in robot.parts]
-    boxes = list(chain.from_iterable(shapes))
-    part = np.array([index for index, each in enumerate(shapes) for _ in each])
-    half = np.array([box.size for box in boxes]) / 2
-    local = np.array([box.position for box in boxes])
-    rotation = rotations[part]
-    centre = positions[part] + (rotation @ local[:, :, None])[:, :, 0]
-    tilted = [i for i, box in enumerate(boxes) if box.rotation is not IDENTITY]
-    if tilted:
-        tilts = np.array([boxes[index].rotation for index in tilted])
-        rotation[tilted] = rotation[tilted] @ tilts
+    shapes = shapes_of(robot, space)
+    rotations, positions = place_parts(robot, shapes)
+    tables = [_table(shape) for shape in shapes]
+    count = np.array([len(table.masses) for table in tables])
+    lengths = np.concatenate([table.lengths for table in tables])
+    half, local = lengths[:, :3] / 2, lengths[:, 3:]
+    rotation = rotations.repeat(count, axis=0)
+    centre = (rotation @ local[:, :, None])[:, :, 0]
+    centre += positions.repeat(count, axis=0)
+    first = 0
+    for table in tables:
+        for index, tilt in table.tilts:
+            rotation[first + index] = rotation[first + index].dot(tilt)
+        first += len(table.masses)
     reach = (np.abs(rotation) @ half[:, :, None])[:, :, 0]
-    mass = math.fsum(box.mass for box in boxes)
-    return Boxes(part, rotation, centre, half, reach, mass)
+    mass = math.fsum(chain.from_iterable([table.masses for table in tables]))
+    lower, upper = centre - reach, centre + reach
+    return Boxes(count, rotation, centre, half, lower, upper, mass)
+
+
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """Boxes of a shape in its part's frame: the same wherever the part sits.
+
+    Attributes:
+        lengths: (B, 6) size, then centre [m].
+        masses: [kg].
+        tilts: index of a box that does not stand as its part does, and (3, 3) how.
+    """
+
+    lengths: Floats
+    masses: list[float]
+    tilts: list[tuple[int, Floats]]
+
+
+@lru_cache(maxsize=1024)
+def _table(shape: Shape) -> _Table:
+    boxes = shape.boxes
+    return _Table(
+        np.array([box.size + box.position for box in boxes]).reshape(-1, 6),
+        [box.mass for box in boxes],
+        [
+            (index, np.array(box.rotation))
+            for index, box in enumerate(boxes)
+            if box.rotation is not IDENTITY
+        ],
+    )
 
 
 def bounding_box(boxes: Boxes) -> tuple[Vector, Vector]:
     """Return the lower and upper corner of the axis-aligned hull [m], core frame."""
-    lower_x, lower_y, lower_z = (boxes.centre - boxes.reach).min(axis=0).tolist()
-    upper_x, upper_y, upper_z = (boxes.centre + boxes.reach).max(axis=0).tolist()
+    lower_x, lower_y, lower_z = np.minimum.reduce(boxes.lower).tolist()
+    upper_x, upper_y, upper_z = np.maximum.reduce(boxes.upper).tolist()
     return (lower_x, lower_y, lower_z), (upper_x, upper_y, upper_z)

@@ -3,9 +3,9 @@
 import time
 
 from analyzer.report import analyze
-from schema.codec import Answer, decode_request, encode_answer
+from schema.codec import Answer, decode_body, decode_request, encode_answer
 from schema.experiment import body_space
-from schema.robot import check_types
+from schema.robot import check_body
 from schema.settings import read_vetting_settings
 
 
@@ -13,7 +13,8 @@ def answer(request: bytes) -> bytes:
     """Return the encoded answer to an encoded request.
 
     Args:
-        request: a ``Request`` with ``VettingSettings``.
+        request: a ``Request`` with ``VettingSettings``, about a body: a brain that it
+            holds is not looked at.
 
     Returns:
         An ``Answer`` with a report; it depends on nothing but the request, except
@@ -22,13 +23,13 @@ def answer(request: bytes) -> bytes:
     Raises:
         MalformedMessage: not a request's bytes.
         ExperimentError: settings that are none, or name what is not there.
-        InvalidRobot: a robot that the body space does not allow.
+        InvalidRobot: a body that the body space does not allow.
     """
     start = time.perf_counter()
-    asked = decode_request(request)
+    asked = decode_request(request, decode_body)
     settings = read_vetting_settings(asked.settings)
     space = body_space(settings.space)
-    check_types(asked.robot, space)
+    check_body(asked.robot.parts, space)
     report = analyze(asked.robot, space, settings.vetting)
     wall_s = time.perf_counter() - start
     return encode_answer(Answer(asked.epoch, asked.number, wall_s, report))

@@ -10,11 +10,12 @@ Source: Gottschalk, Lin, Manocha, *OBBTree*, 1996, section 5.
 import numpy as np
 import numpy.typing as npt
 
-from analyzer.boxes import Boxes, Indices
+from analyzer.boxes import Boxes
 from schema.evaluation import Floats
 from schema.experiment import Vetting
 from schema.robot import Robot
 
+Indices = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
 PARALLEL = 1e-12
@@ -46,16 +47,21 @@ def intersecting_parts(
     Returns:
         Index pairs of parts, each ascending, in ascending order.
     """
-    first, second = _candidates(boxes, robot, vetting)
-    if not first.size:
+    near = _near_parts(boxes, robot, vetting)
+    if not np.count_nonzero(near):
         return ()
+    one, other = np.nonzero(near.repeat(boxes.count, 0).repeat(boxes.count, 1))
+    hit = _hulls_meet(boxes, one, other, vetting)
+    one, other = one[hit], other[hit]
     # Among axis-aligned boxes the hulls have decided already.
-    tilted = np.flatnonzero(_is_tilted(boxes, first) | _is_tilted(boxes, second))
+    is_tilted = _is_tilted(boxes)
+    tilted = np.flatnonzero(is_tilted[one] | is_tilted[other])
     if tilted.size:
-        hit = np.ones(first.size, dtype=bool)
-        hit[tilted] = _is_hit(separation(boxes, first[tilted], second[tilted]), vetting)
-        first, second = first[hit], second[hit]
-    pairs = zip(boxes.part[first].tolist(), boxes.part[second].tolist(), strict=True)
+        hit = np.ones(one.size, dtype=bool)
+        hit[tilted] = _is_hit(separation(boxes, one[tilted], other[tilted]), vetting)
+        one, other = one[hit], other[hit]
+    part = np.arange(len(boxes.count)).repeat(boxes.count)
+    pairs = zip(part[one].tolist(), part[other].tolist(), strict=True)
     return tuple(sorted(set(pairs)))
 
 
@@ -107,24 +113,33 @@ def _is_hit(apart: Floats, vetting: Vetting) -> Mask:
     return apart < -vetting.tolerance_m
 
 
-def _is_tilted(boxes: Boxes, index: Indices) -> Mask:
-    largest = np.abs(boxes.rotation[index]).max(axis=2)
-    tilted: Mask = (largest < 1.0 - ALIGNED).any(axis=1)
+def _is_tilted(boxes: Boxes) -> Mask:
+    largest = np.abs(boxes.rotation).max(axis=2)
+    tilted: Mask = largest.min(axis=1) < 1.0 - ALIGNED
     return tilted
 
 
-def _candidates(boxes: Boxes, robot: Robot, vetting: Vetting) -> tuple[Indices, ...]:
-    """Return the pairs of boxes whose hulls meet and whose parts are not joined.
+def _near_parts(boxes: Boxes, robot: Robot, vetting: Vetting) -> Mask:
+    """Return which parts are not joined and have hulls that meet, (P, P).
 
-    A box lies within its hull, so hulls apart are boxes apart.
+    A part lies within its hull, so hulls apart are parts apart. The lesser of two
+    indices comes first.
     """
-    lower = (boxes.centre - boxes.reach).T
-    upper = (boxes.centre + boxes.reach).T
-    gap = lower[:, :, None] - upper[:, None, :]
-    along = np.maximum(np.maximum(gap[0], gap[1]), gap[2])
-    first, second = np.nonzero(_is_hit(np.maximum(along, along.T), vetting))
-    # Parts ascend with the boxes, and a parent stands before its children.
+    # A part without boxes borrows one: it has none to meet with.
+    start = np.minimum(boxes.count.cumsum() - boxes.count, len(boxes.half) - 1)
+    lower = np.minimum.reduceat(boxes.lower.T, start, axis=1)
+    upper = np.maximum.reduceat(boxes.upper.T, start, axis=1)
+    gap = np.maximum.reduce(lower[:, :, None] - upper[:, None])
+    meet = _is_hit(np.maximum(gap, gap.T), vetting)
+    # A parent stands before its children.
     parent = np.array([part.parent for part in robot.parts])
-    lesser, greater = boxes.part[first], boxes.part[second]
-    free = (lesser < greater) & (parent[greater] != lesser)
-    return first[free], second[free]
+    index = np.arange(len(parent))
+    near: Mask = meet & (index[:, None] < index) & (index[:, None] != parent)
+    return near
+
+
+def _hulls_meet(boxes: Boxes, one: Indices, other: Indices, vetting: Vetting) -> Mask:
+    """Return whether the hulls of boxes meet; a box lies within its hull."""
+    lower, upper = boxes.lower, boxes.upper
+    gap = np.maximum(lower[one] - upper[other], lower[other] - upper[one])
+    return _is_hit(gap.max(axis=1), vetting)

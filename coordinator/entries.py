@@ -33,7 +33,7 @@ from schema.codec import (
     evaluation_from_message,
     evaluation_to_message,
     report_from_message,
-    report_to_message,
+    write_report,
 )
 from schema.errors import MalformedMessage
 from schema.evaluation import Provenance
@@ -82,7 +82,7 @@ def _write_answer(
     match event:
         case Vetted():
             entry.attempt = event.attempt
-            entry.vetted.CopyFrom(report_to_message(event.report))
+            write_report(event.report, entry.vetted)
         case VettingFailed():
             entry.attempt = event.attempt
             entry.vetting_failed = event.reason

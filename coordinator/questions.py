@@ -25,7 +25,14 @@ from coordinator.events import (
 )
 from coordinator.fleet import Fleet
 from schema.birth import BirthId
-from schema.codec import Answer, decode_answer, encode_request, encode_robot
+from schema.codec import (
+    Answer,
+    decode_answer,
+    encode_body,
+    encode_brain,
+    encode_request,
+    encode_robot,
+)
 from schema.errors import JobRefused, MalformedMessage
 from schema.evaluation import Evaluation, Provenance, Report
 from schema.experiment import Experiment, island_count, island_experiment
@@ -37,7 +44,7 @@ from schema.settings import arena_settings, evaluation_settings, vetting_setting
 QUARANTINED = "quarantined: "
 """How the reason begins why a robot that ends its processes has no evaluation."""
 REMEMBERED = 256
-"""Robots whose bytes are kept from their vetting to their evaluation."""
+"""Robots whose bodies' bytes are kept from their vetting to their evaluation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,22 +109,14 @@ class Questions:
         self._came: list[Answered | Audited] = []
         self._refusal: JobRefused | None = None
         self._answers: dict[int, Answer] = {}
-        self._encoded: dict[BirthId, tuple[Robot, bytes]] = {}
+        self._bodies: dict[BirthId, tuple[Robot, bytes]] = {}
 
     def ask(self, command: Vet | Evaluate) -> None:
         """Have a robot vetted or evaluated."""
         birth = command.birth
-        cached = self._encoded.get(birth)
-        if cached is not None and cached[0] is command.robot:
-            robot = cached[1]
-        else:
-            robot = encode_robot(command.robot)
         asks = self._question
         if isinstance(command, Vet):
-            self._encoded[birth] = (command.robot, robot)
-            if len(self._encoded) > REMEMBERED:
-                # The eldest: no robot of an arena is ever evaluated.
-                del self._encoded[next(iter(self._encoded))]
+            robot = self._body(command)
             attempt, steps, settings = command.attempt, 0, asks.vetting
             identity = NOBODY
         else:
@@ -126,7 +125,7 @@ class Questions:
             settings = asks.evaluation[asker]
             origin = structs.replace(asks.origin, island=asker)
             identity = Identity(origin, birth, attempt)
-            self._encoded.pop(birth, None)
+            robot = self._robot(command)
         kind: JobKind = "vet" if isinstance(command, Vet) else "evaluate"
         for number, twin in self._numbers(command):
             payload = encode_request(
@@ -141,6 +140,22 @@ class Questions:
             )
             self._open[number] = command
             self._fleet.ask(Job(number, kind, birth, attempt, payload, twin), self)
+
+    def _body(self, command: Vet) -> bytes:
+        """Return the bytes of a body, and keep them for its robot's evaluation."""
+        body = encode_body(command.robot)
+        self._bodies[command.birth] = (command.robot, body)
+        if len(self._bodies) > REMEMBERED:
+            # The eldest: no robot of an arena is ever evaluated.
+            del self._bodies[next(iter(self._bodies))]
+        return body
+
+    def _robot(self, command: Evaluate) -> bytes:
+        """Return the bytes of a robot; those of its body may be there already."""
+        vetted, body = self._bodies.pop(command.birth, (None, b""))
+        if vetted is command.robot:
+            return body + encode_brain(command.robot)
+        return encode_robot(command.robot)
 
     def _numbers(self, command: Vet | Evaluate) -> list[tuple[int, int]]:
         """Return the number of each job for a question, and of its twin or -1."""

@@ -4,6 +4,7 @@
 """
 
 import math
+from collections.abc import Sequence
 
 from schema import revolve_pb2 as pb
 from schema.birth import BirthId
@@ -23,11 +24,17 @@ _LAYERS: dict[int, Layer] = {int(code): name for name, code in _LAYER_CODES.item
 
 def robot_to_message(robot: Robot) -> pb.Robot:
     """Return a robot as a message."""
+    message = body_to_message(robot.parts)
+    write_brain(robot.brain, message)
+    return message
+
+
+def body_to_message(parts: Sequence[Part]) -> pb.Robot:
+    """Return a body as the message of a robot without a brain."""
     message = pb.Robot()
     add_part = message.parts.add
-    for part in robot.parts:
+    for part in parts:
         _write_part(part, part.parent, part.parent_slot, add_part())
-    write_brain(robot.brain, message)
     return message
 
 
@@ -38,9 +45,19 @@ def robot_from_message(message: pb.Robot) -> Robot:
         InvalidRobot: no tree of parts, or a brain that breaks its rules.
         MalformedMessage: an unknown layer.
     """
+    parts = body_from_message(message)
+    return Robot(parts, read_brain(message, len(parts)))
+
+
+def body_from_message(message: pb.Robot) -> tuple[Part, ...]:
+    """Return the body of a message; whatever brain it holds is not looked at.
+
+    Raises:
+        InvalidRobot: no tree of parts.
+    """
     parts = tuple(map(_part_from_message, message.parts))
     check_tree(parts)
-    return Robot(parts, read_brain(message, len(parts)))
+    return parts
 
 
 def write_brain(brain: Brain, message: pb.Robot | pb.BrainChange) -> None:

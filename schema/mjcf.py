@@ -19,13 +19,13 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from schema.assembly import place_parts
+from schema.assembly import place_parts, shapes_of
 from schema.environment import Environment
 from schema.evaluation import Floats
 from schema.experiment import Simulation
 from schema.mjcf_footing import footprint, standing_height
 from schema.mjcf_world import add_ground, set_options
-from schema.parts import IDENTITY, BodySpace, Joint, PartType, Shape
+from schema.parts import IDENTITY, BodySpace, Joint, PartType
 from schema.robot import Robot
 
 MEMORY_BYTES = 1 << 20
@@ -153,11 +153,8 @@ class _Builder:
         self.robot = robot
         self.simulation = simulation
         self.types: list[PartType] = [space[part.kind] for part in robot.parts]
-        self.shapes: list[Shape] = [
-            kind.shape(part.parameters)
-            for kind, part in zip(self.types, robot.parts, strict=True)
-        ]
-        self.rotations, self.positions = place_parts(robot, space)
+        self.shapes = shapes_of(robot, space)
+        self.rotations, self.positions = place_parts(robot, self.shapes)
         self.lowest = np.inf
         self.spec = mujoco.MjSpec()
         self._set_defaults()

@@ -42,7 +42,7 @@ class Box(Struct, frozen=True):
     rotation: Matrix = IDENTITY
 
 
-class Slot(Struct, frozen=True):
+class Slot(Struct, frozen=True, cache_hash=True):
     """A place where two parts meet: position [m], outward normal, tangent."""
 
     position: Vector
@@ -110,7 +110,7 @@ class Parameter:
     is_mutable: bool = True
 
 
-class Shape(Struct, frozen=True):
+class Shape(Struct, frozen=True, cache_hash=True):
     """Geometry of a part for given parameters; ``joint`` is None if rigid."""
 
     boxes: tuple[Box, ...]

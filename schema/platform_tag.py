@@ -12,6 +12,11 @@ from pathlib import Path
 
 from schema.revolve_pb2 import DESCRIPTOR
 
+MEANING = 1
+"""Counts the times that messages came to mean something else and looked the same.
+
+1: what is to be vetted is a body, without the brain of its robot.
+"""
 # What compilers and libraries choose their code by (x86-64 psABI levels); each
 # level includes those before it.
 _LEVELS = {
@@ -39,9 +44,9 @@ def our_version() -> str:
 
 
 def wire_version() -> str:
-    """Return our version and, after a ``+``, which messages it speaks."""
+    """Return our version and, after a ``+``, which messages it speaks, and how."""
     messages = sha256(DESCRIPTOR.serialized_pb).hexdigest()
-    return f"{our_version()}+{messages[:8]}"
+    return f"{our_version()}+{messages[:8]}.{MEANING}"
 
 
 def cpu_class(machine: str, flags: Collection[str]) -> str:

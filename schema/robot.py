@@ -137,16 +137,29 @@ def check_types(robot: Robot, space: BodySpace) -> None:
     Raises:
         InvalidRobot: as ``check_robot``, as far as part types decide about it.
     """
-    for index, part in enumerate(robot.parts):
+    check_body(robot.parts, space)
+    _check_wiring(robot, space)
+
+
+def check_body(parts: Sequence[Part], space: BodySpace) -> None:
+    """Raise unless a body keeps the rules of a body space, whatever drives it.
+
+    Args:
+        parts: a tree of parts, as every decoded body is.
+        space: the part types that it may use.
+
+    Raises:
+        InvalidRobot: as ``check_types``, but for the brain.
+    """
+    for index, part in enumerate(parts):
         _check_part(part, index, space)
         if index == 0:
             continue
-        parent = robot.parts[part.parent]
+        parent = parts[part.parent]
         if part.parent_slot >= space[parent.kind].arity:
             raise _no_slot(index, "parent_slot", parent, part.parent_slot, space)
         if part.slot >= space[part.kind].arity:
             raise _no_slot(index, "slot", part, part.slot, space)
-    _check_wiring(robot, space)
 
 
 def _no_slot(

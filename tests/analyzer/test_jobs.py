@@ -25,7 +25,7 @@ ROBOT = Robot(
 def request_for(
     robot: Robot, settings: bytes = SETTINGS, *, epoch: int = 1, number: int = 1
 ) -> bytes:
-    """Return the bytes of a request."""
+    """Return the bytes of a request about a robot, its brain included."""
     return encode_request(
         run="run",
         epoch=epoch,
@@ -42,6 +42,27 @@ def test_an_answer_carries_the_report_and_whose_it_is() -> None:
     assert (found.epoch, found.number) == (3, 17)
     assert found.result == analyze(ROBOT, space, EXPERIMENT.vetting)
     assert found.wall_s > 0
+
+
+@pytest.mark.parametrize(
+    "brain",
+    [Brain(), Brain((MOTOR, *INPUTS)), Brain((Neuron("output", "None", 7),))],
+    ids=["none", "out of order", "of another body"],
+)
+def test_a_body_is_judged_whatever_brain_goes_with_it(brain: Brain) -> None:
+    found = decode_answer(answer(request_for(Robot(ROBOT.parts, brain))))
+    assert found.result == decode_answer(answer(request_for(ROBOT))).result
+
+
+def test_a_brain_without_a_body_is_malformed() -> None:
+    with pytest.raises(MalformedMessage, match="at least its core"):
+        answer(request_for(Robot((), ROBOT.brain)))
+
+
+def test_a_slot_that_a_type_does_not_have_is_refused() -> None:
+    hinge = Part("ActiveHinge", 0, 4, 0, 90, GREY)
+    with pytest.raises(InvalidRobot, match=r"parent_slot: Core has slots 0..3, got 4"):
+        answer(request_for(Robot((ROBOT.parts[0], hinge))))
 
 
 def test_a_robot_that_the_space_does_not_allow_is_refused() -> None:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from analyzer.boxes import Boxes, place_boxes
 from analyzer.overlap import intersecting_parts, separation
 from schema.evaluation import Floats
 from schema.experiment import Vetting
-from schema.parts import BUILT_IN
+from schema.parts import BUILT_IN, Box, Shape
 from schema.robot import Part, Robot
 
 OVERLAP = Vetting(mode="overlap", tolerance_m=1e-6)
@@ -24,7 +25,14 @@ def boxes_of(rotation: Floats, centre: Floats, size: Floats) -> Boxes:
     """Return boxes of one part each."""
     half = np.asarray(size) / 2
     reach = (np.abs(rotation) @ half[:, :, None])[:, :, 0]
-    return Boxes(np.arange(len(half)), rotation, centre, half, reach, 0.0)
+    count = np.ones(len(half), dtype=np.intp)
+    return Boxes(count, rotation, centre, half, centre - reach, centre + reach, 0.0)
+
+
+def shaped(*boxes: Box) -> Callable[[tuple[float, ...]], Shape]:
+    """Return the shape function of a part with a brick's slots."""
+    shape = Shape(boxes, BUILT_IN["FixedBrick"].shape(()).slots)
+    return lambda _values: shape
 
 
 def turned(rng: np.random.Generator) -> Floats:
@@ -155,12 +163,42 @@ def test_pads_of_a_touch_sensor_reach_beyond_the_slot_they_sit_on() -> None:
     # Facts 1.1: the pads reach |y| = 19.5 mm, the base 17 mm.
     robot = Robot((CORE, Part("TouchSensor", 0, 1, 0, 0, GREY)))
     boxes = place_boxes(robot, BUILT_IN)
-    pads = boxes.centre[2:], boxes.reach[2:]
-    widest = max(np.abs(pads[0] + pads[1]).max(), np.abs(pads[0] - pads[1]).max())
-    side = np.sort(np.abs(boxes.centre[2] - boxes.centre[1]) + boxes.reach[2])
+    lower, upper = boxes.lower[2:], boxes.upper[2:]
+    widest = max(np.abs(lower).max(), np.abs(upper).max())
+    reach = (upper[0] - lower[0]) / 2
+    side = np.sort(np.abs(boxes.centre[2] - boxes.centre[1]) + reach)
     assert 0.0195 in side.round(12)
     assert widest == pytest.approx(0.045 + 0.0105, abs=1e-12)
     assert intersecting_parts(boxes, robot, CONTACT) == ()
+
+
+@pytest.mark.parametrize(("half_width", "expected"), [(0.1, ()), (0.05, ((0, 2),))])
+def test_of_parts_whose_hulls_meet_the_boxes_decide(
+    half_width: float, expected: tuple[tuple[int, int], ...]
+) -> None:
+    # Core, brick, and a fork whose tines reach back to both sides of the core.
+    tine = (0.02, 0.3, 0.02)
+    tines = [Box(f"{x}", tine, (x, 0.0, 0.0), 0.1) for x in (-half_width, half_width)]
+    fork = replace(BUILT_IN["FixedBrick"], name="Fork", shape=shaped(*tines))
+    chain = (CORE, Part("FixedBrick", 0, 1, 0, 0, GREY), Part("Fork", 1, 1, 0, 0, GREY))
+    robot = Robot(chain)
+    boxes = place_boxes(robot, {**BUILT_IN, "Fork": fork})
+    assert boxes.count.tolist() == [1, 1, 2]
+    assert (boxes.lower[2:].min(axis=0) < boxes.upper[0]).all()
+    assert (boxes.upper[2:].max(axis=0) > boxes.lower[0]).all()
+    assert intersecting_parts(boxes, robot, OVERLAP) == expected
+
+
+@pytest.mark.parametrize("order", [("Ghost", "FixedBrick"), ("FixedBrick", "Ghost")])
+def test_a_part_without_boxes_meets_nobody(order: tuple[str, str]) -> None:
+    ghost = replace(BUILT_IN["FixedBrick"], name="Ghost", shape=shaped())
+    space = {**BUILT_IN, "Ghost": ghost}
+    # By so wide a tolerance even opposite bricks would meet.
+    arms = [Part(kind, 0, slot, 0, 0, GREY) for slot, kind in enumerate(order)]
+    robot = Robot((CORE, *arms))
+    boxes = place_boxes(robot, space)
+    assert len(boxes.half) == 2
+    assert intersecting_parts(boxes, robot, Vetting("contact", 1.0)) == ()
 
 
 @pytest.mark.parametrize(
@@ -254,9 +292,10 @@ def test_bodies_are_judged_as_all_pairs_one_by_one(
         robot = body_of(seed, 16)
         boxes = place_boxes(robot, BUILT_IN)
         expected = set()
-        for one in range(len(boxes.part)):
-            for other in range(one + 1, len(boxes.part)):
-                lesser, greater = int(boxes.part[one]), int(boxes.part[other])
+        owners = [p for p, count in enumerate(boxes.count) for _ in range(count)]
+        for one, lesser in enumerate(owners):
+            for other in range(one + 1, len(owners)):
+                greater = owners[other]
                 if lesser == greater or robot.parts[greater].parent == lesser:
                     continue
                 gap = separation(boxes, np.array([one]), np.array([other]))[0]

@@ -20,7 +20,7 @@ from coordinator.branch import (
 )
 from coordinator.generation import generate
 from coordinator.tally import tallies
-from schema.assembly import place_parts
+from schema.assembly import place_parts, shapes_of
 from schema.birth import BirthId
 from schema.experiment import Experiment, Space, body_space
 from schema.genome import Genome, NeuronGene, Node, develop, walk
@@ -145,7 +145,7 @@ def test_levelling_undoes_all_turns_before_a_brick() -> None:
 @given(SEEDS)
 def test_every_slot_of_a_levelled_robot_looks_sideways(seed: int) -> None:
     robot = develop(random_genome(seed), TYPES)
-    rotations, _ = place_parts(robot, TYPES)
+    rotations, _ = place_parts(robot, shapes_of(robot, TYPES))
     for part, rotation in zip(robot.parts, rotations, strict=True):
         for slot in TYPES[part.kind].shape(part.parameters).slots:
             assert (rotation @ np.asarray(slot.normal))[2] == pytest.approx(0.0)
@@ -157,7 +157,7 @@ def test_without_planarity_some_robots_leave_the_plane() -> None:
     turned = 0
     for seed in range(50):
         robot = develop(random_genome(seed, free), types)
-        rotations, _ = place_parts(robot, types)
+        rotations, _ = place_parts(robot, shapes_of(robot, types))
         turned += bool(np.abs(rotations[:, 2, 0]).max() > 0.5)
     assert turned > 25
 

@@ -25,7 +25,15 @@ from coordinator.fleet import Fleet
 from coordinator.questions import QUARANTINED, REMEMBERED, Question, Questions
 from schema import revolve_pb2 as pb
 from schema.birth import BirthId
-from schema.codec import Answer, decode_request, encode_answer
+from schema.brain import Brain, Connection, Neuron
+from schema.codec import (
+    Answer,
+    decode_body,
+    decode_request,
+    encode_answer,
+    encode_body,
+    encode_robot,
+)
 from schema.errors import JobRefused
 from schema.evaluation import Evaluation, Provenance, Report
 from schema.identity import NOBODY, Identity, Origin
@@ -34,7 +42,16 @@ from schema.robot import Part, Robot
 EPOCH = 3
 ORIGIN = Origin(seed=5, run=2)
 BIRTH = BirthId(0, 7)
-ROBOT = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),))
+ROBOT = Robot(
+    (Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),),
+    Brain(
+        (
+            *(Neuron("input", "Input", 0) for _ in range(6)),
+            Neuron("hidden", "Simple", 0, (0.25, 0.5)),
+        ),
+        (Connection(0, 6, 0.75),),
+    ),
+)
 JUDGED = Evaluation(0.25, 0.0, 0.05, 12.0)
 VIABLE = Report(True, "", (), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.1, 1)
 
@@ -59,7 +76,8 @@ class Desk:
         self.sent.append((number, agent, payload))
 
     def cancel(self, agent: str, payload: bytes) -> None:
-        self.cancelled.append((decode_request(payload).number, agent))
+        asked = decode_request(payload, decode_body)
+        self.cancelled.append((asked.number, agent))
 
     def receive(
         self, _timeout_s: float, _pause_s: float = 0.0, /
@@ -89,10 +107,39 @@ def test_a_request_carries_the_run_its_settings_and_the_robot(desk: Desk) -> Non
     desk.questions.ask(Evaluate(BIRTH, ROBOT))
     (vet, judge, vetting), (_, worker, evaluation) = desk.sent
     assert (judge, worker) == ("judge", "one")
-    asked = decode_request(vetting)
+    asked = decode_request(vetting, decode_body)
     assert (asked.run, asked.epoch, asked.number) == ("run", EPOCH, vet)
-    assert (asked.settings, asked.robot) == (b"vetting", ROBOT)
-    assert decode_request(evaluation).settings == b"evaluation"
+    assert (asked.settings, asked.robot) == (b"vetting", Robot(ROBOT.parts))
+    asked = decode_request(evaluation)
+    assert (asked.settings, asked.robot) == (b"evaluation", ROBOT)
+
+
+def test_a_body_is_vetted_and_a_robot_evaluated_vetted_before_or_not(
+    desk: Desk,
+) -> None:
+    other = Robot(ROBOT.parts, Brain(ROBOT.brain.neurons))
+    desk.questions.ask(Vet(BIRTH, 0, ROBOT))
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    desk.questions.ask(Evaluate(BIRTH, ROBOT, trial=1))
+    desk.questions.ask(Vet(BirthId(0, 8), 0, ROBOT))
+    # Of the same birth, and yet not the one that was vetted.
+    desk.questions.ask(Evaluate(BirthId(0, 8), other))
+    for number, agent, _ in desk.sent[:2]:
+        result = VIABLE if agent == "judge" else JUDGED
+        data = encode_answer(Answer(EPOCH, number, 0.5, result))
+        desk.tell(Returned(number, agent, "ok", data))
+    sent = {
+        number: pb.Request.FromString(payload).robot for number, _, payload in desk.sent
+    }
+    body, whole = encode_body(ROBOT), encode_robot(ROBOT)
+    assert [sent[number] for number in sorted(sent)] == [
+        body,
+        whole,
+        whole,
+        body,
+        encode_robot(other),
+    ]
+    assert body != whole
 
 
 def test_noise_is_drawn_by_who_is_judged_for_whom_and_how_often(desk: Desk) -> None:
@@ -103,7 +150,9 @@ def test_noise_is_drawn_by_who_is_judged_for_whom_and_how_often(desk: Desk) -> N
         Vet(BIRTH, 1, ROBOT),
     ):
         desk.questions.ask(question)
-    found = [decode_request(payload).identity for _, _, payload in desk.sent]
+    found = [
+        decode_request(payload, decode_body).identity for _, _, payload in desk.sent
+    ]
     there = replace(ORIGIN, island=2)
     assert found == [Identity(ORIGIN, BIRTH, 0), Identity(there, guest, 4), NOBODY]
 
@@ -132,7 +181,7 @@ def test_robots_that_are_never_evaluated_are_forgotten(desk: Desk) -> None:
         desk.questions.ask(Vet(BirthId(0, number), 0, ROBOT))
         (event,) = desk.tell(desk.reply(VIABLE))
         assert isinstance(event, Vetted)
-    assert len(desk.questions._encoded) == REMEMBERED
+    assert len(desk.questions._bodies) == REMEMBERED
 
 
 def test_a_request_names_its_plug_ins_by_what_they_are() -> None:

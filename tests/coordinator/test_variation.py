@@ -13,7 +13,7 @@ from coordinator.draws import Draws
 from coordinator.generation import generate
 from coordinator.tally import greatest, tallies
 from coordinator.variation import crossover, mate, mutate
-from schema.assembly import place_parts
+from schema.assembly import place_parts, shapes_of
 from schema.birth import BirthId
 from schema.experiment import Experiment, Space, Variation, body_space
 from schema.genome import Genome, NeuronGene, Node, develop, walk
@@ -204,7 +204,7 @@ def test_children_are_well_formed_and_within_all_restrictions(
     assert 1 <= robot.brain.count("output") <= space.max_outputs
     assert robot.brain.count("hidden") <= space.max_hidden
     if space.planar:
-        rotations, _ = place_parts(robot, types)
+        rotations, _ = place_parts(robot, shapes_of(robot, types))
         for part, rotation in zip(robot.parts, rotations, strict=True):
             for slot in types[part.kind].shape(part.parameters).slots:
                 height = (rotation @ np.asarray(slot.normal))[2]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
-from schema.assembly import attach, place_parts
+from schema.assembly import attach, place_parts, shapes_of
 from schema.evaluation import Floats
 from schema.genome import Genome, Node, develop
 from schema.parts import BUILT_IN, Slot
@@ -60,7 +60,8 @@ def body(genome: Genome) -> Robot:
 
 def test_golden_position_of_a_hinge_on_the_front(node: NodeMaker) -> None:
     core = node("Core", children=((0, node("Hinge")),))
-    rotations, positions = place_parts(body(core), BUILT_IN)
+    robot = body(core)
+    rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
     boxes = BUILT_IN["Hinge"].shape(core.children[0][1].parameters).boxes
     centres = {box.name: rotations[1] @ box.position + positions[1] for box in boxes}
     assert centres["root"] == pytest.approx((0.0, -0.04575, 0.0), abs=1e-12)
@@ -68,7 +69,8 @@ def test_golden_position_of_a_hinge_on_the_front(node: NodeMaker) -> None:
 
 
 def test_core_stays_where_it_is(node: NodeMaker) -> None:
-    rotations, positions = place_parts(body(node("Core")), BUILT_IN)
+    robot = body(node("Core"))
+    rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
     assert (rotations[0] == np.eye(3)).all()
     assert (positions[0] == 0.0).all()
 
@@ -86,7 +88,7 @@ def test_quarter_turn_on_the_right_face() -> None:
 @given(data=st.data())
 def test_rule_of_attachment(robots: SearchStrategy[Robot], data: DataObject) -> None:
     robot = data.draw(robots)
-    rotations, positions = place_parts(robot, BUILT_IN)
+    rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
     slots = [BUILT_IN[p.kind].shape(p.parameters).slots for p in robot.parts]
     for index, part in enumerate(robot.parts[1:], start=1):
         above = part.parent
@@ -104,11 +106,31 @@ def test_rule_of_attachment(robots: SearchStrategy[Robot], data: DataObject) -> 
 
 
 @given(data=st.data())
+def test_frames_are_products_along_the_tree_to_the_last_bit(
+    robots: SearchStrategy[Robot], data: DataObject
+) -> None:
+    robot = data.draw(robots)
+    shapes = shapes_of(robot, BUILT_IN)
+    rotations, positions = place_parts(robot, shapes)
+    for index, part in enumerate(robot.parts[1:], start=1):
+        above = part.parent
+        rotation, offset = attach(
+            shapes[above].slots[part.parent_slot],
+            shapes[index].slots[part.slot],
+            part.orientation,
+        )
+        turned_by = rotations[above] @ rotation
+        moved_by = positions[above] + rotations[above] @ offset
+        assert rotations[index].tobytes() == turned_by.tobytes()
+        assert positions[index].tobytes() == moved_by.tobytes()
+
+
+@given(data=st.data())
 def test_level_bodies_are_flat_and_stand_on_their_core(
     genomes: SearchStrategy[Genome], data: DataObject
 ) -> None:
     robot = body(level(data.draw(genomes)))
-    rotations, positions = place_parts(robot, BUILT_IN)
+    rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
     lowest = math.inf
     corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
     for part, rotation, position in zip(robot.parts, rotations, positions, strict=True):

@@ -16,10 +16,13 @@ from schema.codec import (
     Answer,
     Request,
     decode_answer,
+    decode_body,
     decode_genome,
     decode_request,
     decode_robot,
     encode_answer,
+    encode_body,
+    encode_brain,
     encode_genome,
     encode_request,
     encode_robot,
@@ -28,12 +31,14 @@ from schema.errors import MalformedMessage
 from schema.evaluation import Evaluation, Report
 from schema.genome import Genome, Node, develop
 from schema.identity import NOBODY, Identity, Origin
+from schema.messages import robot_to_message
 from schema.parts import BUILT_IN
 from schema.robot import Robot
 
 NodeMaker = Callable[..., Node]
 DECODERS: list[Callable[[bytes], object]] = [
     decode_robot,
+    decode_body,
     decode_genome,
     decode_request,
     decode_answer,
@@ -78,6 +83,28 @@ def test_robot_round_trip(robots: SearchStrategy[Robot], data: DataObject) -> No
     encoded = encode_robot(robot)
     assert exact(decode_robot(encoded)) == exact(robot)
     assert encode_robot(decode_robot(encoded)) == encoded
+
+
+@given(data=st.data())
+def test_a_body_and_a_brain_add_up_to_a_robot(
+    robots: SearchStrategy[Robot], data: DataObject
+) -> None:
+    robot = data.draw(robots)
+    body, brain = encode_body(robot), encode_brain(robot)
+    whole = robot_to_message(robot).SerializeToString(deterministic=True)
+    assert body + brain == encode_robot(robot) == whole
+    bare = Robot(robot.parts)
+    assert exact(decode_body(whole)) == exact(decode_body(body)) == exact(bare)
+    assert encode_robot(bare) == body
+
+
+def test_a_brain_is_not_looked_at_with_a_body(node: NodeMaker) -> None:
+    message = pb.Robot.FromString(encode_body(develop(node("Core"), BUILT_IN)))
+    message.neurons.add(kind="no such kind", part=7)
+    data = message.SerializeToString()
+    with pytest.raises(MalformedMessage):
+        decode_robot(data)
+    assert [part.kind for part in decode_body(data).parts] == ["Core"]
 
 
 @given(data=st.data())
@@ -148,7 +175,9 @@ def test_damaged_bytes_decode_or_are_malformed(
         assert decode_answer(encode_answer(answer)) == answer
 
 
-@pytest.mark.parametrize("decode", [decode_robot, decode_genome, decode_request])
+@pytest.mark.parametrize(
+    "decode", [decode_robot, decode_body, decode_genome, decode_request]
+)
 def test_nothing_is_no_robot(decode: Callable[[bytes], object]) -> None:
     with pytest.raises(MalformedMessage, match="at least its core"):
         decode(b"")
@@ -157,6 +186,14 @@ def test_nothing_is_no_robot(decode: Callable[[bytes], object]) -> None:
 def test_an_answer_holds_a_result() -> None:
     with pytest.raises(MalformedMessage, match="holds no result"):
         decode_answer(pb.Answer(epoch=1, number=2).SerializeToString())
+
+
+def test_a_report_of_nothing_but_zeros_is_still_one() -> None:
+    nowhere = (0.0, 0.0, 0.0)
+    report = replace(REPORT, is_viable=False, lower=nowhere, upper=nowhere, mass=0.0)
+    report = replace(report, motors=0)
+    answer = Answer(0, 0, 0.0, report)
+    assert decode_answer(encode_answer(answer)) == answer
 
 
 def test_an_empty_reason_is_still_a_failure() -> None:
@@ -187,12 +224,15 @@ def test_a_report_without_corners_is_malformed() -> None:
         decode_answer(message.SerializeToString())
 
 
-def test_a_part_out_of_the_tree_is_malformed(node: NodeMaker) -> None:
+@pytest.mark.parametrize("decode", [decode_robot, decode_body])
+def test_a_part_out_of_the_tree_is_malformed(
+    node: NodeMaker, decode: Callable[[bytes], Robot]
+) -> None:
     message = pb.Robot()
     message.ParseFromString(encode_robot(develop(node("Core"), BUILT_IN)))
     message.parts.add(kind="FixedBrick", parent=4, parent_slot=0, slot=0)
     with pytest.raises(MalformedMessage, match=r"Robot: body.parts\[1\].parent"):
-        decode_robot(message.SerializeToString())
+        decode(message.SerializeToString())
 
 
 def test_an_unknown_layer_is_malformed(node: NodeMaker) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from schema.assembly import place_parts
+from schema.assembly import place_parts, shapes_of
 from schema.brain import Connection
 from schema.errors import InvalidRobot
 from schema.experiment import Space, body_space
@@ -50,7 +50,7 @@ def read(text: str) -> Robot:
 
 def axes(robot: Robot, part: int) -> tuple[list[float], list[float]]:
     """Return a part's own y and z in the frame of the core."""
-    rotations, _ = place_parts(robot, BUILT_IN)
+    rotations, _ = place_parts(robot, shapes_of(robot, BUILT_IN))
     return rotations[part][:, 1].round(9).tolist(), rotations[part][:, 2].tolist()
 
 
@@ -59,7 +59,7 @@ def test_parts_go_where_robogen_has_them() -> None:
     kinds = [part.kind for part in robot.parts]
     assert kinds.count("ActiveHinge") == 4
     # Its slots are left, right, front, back: -x, +x, -y, +y.
-    _, positions = place_parts(robot, BUILT_IN)
+    _, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
     of_core = [index for index, part in enumerate(robot.parts) if part.parent == 0]
     ways = [np.sign(positions[index][:2].round(6)).tolist() for index in of_core]
     assert ways == [[0, -1], [0, 1], [1, 0], [-1, 0]]

@@ -12,7 +12,7 @@ from schema.brain import Brain, Connection, Neuron, check_brain
 from schema.errors import InvalidRobot
 from schema.genome import NeuronGene, Node, develop
 from schema.parts import BUILT_IN
-from schema.robot import Part, Robot, check_robot, check_tree
+from schema.robot import Part, Robot, check_body, check_robot, check_tree
 
 NodeMaker = Callable[..., Node]
 
@@ -102,6 +102,18 @@ def test_breadth_first_is_refused(robot: Robot) -> None:
 def test_a_tree_needs_no_types() -> None:
     colour = (0.5,)
     check_tree((Part("Hub", -1, -1, -1, 0, colour), Part("Fin", 0, 77, 5, 270, colour)))
+
+
+def test_a_body_is_checked_without_a_brain(robot: Robot) -> None:
+    bare = Robot(robot.parts)
+    check_body(bare.parts, BUILT_IN)
+    with pytest.raises(InvalidRobot, match="brain: input neurons"):
+        check_robot(bare, BUILT_IN)
+    core_only = {"Core": BUILT_IN["Core"]}
+    with pytest.raises(
+        InvalidRobot, match=r"body.parts\[1\].kind: must be one of Core"
+    ):
+        check_body(bare.parts, core_only)
 
 
 def test_space_decides_about_types(robot: Robot) -> None:
