@@ -6,11 +6,11 @@ from heapq import heapify, heappop, heappush
 
 from coordinator.events import Job, Joined
 
-MOST_AHEAD = 8
+MOST_AHEAD = 16
 """Jobs more than the one that is always at hand."""
-AHEAD_S = 0.4
+AHEAD_S = 0.8
 """What these may take together [s]: nobody else can have them meanwhile."""
-PAUSE_S = 0.1
+PAUSE_S = 0.2
 """The coordinator looks away from agents that are well provided so long [s]."""
 _NEWEST_WEIGHT = 0.1
 

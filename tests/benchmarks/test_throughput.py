@@ -29,6 +29,7 @@ from coordinator.generation import generate
 from coordinator.island import Island
 from coordinator.journal import Journal
 from coordinator.loop import Loop
+from coordinator.pool import AHEAD_S
 from coordinator.questions import Question
 from coordinator.record import Recorder
 from coordinator.rows import evaluation_record
@@ -54,8 +55,7 @@ NULL_PER_S = 1000
 SECOND_WORKER = 1.85
 TURNS = 12
 TURN_S = 2.0
-# What one that leaves had ahead is done by then: 0.4 s of work, AHEAD_S.
-SETTLING_S = 1.0
+SETTLING_S = AHEAD_S + 0.2  # what one that leaves had ahead is done by then
 
 
 class Judged(Island):
