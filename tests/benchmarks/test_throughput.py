@@ -53,9 +53,10 @@ Body = Callable[[Agent, Post], None]
 CPU_PER_BIRTH_S = 1.5e-3
 NULL_PER_S = 1000
 SECOND_WORKER = 1.85
-TURNS = 12
+TURNS = 10
 TURN_S = 2.0
-SETTLING_S = AHEAD_S + 0.2  # what one that leaves had ahead is done by then
+JOINING_S = 0.3
+LEAVING_S = AHEAD_S + 0.2  # what one that leaves had ahead is done by then
 
 
 class Judged(Island):
@@ -235,7 +236,7 @@ def test_second_worker(tmp_path: Path) -> None:
             workers = 1 + turn % 2
             joins = Joined(name, "worker", 1, platform)
             bench.fleet.tell(Left(name) if workers == 1 else joins)
-            bench.go_on_for(SETTLING_S)
+            bench.go_on_for(LEAVING_S if workers == 1 else JOINING_S)
             found = bench.go_on_for(TURN_S)
             rates[workers].append(found.per_s)
             cpu_s.append(found.cpu_s)

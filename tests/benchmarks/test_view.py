@@ -32,10 +32,10 @@ pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(900)]
 
 ROBOTS, HERTZ, ADVANCE_S = 30, 5, 5
 MINUTES = 3
-PAIRS = 1
+PAIRS = 2
 ARENA = """
 name = "watched"
-births = 45
+births = 25
 [selection]
 population = 12
 [arena]
