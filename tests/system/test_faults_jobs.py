@@ -155,13 +155,16 @@ def test_a_worker_without_the_plug_in_or_with_another_is_refused_and_others_go_o
 
 
 def test_an_audit_changes_nothing_where_workers_agree(
-    stage: Stage, undisturbed: Path, births: int
+    stage: Stage, fleet_of: Fleets, undisturbed: Path, births: int
 ) -> None:
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
-    stage.run("run", *words, "--workers", "2", "--audit", "0.2", "--out", "run")
-    folder = stage.folder / "run"
-    assert compare(undisturbed, folder) == []
-    rows = read_table(folder, "audits").to_pylist()
+    fleet = fleet_of(stage, *words, "--audit", "0.2")
+    fleet.join("one")
+    fleet.join("other")
+    fleet.begin(workers=2)
+    fleet.finish()
+    assert compare(undisturbed, fleet.folder) == []
+    rows = read_table(fleet.folder, "audits").to_pylist()
     assert len(rows) >= 2 * 0.1 * births
     assert all(row["agrees"] for row in rows)
     for first, second in zip(rows[::2], rows[1::2], strict=True):
