@@ -36,7 +36,7 @@ compiled: $(STAMP)
 # Many small tests, two at a time; then those that start processes and often wait.
 test: compiled
 	$(BIN)/python -m pytest -q -n 2 -m 'not system and not benchmark'
-	$(BIN)/python -m pytest -q -n 3 --dist worksteal -m 'system'
+	$(BIN)/python -m pytest -q -n 4 --dist worksteal -m 'system'
 
 # Holds the speed promises to their figures: for a machine with nothing else to do.
 bench: compiled
