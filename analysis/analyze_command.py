@@ -19,6 +19,7 @@ from rich.table import Table
 from analysis.benchmarks import read_benchmarks
 from analysis.comparison import Outcomes, comparison, findings
 from analysis.load import LeftOut, Run, read_runs
+from analysis.namesakes import told_apart
 from analysis.outputs import OUTPUTS, schema
 from analysis.plates import draw_figures
 from analysis.progression import progression
@@ -52,7 +53,8 @@ def analyze(
     folders = [path for path in options.runs if path.is_dir() or not path.is_file()]
     if not folders:
         raise RunFolderError(f"{options.runs[0]}: must be a folder, got a file")
-    runs, unread = read_runs(folders)
+    found, unread = read_runs(folders)
+    runs = told_apart(found)
     benchmark, not_benchmarks = read_benchmarks(options.runs)
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn())
     (options.out / FIGURES).mkdir(parents=True, exist_ok=True)
@@ -131,12 +133,21 @@ def _show(tables: dict[str, pa.Table]) -> None:
             numbers = [f"{row[name]:.3g}" for name in ("mean_a", "mean_b", "q")]
             table.add_row(row["figure"], row["claim"], *numbers, row["verdict"])
         console.print(table)
+    for name, differs in _renamed(tables["runs"]).items():
+        console.print(f"{name}: {differs}", soft_wrap=True, markup=False,
+                      highlight=False)  # fmt: skip
     for row in tables["left_out"].to_pylist():
         whose = f"{row['folder']}: " if row["folder"] else ""
         console.print(
             f"left out: {whose}{row['what']}: {row['why']}", soft_wrap=True,
             markup=False, highlight=False,
         )  # fmt: skip
+
+
+def _renamed(runs: pa.Table) -> dict[str, str]:
+    """Return experiments that another one shares a name with, and how they differ."""
+    rows = runs.filter(pc.not_equal(runs["differs"], "")).to_pylist()
+    return {row["experiment"]: row["differs"] for row in rows}
 
 
 def _last_populations(populations: pa.Table) -> Table:

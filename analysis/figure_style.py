@@ -10,6 +10,8 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from analysis.namesakes import MARK
+
 WIDTH_IN = 7.0
 DPI = 160
 
@@ -53,9 +55,12 @@ def colours(experiments: Iterable[str]) -> dict[str, str]:
 
 def label(experiment: str) -> str:
     """Return an experiment's name as figures say it."""
-    if experiment.startswith("scenario") and experiment[8:].isdigit():
-        return f"scenario {experiment[8:]}"
-    return experiment.replace("-", " ")
+    name, mark, number = experiment.partition(MARK)
+    if name.startswith("scenario") and name[8:].isdigit():
+        said = f"scenario {name[8:]}"
+    else:
+        said = name.replace("-", " ")
+    return f"{said} {mark}{number}" if mark else said
 
 
 def broken(experiment: str) -> str:

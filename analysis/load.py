@@ -58,6 +58,7 @@ class Run:
         state: finished, stopped or running; who runs may have died since.
         document: the experiment, as JSON.
         islands: settings of each island.
+        differs: how, if the name is not its own: others have it, with other settings.
     """
 
     folder: Path
@@ -67,6 +68,7 @@ class Run:
     state: str
     document: str
     islands: tuple[Settings, ...]
+    differs: str = ""
 
     @property
     def is_finished(self) -> bool:

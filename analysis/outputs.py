@@ -118,6 +118,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "births": "recorded, of all islands",
         "planned": "births of the experiment, of all islands",
         "islands": "of the experiment",
+        "differs": "from the settings that most runs of its name have, if it does",
     },
     "populations": {**_ISLAND, **POPULATION},
     "robots": {
@@ -210,7 +211,7 @@ _INTEGERS = {"size", "judged", "ancestors", "planned", "islands", "robots", "sam
              "pairs", "epoch", "to", "descendants", "living", "reached", "runs",
              "runs_a", "runs_b", "finding"}  # fmt: skip
 _TEXTS = {"population", "by", "measure", "a", "b", "figure", "claim", "expected",
-          "verdict", "why", "what"}  # fmt: skip
+          "verdict", "why", "what", "differs"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 

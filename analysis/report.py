@@ -130,6 +130,8 @@ def _cell(value: object, kind: str = "") -> str:
 
 
 def _runs(runs: Sequence[Mapping[str, object]]) -> str:
+    heads = ["experiment", "runs", "births of a run", "islands", "seeds"]
+    heads += ["settings"] if any(row["differs"] for row in runs) else []
     rows = []
     for name in in_order(str(row["experiment"]) for row in runs):
         mine = [row for row in runs if row["experiment"] == name]
@@ -141,8 +143,8 @@ def _runs(runs: Sequence[Mapping[str, object]]) -> str:
         reach = f"{births[0]}" if len(births) == 1 else f"{births[0]} to {births[-1]}"
         islands = max(int(str(row["islands"])) for row in mine)
         cells = (label(name), ", ".join(counts), f"{reach}", islands, _seeds(mine))
-        rows.append([_cell(value) for value in cells])
-    heads = ("experiment", "runs", "births of a run", "islands", "seeds")
+        whole = (*cells, mine[0]["differs"] or "")
+        rows.append([_cell(value) for value in whole[: len(heads)]])
     return _table(heads, rows) if rows else ""
 
 

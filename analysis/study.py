@@ -117,6 +117,7 @@ def _summary(run: Run, births: pa.Table) -> pa.Table:
         "births": births.num_rows,
         "planned": planned_births(run),
         "islands": len(run.islands),
+        "differs": run.differs,
     }
     return pa.Table.from_pylist([row], schema("runs").remove(0).remove(0))
 

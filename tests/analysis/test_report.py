@@ -112,6 +112,16 @@ def test_what_was_read_and_left_out_and_how_is_told(read: Reader) -> None:
     assert "revolve analyze runs what version numpy 9.9" in read.text
 
 
+def test_what_sets_namesakes_apart_stands_beside_their_runs() -> None:
+    rows = tables()["runs"].to_pylist()
+    rows[2]["differs"] = "births & all: 1 instead of 2"
+    runs = pa.Table.from_pylist(rows, schema("runs"))
+    reader = Reader()
+    reader.feed(report({**tables(), "runs": runs}, [], Making("", "now", {})))
+    assert "seeds settings scenario 1" in reader.text
+    assert "b 1 finished 30 1 8 births & all: 1 instead of 2 Findings" in reader.text
+
+
 def test_no_runs_no_sections() -> None:
     empty = {name: table.slice(0, 0) for name, table in tables().items()}
     page = report(empty, [], Making("revolve analyze", "now", {}))

@@ -1,5 +1,6 @@
 """``revolve analyze`` as a user starts it, on runs that were really made."""
 
+import json
 import shutil
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,20 @@ pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 @pytest.fixture(scope="session")
 def analysed(once: Any, undisturbed: Path, calm: Path) -> tuple[Path, str]:  # noqa: ANN401 - the fixture
-    """Return the measures of an off-line run, an arena and two broken runs."""
+    """Return the measures of two off-line runs, an arena and two broken runs.
+
+    The off-line runs have one name, and one setting is different.
+    """
 
     def make(stage: Stage) -> None:
         for name, run in (("a", undisturbed), ("b", calm), ("c", undisturbed)):
             shutil.copytree(run, stage.folder / "runs" / name)
+        shutil.copytree(undisturbed, stage.folder / "runs" / "e")
+        details = stage.folder / "runs" / "e" / "run.json"
+        entries = json.loads(details.read_text())
+        document = json.loads(entries["document"])
+        document["vetting"]["tolerance_m"] = 0.001
+        details.write_text(json.dumps({**entries, "document": json.dumps(document)}))
         (stage.folder / "runs" / "d").mkdir()
         (stage.folder / "runs" / "d" / "run.json").write_text("{")
         told = stage.run("analyze", "runs", "--out", "report")
@@ -40,8 +50,9 @@ def test_runs_are_measured_and_what_is_left_out_is_named(
     assert set(measures) == set(OUTPUTS) - {"between", "migrants"}
     for name, table in measures.items():
         assert table.schema.equals(schema(name), check_metadata=True)
-    assert measures["runs"]["experiment"].to_pylist() == ["scenario1", "crowd"]
-    assert measures["runs"]["births"].to_pylist() == [60, 25]
+    names = ["scenario1", "crowd", "scenario1~2"]
+    assert measures["runs"]["experiment"].to_pylist() == names
+    assert measures["runs"]["births"].to_pylist() == [60, 25, 60]
     (arena,) = measures["interactions"].to_pylist()
     assert arena["robots"] == 25
     assert 0 < arena["touched"] <= 1
@@ -55,6 +66,13 @@ def test_runs_are_measured_and_what_is_left_out_is_named(
         ("runs/c", "the same run"),
     ]
     assert "left out: runs/d: run: run.json" in told
+
+
+def test_experiments_of_one_name_are_told_apart(analysed: tuple[Path, str]) -> None:
+    report, told = analysed
+    differs = "vetting.tolerance_m: 0.001 instead of 1e-06"
+    assert f"scenario1~2: {differs}" in told
+    assert differs in (report / "report.html").read_text("utf-8")
 
 
 def test_figures_and_report_are_written_and_what_is_left_out_has_a_reason(
