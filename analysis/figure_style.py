@@ -66,6 +66,8 @@ def label(experiment: str) -> str:
 def broken(experiment: str) -> str:
     """Return the same for the foot of a column: on two lines if it is long."""
     said = label(experiment)
+    if MARK in said:
+        return said.replace(f" {MARK}", f"\n{MARK}")
     return said if len(said) < _BROAD else said.replace(" ", "\n", 1)
 
 

@@ -136,7 +136,7 @@ def test_names_are_told_apart_each_for_itself() -> None:
 
 def test_figures_say_which_is_meant() -> None:
     assert label("scenario1~2") == "scenario 1 ~2"
-    assert broken("no-selection~2") == "no\nselection ~2"
+    assert broken("no-selection~2") == "no selection\n~2"
     names = ["scenario1~2", "scenario1", "scenario2"]
     assert in_order(names) == ["scenario1", "scenario2", "scenario1~2"]
     assert len(set(colours(names).values())) == 3
