@@ -36,7 +36,7 @@ from coordinator.summary import conclude
 from schema.crew import Crew, stop_on_signals
 from schema.errors import RevolveError
 from schema.experiment import Experiment
-from schema.experiment_file import experiment_text
+from schema.experiment_file import experiment_from_text, experiment_text
 from schema.network import THIS_MACHINE, Agent, Tls
 from schema.platform_tag import platform_tag
 from schema.service import tell_user
@@ -174,8 +174,11 @@ def _plan(folder: Path, campaign: Campaign) -> list[Planned]:
             planned.append(Planned(details, status, partial(RunFolder, path, details)))
             continue
         found = adopted(path, details)
-        if found.document != details.document:
-            tell_user(f"{path}: is taken as it is, with its own number of births")
+        theirs, ours = (
+            experiment_from_text(each.document).births for each in (found, details)
+        )
+        if theirs != ours:
+            tell_user(f"{path}: is taken as it is, with {theirs} births, not {ours}")
         planned.append(Planned(found, folder_status(path), partial(RunFolder, path)))
     return planned
 

@@ -1,5 +1,6 @@
 """Campaigns as a user runs them: interrupted, killed, adopted, shared."""
 
+import json
 import signal
 import socket
 from collections.abc import Callable
@@ -71,9 +72,11 @@ def _sizes(folder: Path) -> int:
 
 
 def _make_alone(stage: Stage, path: Path, name: str, run: int) -> None:
-    """Make a run by itself, as if nobody thought of a campaign."""
+    """Make a run by itself, before campaigns and environments were thought of."""
     text = experiment_text(read_experiment(str(stage.folder / f"{name}.toml")))
-    with RunFolder(path, RunDetails(name, run, 7, text)):
+    document = json.loads(text)
+    del document["environment"]
+    with RunFolder(path, RunDetails(name, run, 7, json.dumps(document))):
         pass
     stage.run("resume", str(path), "--in-process", "--quiet")
 
@@ -94,6 +97,7 @@ def test_a_killed_campaign_goes_on_and_takes_what_is_there(
     assert "stopped" in stage.run("status", "campaign")
     said = stage.run("resume", "campaign", "--workers", "1", "--quiet")
     assert "4 runs are finished" in said
+    assert "is taken as it is" not in said  # it has as many births as the others
     _check_equal(whole, campaign)
     assert taken.stat().st_mtime_ns == before
     again = stage.run("resume", "campaign", "--workers", "1", "--quiet")
