@@ -141,7 +141,7 @@ class Dispatch:
 
     def _put_back(self, pending: Pending, agent: str) -> None:
         """Take a job from an agent; it waits again if that was the only one."""
-        pending.holders.remove(agent)
+        del pending.holders[agent]
         if not pending.holders:
             number = pending.job.number
             heappush(self._pools[AGENT_OF[pending.job.kind]].waiting, number)
@@ -183,12 +183,12 @@ class Dispatch:
         """Deliver a job, or see to it that another agent gets it."""
         pending.errors += event.outcome == "error"
         if event.outcome == "ok" or pending.errors == MAX_ERRORS:
+            since_s, place = pending.holders.pop(event.agent)
             if event.outcome == "ok" and self._now_s is not None:
-                elapsed_s = self._now_s - pending.since_s
+                elapsed_s = self._now_s - since_s
                 self._stragglers.learn(pending.job.kind, elapsed_s)
                 pool = self._pools[AGENT_OF[pending.job.kind]]
-                pool.learn(elapsed_s / pending.place)
-            pending.holders.remove(event.agent)
+                pool.agents[event.agent].learn(elapsed_s / place)
             yield Deliver(pending.job, event.agent, event.answer, event.reason)
             yield from self._close(pending)
             return
@@ -241,8 +241,9 @@ class Dispatch:
             return
         for pending in list(self._jobs.values()):
             kind = pending.job.kind
-            is_late = self._stragglers.is_late(kind, now_s - pending.since_s)
-            if len(pending.holders) != 1 or not is_late:
+            if len(pending.holders) != 1:
+                continue
+            if not self._stragglers.is_late(kind, now_s - pending.since_s):
                 continue
             if self._pools[AGENT_OF[kind]] is not pool:
                 continue
@@ -255,13 +256,11 @@ class Dispatch:
     def _give(self, pending: Pending, pool: Pool, name: str) -> Assign:
         """Have an agent do a job."""
         job = pending.job
-        if not pending.holders:
-            pending.since_s = self._now_s or 0.0
-        pending.holders.append(name)
         self._twins.note(job, name)
         agent = pool.agents[name]
         agent.held[job.number] = None
-        pending.place = max(1.0, len(agent.held) / agent.joined.slots)
+        place = max(1.0, len(agent.held) / agent.joined.slots)
+        pending.holders[name] = (self._now_s or 0.0, place)
         pool.offer(name, next(self._stamps))
         return Assign(job, name)
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
+from math import inf
 
 from coordinator.events import Job, Joined
 
@@ -13,6 +14,8 @@ AHEAD_S = 0.8
 PAUSE_S = 0.2
 """The coordinator looks away from agents that are well provided so long [s]."""
 _NEWEST_WEIGHT = 0.1
+_PROVIDED = 1e6
+"""More than any load of who has not enough at hand."""
 
 
 @dataclass(slots=True)
@@ -21,21 +24,23 @@ class Pending:
 
     Attributes:
         job: which.
-        holders: who is at it: one, or two if the first is late.
-        place: it was to be done as the first, second, ... job of a slot of its holder.
-        since_s: when the first of them was given it [s].
+        holders: who is at it, one, or two if the first is late: when it was given it
+            [s], and as the first, second, ... job of a slot of its.
         errors: how often somebody could not do it.
         avoid: who failed at it.
         killed: processes that it ended, and by what.
     """
 
     job: Job
-    holders: list[str] = field(default_factory=list)
-    place: float = 1.0
-    since_s: float = 0.0
+    holders: dict[str, tuple[float, float]] = field(default_factory=dict)
     errors: int = 0
     avoid: tuple[str, ...] = ()
     killed: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def since_s(self) -> float:
+        """When whoever has it longest was given it [s]."""
+        return min(since_s for since_s, _ in self.holders.values())
 
 
 @dataclass(slots=True)
@@ -43,14 +48,26 @@ class AgentState:
     """One that does jobs.
 
     ``stamp`` names its only valid entry in its pool's heap; ``failures`` counts
-    errors and losses since its last answer.
+    errors and losses since its last answer; ``job_s`` is how long a slot of its is at
+    a job, typically [s], 0 before one is done.
     """
 
     joined: Joined
     held: dict[int, None] = field(default_factory=dict)
+    job_s: float = 0.0
     failures: int = 0
     rests: bool = False
     stamp: int = 0
+
+    def learn(self, duration_s: float) -> None:
+        """Note how long a slot was at a job [s]."""
+        known = self.job_s or duration_s
+        self.job_s = known + _NEWEST_WEIGHT * (duration_s - known)
+
+    @property
+    def most_ahead(self) -> int:
+        """How many jobs it can be given ahead: a slow one's would wait too long."""
+        return min(MOST_AHEAD, int(AHEAD_S / self.job_s)) if self.job_s else 0
 
 
 @dataclass(slots=True)
@@ -63,19 +80,12 @@ class Pool:
         free: (load, name, stamp) of each agent that does not rest, a heap; entries
             with an old stamp are dead and dropped when met.
         waiting: numbers of jobs, a heap.
-        job_s: how long a slot is at a job, typically [s]; 0 before one is done.
     """
 
     at_hand: int = 1
     agents: dict[str, AgentState] = field(default_factory=dict)
     free: list[tuple[float, str, int]] = field(default_factory=list)
     waiting: list[int] = field(default_factory=list)
-    job_s: float = 0.0
-
-    def learn(self, duration_s: float) -> None:
-        """Note how long a slot was at a job [s]."""
-        known = self.job_s or duration_s
-        self.job_s = known + _NEWEST_WEIGHT * (duration_s - known)
 
     def offer(self, name: str, stamp: int) -> None:
         """Note what an agent has to do now; its earlier entry dies."""
@@ -86,12 +96,26 @@ class Pool:
         if len(self.free) > 4 * len(self.agents) + 64:
             self.free = [entry for entry in self.free if self._is_live(entry)]
             heapify(self.free)
-        heappush(self.free, (len(agent.held) / agent.joined.slots, name, stamp))
+        heappush(self.free, (self._load(agent), name, stamp))
+
+    def _load(self, agent: AgentState) -> float:
+        """Return how much an agent has to do; 0 is nothing.
+
+        Who has not what it must have at hand comes before all others, and these are
+        as loaded as what they can be given ahead is used up.
+        """
+        spare = self._spare(agent)
+        if spare < 0:
+            return len(agent.held) / agent.joined.slots
+        return _PROVIDED + (spare / agent.most_ahead if agent.most_ahead else inf)
 
     def best(self) -> str:
         """Return who has the least to do and may have more, empty if nobody may."""
         name = self._least_busy()
-        return name if name and self._spare(name) < self._ahead() else ""
+        if not name:
+            return ""
+        agent = self.agents[name]
+        return name if self._spare(agent) < self._ahead(agent) else ""
 
     def _least_busy(self) -> str:
         while self.free:
@@ -100,32 +124,33 @@ class Pool:
             heappop(self.free)
         return ""
 
-    def _spare(self, name: str) -> int:
+    def _spare(self, agent: AgentState) -> int:
         """Return how many jobs an agent has beyond what it must have at hand."""
-        agent = self.agents[name]
         return len(agent.held) - agent.joined.slots - self.at_hand
 
-    def _ahead(self) -> int:
+    def _ahead(self, agent: AgentState) -> int:
         """Return how many jobs beyond that an agent may have: fewer near the end.
 
         Half of what waits is shared out, so that the last jobs go to whoever is done
         first.
         """
-        if not self.job_s:
-            return 0
-        share = len(self.waiting) // (2 * len(self.agents))
-        return min(MOST_AHEAD, share, int(AHEAD_S / self.job_s))
+        return min(agent.most_ahead, len(self.waiting) // (2 * len(self.agents)))
 
     @property
     def leisure_s(self) -> float:
         """How long nobody will want for a job, as far as one can tell [s].
 
-        Half of what the least busy agent has to spare: jobs differ.
+        Half of what the agent has to spare that is done first: jobs differ.
         """
-        if not (name := self._least_busy()):
+        name = self._least_busy()
+        if not name or self._spare(self.agents[name]) <= 0:
             return 0.0
-        spare = max(0, self._spare(name)) / self.agents[name].joined.slots
-        return min(PAUSE_S, spare * self.job_s / 2)
+        spare_s = min(
+            self._spare(agent) / agent.joined.slots * agent.job_s
+            for agent in self.agents.values()
+            if not agent.rests
+        )
+        return min(PAUSE_S, spare_s / 2)
 
     def idle(self) -> list[str]:
         """Return who has nothing to do and does not rest, by name."""

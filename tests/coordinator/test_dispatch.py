@@ -81,26 +81,37 @@ def test_an_agent_holds_one_job_more_than_it_has_slots() -> None:
     assert given_out(dispatch.handle(ok(1, "w"))) == [(3, "w")]
 
 
-def busy_pair(job_s: float) -> tuple[Dispatch, list[tuple[int, str]]]:
-    """Return two workers of whom one did the first of 30 jobs, and what it set off."""
+def busy_pair(
+    *job_s: float,
+) -> tuple[Dispatch, list[tuple[int, str]], list[tuple[int, str]]]:
+    """Return two workers who did a job each of 30, and what either answer set off.
+
+    Args:
+        job_s: how long the first worker and the second one were at it, ascending.
+    """
     dispatch = told(Ticked(0.0), worker("a"), worker("b"), *requests(*range(30)))
     assert dispatch.waiting("worker") == 26  # how long they take is not known yet
     assert dispatch.leisure_s == 0.0
-    dispatch.handle(Ticked(job_s))
-    return dispatch, given_out(dispatch.handle(ok(0, "a")))
+    given = []
+    for number, (name, duration_s) in enumerate(zip("ab", job_s, strict=True)):
+        dispatch.handle(Ticked(duration_s))
+        given.append(given_out(dispatch.handle(ok(number, name))))
+    return dispatch, given[0], given[1]
 
 
 def test_short_jobs_are_given_ahead_while_many_wait() -> None:
-    dispatch, given = busy_pair(0.04)
+    dispatch, first, second = busy_pair(0.04, 0.04)
     # One for the one that is done; then 25 wait, and a quarter of what still waits
-    # may be ahead at each: 4 of 17.
-    assert given == list(zip(range(4, 13), "aabababab", strict=True))
-    # Each has four to spare; half of them take 80 ms.
+    # may be ahead at each: 5 of 20.
+    assert first == [(number, "a") for number in range(4, 10)]
+    # The same: 4 of 16.
+    assert second == [(number, "b") for number in range(10, 15)]
+    # Half of what the second has to spare takes 80 ms.
     assert dispatch.leisure_s == pytest.approx(0.08)
     dispatch.handle(Left("a"))
-    # The other had 6, and half of what waits may be ahead at the only one: 9 of 18.
+    # The other had 7, and half of what waits may be ahead at the only one: 9 of 18.
     held = dispatch._pools["worker"].agents["b"].held
-    assert (len(held), dispatch.waiting("worker")) == (2 + 9, 18)
+    assert (len(held), dispatch.waiting("worker")) == (2 + 9, 17)
     assert dispatch.leisure_s == pytest.approx(0.18)
     for event in requests(*range(30, 60)):
         dispatch.handle(event)
@@ -108,8 +119,34 @@ def test_short_jobs_are_given_ahead_while_many_wait() -> None:
     assert dispatch.leisure_s == PAUSE_S
 
 
+def test_a_slow_worker_is_given_no_more_ahead_than_it_can_do_soon() -> None:
+    dispatch, first, second = busy_pair(0.04, 0.5)
+    assert len(first) == 6
+    # One in the place of the one that is done, and what takes less than 0.8 s.
+    assert second == [(10, "b"), (11, "b")]
+    # The quick one, too, is done with 5 x 40 ms, and the slow one with 500 ms.
+    assert dispatch.leisure_s == pytest.approx(0.1)
+    # What the slow one has keeps nothing from the quick one.
+    for event in requests(*range(30, 90)):
+        dispatch.handle(event)
+    agents = dispatch._pools["worker"].agents
+    assert {name: len(agent.held) for name, agent in agents.items()} == {
+        "a": 2 + MOST_AHEAD,
+        "b": 2 + 1,
+    }
+
+
+def test_a_newcomer_is_given_nothing_ahead_before_it_did_a_job() -> None:
+    dispatch, *_ = busy_pair(0.04, 0.04)
+    for event in (worker("c"), *requests(*range(30, 190))):
+        dispatch.handle(event)
+    agents = dispatch._pools["worker"].agents
+    assert [len(agents[name].held) for name in "abc"] == [18, 18, 2]
+    assert dispatch.leisure_s == 0.0
+
+
 def test_nothing_is_given_ahead_near_the_end() -> None:
-    dispatch, _ = busy_pair(0.04)
+    dispatch, *_ = busy_pair(0.04, 0.04)
     agents = dispatch._pools["worker"].agents
     while dispatch.waiting("worker"):
         name = max(agents, key=lambda each: len(agents[each].held))
@@ -119,8 +156,8 @@ def test_nothing_is_given_ahead_near_the_end() -> None:
 
 
 def test_long_jobs_are_not_given_ahead() -> None:
-    dispatch, given = busy_pair(1.0)
-    assert given == [(4, "a")]
+    dispatch, first, second = busy_pair(1.0, 1.0)
+    assert (first, second) == ([(4, "a")], [(5, "b")])
     assert dispatch.leisure_s == 0.0
 
 
@@ -286,6 +323,21 @@ def test_who_answers_first_is_heard_and_the_other_may_stop() -> None:
     assert dispatch.handle(Requested(job(4))) == []
     assert given_out(dispatch.handle(error(1, "a"))) == [(4, "a")]
     assert dispatch.wake_s is None
+
+
+@pytest.mark.parametrize(
+    ("who", "job_s"),
+    # The first did a job in 0.5 s before and has had this one for 9.5 s; the second
+    # has had its copy for 1 s.
+    [("a", 0.9 * 0.5 + 0.1 * 9.5), ("b", 1.0)],
+)
+def test_of_two_at_a_job_each_tells_of_its_own_time(who: str, job_s: float) -> None:
+    dispatch = late()
+    dispatch.handle(Ticked(9.0))
+    dispatch.handle(Ticked(10.0))
+    dispatch.handle(ok(1, who))
+    learned = dispatch._pools["worker"].agents[who].job_s
+    assert learned == pytest.approx(job_s)
 
 
 def test_a_copy_survives_the_loss_of_the_other() -> None:

@@ -172,11 +172,14 @@ def test_it_pauses_while_all_workers_have_more_than_enough(
     numbers = [ask(fleet, asker) for _ in range(200)]
     fleet.listen(0.2, 0.0)
     assert agents.pauses_s[-1] == 0.0  # how long a job takes is not known yet
-    agents.news = [Returned(numbers[0], "one", "ok", b"x")]
+    agents.news = [
+        Returned(number, agent, "ok", b"x")
+        for number, agent in zip(numbers, ("one", "two"), strict=False)
+    ]
     fleet.listen(0.2, 0.02)
     fleet.listen(0.2, 0.03)
-    # The least busy is the one with two slots: sixteen to spare are eight jobs of
-    # 20 ms in each; it pauses for half of that.
+    # The first to be done is the one with two slots: sixteen to spare are eight jobs
+    # of 20 ms in each; it pauses for half of that.
     assert agents.pauses_s[-1] == pytest.approx(0.08)
     fleet.listen(0.01, 0.04)
     assert agents.pauses_s[-1] == 0.01  # no longer than whoever asked wants to wait
