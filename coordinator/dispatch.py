@@ -1,10 +1,10 @@
 """Who gets which job: a pure machine between those who ask and those who do.
 
-Each requested job is delivered exactly once, whatever joins, leaves, dies, errs
-or answers late. An agent holds ``slots + 1`` jobs, so that the next one is always
-at hand, and some more while many short ones wait, so that nobody need be asked for
-each of them. Lower numbers go first, and so what was lost goes first again; the agent
-with the least to do gets it, ties break on its name.
+Each requested job is delivered exactly once, unless it is withdrawn, whatever joins,
+leaves, dies, errs or answers late. An agent holds ``slots + 1`` jobs, so that the next
+one is always at hand, and some more while many short ones wait, so that nobody need be
+asked for each of them. Lower numbers go first, and so what was lost goes first again;
+the agent with the least to do gets it, ties break on its name.
 
 An agent that erred or lost a job without leaving rests before it is given more,
 longer each time in a row, so that a broken one cannot eat the queue.
@@ -31,6 +31,7 @@ from coordinator.events import (
     Requested,
     Returned,
     Ticked,
+    Withdrawn,
 )
 from coordinator.pool import AgentState, Pending, Pool
 from coordinator.rests import Rests
@@ -65,6 +66,7 @@ class Dispatch:
             Joined: self._joined,
             Left: self._left,
             Requested: self._requested,
+            Withdrawn: self._withdrawn,
             Returned: self._returned,
             Died: self._died,
             Ticked: self._ticked,
@@ -160,6 +162,14 @@ class Dispatch:
         heappush(pool.waiting, number)
         yield from self._assign(pool)
 
+    def _withdrawn(self, event: Withdrawn) -> Iterator[DispatchCommand]:
+        pending = self._jobs.get(event.number)
+        if pending is None:
+            return
+        if not pending.holders:
+            self._pools[AGENT_OF[pending.job.kind]].drop(event.number)
+        yield from self._close(pending)
+
     def _returned(self, event: Returned) -> Iterator[DispatchCommand]:
         kind = self._kind_of.get(event.agent)
         if kind is None:
@@ -197,7 +207,7 @@ class Dispatch:
         self._put_back(pending, event.agent)
 
     def _close(self, pending: Pending) -> Iterator[DispatchCommand]:
-        """Forget a job that is delivered; whoever is still at it may stop."""
+        """Forget a job that is done with; whoever is still at it may stop."""
         job = pending.job
         del self._jobs[job.number]
         if job.twin not in self._jobs:

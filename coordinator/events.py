@@ -386,6 +386,13 @@ class Requested:
 
 
 @dataclass(frozen=True, slots=True)
+class Withdrawn:
+    """Nobody wants a job done any more; it may be done."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
 class Returned:
     """A job came back from an agent.
 
@@ -430,7 +437,7 @@ class Ticked:
     now_s: float
 
 
-DispatchEvent = Joined | Left | Requested | Returned | Died | Ticked
+DispatchEvent = Joined | Left | Requested | Withdrawn | Returned | Died | Ticked
 
 
 @dataclass(frozen=True, slots=True)

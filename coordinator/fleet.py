@@ -23,6 +23,7 @@ from coordinator.events import (
     Requested,
     Returned,
     Ticked,
+    Withdrawn,
 )
 from coordinator.shards import (
     Accept,
@@ -150,10 +151,10 @@ class Fleet:
         self._move(Released(shard))
 
     def leave(self, asker: Asker) -> None:
-        """Let nobody wait for the answers to one that asks no more."""
-        self._askers = {
-            number: each for number, each in self._askers.items() if each is not asker
-        }
+        """Let nobody work for one that asks no more."""
+        for number in [n for n, each in self._askers.items() if each is asker]:
+            del self._askers[number]
+            self._obey(self.dispatch.handle(Withdrawn(number)))
 
     def listen(self, timeout_s: float, now_s: float) -> list[Asker | Owner]:
         """Return who has news, after waiting for some.

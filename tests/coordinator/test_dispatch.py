@@ -23,6 +23,7 @@ from coordinator.events import (
     Requested,
     Returned,
     Ticked,
+    Withdrawn,
 )
 from coordinator.pool import MOST_AHEAD, PAUSE_S
 from coordinator.rests import LONGEST_REST_S, REST_S
@@ -138,7 +139,8 @@ def test_a_slow_worker_is_given_no_more_ahead_than_it_can_do_soon() -> None:
 
 def test_a_newcomer_is_given_nothing_ahead_before_it_did_a_job() -> None:
     dispatch, *_ = busy_pair(0.04, 0.04)
-    for event in (worker("c"), *requests(*range(30, 190))):
+    dispatch.handle(worker("c"))
+    for event in requests(*range(30, 190)):
         dispatch.handle(event)
     agents = dispatch._pools["worker"].agents
     assert [len(agents[name].held) for name in "abc"] == [18, 18, 2]
@@ -408,6 +410,7 @@ class World:
         self.now_s = 0.0
         self.jobs: dict[int, Job] = {}
         self.delivered: dict[int, Deliver] = {}
+        self.withdrawn: set[int] = set()
         self.errors: dict[int, int] = {}
         self.killed: dict[int, list[str]] = {}
         self.agents: dict[str, Joined] = {}
@@ -418,14 +421,14 @@ class World:
         for command in self.dispatch.handle(event):
             number, agent = command.job.number, command.agent
             if isinstance(command, Deliver):
-                assert number not in self.delivered
+                assert number not in {*self.delivered, *self.withdrawn}
                 self.delivered[number] = command
                 continue
             if isinstance(command, Cancel):
-                assert number in self.delivered
+                assert number in {*self.delivered, *self.withdrawn}
                 assert number in self.held[agent]
                 continue
-            assert number not in self.delivered
+            assert number not in {*self.delivered, *self.withdrawn}
             assert sum(number in held for held in self.held.values()) < 2
             assert number not in self.held[agent]
             kind: AgentKind = "analyzer" if command.job.kind == "vet" else "worker"
@@ -440,7 +443,8 @@ class World:
     def check(self) -> None:
         """Hold the machine's books against the world's."""
         inside = self.dispatch
-        assert inside.pending == len(self.jobs) - len(self.delivered)
+        ended = len(self.delivered) + len(self.withdrawn)
+        assert inside.pending == len(self.jobs) - ended
         for kind, pool in inside._pools.items():
             names = [n for n, joined in self.agents.items() if joined.kind == kind]
             assert sorted(pool.agents) == sorted(names)
@@ -458,6 +462,14 @@ class World:
         number = next(self.numbers)
         self.jobs[number] = job(number, self.random.choice(("vet", "evaluate")))
         self.tell(Requested(self.jobs[number]))
+
+    def withdraw(self) -> None:
+        """Nobody wants a job more that may be waiting, out, or long done."""
+        if self.jobs:
+            number = self.random.choice(sorted(self.jobs))
+            if number not in self.delivered:
+                self.withdrawn.add(number)
+            self.tell(Withdrawn(number))
 
     def join(self) -> None:
         kind: AgentKind = self.random.choice(("worker", "analyzer"))
@@ -531,6 +543,7 @@ class World:
 
 
 ACTIONS = ["request"] * 3 + [
+    "withdraw",
     "join",
     "leave",
     "answer",
@@ -555,7 +568,7 @@ def test_each_job_is_delivered_once_whatever_happens(
     for action in actions:
         getattr(world, action)()
     world.finish()
-    assert sorted(world.delivered) == sorted(world.jobs)
+    assert sorted([*world.delivered, *world.withdrawn]) == sorted(world.jobs)
     for number, delivered in world.delivered.items():
         failed = world.errors.get(number, 0) == MAX_ERRORS
         assert delivered.job == world.jobs[number]

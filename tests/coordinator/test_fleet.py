@@ -49,6 +49,7 @@ class Agents:
 
     def __init__(self) -> None:
         self.sent: list[tuple[int, str, bytes]] = []
+        self.cancelled: list[tuple[str, bytes]] = []
         self.pauses_s: list[float] = []
         self.news: list[DispatchEvent] = [
             Joined("one", "worker", 1, "p"),
@@ -58,8 +59,8 @@ class Agents:
     def send(self, number: int, agent: str, payload: bytes) -> None:
         self.sent.append((number, agent, payload))
 
-    def cancel(self, _agent: str, _payload: bytes, /) -> None:
-        """Do nothing: jobs end by themselves."""
+    def cancel(self, agent: str, payload: bytes, /) -> None:
+        self.cancelled.append((agent, payload))
 
     def receive(
         self, _timeout_s: float, pause_s: float = 0.0, /
@@ -110,7 +111,8 @@ def test_nobody_hears_of_jobs_of_one_that_left(fleet: Fleet, agents: Agents) -> 
     ask(fleet, asker)
     fleet.leave(asker)
     assert fleet.open == 0
-    number, agent, _ = agents.sent[0]
+    number, agent, payload = agents.sent[0]
+    assert agents.cancelled == [(agent, payload)]
     agents.news = [Returned(number, agent, "ok", b"x")]
     assert fleet.listen(0.0, 1.0) == []
     assert asker.ends == []
@@ -119,6 +121,24 @@ def test_nobody_hears_of_jobs_of_one_that_left(fleet: Fleet, agents: Agents) -> 
     for _ in range(5):
         ask(fleet, others)
     assert len(agents.sent) == 6
+
+
+def test_a_deadly_job_of_one_that_left_kills_nobody_more(
+    fleet: Fleet, agents: Agents
+) -> None:
+    asker, others = Asker(), Asker()
+    ask(fleet, asker)
+    waiting = [ask(fleet, each) for each in (asker, others, others, others, asker)][-1]
+    assert waiting not in [number for number, _, _ in agents.sent]
+    fleet.leave(asker)
+    (number, agent, _), *rest = agents.sent
+    fleet.tell(Left(agent))
+    fleet.tell(Died("run", 1, number, agent, "SIGSEGV"))
+    fleet.tell(Joined("three", "worker", 9, "p"))
+    again = [each for each, _, _ in agents.sent[1 + len(rest) :]]
+    assert number not in again
+    assert waiting not in again
+    assert fleet.dispatch.pending == 3
 
 
 def test_deaths_by_jobs_of_other_coordinators_are_not_ours(
