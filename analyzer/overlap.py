@@ -125,10 +125,13 @@ def _near_parts(boxes: Boxes, robot: Robot, vetting: Vetting) -> Mask:
     A part lies within its hull, so hulls apart are parts apart. The lesser of two
     indices comes first.
     """
-    # A part without boxes borrows one: it has none to meet with.
-    start = np.minimum(boxes.count.cumsum() - boxes.count, len(boxes.half) - 1)
-    lower = np.minimum.reduceat(boxes.lower.T, start, axis=1)
-    upper = np.maximum.reduceat(boxes.upper.T, start, axis=1)
+    # A part without boxes meets nobody, wherever it is.
+    solid = np.flatnonzero(boxes.count)
+    start = (boxes.count.cumsum() - boxes.count)[solid]
+    lower = np.full((3, len(boxes.count)), np.inf)
+    upper = -lower
+    lower[:, solid] = np.minimum.reduceat(boxes.lower.T, start, axis=1)
+    upper[:, solid] = np.maximum.reduceat(boxes.upper.T, start, axis=1)
     gap = np.maximum.reduce(lower[:, :, None] - upper[:, None])
     meet = _is_hit(np.maximum(gap, gap.T), vetting)
     # A parent stands before its children.

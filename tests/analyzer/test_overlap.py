@@ -189,6 +189,22 @@ def test_of_parts_whose_hulls_meet_the_boxes_decide(
     assert intersecting_parts(boxes, robot, OVERLAP) == expected
 
 
+@pytest.mark.parametrize("ghosts", [0, 1, 2])
+def test_parts_without_boxes_hide_nothing_of_the_part_before(ghosts: int) -> None:
+    # As above, but the tine that meets the core is the last of the boxes.
+    tine = (0.02, 0.3, 0.02)
+    tines = [Box(f"{x}", tine, (x, 0.0, 0.0), 0.1) for x in (0.2, -0.05)]
+    brick = BUILT_IN["FixedBrick"]
+    fork = replace(brick, name="Fork", shape=shaped(*tines))
+    ghost = replace(brick, name="Ghost", shape=shaped())
+    parts = [CORE, Part("FixedBrick", 0, 1, 0, 0, GREY), Part("Fork", 1, 1, 0, 0, GREY)]
+    parts += [Part("Ghost", 0, slot, 0, 0, GREY) for slot in (0, 2)[:ghosts]]
+    robot = Robot(tuple(parts))
+    boxes = place_boxes(robot, {**BUILT_IN, "Fork": fork, "Ghost": ghost})
+    assert boxes.count.tolist() == [1, 1, 2] + [0] * ghosts
+    assert intersecting_parts(boxes, robot, OVERLAP) == ((0, 2),)
+
+
 @pytest.mark.parametrize("order", [("Ghost", "FixedBrick"), ("FixedBrick", "Ghost")])
 def test_a_part_without_boxes_meets_nobody(order: tuple[str, str]) -> None:
     ghost = replace(BUILT_IN["FixedBrick"], name="Ghost", shape=shaped())
