@@ -1,7 +1,6 @@
 """A run that this process has in hand, from opening its folder to its last row."""
 
 import json
-import socket
 from contextlib import ExitStack
 from datetime import UTC, datetime
 from importlib import metadata
@@ -81,12 +80,13 @@ class ActiveRun:
             self._recorder = Recorder(held.path, details, fsync=fsync)
             stack.callback(self._recorder.close)
             self.experiment = experiment_from_text(details.document)
-            run = f"{socket.gethostname()}:{held.path.resolve()}"
-            self.feed = Feed(run, held.epoch, details) if is_watched else None
+            self.feed = Feed(held.name, held.epoch, details) if is_watched else None
             rows = Overheard(self._recorder, self.feed) if self.feed else self._recorder
             self.loop = Loop(
                 archipelago(self.experiment, details.seed, details.run),
-                question=Question.of(run, held.epoch, self.experiment, details.origin),
+                question=Question.of(
+                    held.name, held.epoch, self.experiment, details.origin
+                ),
                 fleet=fleet,
                 log=self._journal,
                 rows=rows,

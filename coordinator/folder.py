@@ -9,11 +9,12 @@ import contextlib
 import fcntl
 import json
 import os
+import secrets
 import socket
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 from coordinator.disk import replace_durably, storage_error
 from schema.errors import RunFolderError
@@ -26,6 +27,7 @@ DETAILS = "run.json"
 EPOCH = "epoch"
 STATE = "state"
 LOCK = "lock"
+_NONCE = "nonce"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +59,8 @@ class RunFolder:
         path: where it is.
         details: what is run here.
         epoch: how many coordinators have opened it, this one included.
+        name: of this run among all that workers may ever hear of: a folder that is
+            begun anew is another run, whose epochs count from 1 again.
     """
 
     def __init__(self, path: Path, details: RunDetails | None = None) -> None:
@@ -82,9 +86,11 @@ class RunFolder:
         try:
             if details is not None:
                 _refuse_used(path)
-                text = json.dumps(asdict(details), indent=1)
-                _replace_text(path / DETAILS, text)
+                entries = {**asdict(details), _NONCE: secrets.token_hex(4)}
+                _replace_text(path / DETAILS, json.dumps(entries, indent=1))
             self.details = read_details(path)
+            nonce = _read_entries(path).get(_NONCE, "")
+            self.name = f"{socket.gethostname()}:{nonce}:{path.resolve()}"
             self.epoch = _read_epoch(path) + 1
             _replace_text(path / EPOCH, str(self.epoch))
         except BaseException:
@@ -137,14 +143,11 @@ def read_details(path: Path) -> RunDetails:
         RunFolderError: no run is there, or its description is damaged.
     """
     file = path / DETAILS
+    entries = _read_entries(path)
+    entries.pop(_NONCE, None)  # runs of before have none
     try:
-        entries = json.loads(file.read_text(encoding="utf-8"))
         details = RunDetails(**entries)
-    except (FileNotFoundError, NotADirectoryError):
-        raise RunFolderError(
-            f"{path}: no run is there ({DETAILS} is missing)"
-        ) from None
-    except (OSError, ValueError, TypeError) as error:
+    except TypeError as error:
         raise RunFolderError(f"{file}: cannot be read: {error}") from None
     types = {"name": str, "run": int, "seed": int, "document": str}
     for key, kind in types.items():
@@ -153,6 +156,22 @@ def read_details(path: Path) -> RunDetails:
                 f"{file}: {key}: must be {kind.__name__}, got {entries[key]!r}"
             )
     return details
+
+
+def _read_entries(path: Path) -> dict[str, Any]:
+    """Return what stands in a run's description."""
+    file = path / DETAILS
+    try:
+        entries = json.loads(file.read_text(encoding="utf-8"))
+    except (FileNotFoundError, NotADirectoryError):
+        raise RunFolderError(
+            f"{path}: no run is there ({DETAILS} is missing)"
+        ) from None
+    except (OSError, ValueError) as error:
+        raise RunFolderError(f"{file}: cannot be read: {error}") from None
+    if not isinstance(entries, dict):
+        raise RunFolderError(f"{file}: must be an object, got {entries!r}")
+    return entries
 
 
 def read_state(path: Path) -> State:

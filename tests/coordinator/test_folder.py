@@ -1,6 +1,8 @@
 """Who may run in a folder, and how often it was opened."""
 
+import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -44,6 +46,28 @@ def test_the_epoch_grows_with_every_opening(tmp_path: Path) -> None:
         with RunFolder(tmp_path / "run") as folder:
             epochs.append(folder.epoch)
     assert epochs == [2, 3, 4]
+
+
+def test_a_folder_that_is_begun_anew_is_another_run(tmp_path: Path) -> None:
+    """Workers that outlive a run would take the new one for an old incarnation."""
+    path = tmp_path / "run"
+    with RunFolder(path, DETAILS) as first:
+        assert first.name.endswith(f":{path}")
+    with RunFolder(path) as resumed:
+        assert resumed.name == first.name
+    shutil.rmtree(path)
+    with RunFolder(path, DETAILS) as anew:
+        assert anew.epoch == 1
+        assert anew.name != first.name
+
+
+def test_a_run_of_before_names_were_unique_is_still_read(tmp_path: Path) -> None:
+    RunFolder(tmp_path, DETAILS).close()
+    entries = json.loads((tmp_path / "run.json").read_text())
+    del entries["nonce"]
+    (tmp_path / "run.json").write_text(json.dumps(entries))
+    with RunFolder(tmp_path) as folder:
+        assert folder.details == DETAILS
 
 
 def test_a_used_folder_is_refused(tmp_path: Path) -> None:
