@@ -1,7 +1,8 @@
 """``revolve worker`` and ``revolve analyzer``: the same flags, the same life.
 
 One process does one job at a time; the command starts as many as it is told,
-starts those again that are killed, and ends all on Ctrl-C.
+starts those again that end, and ends all on Ctrl-C. It gives up when none is left and
+all ended by themselves.
 """
 
 import argparse
@@ -112,7 +113,7 @@ def run_crew(
                 for death in crew.deaths[deaths:]:
                     sys.stderr.write(f"{tell_death(death)}\n")
                 if crew.restarts > restarts:
-                    sys.stderr.write(f"a {role} was killed; another takes its place\n")
+                    sys.stderr.write(f"a {role} is gone; another takes its place\n")
                 restarts, deaths = crew.restarts, len(crew.deaths)
                 if len(crew.exit_codes) == options.processes:
                     return max(crew.exit_codes)

@@ -1,9 +1,10 @@
 """A crew of processes that one process starts, watches and ends.
 
-Processes are spawned, never forked: the network does not survive a fork. One
-that is killed is started again; one that ends between two jobs meant to. None
-outlives the one that started it. Who takes a dead one's place is told what that one
-died of, if its job did it.
+Processes are spawned, never forked: the network does not survive a fork. One that
+ends before its crew does is started again, whatever it ended by; if it ended itself
+and not by its job, after a rest that grows as long as it does so soon. None outlives
+the one that started it. Who takes a dead one's place is told what that one died of,
+if its job did it.
 """
 
 import contextlib
@@ -41,6 +42,7 @@ _NETWORK = (
 _ONE_PIECE = "131072"
 GRACE_S = 10.0
 _BETWEEN_STARTS_S = 1.0
+_LONGEST_REST_S = 30.0
 
 
 def prepare_process() -> None:
@@ -88,7 +90,9 @@ class Crew:
         self._arguments = arguments
         self._context = get_context("spawn")
         self._processes: list[SpawnProcess | None] = [None] * size
-        self._started_s = [-_BETWEEN_STARTS_S] * size
+        self._started_s = [-1.0] * size
+        self._due_s = [0.0] * size
+        self._rests_s = [_BETWEEN_STARTS_S] * size
         self._posts = [Post(index, JobNote()) for index in range(size)]
         self._codes: list[int | None] = [None] * size
         self.restarts = 0
@@ -112,30 +116,35 @@ class Crew:
 
     @property
     def exit_codes(self) -> list[int]:
-        """How those ended that ended by themselves, and meant to."""
+        """How those ended that ended by themselves and rest since."""
         return [code for code in self._codes if code is not None]
 
     def look_after(self) -> None:
-        """Start who is not there yet, and again who was killed; not twice a second."""
+        """Start who is not there yet, and again who ended; not twice a second."""
         now_s = time.monotonic()
         for index, process in enumerate(self._processes):
             if process is not None and process.exitcode is not None:
-                self._bury(index, process.exitcode)
-            is_gone = self._processes[index] is None and self._codes[index] is None
-            if is_gone and now_s - self._started_s[index] >= _BETWEEN_STARTS_S:
+                self._bury(index, process.exitcode, now_s)
+            if self._processes[index] is None and now_s >= self._due_s[index]:
                 self.restarts += self._started_s[index] >= 0.0
                 self._started_s[index] = now_s
+                self._codes[index] = None
                 self._processes[index] = self._start(index)
 
-    def _bury(self, index: int, code: int) -> None:
-        """Note how a process ended."""
+    def _bury(self, index: int, code: int, now_s: float) -> None:
+        """Note how a process ended, and when its place is to be taken."""
         self._processes[index] = None
+        self._due_s[index] = self._started_s[index] + _BETWEEN_STARTS_S
         post = self._posts[index]
         assert post.note is not None
         task = post.note.read()
         post.note.end()
         if task is None and code >= 0:
             self._codes[index] = code
+            if now_s - self._started_s[index] > _LONGEST_REST_S:
+                self._rests_s[index] = _BETWEEN_STARTS_S
+            self._due_s[index] = now_s + self._rests_s[index]
+            self._rests_s[index] = min(2.0 * self._rests_s[index], _LONGEST_REST_S)
         elif task is not None and (cause := own_doing(code)):
             death = Death(task, cause)
             self.deaths.append(death)

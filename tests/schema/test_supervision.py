@@ -120,3 +120,24 @@ def test_who_takes_a_dead_ones_place_is_told_what_it_died_of(tmp_path: Path) -> 
         assert crew.restarts == 2
     lines = log.read_text().splitlines()
     assert lines == ["[]", "['SIGSEGV']", "['SIGSEGV', 'SIGSEGV']"]
+
+
+def leave(how: str, post: Post) -> None:
+    """End between two jobs."""
+    assert post.note is not None
+    if how == "by an error":
+        raise RuntimeError("the network's, not a job's")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("how", "code"), [("as asked", 0), ("by an error", 1)])
+def test_who_ends_by_itself_is_replaced_later_each_time(how: str, code: int) -> None:
+    """After 1 s, then 2 s: whatever befell it may befall it again."""
+    began_s = time.monotonic()
+    with Crew(leave, (how,), size=1) as crew:
+        until(crew, lambda: crew.exit_codes == [code])
+        assert crew.restarts == 0
+        until(crew, lambda: crew.restarts == 2)
+        assert crew.exit_codes == []
+        assert time.monotonic() - began_s > 3.0
+    assert crew.deaths == []

@@ -18,7 +18,8 @@ import pytest
 from coordinator.compare import compare
 from coordinator.events import Advanced
 from coordinator.journal import NAME, Journal
-from tests.system.fleet import Fleet
+from tests.system.fleet import Fleet, agent_processes, size
+from tests.system.stage import wait_until
 
 pytestmark = [
     pytest.mark.system,
@@ -109,6 +110,22 @@ def test_the_only_analyzer_is_lost_and_replaced(
     fleet.join("another", "analyzer")
     fleet.finish()
     assert compare(undisturbed, fleet.folder) == []
+
+
+def test_a_run_replaces_its_only_worker_when_somebody_asks_it_to_end(
+    stage: Stage, undisturbed: Path, births: int
+) -> None:
+    folder = stage.folder / "run"
+    words = (*singles(births), "--workers", "1", "--out", "run")
+    command = stage.start("run", *words)
+    share = np.random.default_rng(25).uniform(0.1, 0.7)
+    wait_until(
+        lambda: size(folder) > share * whole(undisturbed), "the run is on its way"
+    )
+    os.kill(agent_processes(command.pid)[-1], signal.SIGTERM)
+    wait_until(lambda: command.poll() is not None, "the run ends")
+    assert command.returncode == 0
+    assert compare(undisturbed, folder) == []
 
 
 @pytest.mark.parametrize("behaviour", ["twice", "late"])
