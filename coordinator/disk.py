@@ -42,19 +42,29 @@ class AppendedFile:
     def append(self, piece: bytes) -> None:
         """Add a piece at the end; on any failure nothing of it stays.
 
+        Unless somebody else has written behind it: what they wrote stays.
+
         Raises:
             RunFolderError: the disk is full or failed.
         """
         rest = memoryview(piece)
         try:
+            # Not as it is remembered: whoever replaced this process may have written.
+            self.size = os.fstat(self._descriptor).st_size
             while rest:
                 rest = rest[os.write(self._descriptor, rest) :]
             if self._fsync:
                 os.fsync(self._descriptor)
         except OSError as error:
-            self.cut(self.size)
+            self._take_back(len(piece) - len(rest))
             raise storage_error(self.path, error) from None
         self.size += len(piece)
+
+    def _take_back(self, written: int) -> None:
+        """Drop what was written of a piece, if it is the last in the file."""
+        with contextlib.suppress(OSError):
+            if os.fstat(self._descriptor).st_size == self.size + written:
+                self.cut(self.size)
 
     def cut(self, size: int) -> None:
         """Drop everything from ``size`` on; a file that will not be cut is closed."""

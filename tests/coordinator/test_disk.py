@@ -1,8 +1,11 @@
 """Writing where there is no room left."""
 
+import errno
+import os
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -64,6 +67,43 @@ def test_a_closed_file_takes_nothing(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="cannot be written"):
         file.append(b"two")
     assert (tmp_path / "f").read_bytes() == b"one"
+
+
+@pytest.mark.parametrize("room", [0, 3])
+def test_a_failure_takes_back_nothing_that_another_wrote(
+    tmp_path: Path,
+    full_beyond: Callable[[int], AbstractContextManager[None]],
+    room: int,
+) -> None:
+    """A coordinator that slept through its replacement, on a full disk."""
+    old = AppendedFile(tmp_path / "f")
+    old.append(b"old")
+    new = AppendedFile(tmp_path / "f")
+    new.append(b" and new")
+    with full_beyond(11 + room), pytest.raises(RunFolderError, match="disk full"):
+        old.append(b" again")
+    new.append(b" still")
+    assert (tmp_path / "f").read_bytes() == b"old and new still"
+    for file in (old, new):
+        file.close()
+
+
+def test_a_failure_behind_which_another_wrote_takes_back_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = AppendedFile(tmp_path / "f", fsync=True)
+    new = AppendedFile(tmp_path / "f")
+
+    def fail(_descriptor: int) -> None:
+        new.append(b"new")
+        raise OSError(errno.EIO, "gone")
+
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(RunFolderError, match="cannot be written: gone"):
+        old.append(b"old ")
+    assert (tmp_path / "f").read_bytes() == b"old new"
+    for file in (old, new):
+        file.close()
 
 
 def test_a_file_is_continued_at_its_end(tmp_path: Path) -> None:
