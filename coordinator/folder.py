@@ -11,6 +11,7 @@ import json
 import os
 import secrets
 import socket
+import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
@@ -28,6 +29,10 @@ EPOCH = "epoch"
 STATE = "state"
 LOCK = "lock"
 _NONCE = "nonce"
+
+# Who looks who holds a folder has its lock for an instant: no reason to be refused.
+_LOOKED_AT_S = 0.2
+_TRY_AGAIN_S = 0.005
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +205,8 @@ def read_holder(path: Path) -> str:
     except OSError:
         return ""
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        # Shared: two who look at a time shall not take each other for a holder.
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return _holder(descriptor)
     finally:
@@ -216,7 +222,7 @@ def lock_folder(path: Path) -> int:
     """
     descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        _lock(descriptor)
     except BlockingIOError:
         holder = _holder(descriptor)
         os.close(descriptor)
@@ -229,6 +235,24 @@ def lock_folder(path: Path) -> int:
         os.ftruncate(descriptor, 0)
         os.pwrite(descriptor, signature, 0)
     return descriptor
+
+
+def _lock(descriptor: int) -> None:
+    """Lock a file for this process alone.
+
+    Raises:
+        BlockingIOError: it stays locked by another.
+    """
+    until_s = time.monotonic() + _LOOKED_AT_S
+    while True:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= until_s:
+                raise
+            time.sleep(_TRY_AGAIN_S)
+        else:
+            return
 
 
 def unlock_folder(descriptor: int) -> None:

@@ -1,5 +1,6 @@
 """Who may run in a folder, and how often it was opened."""
 
+import fcntl
 import json
 import os
 import shutil
@@ -7,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -29,6 +31,7 @@ with RunFolder(Path(sys.argv[1])):
     print("held", flush=True)
     sys.stdin.read()
 """
+LOOKED_AT_S = 0.05
 
 
 def test_what_is_run_there_comes_back(tmp_path: Path) -> None:
@@ -119,6 +122,19 @@ def test_a_second_coordinator_is_refused_with_the_first_ones_name(
         with RunFolder(path) as folder:
             # The refused one did not count.
             assert folder.epoch == 3
+
+
+def test_who_looks_at_a_folder_is_no_reason_to_refuse_it(tmp_path: Path) -> None:
+    path = tmp_path / "run"
+    RunFolder(path, DETAILS).close()
+    with (path / "lock").open() as lock:
+        fcntl.flock(lock, fcntl.LOCK_SH)
+        assert read_holder(path) == ""
+        end = threading.Timer(LOOKED_AT_S, fcntl.flock, (lock, fcntl.LOCK_UN))
+        end.start()
+        with RunFolder(path) as folder:
+            assert folder.epoch == 2
+        end.join()
 
 
 def test_a_child_process_does_not_keep_the_lock(tmp_path: Path) -> None:
