@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import Any, Literal, Self
 
 from coordinator.disk import replace_durably, storage_error
+from coordinator.journal import newest_epoch
 from schema.errors import RunFolderError
 from schema.identity import Origin
 
@@ -96,7 +97,8 @@ class RunFolder:
             self.details = read_details(path)
             nonce = _read_entries(path).get(_NONCE, "")
             self.name = f"{socket.gethostname()}:{nonce}:{path.resolve()}"
-            self.epoch = _read_epoch(path) + 1
+            # The journal's, too: a lost or older file would have it void what comes.
+            self.epoch = max(_read_epoch(path), newest_epoch(path)) + 1
             _replace_text(path / EPOCH, str(self.epoch))
         except BaseException:
             self.close()

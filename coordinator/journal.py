@@ -50,10 +50,7 @@ class Journal:
             RunFolderError: not a journal, damage before intact records, or a disk
                 that fails.
         """
-        try:
-            data = path.read_bytes() if path.exists() else b""
-        except OSError as error:
-            raise RunFolderError(f"{path}: cannot be read: {error}") from None
+        data = _read(path)
         payloads, end = _intact(path, data)
         self._history = [_event(path, payload) for payload in payloads]
         self._epoch = epoch
@@ -104,6 +101,28 @@ class Journal:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def newest_epoch(folder: Path) -> int:
+    """Return the newest epoch in which a run's journal was written, from 0.
+
+    Only of what stands before any damage; to refuse that is for who opens it.
+
+    Raises:
+        RunFolderError: it cannot be read.
+    """
+    data = _read(folder / NAME)
+    position, newest = len(MAGIC), 0
+    while found := _record_at(data, position):
+        newest, position = max(newest, found[0] // _RECORDS), found[1]
+    return newest
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes() if path.exists() else b""
+    except OSError as error:
+        raise RunFolderError(f"{path}: cannot be read: {error}") from None
 
 
 def _frame(number: int, payload: bytes) -> bytes:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from coordinator.events import VettingFailed
 from coordinator.folder import (
     RunDetails,
     RunFolder,
@@ -20,6 +21,8 @@ from coordinator.folder import (
     read_holder,
     read_state,
 )
+from coordinator.journal import Journal
+from schema.birth import BirthId
 from schema.errors import RunFolderError
 
 DETAILS = RunDetails("scenario1", 3, 2**64 - 1, '{"name": "scenario1", "ü": 1}')
@@ -71,6 +74,30 @@ def test_a_run_of_before_names_were_unique_is_still_read(tmp_path: Path) -> None
     (tmp_path / "run.json").write_text(json.dumps(entries))
     with RunFolder(tmp_path) as folder:
         assert folder.details == DETAILS
+
+
+@pytest.mark.parametrize("left", [None, "1"])
+def test_a_lost_epoch_voids_nothing_that_is_written_later(
+    tmp_path: Path, left: str | None
+) -> None:
+    """The file is gone, or an older one was put in its place."""
+    path = tmp_path / "run"
+    RunFolder(path, DETAILS).close()
+    events = [VettingFailed(BirthId(0, number), 0, "refused") for number in range(5)]
+    for number, event in enumerate(events):
+        if number == 2 and left is None:
+            (path / "epoch").unlink()
+        elif number == 2 and left is not None:
+            (path / "epoch").write_text(left)
+        with (
+            RunFolder(path) as folder,
+            Journal.open(path, epoch=folder.epoch) as journal,
+        ):
+            folder.confirm()
+            assert journal.replay() == events[:number]
+            journal.append([event])
+    with Journal.open(path) as journal:
+        assert journal.replay() == events
 
 
 def test_a_used_folder_is_refused(tmp_path: Path) -> None:
