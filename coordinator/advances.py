@@ -36,8 +36,8 @@ from schema.plugin_source import plugins_of
 class Vault(Protocol):
     """Where snapshots of shards are kept."""
 
-    def has(self, shard: int, step: int) -> bool:
-        """Return whether the state of a shard at a step is there."""
+    def has(self, shard: int, step: int, digest: bytes) -> bool:
+        """Return whether a shard's state of this digest at a step is there."""
 
     def write(self, shard: int, step: int, data: bytes) -> None:
         """Keep the state of a shard at a step, durably."""
@@ -222,7 +222,7 @@ class Advances:
         past.platform = platform
         past.history.append(PastAdvance(asked.changes, asked.until, advance.digest))
         past.places = {one.birth: one.place for one in advance.judgements}
-        if self._vault.has(event.island, past.step):
+        if self._vault.has(event.island, past.step, past.digest):
             past.base, past.history = past.step, []
             self._vault.drop_before(event.island, past.step)
         self._fleet.place(self._number(event.island), platform)

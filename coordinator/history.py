@@ -64,8 +64,8 @@ class _Vault:
     kept: Snapshots
     until: int
 
-    def has(self, shard: int, step: int) -> bool:
-        return step <= self.until and self.kept.has(shard, step)
+    def has(self, shard: int, step: int, digest: bytes) -> bool:
+        return step <= self.until and self.kept.has(shard, step, digest)
 
     def write(self, shard: int, step: int, data: bytes) -> None:
         """Keep nothing."""

@@ -2,10 +2,12 @@
 
 ``snapshots/island-N-STEP.bin`` is there whole or not at all. An older one goes only
 when the journal has come to the newer; one that a journal does not come to (a kill
-between the two) is passed over, and written again.
+between the two) is passed over, and written again. Where the step is reached after
+all but on another platform, the state is another one, which the digest tells.
 """
 
 import re
+from hashlib import sha256
 from pathlib import Path
 
 from coordinator.disk import replace_durably, storage_error
@@ -38,9 +40,15 @@ class Snapshots:
             if match := _NAME.fullmatch(name):
                 self._there.add((int(match[1]), int(match[2])))
 
-    def has(self, shard: int, step: int) -> bool:
-        """Return whether the state of a shard at a step is there."""
-        return (shard, step) in self._there
+    def has(self, shard: int, step: int, digest: bytes) -> bool:
+        """Return whether a shard's state of this digest at a step is there.
+
+        Raises:
+            RunFolderError: it cannot be read.
+        """
+        if (shard, step) not in self._there:
+            return False
+        return sha256(self.read(shard, step)).digest() == digest
 
     def write(self, shard: int, step: int, data: bytes) -> None:
         """Keep the state of a shard at a step, durably.

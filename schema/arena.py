@@ -94,7 +94,7 @@ class Advance:
 
     Attributes:
         step: reached.
-        digest: SHA-256 of the state there.
+        digest: SHA-256 of the state there, which is that of a snapshot of it.
         judgements: of all living robots, by birth.
         casualties: in the order in which they fell.
         touches: by pair; empty unless the experiment asks for them.

@@ -3,6 +3,7 @@
 import sys
 import time
 from collections.abc import Callable
+from hashlib import sha256
 
 import numpy as np
 import pytest
@@ -64,6 +65,14 @@ def _continued(world: World) -> list[object]:
     first = seconds(world, 0.7)
     world.apply(Changes(removals=(world.births[4],)))
     return [first, seconds(world, 0.5)]
+
+
+def test_an_advance_tells_the_digest_of_its_snapshot(robot_of: Robots) -> None:
+    """By which a coordinator knows whose state a file holds."""
+    world = inhabited(RECORDING, crowd(robot_of, 14, 0.5))
+    advance = seconds(world, 2.0)
+    assert advance.touches
+    assert sha256(world.snapshot()).digest() == advance.digest
 
 
 def test_a_snapshot_right_after_changes_goes_on_as_well(robot_of: Robots) -> None:
