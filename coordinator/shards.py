@@ -160,7 +160,11 @@ class ShardDispatch:
         """When the next ``Ticked`` can change something [s]; None: no need."""
         shards = self._shards.values()
         wakes = [*(s.rests_until_s for s in shards), *(s.drifts_at_s for s in shards)]
-        return min((wake for wake in wakes if wake is not None), default=None)
+        # What was due is done; who may drift by now waits for a worker, not for a time.
+        return min(
+            (wake for wake in wakes if wake is not None and wake > self._now_s),
+            default=None,
+        )
 
     @property
     def waiting(self) -> dict[int, str]:

@@ -191,6 +191,16 @@ def test_another_platform_gets_a_shard_after_a_while_if_that_is_allowed() -> Non
     assert dispatch.handle(Wanted(0)) == [Hand(2, 0, "a", is_whole=False)]
 
 
+def test_one_that_may_drift_waits_for_whoever_comes_and_not_for_a_time() -> None:
+    dispatch = ShardDispatch(count(1), allows_drift=True)
+    dispatch.handle(Placed(0, "theirs"))
+    dispatch.handle(Wanted(0))
+    dispatch.handle(Ticked(100.0))
+    assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == []
+    assert dispatch.wake_s is None
+    assert dispatch.handle(joined("a", "ours")) == [Hand(1, 0, "a", is_whole=True)]
+
+
 def test_its_own_platform_comes_back_in_time() -> None:
     dispatch = drifting(allows_drift=True)
     assert dispatch.handle(joined("z", "theirs")) == [Hand(1, 0, "z", is_whole=True)]
