@@ -1,7 +1,8 @@
 """Doing again what robots did, to see all of it.
 
 What comes out is what came out the first time, to the last bit, on an equal platform;
-whoever asks compares.
+whoever asks compares. An arena that drifted has lived on several, and is done again as
+nearly as it goes.
 """
 
 from collections.abc import Iterator
@@ -18,6 +19,7 @@ from schema.identity import Identity
 from schema.robot import Robot
 from schema.settings import EvaluationSettings, read_arena_settings
 from schema.tables import POSES, read_columns
+from worker.arrival import possible
 from worker.evaluation import evaluate, simulate
 from worker.world import World
 
@@ -91,7 +93,7 @@ def together(
     tick = own.simulation.brain_steps
     try:
         for advance in past.history:
-            world.apply(advance.changes)
+            world.apply(possible(advance.changes, world.births))
             is_seen = not births.isdisjoint(world.births)
             samples: list[pa.Table] = []
             motion: list[pa.Table] = []

@@ -1,5 +1,7 @@
 """How robots come into an arena, and which changes are none."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from schema.arena import Casualty, Changes, Insertion
@@ -60,6 +62,25 @@ def _once(births: tuple[BirthId, ...]) -> tuple[BirthId, ...]:
     if len(set(births)) < len(births):
         raise UnexpectedEvent(f"apply: somebody is named twice in {births}")
     return births
+
+
+def possible(changes: Changes, living: Collection[BirthId]) -> Changes:
+    """Return what of changes made on another platform can be made here.
+
+    Who fell here only is let alone; who fell there only, and comes back as a migrant,
+    makes room for itself. Where the same live as there, these are the same changes.
+    """
+    coming = [each.birth for each in changes.insertions]
+    going = dict.fromkeys((*changes.removals, *coming))
+    return Changes(
+        tuple(birth for birth in going if birth in living),
+        changes.insertions,
+        tuple(
+            change
+            for change in changes.brains
+            if change.birth in living or change.birth in coming
+        ),
+    )
 
 
 def newborn(insertion: Insertion, company: Company, step: int) -> Inhabitant | Casualty:

@@ -27,6 +27,7 @@ from schema.errors import StateDiffers
 from schema.experiment import body_space
 from schema.robot import check_robot
 from schema.settings import ArenaSettings, read_arena_settings
+from worker.arrival import possible
 
 MOST_HELD = 16
 """Shards that one process keeps; the one that rested longest goes first."""
@@ -126,7 +127,7 @@ class Shards:
         if held is None and job.rebuild is not None:
             held = _Held(self._rebuilt(job, job.rebuild), job.settings, job.from_digest)
             if job.rebuild.living is not None:
-                changes = _possible(changes, held.world)
+                changes = possible(changes, held.world.births)
         advance: Advance | None = None
         snapshot = b""
         if held is not None:
@@ -223,19 +224,9 @@ def _imitate(
     Who fell there and not here goes at the end; who fell here only stays away.
     """
     for past in history:
-        world.apply(_possible(past.changes, world))
+        world.apply(possible(past.changes, world.births))
         world.advance(past.until)
     world.apply(Changes(tuple(sorted(set(world.births) - set(living)))))
-
-
-def _possible(changes: Changes, world: World) -> Changes:
-    """Return changes without those of robots that are not there."""
-    there = {*world.births, *(each.birth for each in changes.insertions)}
-    return Changes(
-        tuple(birth for birth in changes.removals if birth in there),
-        changes.insertions,
-        tuple(change for change in changes.brains if change.birth in there),
-    )
 
 
 def _check_digest(step: int, digest: bytes, expected: bytes) -> None:
