@@ -29,6 +29,8 @@ from analysis.study import gathered, measure_runs
 from schema.errors import RunFolderError
 
 MEASURES, FIGURES, REPORT = "measures", "figures", "report.html"
+_ALWAYS = ("populations", "robots", "extremities")
+"""Measures that all that follows reads, whatever could be measured."""
 _SHOWN = ("fitness", "fitness_best")
 _LIBRARIES = ("revolve-islands", "mujoco-core", "numpy", "pyarrow", "plotnine")
 
@@ -101,7 +103,8 @@ def _measured(
         tell=lambda: bar.advance(task),
     )
     comparing = bar.add_task("experiments compared", total=None)
-    tables = gathered(measured)
+    empty = {name: schema(name).empty_table() for name in _ALWAYS}
+    tables = {**empty, **gathered(measured)}
     tables["progression"] = progression(tables["populations"])
     outcomes = Outcomes(measured)
     tables["outcomes"] = outcomes.table()

@@ -83,7 +83,8 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
     one: the finished of them, or else the first.
 
     Raises:
-        RunFolderError: a folder that is not there, or no run in any of them.
+        RunFolderError: a folder that is not there, or no run in any of them that can
+            be read.
     """
     folders: set[Path] = set()
     for root in roots:
@@ -102,6 +103,9 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
             runs.append(_read_run(folder))
         except RunFolderError as error:
             left_out.append(LeftOut(str(folder), "run", str(error)))
+    if not runs:
+        first = left_out[0]
+        raise RunFolderError(f"no run can be read: {first.folder}: {first.why}")
     return _different(runs, left_out), left_out
 
 

@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import count
 from typing import Any
 
 from analysis.load import Run
@@ -26,7 +27,8 @@ def told_apart(runs: Sequence[Run]) -> list[Run]:
     """Return runs in their order, experiments of one name and other settings renamed.
 
     The settings that most runs of a name have (of several, those of the first run)
-    keep it; the next become ``name~2`` and say in ``differs`` what sets them apart.
+    keep it; the next become ``name~2``, or the next that no experiment has, and say
+    in ``differs`` what sets them apart.
 
     Args:
         runs: of any experiments.
@@ -38,10 +40,10 @@ def told_apart(runs: Sequence[Run]) -> list[Run]:
     renamed: dict[int, Run] = {}
     for name, by_settings in groups.items():
         first, *others = sorted(by_settings.values(), key=len, reverse=True)
-        for number, group in enumerate(others, start=2):
+        free = (each for n in count(2) if (each := f"{name}{MARK}{n}") not in groups)
+        for experiment, group in zip(free, others, strict=False):
             differs = _told(group[0].document, first[0].document)
             for run in group:
-                experiment = f"{name}{MARK}{number}"
                 renamed[id(run)] = replace(run, experiment=experiment, differs=differs)
     return [renamed.get(id(run), run) for run in runs]
 

@@ -117,6 +117,12 @@ def test_a_broken_description_is_named_and_the_others_are_read(
     assert one.why.startswith("run.json: ")
 
 
+def test_where_no_run_can_be_read_is_said(tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text("{}")
+    with pytest.raises(RunFolderError, match=r"no run can be read: .*: run.json: "):
+        read_runs([tmp_path])
+
+
 def test_a_finished_run_tells_what_it_is_without_its_description(made: Maker) -> None:
     folder = made("x")
     document = json.dumps({"births": 3, "arena": None})

@@ -134,6 +134,13 @@ def test_names_are_told_apart_each_for_itself() -> None:
     assert told_apart(some)[-1].experiment == "mine~2"
 
 
+def test_a_name_that_an_experiment_has_is_given_to_no_other() -> None:
+    taken = runs(SCENARIO, name="scenario1~2")
+    others = [changed(simulation={"friction": each}) for each in (0.5, 0.7)]
+    names = [run.experiment for run in told_apart(runs(SCENARIO, *others) + taken)]
+    assert names == ["scenario1", "scenario1~3", "scenario1~4", "scenario1~2"]
+
+
 def test_figures_say_which_is_meant() -> None:
     assert label("scenario1~2") == "scenario 1 ~2"
     assert broken("no-selection~2") == "no selection\n~2"

@@ -109,3 +109,15 @@ def test_three_readers_read_the_same(analysed: tuple[Path, str]) -> None:
 def test_no_run_is_one_line(stage: Stage) -> None:
     told = stage.run("analyze", "nowhere", code=2)
     assert told == "revolve: nowhere: no such folder\n"
+
+
+def test_a_single_run_that_is_broken_in_part_is_measured_as_far_as_it_goes(
+    stage: Stage, undisturbed: Path
+) -> None:
+    shutil.copytree(undisturbed, stage.folder / "run")
+    (evaluations,) = (stage.folder / "run").glob("tables/*/*/evaluations.parquet")
+    evaluations.write_bytes(b"")
+    told = stage.run("analyze", "run", "--out", "report")
+    assert "left out: run: table evaluations: " in told
+    robots = pq.read_table(stage.folder / "report" / "measures" / "robots.parquet")
+    assert robots.num_rows == 0
