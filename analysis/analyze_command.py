@@ -50,7 +50,7 @@ def analyze(
         0 if done, whatever was left out.
 
     Raises:
-        RunFolderError: no run.
+        RunFolderError: no run, or nowhere to write.
     """
     folders = [path for path in options.runs if path.is_dir() or not path.is_file()]
     if not folders:
@@ -59,7 +59,11 @@ def analyze(
     runs = told_apart(found)
     benchmark, not_benchmarks = read_benchmarks(options.runs)
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn())
-    (options.out / FIGURES).mkdir(parents=True, exist_ok=True)
+    try:
+        (options.out / FIGURES).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        why = f"cannot be written: {error.strerror}"
+        raise RunFolderError(f"{options.out}: {why}") from None
     with Progress(
         *columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True
     ) as bar:

@@ -111,6 +111,13 @@ def test_no_run_is_one_line(stage: Stage) -> None:
     assert told == "revolve: nowhere: no such folder\n"
 
 
+def test_a_file_is_no_place_for_a_report(stage: Stage, undisturbed: Path) -> None:
+    (stage.folder / "file").write_text("mine")
+    told = stage.run("analyze", str(undisturbed), "--out", "file", code=2)
+    assert told == "revolve: file: cannot be written: Not a directory\n"
+    assert (stage.folder / "file").read_text() == "mine"
+
+
 def test_a_single_run_that_is_broken_in_part_is_measured_as_far_as_it_goes(
     stage: Stage, undisturbed: Path
 ) -> None:
