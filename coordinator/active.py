@@ -13,7 +13,8 @@ from coordinator.events import Record
 from coordinator.fleet import Fleet
 from coordinator.folder import DETAILS, RunFolder
 from coordinator.island import Island
-from coordinator.journal import Journal
+from coordinator.journal import NAME as JOURNAL
+from coordinator.journal import Journal, is_begun
 from coordinator.live import Feed, Overheard
 from coordinator.loop import Loop
 from coordinator.operator import Desk
@@ -22,6 +23,7 @@ from coordinator.questions import Question
 from coordinator.record import Recorder
 from coordinator.snapshots import Snapshots
 from coordinator.tempo import Tempo
+from schema.errors import RunFolderError
 from schema.experiment import Experiment, island_experiment
 from schema.experiment_file import experiment_from_text
 from schema.platform_tag import cpu_flags, our_version, platform_tag
@@ -69,6 +71,13 @@ class ActiveRun:
         details = held.details
         with ExitStack() as stack:
             stack.callback(held.close)
+            self._recorder = Recorder(held.path, details, fsync=fsync)
+            stack.callback(self._recorder.close)
+            if not (self._recorder.is_empty or is_begun(held.path)):
+                raise RunFolderError(
+                    f"{held.path / JOURNAL}: is lost, and there are tables: put a "
+                    "sound copy of it in its place, or begin anew in another folder"
+                )
             self._journal = stack.enter_context(
                 Journal.open(held.path, epoch=held.epoch, fsync=fsync)
             )
@@ -77,8 +86,6 @@ class ActiveRun:
                     f"{held.path}: journal: dropped a cut record of "
                     f"{self._journal.dropped} bytes at its end"
                 )
-            self._recorder = Recorder(held.path, details, fsync=fsync)
-            stack.callback(self._recorder.close)
             self.experiment = experiment_from_text(details.document)
             self.feed = Feed(held.name, held.epoch, details) if is_watched else None
             rows = Overheard(self._recorder, self.feed) if self.feed else self._recorder
@@ -178,7 +185,7 @@ def _pace(experiment: Experiment, speed: float | None) -> Pace | None:
 
 
 def _island_status(island: Island | Arena, own: Experiment) -> IslandStatus:
-    best = max((one.fitness for one in island.population), default=None)
+    best = max((one.fitness for one in island.judged), default=None)
     alive = len(island.population)
     if not isinstance(island, Arena):
         return IslandStatus(island.births, own.births, best, alive)

@@ -120,6 +120,11 @@ class Arena:
         return tuple(one.individual for one in self._residents)
 
     @property
+    def judged(self) -> tuple[Individual, ...]:
+        """Those of the living whose fitness counts: the mature."""
+        return self._residents.mature()
+
+    @property
     def next_step(self) -> int:
         """The step at which an order that comes now takes effect."""
         return self.step if self._awaited is None else self._awaited.until

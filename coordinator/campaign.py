@@ -20,9 +20,9 @@ from coordinator.folder import (
     DETAILS,
     RunDetails,
     lock_folder,
-    read_details,
     unlock_folder,
 )
+from coordinator.wording import command
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment import Experiment
 from schema.experiment_file import (
@@ -146,8 +146,8 @@ def refuse_used(folder: Path) -> None:
     """
     if is_campaign(folder):
         raise RunFolderError(
-            f"{folder}: already holds a campaign; 'revolve resume {folder}' goes on "
-            "with it, or choose another folder"
+            f"{folder}: already holds a campaign; to go on with it: "
+            f"{command('resume', folder)}; or choose another folder"
         )
     if (folder / DETAILS).exists():
         raise RunFolderError(
@@ -162,7 +162,7 @@ def write_campaign(folder: Path, campaign: Campaign) -> None:
         RunFolderError: the disk is full or failed.
     """
     lines = [
-        f"# Go on with it:  revolve resume {folder}",
+        f"# Go on with it:  {command('resume', folder)}",
         f"seed = {campaign.seed}",
         f"repeats = {campaign.repeats}",
     ]
@@ -197,22 +197,31 @@ def read_campaign(folder: Path) -> Campaign:
         raise RunFolderError(f"{file}: is not one of a campaign: {error}") from None
 
 
-def adopted(folder: Path, wanted: RunDetails) -> RunDetails:
-    """Return what is run in a folder that is there, if it is the run that is wanted.
+def forget_campaign(folder: Path) -> None:
+    """Let a folder be one of no campaign again."""
+    (folder / CAMPAIGN).unlink(missing_ok=True)
+
+
+def check_adopted(folder: Path, found: RunDetails, wanted: RunDetails) -> None:
+    """Raise unless the run that a folder holds is the one that is wanted.
 
     A number of births of its own is all in which it may differ.
+
+    Args:
+        folder: of the run, to name it.
+        found: what it holds.
+        wanted: what it shall hold.
 
     Raises:
         RunFolderError: another run is there.
     """
-    found = read_details(folder)
     ours = experiment_from_text(wanted.document)
     theirs = experiment_from_text(found.document)
     same = replace(theirs, births=ours.births)
     if (found.name, found.run, found.seed, same) == (
         wanted.name, wanted.run, wanted.seed, ours,
     ):  # fmt: skip
-        return found
+        return
     what = "another experiment of that name"
     if (found.run, found.seed) != (wanted.run, wanted.seed):
         what = f"run {found.run} of seed {found.seed}"

@@ -159,8 +159,14 @@ class Conductor:
         for asker in run.loop.askers:
             del self._run_of[asker]
 
-    def do_chores(self) -> None:
-        """Bring all rows to disk; find out which runs went on without us."""
+    def do_chores(self, now_s: float) -> None:
+        """Bring all rows to disk; find out which runs went on without us.
+
+        Args:
+            now_s: the time, of any clock that only goes forward [s].
+        """
+        # So that whoever asks hears a pace, though nobody here looks.
+        self.status(now_s)
         for run in list(self.active):
             self.guard(run, run.do_chores)
 

@@ -18,7 +18,9 @@ from types import TracebackType
 from typing import Any, Literal, Self
 
 from coordinator.disk import replace_durably, storage_error
+from coordinator.journal import NAME as JOURNAL
 from coordinator.journal import newest_epoch
+from coordinator.wording import command
 from schema.errors import RunFolderError
 from schema.identity import Origin
 
@@ -86,6 +88,7 @@ class RunFolder:
         try:
             if details is not None:
                 path.mkdir(parents=True, exist_ok=True)
+                _refuse_foreign(path)
             self._lock = lock_folder(path)
         except OSError as error:
             raise storage_error(path, error) from None
@@ -119,11 +122,24 @@ class RunFolder:
             RunFolderError: a later coordinator has opened the folder.
         """
         epoch = _read_epoch(self.path)
+        if not epoch:
+            raise RunFolderError(
+                f"{self.path}: moved or removed, or its file {EPOCH!r} is: stop"
+            )
         if epoch != self.epoch:
             raise RunFolderError(
                 f"{self.path}: this is coordinator {self.epoch} of the run, and "
                 f"coordinator {epoch} has taken it over: stop"
             )
+
+    def forget(self) -> None:
+        """Leave no trace of a run of which nothing has been done.
+
+        The lock stays: it is a holder's even after a moment.
+        """
+        if self.epoch == 1 and not (self.path / JOURNAL).exists():
+            for name in (DETAILS, EPOCH):
+                (self.path / name).unlink(missing_ok=True)
 
     def close(self) -> None:
         """Let go of the folder."""
@@ -152,17 +168,17 @@ def read_details(path: Path) -> RunDetails:
     file = path / DETAILS
     entries = _read_entries(path)
     entries.pop(_NONCE, None)  # runs of before have none
-    try:
-        details = RunDetails(**entries)
-    except TypeError as error:
-        raise RunFolderError(f"{file}: cannot be read: {error}") from None
     types = {"name": str, "run": int, "seed": int, "document": str}
+    if entries.keys() != types.keys():
+        raise RunFolderError(
+            f"{file}: must have {', '.join(types)}, has {', '.join(entries) or 'none'}"
+        )
     for key, kind in types.items():
         if not isinstance(entries[key], kind):
             raise RunFolderError(
                 f"{file}: {key}: must be {kind.__name__}, got {entries[key]!r}"
             )
-    return details
+    return RunDetails(**entries)
 
 
 def _read_entries(path: Path) -> dict[str, Any]:
@@ -270,15 +286,20 @@ def _holder(descriptor: int) -> str:
 
 def _refuse_used(path: Path) -> None:
     """Raise if a folder holds a run, or anything that is not ours."""
-    names = sorted(entry.name for entry in path.iterdir() if entry.name != LOCK)
-    if DETAILS in names:
+    if (path / DETAILS).exists():
         raise RunFolderError(
-            f"{path}: already holds a run; 'revolve resume {path}' goes on with it, "
-            "or choose another folder"
+            f"{path}: already holds a run; to go on with it: "
+            f"{command('resume', path)}; or choose another folder"
         )
+    _refuse_foreign(path)
+
+
+def _refuse_foreign(path: Path) -> None:
+    """Raise if a folder that holds no run holds anything that is not ours."""
+    names = sorted(entry.name for entry in path.iterdir())
     # What a kill between taking the folder and describing the run may leave.
-    foreign = [name for name in names if name != f".{DETAILS}.new"]
-    if foreign:
+    foreign = [name for name in names if name not in (LOCK, f".{DETAILS}.new")]
+    if foreign and DETAILS not in names:
         raise RunFolderError(
             f"{path}: not empty ({foreign[0]!r} is there): choose another folder"
         )

@@ -7,6 +7,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from coordinator.folder import RunDetails, read_details, read_holder, read_state
+from schema.errors import RunFolderError
 from schema.experiment import island_count, island_experiment
 from schema.experiment_file import experiment_from_text
 from schema.run_tables import read_table
@@ -17,7 +18,8 @@ def folder_status(folder: Path) -> RunStatus:
     """Return how far the run of a folder is; "running" only if somebody holds it.
 
     Raises:
-        RunFolderError: no run is there, or a file is damaged.
+        RunFolderError: no run is there, or a file is damaged or lost.
+        ExperimentError: its experiment cannot be read.
     """
     details = read_details(folder)
     state: str = read_state(folder)
@@ -25,6 +27,8 @@ def folder_status(folder: Path) -> RunStatus:
         state = "stopped"
     status = unbegun_status(folder, details)
     births = _by_island(read_table(folder, "births").select(["island"]), "count")
+    if state == "finished" and not births:
+        raise RunFolderError(f"{folder}: is finished, and its tables are gone")
     population = read_table(folder, "population").select(
         ["island", "births", "fitness"]
     )

@@ -92,6 +92,11 @@ class Island:
         )
 
     @property
+    def judged(self) -> tuple[Individual, ...]:
+        """Those of the living whose fitness is known."""
+        return tuple(one for one in self.population if not one.has_failed)
+
+    @property
     def is_finished(self) -> bool:
         """All births of the experiment have been recorded."""
         return self.births == self._experiment.births and not self._trials.is_open

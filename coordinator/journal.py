@@ -103,6 +103,12 @@ class Journal:
         self.close()
 
 
+def is_begun(folder: Path) -> bool:
+    """Return whether the journal of a run folder is there and not empty."""
+    path = folder / NAME
+    return path.exists() and path.stat().st_size > 0
+
+
 def newest_epoch(folder: Path) -> int:
     """Return the newest epoch in which a run's journal was written, from 0.
 

@@ -16,7 +16,8 @@ from coordinator.audits import CARELESS, Caution
 from coordinator.campaign import (
     Campaign,
     CampaignFolder,
-    adopted,
+    check_adopted,
+    forget_campaign,
     is_campaign,
     read_campaign,
     refuse_used,
@@ -26,15 +27,22 @@ from coordinator.conductor import Conductor, Planned
 from coordinator.disk import replace_durably
 from coordinator.events import AgentKind
 from coordinator.fleet import Agents, Fleet
-from coordinator.folder import DETAILS, RunDetails, RunFolder, read_state
+from coordinator.folder import (
+    DETAILS,
+    RunDetails,
+    RunFolder,
+    read_details,
+    read_state,
+)
 from coordinator.folder_status import folder_status, unbegun_status
 from coordinator.local import LocalAgents
 from coordinator.progress import Display
 from coordinator.reception import Reception
 from coordinator.service import Network
-from coordinator.summary import conclude
+from coordinator.summary import Conclusion, conclude
+from coordinator.wording import command
 from schema.crew import Crew, stop_on_signals
-from schema.errors import RevolveError
+from schema.errors import NetworkError, RevolveError
 from schema.experiment import Experiment
 from schema.experiment_file import experiment_from_text, experiment_text
 from schema.network import THIS_MACHINE, Agent, Tls
@@ -118,8 +126,19 @@ def start_campaign(folder: Path, campaign: Campaign, deployment: Deployment) -> 
     with CampaignFolder(folder):
         refuse_used(folder)
         planned = _plan(folder, campaign)
+        begun = _begun(folder, campaign)
         write_campaign(folder, campaign)
-        return _together(folder, planned, deployment)
+        try:
+            return _together(folder, planned, deployment)
+        except NetworkError:
+            if _begun(folder, campaign) == begun:
+                forget_campaign(folder)
+            raise
+
+
+def _begun(folder: Path, campaign: Campaign) -> int:
+    """Return how many runs of a campaign are there, be it no more than a beginning."""
+    return sum((path / DETAILS).exists() for path, _ in campaign.runs(folder))
 
 
 def resume(folder: Path, deployment: Deployment) -> int:
@@ -145,20 +164,24 @@ def _alone(folder: Path, held: RunFolder, deployment: Deployment) -> int:
     """Do the run of a folder that is held, and tell what came of it."""
     with held:
         status = unbegun_status(folder, held.details)
-        said: list[str] = []
-        conductor = _conduct(
-            folder,
-            [Planned(held.details, status, lambda: held)],
-            deployment,
-            lambda run: said.append(_conclusion(run)),
-        )
+        said: list[Conclusion] = []
+        try:
+            conductor = _conduct(
+                folder,
+                [Planned(held.details, status, lambda: held)],
+                deployment,
+                lambda run: said.append(_conclusion(run)),
+            )
+        except NetworkError:
+            held.forget()
+            raise
     for _, error in conductor.failed:
         raise error
     if not conductor.is_finished:
-        tell_user(f"stopped; to go on: revolve resume {folder}")
+        tell_user(f"stopped; to go on: {command('resume', folder)}")
         return 130
-    print(said[0])  # noqa: T201 - the result of the command
-    return 0
+    print(said[0].text)  # noqa: T201 - the result of the command
+    return 0 if said[0].is_judged else 1
 
 
 def _plan(folder: Path, campaign: Campaign) -> list[Planned]:
@@ -169,18 +192,28 @@ def _plan(folder: Path, campaign: Campaign) -> list[Planned]:
     """
     planned = []
     for path, details in campaign.runs(folder):
+        status = unbegun_status(path, details)
         if not (path / DETAILS).exists():
-            status = unbegun_status(path, details)
             planned.append(Planned(details, status, partial(RunFolder, path, details)))
             continue
-        found = adopted(path, details)
+        try:
+            found, status = read_details(path), folder_status(path)
+        except RevolveError as error:
+            # It cannot go on, and is no reason for the others not to.
+            planned.append(Planned(details, status, partial(_refuse, error)))
+            continue
+        check_adopted(path, found, details)
         theirs, ours = (
             experiment_from_text(each.document).births for each in (found, details)
         )
         if theirs != ours:
             tell_user(f"{path}: is taken as it is, with {theirs} births, not {ours}")
-        planned.append(Planned(found, folder_status(path), partial(RunFolder, path)))
+        planned.append(Planned(found, status, partial(RunFolder, path)))
     return planned
+
+
+def _refuse(error: RevolveError) -> RunFolder:
+    raise error
 
 
 def _together(folder: Path, planned: Sequence[Planned], deployment: Deployment) -> int:
@@ -188,23 +221,32 @@ def _together(folder: Path, planned: Sequence[Planned], deployment: Deployment) 
     there = sum(one.status.state == "finished" for one in planned)
     if there:
         tell_user(f"{there} of {len(planned)} runs are finished already")
-    conductor = _conduct(folder, planned, deployment, _conclusion)
+    barren: list[Path] = []
+
+    def conclude_run(run: ActiveRun) -> None:
+        conclusion = _conclusion(run)
+        if conclusion.failures:
+            tell_user(f"{run.held.path}: {conclusion.failures}")
+        if not conclusion.is_judged:
+            barren.append(run.held.path)
+
+    conductor = _conduct(folder, planned, deployment, conclude_run)
     if not conductor.is_finished:
-        tell_user(f"stopped; to go on: revolve resume {folder}")
+        tell_user(f"stopped; to go on: {command('resume', folder)}")
         return 130
     if conductor.failed:
         tell_user(
             f"{len(conductor.failed)} of {len(planned)} runs failed; when that is "
-            f"mended: revolve resume {folder}"
+            f"mended: {command('resume', folder)}"
         )
         return 1
     print(  # noqa: T201 - the result of the command
-        f"{len(planned)} runs are finished\ntry next:\n  revolve analyze {folder}"
+        f"{len(planned)} runs are finished\ntry next:\n  {command('analyze', folder)}"
     )
-    return 0
+    return 1 if barren else 0
 
 
-def _conclusion(run: ActiveRun) -> str:
+def _conclusion(run: ActiveRun) -> Conclusion:
     return conclude(run.held.path, run.experiment, run.loop.islands)
 
 
@@ -254,7 +296,7 @@ def _conduct(
                     display.update(now_s)
                 if now_s - done_s >= _CHORES_S:
                     done_s = now_s
-                    conductor.do_chores()
+                    conductor.do_chores(now_s)
                     for look_after in crews:
                         look_after()
         conductor.stop()

@@ -7,14 +7,14 @@ from uuid import uuid4
 from rich.console import Console
 from rich.table import Table
 
-from coordinator.campaign import is_campaign, read_campaign
+from coordinator.campaign import CAMPAIGN, read_campaign
 from coordinator.client_service import ask_coordinators
-from coordinator.folder import DETAILS
+from coordinator.folder import DETAILS, RunDetails
 from coordinator.folder_status import folder_status, unbegun_status
 from coordinator.running import ADDRESS
 from coordinator.wording import about_arenas, best_of, duration
 from schema.agent_command import add_network_flags, tls_of
-from schema.errors import NetworkError, RunFolderError
+from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.flags import Flags
 from schema.operator_codec import (
     OperatorRequest,
@@ -22,7 +22,8 @@ from schema.operator_codec import (
     decode_operator_reply,
     encode_operator_request,
 )
-from schema.status import Status
+from schema.service import tell_user
+from schema.status import RunStatus, Status
 
 
 def main(arguments: list[str]) -> int:
@@ -32,7 +33,7 @@ def main(arguments: list[str]) -> int:
         arguments: the command's name first.
 
     Returns:
-        0 if done.
+        0 if done, 1 if a run is damaged.
 
     Raises:
         NetworkError: no coordinator answers at an address that was given.
@@ -47,9 +48,9 @@ def main(arguments: list[str]) -> int:
             _show(status, name)
         return 0
     folder = Path(options.folder)
-    live = _live(folder, options)
-    _show(live or _by_folder(folder), str(folder))
-    return 0
+    status = _live(folder, options) or _by_folder(folder)
+    _show(status, str(folder), folder)
+    return 1 if any(run.state == "damaged" for run in status.runs) else 0
 
 
 def ask_status(options: argparse.Namespace) -> dict[str, Status]:
@@ -84,37 +85,55 @@ def _live(folder: Path, options: argparse.Namespace) -> Status | None:
 
 
 def _by_folder(folder: Path) -> Status:
-    """Return how far the runs of a folder are by what stands on disk.
+    """Return how far the runs at or below a folder are by what stands on disk.
 
     Raises:
         RunFolderError: no run and no campaign is there.
     """
-    if is_campaign(folder):
-        runs = tuple(
-            folder_status(path)
-            if (path / DETAILS).exists()
-            else unbegun_status(path, details)
-            for path, details in read_campaign(folder).runs(folder)
-        )
-    elif (folder / DETAILS).exists():
-        runs = (folder_status(folder),)
-    else:
-        places = sorted(path.parent for path in folder.glob(f"*/{DETAILS}"))
-        runs = tuple(map(folder_status, places))
+    planned: dict[Path, RunDetails] = {}
+    runs: list[RunStatus] = []
+    for file in sorted(folder.glob(f"**/{CAMPAIGN}")):
+        try:
+            planned.update(read_campaign(file.parent).runs(file.parent))
+        except RunFolderError as error:
+            runs.append(_damaged(file.parent, error))
+    begun = {file.parent for file in folder.glob(f"**/{DETAILS}")}
+    for path in (*planned, *sorted(begun - planned.keys())):
+        try:
+            is_begun = path in begun
+            told = (
+                folder_status(path) if is_begun else unbegun_status(path, planned[path])
+            )
+            runs.append(told)
+        except RevolveError as error:
+            runs.append(_damaged(path, error))
     if not runs:
-        raise RunFolderError(f"{folder}: no run and no campaign is there")
-    return Status(runs, 0, 0, 0.0)
+        raise RunFolderError(f"{folder}: no run and no campaign is there or below")
+    return Status(tuple(runs), 0, 0, 0.0)
 
 
-def _show(status: Status, title: str) -> None:
-    table = Table("run", "state", "births", "births/s", "best, arenas", box=None)
+def _damaged(folder: Path, error: RevolveError) -> RunStatus:
+    """Say what is wrong with a folder; nothing else is known of it."""
+    tell_user(f"damaged: {error}")
+    return RunStatus(str(folder.resolve()), folder.name, 0, "damaged")
+
+
+def _show(status: Status, title: str, root: Path | None = None) -> None:
+    """Print how far runs are, each by its path below ``root`` or its folder's name."""
+    table = Table("run", "state", "births", "births/s", "best alive, arenas", box=None)
     for run in status.runs:
+        folder = Path(run.folder)
+        what = f"{best_of(run)}{about_arenas(run)}"
+        if root is not None and root.resolve() in folder.parents:
+            name = str(folder.relative_to(root.resolve()))
+        else:
+            name = folder.name
         table.add_row(
-            Path(run.folder).name,
+            name,
             run.state,
-            f"{run.births} of {run.wanted}",
-            f"{run.births_per_s:.1f}" if run.state == "running" else "",
-            f"{best_of(run)}{about_arenas(run)}",
+            f"{run.births} of {run.wanted}" if run.islands else "",
+            f"{run.births_per_s:.1f}" if run.births_per_s else "",
+            what if run.islands else "",
         )
     done = sum(run.state == "finished" for run in status.runs)
     births = f"{status.births} of {status.wanted} births"

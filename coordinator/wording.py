@@ -1,8 +1,15 @@
-"""How figures of runs are said on a terminal."""
+"""How figures of runs, and what to do next, are said on a terminal."""
+
+import shlex
 
 from schema.status import IslandStatus, RunStatus
 
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
+
+
+def command(*words: object) -> str:
+    """Return a command of ours, as it can be pasted into a shell."""
+    return shlex.join(["revolve", *map(str, words)])
 
 
 def duration(seconds: float | None) -> str:

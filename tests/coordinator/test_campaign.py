@@ -1,5 +1,6 @@
 """What a campaign is, how it is written down, and which runs are taken as they are."""
 
+import shlex
 from dataclasses import replace as changed
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from msgspec.structs import replace
 from coordinator.campaign import (
     Campaign,
     CampaignFolder,
-    adopted,
+    check_adopted,
     is_campaign,
     read_campaign,
     read_experiments,
@@ -19,7 +20,7 @@ from coordinator.campaign import (
 )
 from coordinator.folder import RunDetails, RunFolder
 from coordinator.tempo import Tempo
-from coordinator.wording import about_arenas, best_of, duration
+from coordinator.wording import about_arenas, best_of, command, duration
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment_file import experiment_text, read_experiment
 from schema.status import IslandStatus, RunStatus
@@ -100,12 +101,12 @@ def _made(folder: Path, details: RunDetails) -> Path:
 
 
 def test_a_run_made_alone_is_taken(tmp_path: Path) -> None:
-    assert adopted(_made(tmp_path, WANTED), WANTED) == WANTED
+    check_adopted(tmp_path, WANTED, WANTED)
 
 
 def test_a_run_with_births_of_its_own_is_taken_as_it_is(tmp_path: Path) -> None:
     short = changed(WANTED, document=experiment_text(replace(FIRST, births=600)))
-    assert adopted(_made(tmp_path, short), WANTED) == short
+    check_adopted(tmp_path, short, WANTED)
 
 
 @pytest.mark.parametrize(
@@ -124,7 +125,7 @@ def test_a_run_with_births_of_its_own_is_taken_as_it_is(tmp_path: Path) -> None:
 )
 def test_another_run_is_refused(tmp_path: Path, other: RunDetails) -> None:
     with pytest.raises(RunFolderError, match="must be run 1 of seed 5"):
-        adopted(_made(tmp_path, other), WANTED)
+        check_adopted(tmp_path, other, WANTED)
 
 
 def test_a_rate_is_that_of_the_last_seconds() -> None:
@@ -152,6 +153,11 @@ def test_a_rate_is_that_of_the_last_seconds() -> None:
 )
 def test_durations_in_words(seconds: float | None, said: str) -> None:
     assert duration(seconds) == said
+
+
+def test_a_command_can_be_pasted() -> None:
+    said = command("resume", Path("runs/it's mine"))
+    assert shlex.split(said) == ["revolve", "resume", "runs/it's mine"]
 
 
 def test_the_best_of_few_islands_stand_side_by_side() -> None:

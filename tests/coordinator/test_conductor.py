@@ -111,6 +111,14 @@ def test_stopped_runs_go_on_and_finished_ones_are_not_begun(
     assert conductor_of(finished, local()).is_finished
 
 
+def test_the_pace_is_known_though_nobody_looked_before(tmp_path: Path) -> None:
+    conductor = conductor_of(plan(tmp_path), local())
+    conductor.do_chores(0.0)
+    conduct(conductor, 100)
+    status = conductor.status(2.0)
+    assert status.births_per_s == status.births / 2.0 > 0.0
+
+
 def test_whatever_fails_in_a_run_that_another_took_over_is_that(tmp_path: Path) -> None:
     """It slept just after it had found the run its own."""
     conductor = conductor_of(plan(tmp_path)[:1], local())
@@ -210,7 +218,7 @@ def test_a_disk_that_fails_a_run_in_the_middle_stops_no_other(
     # Another coordinator has opened it since, by its epoch.
     victim = conductor.active[0].held.path
     (victim / "epoch").write_text("7")
-    conductor.do_chores()
+    conductor.do_chores(0.0)
     conduct(conductor)
     assert [details.name for details, _ in conductor.failed] == [
         victim.name.rpartition("-")[0]

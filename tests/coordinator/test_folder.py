@@ -102,7 +102,9 @@ def test_a_lost_epoch_voids_nothing_that_is_written_later(
 
 def test_a_used_folder_is_refused(tmp_path: Path) -> None:
     RunFolder(tmp_path / "run", DETAILS).close()
-    with pytest.raises(RunFolderError, match="already holds a run; 'revolve resume"):
+    with pytest.raises(
+        RunFolderError, match="already holds a run; to go on with it: revolve "
+    ):
         RunFolder(tmp_path / "run", DETAILS)
     assert RunFolder(tmp_path / "run").epoch == 2
 
@@ -201,7 +203,7 @@ def test_a_folder_without_a_run_is_refused_and_nothing_is_made(tmp_path: Path) -
     ("text", "story"),
     [
         ("{", "cannot be read"),
-        ('{"name": "a"}', "cannot be read"),
+        ('{"name": "a"}', "must have name, run, seed, document, has name"),
         ('{"name": "a", "run": "0", "seed": 1, "document": ""}', "run: must be int"),
     ],
 )

@@ -219,7 +219,10 @@ def test_a_failed_evaluation_is_a_result_without_numbers_and_counts_as_zero() ->
     alive = rows(commands, "population")
     assert any(row["birth"] == 3 and row["fitness"] is None for row in alive)
     failed = [one for one in island.population if one.has_failed]
+    assert failed
     assert all(one.fitness == 0.0 for one in failed)
+    assert not set(island.judged) & set(failed)
+    assert {*island.judged, *failed} == set(island.population)
 
 
 def test_the_best_that_ever_lived_are_alive() -> None:

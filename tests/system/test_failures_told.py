@@ -1,0 +1,191 @@
+"""What did not come off is told: by the summary, by status, and before a resume."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coordinator.compare import compare
+from coordinator.folder import read_state
+from coordinator.folder_status import folder_status
+from schema.errors import RunFolderError
+
+pytestmark = pytest.mark.system
+
+Stage = Any
+Until = Callable[[Callable[[], bool], str], None]
+
+SHORT = """
+name = "{name}"
+births = 12
+[selection]
+population = 6
+children = 6
+[simulation]
+window_steps = 400
+[fitness]
+function = "{fitness}"
+"""
+
+FITNESS = """
+from worker.fitness import thesis
+
+def few(track, settings):
+    value = thesis(track, settings)
+    if value > 0.005:
+        raise ValueError("too fast to see")
+    return value
+
+def none(track, settings):
+    raise ValueError("nobody looked")
+"""
+
+
+def _write(stage: Stage, name: str, fitness: str) -> str:
+    (stage.folder / "judge.py").write_text(FITNESS)
+    text = SHORT.format(name=name, fitness=fitness)
+    (stage.folder / f"{name}.toml").write_text(text)
+    return f"{name}.toml"
+
+
+def _run(stage: Stage, *words: str, code: int = 0) -> str:
+    said: str = stage.run("run", *words, "--in-process", "--quiet", code=code)
+    return said
+
+
+def test_a_run_that_judged_nobody_names_no_best_robot(stage: Stage) -> None:
+    source = _write(stage, "blind", "judge:none")
+    said = _run(stage, source, "--out", "a b", code=1)
+    assert "12 births; nobody of the last population has been judged" in said
+    assert "12 of 12 evaluations failed, all: " in said
+    assert "nobody looked" in said
+    assert "best robot" not in said
+    assert not (stage.folder / "a b" / "best.yaml").exists()
+    assert "revolve view 'a b'" in said
+    assert "best -" in stage.run("status", "a b")
+
+
+def test_a_run_tells_how_many_evaluations_failed_and_why(stage: Stage) -> None:
+    said = _run(stage, _write(stage, "dim", "judge:few"), "--out", "a")
+    failed = [line for line in said.splitlines() if "evaluations failed" in line]
+    assert len(failed) == 1
+    assert "too fast to see" in failed[0]
+    assert "of 12 evaluations failed, all: " in failed[0]
+    assert "its best robot: birth " in said
+    assert (stage.folder / "a" / "best.yaml").exists()
+
+
+def test_a_campaign_tells_which_of_its_runs_judged_nobody(stage: Stage) -> None:
+    sources = [
+        _write(stage, "blind", "judge:none"),
+        _write(stage, "seeing", "worker.fitness:thesis"),
+    ]
+    said = _run(stage, *sources, "--out", "both", code=1)
+    assert "both/blind-0: 12 of 12 evaluations failed, all: " in said
+    assert "seeing-0" not in said
+    assert "2 runs are finished" in said
+
+
+@pytest.fixture(scope="module")
+def made(once: Any) -> Path:  # noqa: ANN401 - the fixture
+    """Return a folder with a campaign of two finished runs."""
+
+    def make(stage: Stage) -> None:
+        words = ("--repeats", "2", "--out", "all/twice")
+        _run(stage, _write(stage, "seeing", "worker.fitness:thesis"), *words)
+
+    folder: Path = once("failures-told", make)
+    return folder / "all"
+
+
+def test_a_damaged_run_hides_none_beside_it(stage: Stage, made: Path) -> None:
+    shutil.copytree(made, stage.folder / "all")
+    twice = stage.folder / "all" / "twice"
+    told = "seeing-0/run.json: must have name, run, seed, document, has none"
+    (twice / "seeing-0" / "run.json").write_text("{}")
+    said = stage.run("status", "all", code=1)
+    assert f"damaged: all/twice/{told}" in said
+    assert "1 of 2 runs finished" in said
+    assert "twice/seeing-0  damaged" in said
+    # The other one is begun anew: the damaged one keeps it from nothing.
+    shutil.rmtree(twice / "seeing-1")
+    said = stage.run("resume", "all/twice", "--in-process", "--quiet", code=1)
+    assert f"seeing-0 failed: all/twice/{told}" in said
+    assert read_state(twice / "seeing-1") == "finished"
+    assert compare(twice / "seeing-1", made / "twice" / "seeing-1") == []
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "told"),
+    [
+        ("state", "", "must be one of running, stopped, finished, got ''"),
+        ("births.parquet", "", "births.parquet: cannot be read"),
+        ("births.parquet", None, "is finished, and its tables are gone"),
+    ],
+    ids=["state", "births.parquet", "no tables"],
+)
+def test_what_is_damaged_or_lost_of_a_run_is_told(
+    tmp_path: Path, made: Path, file: str, content: str | None, told: str
+) -> None:
+    run = tmp_path / "run"
+    shutil.copytree(made / "twice" / "seeing-0", run)
+    assert folder_status(run).births == 12
+    (path,) = run.glob(f"**/{file}")
+    if content is None:
+        path.unlink()
+    else:
+        path.write_text(content)
+    with pytest.raises(RunFolderError, match=told):
+        folder_status(run)
+
+
+def test_a_run_whose_journal_is_lost_does_not_begin_anew(
+    stage: Stage, made: Path
+) -> None:
+    run = stage.folder / "run"
+    shutil.copytree(made / "twice" / "seeing-0", run)
+    (run / "state").write_text("running")
+    (run / "journal.bin").unlink()
+    told = "journal.bin: is lost, and there are tables"
+    words = ("resume", "run", "--in-process", "--quiet")
+    assert told in stage.run(*words, code=2)
+    (run / "journal.bin").touch()
+    assert told in stage.run(*words, code=2)
+
+
+@pytest.mark.parametrize("repeats", [(), ("--repeats", "2")])
+def test_a_wrong_address_leaves_the_folder_to_the_right_one(
+    stage: Stage, repeats: tuple[str, ...]
+) -> None:
+    source = _write(stage, "seeing", "worker.fitness:thesis")
+    words = ("run", source, *repeats, "--out", "new", "--quiet")
+    said = stage.run(*words, "--connect", "tcp/127.0.0.1:1", code=2)
+    assert "no hub at tcp/127.0.0.1:1" in said
+    stage.run(*words, "--in-process")
+
+
+def test_a_folder_with_something_else_gets_no_lock(stage: Stage) -> None:
+    (stage.folder / "mine").mkdir()
+    (stage.folder / "mine" / "thesis.tex").write_text("years of work")
+    source = _write(stage, "seeing", "worker.fitness:thesis")
+    said = stage.run("run", source, "--out", "mine", code=2)
+    assert "not empty ('thesis.tex' is there)" in said
+    assert [path.name for path in (stage.folder / "mine").iterdir()] == ["thesis.tex"]
+
+
+def test_a_folder_that_is_removed_is_said_to_be_gone(
+    stage: Stage, until: Until
+) -> None:
+    words = ("scenario1", "--births", "3000", "--workers", "1", "--out", "gone")
+    process = stage.start("run", *words, "--quiet")
+    journal = stage.folder / "gone" / "journal.bin"
+    until(lambda: journal.exists() and journal.stat().st_size > 2000, "it lives")
+    (stage.folder / "gone").rename(stage.folder / "elsewhere")
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert "gone: moved or removed" in err
+    details = json.loads((stage.folder / "elsewhere" / "run.json").read_text())
+    assert details["name"] == "scenario1"
