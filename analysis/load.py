@@ -80,7 +80,8 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
     """Return the runs at or below some folders, by path, and what is no run.
 
     Two folders that hold the same run (experiment, repeat, seed, settings) count as
-    one: the finished of them, or else the first.
+    one: the one of which most tables can be read; of several the finished, else the
+    longest, else the first.
 
     Raises:
         RunFolderError: a folder that is not there, or no run in any of them that can
@@ -111,14 +112,31 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
 
 def _different(runs: list[Run], left_out: list[LeftOut]) -> list[Run]:
     """Return runs, each once; add to ``left_out`` the others."""
-    kept: dict[tuple[str, int, int, str], Run] = {}
-    for run in sorted(runs, key=lambda run: (not run.is_finished, run.folder)):
+    copies: dict[tuple[str, int, int, str], list[Run]] = {}
+    for run in runs:
         name = (run.experiment, run.number, run.seed, run.document)
-        known = kept.setdefault(name, run)
-        if known is not run:
-            why = f"the same run as {known.folder}"
+        copies.setdefault(name, []).append(run)
+    kept = []
+    for group in copies.values():
+        if len(group) == 1:  # nothing to choose: its tables are not read yet
+            kept += group
+            continue
+        (_, best), *others = sorted(
+            ((_flaws(run), run) for run in group),
+            key=lambda one: (one[0], one[1].folder),
+        )
+        kept.append(best)
+        for (unread, *_), run in others:
+            broken = ", and not all of it can be read" if unread else ""
+            why = f"the same run as {best.folder}{broken}"
             left_out.append(LeftOut(str(run.folder), "run", why))
-    return sorted(kept.values(), key=lambda run: run.folder)
+    return sorted(kept, key=lambda run: run.folder)
+
+
+def _flaws(run: Run) -> tuple[int, bool, int]:
+    """Return what of several copies the best has least of, the gravest first."""
+    tables, unread = read_tables(run)
+    return len(unread), not run.is_finished, -tables["births"].num_rows
 
 
 def _read_run(folder: Path) -> Run:

@@ -147,6 +147,33 @@ def test_a_run_in_two_folders_counts_once(made: Maker, tmp_path: Path) -> None:
     assert all(one.why.endswith("b") for one in left_out)
 
 
+def test_of_a_run_in_two_folders_the_one_that_can_be_read_counts(
+    made: Maker, tmp_path: Path
+) -> None:
+    for name in ("a", "b", "c"):
+        made(name)
+    for name, damaged in (("a", "population"), ("c", "births")):
+        parquet_path(tmp_path / name, "e", 0, damaged).write_bytes(b"")
+    runs, left_out = read_runs([tmp_path])
+    assert [run.folder.name for run in runs] == ["b"]
+    same = f"the same run as {tmp_path / 'b'}, and not all of it can be read"
+    assert [(Path(one.folder).name, one.why) for one in left_out] == [
+        ("a", same),
+        ("c", same),
+    ]
+
+
+def test_of_an_unfinished_run_in_two_folders_the_longer_counts(
+    made: Maker, tmp_path: Path
+) -> None:
+    for name in ("a", "b"):
+        made(name, state="stopped")
+    path = segment_path(tmp_path / "a", "births", 0)
+    path.write_bytes(path.read_bytes()[:-100])
+    runs, _ = read_runs([tmp_path])
+    assert [run.folder.name for run in runs] == ["b"]
+
+
 def test_a_damaged_table_is_named_and_the_others_are_measured(made: Maker) -> None:
     folder = made("x")
     path = parquet_path(folder, "e", 0, "evaluations")
