@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 from pyarrow.parquet import read_schema
 
 from schema.errors import RunFolderError
-from schema.run_tables import FINISHED, read_table
+from schema.run_tables import FINISHED, read_table, segments_of
 from schema.tables import TABLES, VERSION
 
 TABLE = "table "
@@ -55,7 +55,7 @@ class Run:
         experiment: its name.
         number: of the repeat.
         seed: of the run.
-        state: finished, stopped or running; who runs may have died since.
+        state: finished, stopped or running, which may have died since.
         document: the experiment, as JSON.
         islands: settings of each island.
         differs: how, if the name is not its own: others have it, with other settings.
@@ -148,7 +148,7 @@ def _read_run(folder: Path) -> Run:
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         story = f"{type(error).__name__}: {error}"
         raise RunFolderError(f"{_DETAILS}: cannot be understood: {story}") from None
-    return Run(
+    run = Run(
         folder=folder,
         experiment=str(name),
         number=int(number),
@@ -157,6 +157,9 @@ def _read_run(folder: Path) -> Run:
         document=str(details["document"]),
         islands=islands,
     )
+    if run.is_finished and not any(_is_there(folder, each) for each in TABLES):
+        raise RunFolderError("is finished, but its tables are gone: none is there")
+    return run
 
 
 def _details(folder: Path) -> dict[str, Any]:
@@ -200,8 +203,8 @@ def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:
         run: which.
 
     Returns:
-        Tables by name; one that cannot be read is empty, and named in the list. An
-        older run lacks tables that were added since: they are empty, too.
+        Tables by name; one that cannot be read is empty, and named in the list. One
+        that such a run has no rows for may be lacking: it is empty, too.
         ``birth_island`` says of everybody where it was born, and ``is_online`` in
         ``population`` whether it lives in an arena.
     """
@@ -209,6 +212,7 @@ def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:
     left_out: list[LeftOut] = []
     for name in _NEEDED:
         try:
+            _check_there(run, name)
             _check_version(run.folder, name)
             tables[name] = _named(read_table(run.folder, name))
         except (RunFolderError, pa.ArrowException, OSError) as error:
@@ -229,6 +233,26 @@ def _named(table: pa.Table) -> pa.Table:
     index = table.schema.get_field_index("birth_island")
     full = pc.coalesce(table["birth_island"], table["island"])
     return table.set_column(index, "birth_island", full)
+
+
+def _check_there(run: Run, name: str) -> None:
+    """Raise if a finished run has lost a table: no rows would be taken for none."""
+    online = [island.is_online for island in run.islands]
+    has_rows = {
+        "evaluations": not all(online),
+        "fitness": any(online),
+        "deaths": any(online),
+        "touches": any(island.records_touches for island in run.islands),
+        "migrations": len(run.islands) > 1,
+    }
+    is_expected = run.is_finished and has_rows.get(name, True)
+    if is_expected and not _is_there(run.folder, name):
+        raise RunFolderError("is gone: the run is finished, and its file is not there")
+
+
+def _is_there(folder: Path, name: str) -> bool:
+    finished = (folder / FINISHED).glob(f"*/*/{name}.parquet")
+    return any(finished) or bool(segments_of(folder, name))
 
 
 def _check_version(folder: Path, name: str) -> None:

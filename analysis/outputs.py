@@ -114,7 +114,7 @@ OUTPUTS: dict[str, dict[str, str]] = {
         **_RUN,
         "run": "number of the repeat",
         "seed": "of the run",
-        "state": "finished, stopped or running",
+        "state": "finished, stopped or running, which may have died since",
         "births": "recorded, of all islands",
         "planned": "births of the experiment, of all islands",
         "islands": "of the experiment",

@@ -135,7 +135,10 @@ def _runs(runs: Sequence[Mapping[str, object]]) -> str:
     rows = []
     for name in in_order(str(row["experiment"]) for row in runs):
         mine = [row for row in runs if row["experiment"] == name]
-        states = [str(row["state"]) for row in mine]
+        # Whether somebody still works on the others, their folders do not tell.
+        states = [
+            "finished" if row["state"] == "finished" else "not finished" for row in mine
+        ]
         counts = [
             f"{states.count(state)} {state}" for state in dict.fromkeys(sorted(states))
         ]

@@ -86,7 +86,7 @@ def measure_run(run: Run, slots: SlotRule) -> Measured:
     ]
     if not run.is_finished:
         born, planned = tables["births"].num_rows, planned_births(run)
-        why = f"the run is {run.state}: {born} of {planned} births are there"
+        why = f"the run is not finished: {born} of {planned} births are there"
         left_out.append(LeftOut(folder, "comparison", why))
     named = {name: _named(found[name], name, run) for name in found}
     named["runs"] = _named(_summary(run, tables["births"]), "runs", run)

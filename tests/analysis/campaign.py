@@ -68,6 +68,7 @@ def write_run(
     if is_online:
         tables["fitness"] = _samples(rng, levels)
         tables["touches"] = _touches(rng, levels)
+        tables["deaths"] = {"birth": []}
     else:
         tables["evaluations"] = {
             "birth": np.arange(births), "status": ["ok"] * births, "fitness": fitness

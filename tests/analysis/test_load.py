@@ -82,7 +82,7 @@ def test_finished_and_unfinished_runs_are_measured_alike(
     assert fitness(measured) == pytest.approx([0.2, 0.4])
     assert measured.tables["robots"].num_rows == 3
     expected = {} if state == "finished" else {
-        "comparison": f"the run is {state}: 3 of 3 births are there"
+        "comparison": "the run is not finished: 3 of 3 births are there"
     }  # fmt: skip
     assert whys(measured) == expected
 
@@ -145,6 +145,48 @@ def test_a_run_in_two_folders_counts_once(made: Maker, tmp_path: Path) -> None:
     assert [run.folder.name for run in runs] == ["b"]
     assert [Path(one.folder).name for one in left_out] == ["c", "a"]
     assert all(one.why.endswith("b") for one in left_out)
+
+
+def test_a_finished_run_without_tables_is_named(made: Maker, tmp_path: Path) -> None:
+    made("whole")
+    shutil.rmtree(made("gone", seed=2) / "tables")
+    runs, left_out = read_runs([tmp_path])
+    assert [run.folder.name for run in runs] == ["whole"]
+    (one,) = left_out
+    assert (Path(one.folder).name, one.what) == ("gone", "run")
+    assert one.why == "is finished, but its tables are gone: none is there"
+
+
+@pytest.mark.parametrize("name", ["births", "population", "evaluations"])
+def test_a_table_that_a_finished_run_must_have_is_missed(
+    made: Maker, name: str
+) -> None:
+    folder = made("x")
+    parquet_path(folder, "e", 0, name).unlink()
+    measured = measure_run(found_in(folder), "parent")
+    why = "is gone: the run is finished, and its file is not there"
+    assert whys(measured)[f"table {name}"] == why
+    assert whys(measured)["measure robots"] == f"needs table {name}"
+
+
+def test_an_arena_s_tables_are_missed_too(made: Maker) -> None:
+    folder = made("x")
+    document = {"births": 3, "arena": {"record_touches": True}}
+    details = {"name": "e", "run": 0, "seed": 1, "document": json.dumps(document)}
+    (folder / "run.json").write_text(json.dumps(details))
+    missing = {one.what for one in read_tables(found_in(folder))[1]}
+    assert missing == {"table fitness", "table deaths", "table touches"}
+
+
+def test_a_copy_whose_tables_are_gone_does_not_count(
+    made: Maker, tmp_path: Path
+) -> None:
+    for name in ("a", "b", "c"):
+        made(name)
+    shutil.rmtree(tmp_path / "a" / "tables")
+    parquet_path(tmp_path / "b", "e", 0, "births").unlink()
+    runs, _ = read_runs([tmp_path])
+    assert [run.folder.name for run in runs] == ["c"]
 
 
 def test_of_a_run_in_two_folders_the_one_that_can_be_read_counts(
@@ -250,7 +292,7 @@ def test_an_empty_run_is_named(made: Maker) -> None:
     measured = measure_run(found_in(folder), "parent")
     assert whys(measured) == {
         "measures": "no population is recorded",
-        "comparison": "the run is running: 0 of 3 births are there",
+        "comparison": "the run is not finished: 0 of 3 births are there",
     }
 
 
@@ -265,6 +307,8 @@ def test_islands_have_their_own_settings(made: Maker) -> None:
     assert [one.births for one in settings] == [5, 5, 3]
     assert [one.is_online for one in settings] == [False, False, True]
     assert [one.records_touches for one in settings] == [False, False, True]
+    for name in ("fitness", "deaths", "touches", "migrations"):
+        pq.write_table(table(name, []), parquet_path(folder, "e", 0, name))
     measured = measure_run(found_in(folder), "parent")
     assert {"between", "migrants", "variability"} <= set(measured.tables)
 

@@ -106,7 +106,9 @@ def test_findings_stand_with_numbers_and_count(read: Reader) -> None:
 
 def test_what_was_read_and_left_out_and_how_is_told(read: Reader) -> None:
     assert "3 runs, 135 births; written 2020-01-01" in read.text
-    assert "scenario 1 1 finished, 1 stopped 45 to 60 1 7: repeats 0, 2" in read.text
+    assert (
+        "scenario 1 1 finished, 1 not finished 45 to 60 1 7: repeats 0, 2" in read.text
+    )
     assert "b 1 finished 30 1 8 Findings" in read.text
     assert "figure 6.1 no benchmark run runs/x broken & gone" in read.text
     assert "revolve analyze runs what version numpy 9.9" in read.text
