@@ -7,14 +7,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
-from rich.table import Table
 
 from analysis.benchmarks import read_benchmarks
 from analysis.comparison import Outcomes, comparison, findings
@@ -26,12 +23,12 @@ from analysis.progression import progression
 from analysis.render_command import Simulate
 from analysis.report import Making, report
 from analysis.study import gathered, measure_runs
+from analysis.summary import show
 from schema.errors import RunFolderError
 
 MEASURES, FIGURES, REPORT = "measures", "figures", "report.html"
 _ALWAYS = ("populations", "robots", "extremities")
 """Measures that all that follows reads, whatever could be measured."""
-_SHOWN = ("fitness", "fitness_best")
 _LIBRARIES = ("revolve-islands", "mujoco-core", "numpy", "pyarrow", "plotnine")
 
 
@@ -87,7 +84,7 @@ def analyze(
         pq.write_table(table, options.out / MEASURES / f"{name}.parquet")
     page = report(tables, drawn, _making(words))
     (options.out / REPORT).write_text(page, encoding="utf-8")
-    _show(tables)
+    show(tables, Console())
     print(f"{options.out / MEASURES}: {len(tables)} tables, {', '.join(tables)}")
     numbers = ", ".join(one.number for one in drawn)
     print(f"{options.out / FIGURES}: figures {numbers} as PDF and PNG")
@@ -127,49 +124,3 @@ def _making(words: Sequence[str]) -> Making:
             versions[name] = "not installed as a package"
     now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     return Making(shlex.join(["revolve", *words]), now, versions)
-
-
-def _show(tables: dict[str, pa.Table]) -> None:
-    """Print each run's last populations, the findings, and what was left out."""
-    console = Console()
-    console.print(_last_populations(tables["populations"]))
-    compared = tables["findings"].filter(pc.field("runs_a").is_valid())
-    if compared.num_rows:
-        table = Table("figure", "finding of the thesis", "a", "b", "q", "verdict")
-        for row in compared.to_pylist():
-            numbers = [f"{row[name]:.3g}" for name in ("mean_a", "mean_b", "q")]
-            table.add_row(row["figure"], row["claim"], *numbers, row["verdict"])
-        console.print(table)
-    for name, differs in _renamed(tables["runs"]).items():
-        console.print(f"{name}: {differs}", soft_wrap=True, markup=False,
-                      highlight=False)  # fmt: skip
-    for row in tables["left_out"].to_pylist():
-        whose = f"{row['folder']}: " if row["folder"] else ""
-        console.print(
-            f"left out: {whose}{row['what']}: {row['why']}", soft_wrap=True,
-            markup=False, highlight=False,
-        )  # fmt: skip
-
-
-def _renamed(runs: pa.Table) -> dict[str, str]:
-    """Return experiments that another one shares a name with, and how they differ."""
-    rows = runs.filter(pc.not_equal(runs["differs"], "")).to_pylist()
-    return {row["experiment"]: row["differs"] for row in rows}
-
-
-def _last_populations(populations: pa.Table) -> Table:
-    table = Table("experiment", "run", "births", "size", "mean fitness", "best")
-    keys = ["experiment", "folder", "island"]
-    last = populations.group_by(keys, use_threads=False).aggregate([("births", "max")])
-    joined = populations.join(last, keys)
-    rows = joined.filter(pc.equal(joined["births"], joined["births_max"]))
-    for row in rows.sort_by([(key, "ascending") for key in keys]).to_pylist():
-        fitness = ("-" if row[name] is None else f"{row[name]:.4f}" for name in _SHOWN)
-        table.add_row(
-            row["experiment"],
-            Path(row["folder"]).name + (f" {row['island']}" if row["island"] else ""),
-            str(row["births"]),
-            str(row["judged"]),
-            *fitness,
-        )
-    return table

@@ -1,0 +1,60 @@
+"""What is said at the end of an analysis, on screens of any width."""
+
+import io
+from typing import Any
+
+import pyarrow as pa
+import pytest
+from rich.console import Console
+
+from analysis.outputs import schema
+from analysis.summary import show
+
+NAME = "archipelago-of-many-islands"
+ROWS: dict[str, list[dict[str, Any]]] = {
+    "populations": [
+        {"experiment": NAME, "folder": f"runs/{NAME}-12", "island": 3,
+         "births": births, "judged": 15, "fitness": 0.1234, "fitness_best": 0.5678}
+        for births in (30, 1500)
+    ],
+    "findings": [
+        {"figure": "6.14", "claim": f"{NAME}: more [bold] extremities", "runs_a": 2,
+         "mean_a": -0.369, "mean_b": 0.5, "q": 0.701, "verdict": "not reproduced"},
+    ],
+    "runs": [{"experiment": NAME, "differs": "births: 1 instead of 2"}],
+    "left_out": [{"folder": "runs/x", "what": "run", "why": "broken [red] & gone"}],
+}  # fmt: skip
+
+
+def told(rows: dict[str, list[dict[str, Any]]], width: int) -> str:
+    tables = {
+        name: pa.Table.from_pylist(rows.get(name, []), schema(name)) for name in ROWS
+    }
+    out = io.StringIO()
+    show(tables, Console(file=out, width=width))
+    return out.getvalue()
+
+
+@pytest.mark.parametrize("width", [10, 40, 60, 70, 80, 120])
+def test_nothing_is_cut_however_narrow_the_screen(width: int) -> None:
+    text = told(ROWS, width)
+    assert "…" not in text
+    for number in ("1500", "15", "0.1234", "0.5678", "6.14", "-0.369", "0.5", "0.701"):
+        assert number in text.replace("│", " ").replace(",", " ").split()
+    words = "".join(text.replace("│", " ").split())
+    for cell in ("[bold]", "reproduced", "instead", "[red]"):
+        assert cell in words
+
+
+def test_names_are_whole_where_they_are_folded() -> None:
+    lines = told({"populations": ROWS["populations"]}, 80).splitlines()
+    cells = [line.split("│")[1:3] for line in lines if line.startswith("│")]
+    assert "".join(name.strip() for name, _ in cells) == NAME
+    assert "".join(run.strip() for _, run in cells).replace(" ", "") == f"{NAME}-123"
+
+
+def test_where_there_is_no_population_it_is_said() -> None:
+    text = told({"left_out": ROWS["left_out"]}, 80)
+    assert text == (
+        "no population could be measured\nleft out: runs/x: run: broken [red] & gone\n"
+    )
