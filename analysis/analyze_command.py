@@ -21,7 +21,7 @@ from analysis.outputs import OUTPUTS, schema
 from analysis.plates import draw_figures
 from analysis.progression import progression
 from analysis.render_command import Simulate
-from analysis.report import Making, report
+from analysis.report import Drawn, Making, report
 from analysis.study import gathered, measure_runs
 from analysis.summary import show
 from schema.errors import RunFolderError
@@ -86,8 +86,7 @@ def analyze(
     (options.out / REPORT).write_text(page, encoding="utf-8")
     show(tables, Console())
     print(f"{options.out / MEASURES}: {len(tables)} tables, {', '.join(tables)}")
-    numbers = ", ".join(one.number for one in drawn)
-    print(f"{options.out / FIGURES}: figures {numbers} as PDF and PNG")
+    print(f"{options.out / FIGURES}: {_told(drawn)}")
     print(f"{options.out / REPORT}: all of it in one file")
     return 0
 
@@ -113,6 +112,14 @@ def _measured(
     tables["findings"] = findings(outcomes)
     bar.remove_task(comparing)
     return tables, [one for run in measured for one in run.left_out]
+
+
+def _told(figures: Sequence[Drawn]) -> str:
+    """Return which figures there are, in words."""
+    if not figures:
+        return "no figure could be drawn; the lines 'left out: figure' tell why"
+    numbers = ", ".join(one.number for one in figures)
+    return f"figures {numbers} as PDF and PNG"
 
 
 def _making(words: Sequence[str]) -> Making:

@@ -143,7 +143,7 @@ def _tested(outcomes: Outcomes, claim: Claim) -> Row:
     names = [name for name in (claim.a, claim.b) if name is not None]
     for name in names:
         if name not in outcomes.experiments:
-            why = f"there is no finished run of {name}"
+            why = f"no finished run of {name} could be measured"
             return {"verdict": "undecided", "why": why}
     births = outcomes.births(*names)
     samples = [outcomes.values(name, claim.measure, births) for name in names]

@@ -50,7 +50,7 @@ def over_runs(tables: Tables, *panels: Panel) -> p9.ggplot:
         NothingToDraw: no finished run has a value.
     """
     if not tables["outcomes"].num_rows:
-        raise NothingToDraw("no run is finished")
+        raise NothingToDraw("no finished run could be measured")
     runs = stacked(tables["outcomes"], panels)
     if not runs.num_rows:
         raise NothingToDraw(f"no finished run has a value of {panels[0].measure}")

@@ -247,7 +247,7 @@ def _check_there(run: Run, name: str) -> None:
     }
     is_expected = run.is_finished and has_rows.get(name, True)
     if is_expected and not _is_there(run.folder, name):
-        raise RunFolderError("is gone: the run is finished, and its file is not there")
+        raise RunFolderError("is not there, though the run is finished")
 
 
 def _is_there(folder: Path, name: str) -> bool:

@@ -168,7 +168,7 @@ def test_findings_are_reproduced_or_not_or_undecided() -> None:
         (7, "reproduced"),
         (8, "not reproduced"),
     ]
-    assert found[3]["why"] == "there is no finished run of ghost"
+    assert found[3]["why"] == "no finished run of ghost could be measured"
     assert found[3]["q"] is None
     assert (found[6]["mean_b"], found[6]["effect"]) == (0.5, 1)
     assert found[6]["p"] == pytest.approx(2 / 1024)

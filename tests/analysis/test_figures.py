@@ -133,7 +133,7 @@ def test_course_of_few_runs_is_drawn_without_bands() -> None:
 
 def test_what_is_missing_is_said() -> None:
     empty = {name: table(name, []) for name in ("outcomes", "progression")}
-    with pytest.raises(NothingToDraw, match="no run is finished"):
+    with pytest.raises(NothingToDraw, match="no finished run could be measured"):
         over_runs(empty, FITNESS)
     with pytest.raises(NothingToDraw, match="fitness at two births"):
         over_births(empty, "fitness", "f")

@@ -164,7 +164,7 @@ def test_a_table_that_a_finished_run_must_have_is_missed(
     folder = made("x")
     parquet_path(folder, "e", 0, name).unlink()
     measured = measure_run(found_in(folder), "parent")
-    why = "is gone: the run is finished, and its file is not there"
+    why = "is not there, though the run is finished"
     assert whys(measured)[f"table {name}"] == why
     assert whys(measured)["measure robots"] == f"needs table {name}"
 

@@ -1,0 +1,39 @@
+"""``revolve analyze`` on runs that nothing can be drawn of."""
+
+import argparse
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from analysis.analyze_command import analyze
+from analysis.render import NoPictures
+from schema.run_tables import parquet_path
+from schema.tables import TABLES
+from tests.analysis.campaign import random_bodies, write_run
+
+
+def no_pictures() -> NoReturn:
+    raise NoPictures("nothing draws here")
+
+
+def test_that_no_figure_could_be_drawn_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    kind = TABLES["births"].field("body").type
+    bodies = pa.array(random_bodies(np.random.default_rng(1), 30), kind)
+    write_run(tmp_path / "run", "scenario1", 0, 30, bodies)
+    parquet_path(tmp_path / "run", "scenario1", 0, "births").unlink()
+    out = tmp_path / "report"
+    options = argparse.Namespace(
+        runs=[tmp_path / "run"], out=out, slots="parent", processes=1
+    )
+    assert analyze(options, ["analyze", "run"], no_pictures) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "no population could be measured"
+    told = "no figure could be drawn; the lines 'left out: figure' tell why"
+    assert f"{out / 'figures'}: {told}" in lines
+    whys = [line for line in lines if line.startswith("left out: figure 6.2: ")]
+    assert whys == ["left out: figure 6.2: no finished run could be measured"]
