@@ -4,8 +4,9 @@ import argparse
 import re
 from pathlib import Path
 
-from rich.progress import Progress, track
+from rich.progress import Progress
 
+from analysis.progress import bars
 from analysis.view_again import Simulators, move_again
 from analysis.view_blueprint import layout
 from analysis.view_body import figure
@@ -88,9 +89,13 @@ def _replay(
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         recording.stage(scene)
         show = Show(recording, scene.space)
-        show.tell(news)
-        if scene.arenas:
-            _replay_poses(folder, _span(options, folder), show)
+        span = _span(options, folder) if scene.arenas else None
+        with bars(f"recording {name}") as bar:
+            task = bar.add_task("births", total=None)
+            show.tell(news)
+            bar.remove_task(task)
+            if span is not None:
+                _replay_poses(folder, span, show, bar)
         bodies = {one.birth: one.body for one in news.births}
         recording.upright("motion")
         recording.ground("motion", scene.below(moving))
@@ -119,7 +124,7 @@ def _motions(options: argparse.Namespace, simulators: Simulators) -> list[Motion
     births = chosen(folder, options.robot, has_ancestry=options.ancestry)
     if not births:
         return []
-    with Progress(transient=True) as bar:
+    with bars(f"robots simulated again: {len(births)}") as bar:
         task = bar.add_task("simulating again", total=1.0)
         motions = move_again(
             folder,
@@ -146,11 +151,9 @@ def _span(options: argparse.Namespace, folder: Path) -> Span:
     return Span(start_s, end_s)
 
 
-def _replay_poses(folder: Path, span: Span, show: Show) -> None:
+def _replay_poses(folder: Path, span: Span, show: Show, bar: Progress) -> None:
     bits = (span.end_s - span.start_s) / CHUNK_S
-    for arena, poses in track(
-        read_poses(folder, span), "poses", total=bits, transient=True
-    ):
+    for arena, poses in bar.track(read_poses(folder, span), bits, description="poses"):
         show.move(arena, poses)
 
 

@@ -1,6 +1,7 @@
 """Where a recording goes: a file, viewers that come, or a window that is opened."""
 
 import contextlib
+import shlex
 import socket
 import subprocess
 import sys
@@ -104,10 +105,11 @@ def linger(
     """Keep serving what is complete, for as long as somebody may look at it."""
     recording.flush()
     if output.file is not None:
-        tell_user(f"saved {output.file}; to look: rerun {output.file}")
+        command = shlex.join(["rerun", str(output.file)])
+        tell_user(f"saved {output.file}; to look: {command}")
     if output.serve is None:
         return
-    if not output.has_window:
+    if not (output.has_window or stop.is_set()):
         tell_user("all is there; Ctrl-C ends")
     while not (stop.is_set() or window.was_closed):
         stop.wait(_POLL_S)

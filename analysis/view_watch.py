@@ -6,6 +6,7 @@ from collections import deque
 
 import pyarrow as pa
 
+from analysis.progress import Course
 from analysis.view_blueprint import layout
 from analysis.view_live import Ended, LiveSource, Told
 from analysis.view_output import Output, Window, linger
@@ -46,6 +47,8 @@ def watch(
     """
     news, rest = _first(source, stop)
     if news is None:
+        if output.file is not None:
+            tell_user(f"stopped before a run was told of: no {output.file} is written")
         return
     scene = stage(experiment_from_text(news.document))
     name = f"{news.experiment}-{news.run.rpartition('/')[2]}"
@@ -60,12 +63,16 @@ def watch(
         recording.stage(scene)
         spectator = Spectator(Show(recording, scene.space), news.run)
         spectator.tell([news, *rest])
-        while not (stop.is_set() or spectator.has_ended or window.was_closed):
-            spectator.tell(source.receive(_POLL_S, time.monotonic()))
+        with Course() as course:
+            while not (stop.is_set() or spectator.has_ended or window.was_closed):
+                now_s = time.monotonic()
+                if not output.has_window:  # it shows all, and a run's bars may be here
+                    born = spectator.births
+                    course.tell(f"watching {name}: {born} births so far", now_s)
+                spectator.tell(source.receive(_POLL_S, now_s))
         if spectator.has_ended:
             tell_user("the run has ended")
-        if not (stop.is_set() or window.was_closed):
-            linger(output, window, recording, stop)
+        linger(output, window, recording, stop)
 
 
 def _first(source: LiveSource, stop: threading.Event) -> tuple[News | None, list[Told]]:
@@ -92,14 +99,22 @@ class Spectator:
     def __init__(self, show: Show, run: str) -> None:
         """Watch a run."""
         self.has_ended = False
+        self._births: dict[int, int] = {}
         self._show = show
         self._run = run
         self._unknown: deque[tuple[int, pa.Table]] = deque(maxlen=_STRANGERS)
+
+    @property
+    def births(self) -> int:
+        """How many were born on all islands so far."""
+        return sum(self._births.values())
 
     def tell(self, told: list[Told]) -> None:
         """Show what came, news before poses: births before their robots."""
         news = [each for each in told if isinstance(each, News)]
         for one in news:
+            # What came twice counts once: each birth says how many there were.
+            self._births |= {each.birth.island: each.births for each in one.births}
             self._show.tell(one)
         if news:
             waiting, self._unknown = self._unknown, deque(maxlen=_STRANGERS)
