@@ -19,6 +19,7 @@ from analysis.load import LeftOut, Run, read_runs
 from analysis.namesakes import told_apart
 from analysis.outputs import OUTPUTS, schema
 from analysis.plates import draw_figures
+from analysis.progress import bars
 from analysis.progression import progression
 from analysis.render_command import Simulate
 from analysis.report import Drawn, Making, report
@@ -61,9 +62,7 @@ def analyze(
     except OSError as error:
         why = f"cannot be written: {error.strerror}"
         raise RunFolderError(f"{options.out}: {why}") from None
-    with Progress(
-        *columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True
-    ) as bar:
+    with bars(f"runs to measure: {len(runs)}", *columns, TimeRemainingColumn()) as bar:
         tables, left_out = _measured(runs, options, bar)
         drawn, undrawn = draw_figures(
             {**tables, "benchmark": benchmark},
