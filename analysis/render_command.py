@@ -2,14 +2,15 @@
 
 import argparse
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+from analysis.progress import bars
 from analysis.render import (
     NoPictures,
-    Picture,
     Studio,
     gait_strip,
     save_film,
@@ -55,7 +56,8 @@ def main(arguments: list[str], simulate: Simulate) -> int:
         0 if the picture is there.
 
     Raises:
-        NoPictures: nothing here can draw, or an ending that is no picture's.
+        NoPictures: nothing here can draw, an ending that is no picture's, or more
+            pictures than there are ticks to show.
         InvalidRobot: a file that holds no robot.
         SimulationDiverged: the physics did.
         ExperimentError: no such experiment, or a sensor that it cannot feed.
@@ -71,48 +73,54 @@ def main(arguments: list[str], simulate: Simulate) -> int:
     named = options.experiment
     settings = settings_of(read_experiment(named) if named else None)
     space, world = body_space(settings.space), settings.simulation
+    _check_gait(options.gait, world)
     robot = read_robot(options.file, space)
     size = (options.width, options.width * 3 // 4)
     with Studio(robot, space, world, settings.environment, size=size) as studio:
         if not is_film and not options.gait:
             save_picture(studio.picture(), out)
         else:
-            poses: list[Floats] = []
-            simulate(
-                robot,
-                settings.space,
-                world,
-                settings.environment,
-                watch=lambda data: poses.append(data.qpos.copy()),
-            )
-            _draw_motion(studio, poses, options.gait, out, world)
+            live = partial(simulate, robot, settings.space, world, settings.environment)
+            tick_s = world.brain_steps * world.timestep_s
+            _draw_motion(studio, live, options.gait, out, tick_s)
     print(f"{out}: written")
     return 0
 
 
+def _check_gait(gait: int | None, world: Simulation) -> None:
+    """Refuse more pictures than there are ticks to show."""
+    ticks = -(-(world.warmup_steps + world.window_steps) // world.brain_steps)
+    most = ticks - ticks // 2
+    if gait is not None and gait > most:
+        raise NoPictures(
+            f"--gait {gait}: must be <= {most}, the ticks of the second half of its "
+            "life, which is drawn"
+        )
+
+
 def _draw_motion(
-    studio: Studio, poses: list[Floats], gait: int | None, out: Path, world: Simulation
+    studio: Studio,
+    live: Callable[..., object],
+    gait: int | None,
+    out: Path,
+    tick_s: float,
 ) -> None:
-    """Write a film of all poses, or a strip of some."""
-    if out.suffix.lower() == FILM_ENDING:
-        pictures = _drawn(studio, poses)
-        save_film(pictures, out, world.brain_steps * world.timestep_s)
-        return
-    # From the middle of the life on, when the first fall is over.
-    chosen = poses[len(poses) // 2 :][:gait]
-    # A camera that stands still: the robot is seen to go.
-    middle = np.mean([pose[:3] for pose in chosen], axis=0)
-    save_picture(gait_strip(_drawn(studio, chosen, middle)), out)
-
-
-def _drawn(
-    studio: Studio, poses: list[Floats], look_at: Floats | None = None
-) -> list[Picture]:
-    """Draw poses, and show that it goes on."""
-    from rich.progress import track
-
-    shown = track(poses, description="drawing", transient=True)
-    return [studio.picture(pose, look_at=look_at) for pose in shown]
+    """Write a film of a whole life, or a strip of some of its ticks."""
+    poses: list[Floats] = []
+    look_at = None
+    with bars(f"simulating and drawing: {out}") as bar:
+        live(watch=lambda data: poses.append(data.qpos.copy()))
+        if gait is not None:
+            # From the middle of the life on, when the first fall is over.
+            poses = poses[len(poses) // 2 :][:gait]
+            # A camera that stands still: the robot is seen to go.
+            look_at = np.mean([pose[:3] for pose in poses], axis=0)
+        shown = bar.track(poses, description="drawing")
+        pictures = [studio.picture(pose, look_at=look_at) for pose in shown]
+    if gait is None:
+        save_film(pictures, out, tick_s)
+    else:
+        save_picture(gait_strip(pictures), out)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -128,7 +136,8 @@ def _parser() -> argparse.ArgumentParser:
         "--gait",
         type=whole_number(1),
         metavar="N",
-        help="N pictures, one per tick of the brain, in rows of five",
+        help="N pictures, one per tick of the brain from the middle of its life on, in "
+        "rows of five",
     )
     parser.add_argument("--width", type=whole_number(16), default=640, metavar="PIXELS")
     parser.add_argument("--experiment", metavar="NAME|FILE.toml")

@@ -22,6 +22,7 @@ from schema.environment import FLAT
 from schema.experiment import Simulation
 from schema.parts import BUILT_IN
 from schema.robot import Part, Robot
+from schema.robot_file import write_robot
 
 RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 ROBOT = Robot(
@@ -117,6 +118,34 @@ def test_words_that_cannot_be_are_refused(
         main(["robot render", "a.yaml", "a.png", *words], simulate)
     assert end.value.code == 2
     assert said in capsys.readouterr().err
+
+
+@pytest.fixture
+def robot_file(tmp_path: Path) -> Path:
+    path = tmp_path / "robot.yaml"
+    write_robot(ROBOT, path, BUILT_IN)
+    return path
+
+
+@pytest.mark.usefixtures("studio")  # where nothing can draw, that is told
+def test_a_strip_longer_than_there_are_ticks_is_refused(robot_file: Path) -> None:
+    words = ["robot render", str(robot_file), str(robot_file.with_suffix(".png"))]
+    said = r"--gait 49: must be <= 48, the ticks of the second half of its life"
+    with pytest.raises(NoPictures, match=said):
+        main([*words, "--gait", "49"], simulate)
+    # One less is what there is, and goes on to the simulation.
+    with pytest.raises(AssertionError, match="words come first"):
+        main([*words, "--gait", "48"], simulate)
+
+
+@pytest.mark.usefixtures("studio")
+def test_a_log_is_told_at_the_beginning_what_is_drawn(
+    robot_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = robot_file.with_suffix(".gif")
+    with pytest.raises(AssertionError, match="words come first"):
+        main(["robot render", str(robot_file), str(out)], simulate)
+    assert capsys.readouterr().err == f"simulating and drawing: {out}\n"
 
 
 def test_a_film_is_no_strip() -> None:
