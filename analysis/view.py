@@ -11,7 +11,7 @@ from analysis.view_again import Simulators, move_again
 from analysis.view_blueprint import layout
 from analysis.view_body import figure
 from analysis.view_live import LiveSource
-from analysis.view_motion import Motion, chosen, name_of, show_motion
+from analysis.view_motion import Motion, best_ever, chosen, name_of, show_motion
 from analysis.view_output import HOST, PORT, Output, Window, linger
 from analysis.view_recording import Recording, ViewerError
 from analysis.view_replay import (
@@ -121,7 +121,7 @@ def _check(options: argparse.Namespace, born: set[BirthId], *, is_online: bool) 
 def _motions(options: argparse.Namespace, simulators: Simulators) -> list[Motion]:
     """Return the motion of the robots that were asked for; tell if it is equal."""
     folder: Path = options.run
-    births = chosen(folder, options.robot, has_ancestry=options.ancestry)
+    births = chosen(folder, _wanted(options), has_ancestry=options.ancestry)
     if not births:
         return []
     with bars(f"robots simulated again: {len(births)}") as bar:
@@ -136,6 +136,15 @@ def _motions(options: argparse.Namespace, simulators: Simulators) -> list[Motion
     for motion in motions:
         tell_user(motion.verdict)
     return motions
+
+
+def _wanted(options: argparse.Namespace) -> list[BirthId]:
+    """Return the robots that were asked for by name; tell who the best is."""
+    if None not in options.robot:
+        return list(options.robot)
+    best, fitness = best_ever(options.run)
+    tell_user(f"best ever judged: {name_of(best)}, fitness {fitness:.4f}")
+    return [best if who is None else who for who in options.robot]
 
 
 def _span(options: argparse.Namespace, folder: Path) -> Span:
@@ -170,7 +179,7 @@ def robot_name(text: str) -> BirthId:
 
 
 def _chosen(text: str) -> BirthId | None:
-    """Return whom a flag names; None is the best."""
+    """Return whom a flag names; None is the best ever judged."""
     return None if text == "best" else robot_name(text)
 
 
@@ -204,8 +213,8 @@ def _flags() -> Flags:
     )  # fmt: skip
     flags.add_argument(
         "--robot", action="append", default=[], type=_chosen, metavar="WHO",
-        help="simulate a robot again to see all of its motion: best, or ISLAND:BIRTH; "
-        "may be given more than once",
+        help="simulate a robot again to see all of its motion: best (ever judged, "
+        "alive at the end or not), or ISLAND:BIRTH; may be given more than once",
     )  # fmt: skip
     flags.add_argument(
         "--ancestry", action="store_true",

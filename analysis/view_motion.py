@@ -30,17 +30,17 @@ class Motion:
 
 
 def chosen(
-    folder: Path, wanted: Iterable[BirthId | None], *, has_ancestry: bool
+    folder: Path, wanted: Iterable[BirthId], *, has_ancestry: bool
 ) -> list[BirthId]:
     """Return the robots of ``--robot``, each once, in their order.
 
     Args:
         folder: of the run.
-        wanted: None is the best.
+        wanted: who.
         has_ancestry: with each its first parent, and so on, back to a founder.
 
     Raises:
-        ViewerError: nobody of that name was born, or nobody was judged.
+        ViewerError: nobody of that name was born.
     """
     births = read_table(folder, "births").select(["island", "birth", "parents"])
     parents = {
@@ -48,21 +48,33 @@ def chosen(
         for row in births.to_pylist()
     }
     found: dict[BirthId, None] = {}
-    for who in wanted:
-        birth = _best(folder) if who is None else who
+    for birth in wanted:
         if birth not in parents:
             name = name_of(birth)
             raise ViewerError(f"--robot {name}: nobody of that name was born")
         found[birth] = None
-        while has_ancestry and parents[birth]:
-            first = parents[birth][0]
-            birth = BirthId(first["island"], first["birth"])
-            found[birth] = None
+        last = birth
+        while has_ancestry and parents[last]:
+            first = parents[last][0]
+            last = BirthId(first["island"], first["birth"])
+            found[last] = None
     return list(found)
 
 
-def _best(folder: Path) -> BirthId:
-    """Return the fittest of all that a run has judged, the first of equals."""
+def best_ever(folder: Path) -> tuple[BirthId, float]:
+    """Return the fittest of all that a run ever judged, the first of equals.
+
+    It may have died since: the best of the last population is another, then.
+
+    Args:
+        folder: of the run.
+
+    Returns:
+        Who, and its fitness [m/s].
+
+    Raises:
+        ViewerError: nobody was judged.
+    """
     alone = read_table(folder, "evaluations")
     together = read_table(folder, "fitness")
     judged = (alone, together.filter(together["is_mature"]))
@@ -72,7 +84,7 @@ def _best(folder: Path) -> BirthId:
         raise ViewerError(f"{folder}: nobody has been judged yet")
     best, rows = max(known, key=lambda one: one[0])
     (row,) = rows.filter(pc.equal(rows["fitness"], best)).slice(0, 1).to_pylist()
-    return individual(row)
+    return individual(row), best
 
 
 def show_motion(

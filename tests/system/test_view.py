@@ -237,6 +237,12 @@ def test_a_robot_that_was_alone_moves_again_as_recorded(
 ) -> None:
     words = ("view", str(undisturbed), "--robot", "best", "--ancestry")
     out = stage.run(*words, "--save", "again.rrd")
+    best = max(
+        row["fitness"] or 0.0
+        for row in read_table(undisturbed, "evaluations").to_pylist()
+    )
+    (told,) = [line for line in out.splitlines() if line.startswith("best ever judged")]
+    assert told.endswith(f", fitness {best:.4f}")
     assert "moves again as recorded, to the last bit" in out
     assert "DIFFERS" not in out
 
