@@ -23,6 +23,7 @@ from schema.tables import read_columns
 
 _POLL_S = 0.2
 _PATIENCE_S = 15.0
+_SILENT_S = 2.0
 _STRANGERS = 200
 """Messages with poses of robots not yet known that are kept."""
 
@@ -77,15 +78,19 @@ def watch(
 
 def _first(source: LiveSource, stop: threading.Event) -> tuple[News | None, list[Told]]:
     """Wait for all that has happened so far; return it, and what came behind it."""
-    until_s = time.monotonic() + _PATIENCE_S
+    since_s = time.monotonic()
+    has_said = False
     while not stop.is_set():
         now_s = time.monotonic()
         told = source.receive(_POLL_S, now_s)
         for index, each in enumerate(told):
             if isinstance(each, News) and each.is_whole:
                 return each, told[index + 1 :]
-        if now_s > until_s:
+        if now_s > since_s + _PATIENCE_S:
             raise NetworkError("the coordinator does not tell of a run")
+        if now_s > since_s + _SILENT_S and not has_said:
+            has_said = True
+            tell_user("waiting to be told of a run")
     return None, []
 
 

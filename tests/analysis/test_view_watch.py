@@ -3,6 +3,7 @@
 import threading
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -11,6 +12,7 @@ from analysis.view_live import Ended, Told
 from analysis.view_output import Output
 from analysis.view_watch import Spectator, watch
 from schema.birth import BirthId
+from schema.errors import NetworkError
 from schema.experiment_file import experiment_text, read_experiment
 from schema.live import Newborn, News
 
@@ -75,6 +77,19 @@ def test_that_nothing_was_saved_is_told(
     why = f"stopped before a run was told of: no {file} is written\n"
     assert capsys.readouterr().err == why
     assert not file.exists()
+
+
+def test_who_waits_for_a_run_is_told_so_once(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    times = iter([0.0, 0.0, 1.0, 2.5, 3.0, 16.0])
+    clock = SimpleNamespace(monotonic=lambda: next(times))
+    monkeypatch.setattr("analysis.view_watch.time", clock)
+    with pytest.raises(NetworkError, match="does not tell of a run"):
+        seen(tmp_path / "a.rrd", *[news(number) for number in range(5)])
+    assert capsys.readouterr().err == "waiting to be told of a run\n"
 
 
 def test_births_count_once_on_every_island() -> None:
