@@ -1,6 +1,7 @@
 """The command ``revolve``: names the rooms' commands, nothing else."""
 
 import os
+import signal
 import sys
 from collections.abc import Iterable
 from importlib import import_module
@@ -40,7 +41,22 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         0 if done, 2 for a user's error (one line on stderr), 130 after Ctrl-C.
     """
-    words = sys.argv[1:] if arguments is None else arguments
+    try:
+        return _obey(sys.argv[1:] if arguments is None else arguments)
+    except KeyboardInterrupt:
+        return 130
+    except ImportError as error:
+        if not _is_interrupted(error):
+            raise
+        return 130
+    finally:
+        if arguments is None:
+            # This process ends: whoever presses again shall not see how.
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _obey(words: list[str]) -> int:
+    """Run the command that words begin with and return its exit code."""
     if not words or words[0] in ("-h", "--help"):
         print(_overview())
         return 0
@@ -68,13 +84,18 @@ def main(arguments: list[str] | None = None) -> int:
     except error_type as error:
         print(f"revolve: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        return 130
     else:
         return code
     finally:
         if words[1:] in (["-h"], ["--help"]):
             print(_also(words[0]), end="")
+
+
+def _is_interrupted(error: BaseException | None) -> bool:
+    """Return whether a Ctrl-C is what an engine could not be loaded for."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _is_heard() -> bool:

@@ -16,7 +16,7 @@ from coordinator.campaign import (
 from coordinator.command_line import LISTEN, parser
 from coordinator.compare import compare
 from coordinator.events import AgentKind
-from coordinator.folder import read_details
+from coordinator.folder import DETAILS, read_details
 from coordinator.running import Deployment, resume, start, start_campaign
 from schema.agent_command import tls_of
 from schema.crew import cores
@@ -29,6 +29,7 @@ from schema.experiment import (
 )
 from schema.experiment_check import check_experiment
 from schema.experiment_file import experiment_from_text
+from schema.service import tell_user
 from schema.settings import fitness_function
 
 
@@ -50,7 +51,8 @@ def main(arguments: list[str]) -> int:
         return _bench(options)
     if command == "resume":
         folder = Path(options.folder)
-        return resume(folder, _deployment(options, _experiments_of(folder)))
+        deployment = _deployment(options, _experiments_of(folder))
+        return _stoppable(folder, lambda: resume(folder, deployment))
     experiments = _experiments(options)
     deployment = _deployment(options, experiments)
     is_campaign_wanted = len(experiments) > 1 or options.repeats is not None
@@ -61,9 +63,21 @@ def main(arguments: list[str]) -> int:
     )
     folder = Path(options.out or Path("runs") / f"{name}-seed{options.seed}")
     if not is_campaign_wanted:
-        return start(folder, experiments[0], options.seed, deployment)
+        return _stoppable(
+            folder, lambda: start(folder, experiments[0], options.seed, deployment)
+        )
     campaign = Campaign(experiments, options.repeats or 1, options.seed)
-    return start_campaign(folder, campaign, deployment)
+    return _stoppable(folder, lambda: start_campaign(folder, campaign, deployment))
+
+
+def _stoppable(folder: Path, evolve: Callable[[], int]) -> int:
+    """Do what runs in a folder; who interrupts it is told how to go on."""
+    try:
+        return evolve()
+    except KeyboardInterrupt:
+        if is_campaign(folder) or (folder / DETAILS).exists():
+            tell_user(f"stopped; to go on: revolve resume {folder}")
+        raise
 
 
 def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:

@@ -8,6 +8,7 @@ if its job did it.
 """
 
 import contextlib
+import math
 import os
 import signal
 import sys
@@ -15,7 +16,7 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from multiprocessing import connection, get_context, parent_process
+from multiprocessing import connection, get_context, parent_process, resource_tracker
 from multiprocessing.context import SpawnProcess
 from typing import Any, Self
 
@@ -43,6 +44,8 @@ _ONE_PIECE = "131072"
 GRACE_S = 10.0
 _BETWEEN_STARTS_S = 1.0
 _LONGEST_REST_S = 30.0
+# What is pressed again sooner is one wish: a Ctrl-C of an impatient finger.
+_ONE_WISH_S = 1.0
 
 
 def prepare_process() -> None:
@@ -155,7 +158,9 @@ class Crew:
         process = self._context.Process(
             target=self._body, args=(*self._arguments, self._posts[index])
         )
-        # A Ctrl-C of the terminal reaches all; only this process shall act on it.
+        # A Ctrl-C of the terminal reaches all; only this process shall act on it. The
+        # tracker first: whoever starts it lets SIGINT in again for all that follow.
+        resource_tracker.ensure_running()
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             process.start()
@@ -187,13 +192,18 @@ class Crew:
 
 
 def stop_on_signals() -> threading.Event:
-    """Return an event that Ctrl-C or SIGTERM sets; a second Ctrl-C interrupts."""
+    """Return an event that Ctrl-C or SIGTERM sets; Ctrl-C a second later interrupts."""
     stop = threading.Event()
+    asked_s = -math.inf
 
     def ask(number: int, _frame: object) -> None:
-        if number == signal.SIGINT and stop.is_set():
+        nonlocal asked_s
+        now_s = time.monotonic()
+        if not stop.is_set():
+            asked_s = now_s
+            stop.set()
+        elif number == signal.SIGINT and now_s >= asked_s + _ONE_WISH_S:
             raise KeyboardInterrupt
-        stop.set()
 
     signal.signal(signal.SIGINT, ask)
     signal.signal(signal.SIGTERM, ask)

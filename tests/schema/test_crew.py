@@ -1,10 +1,15 @@
 """What one process asks of the system for itself and for all that it starts."""
 
 import os
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
+
+from schema.crew import stop_on_signals
 
 _ASK = "import os; print(os.sched_getscheduler(0) == os.SCHED_{policy})"
 _START = (
@@ -76,3 +81,55 @@ def test_a_child_gives_back_what_it_leaves() -> None:
     ]
     assert left_mib[0] > 40
     assert left_mib[1] < 5
+
+
+_SHIELDED = """
+import pathlib, signal, sys
+from schema.crew import Crew
+
+def body(folder, post):
+    masked = signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    pathlib.Path(folder, str(post.index)).write_text(str(signal.SIGINT in masked))
+
+if __name__ == "__main__":
+    with Crew(body, (sys.argv[1],), size=2) as crew:
+        while len(crew.exit_codes) < 2:
+            crew.wait(1.0)
+            crew.look_after()
+    print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))
+"""
+
+
+def test_a_ctrl_c_reaches_no_child_from_its_birth_on(tmp_path: Path) -> None:
+    """Nor the first one, with which Python starts a process of its own."""
+    script = tmp_path / "crew.py"
+    script.write_text(_SHIELDED)
+    done = subprocess.check_output(
+        [sys.executable, script, tmp_path],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        text=True,
+    )
+    assert [(tmp_path / name).read_text() for name in "01"] == ["True", "True"]
+    assert done.split() == ["False"]
+
+
+@pytest.fixture
+def _own_signals() -> Iterator[None]:
+    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("_own_signals")
+def test_ctrl_c_pressed_twice_at_once_is_one_wish(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("schema.crew._ONE_WISH_S", 60.0)
+    stop = stop_on_signals()
+    for _ in range(2):
+        signal.raise_signal(signal.SIGINT)
+        assert stop.is_set()
+    monkeypatch.setattr("schema.crew._ONE_WISH_S", 0.0)
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
