@@ -1,5 +1,6 @@
 """The command ``revolve``: names the rooms' commands, nothing else."""
 
+import io
 import os
 import signal
 import sys
@@ -39,10 +40,28 @@ def main(arguments: list[str] | None = None) -> int:
         arguments: without the program's name; those of the process by default.
 
     Returns:
-        0 if done, 2 for a user's error (one line on stderr), 130 after Ctrl-C.
+        0 if done, 1 if nobody reads on, 2 for a user's error and for output that
+        cannot be written (one line on stderr), 130 after Ctrl-C.
     """
+    if sys.stdout is None:
+        # A file of the command would take its place, and be written into.
+        print("revolve: standard output is closed", file=sys.stderr)
+        return 2
+    _keep_what_fails()
     try:
-        return _obey(sys.argv[1:] if arguments is None else arguments)
+        try:
+            return _obey(sys.argv[1:] if arguments is None else arguments)
+        finally:
+            sys.stdout.flush()
+    except OSError:
+        trouble = _trouble_of_output()
+        if trouble is None:
+            raise
+        if isinstance(trouble, BrokenPipeError):
+            return 1
+        why = str(trouble.strerror)
+        print(f"revolve: standard output: {why[:1].lower()}{why[1:]}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         return 130
     except ImportError as error:
@@ -75,17 +94,10 @@ def _obey(words: list[str]) -> int:
     error_type = import_module("schema.errors").RevolveError
     try:
         room = import_module(COMMANDS[words[0]][0])
-        code = int(room.main(words))
-        sys.stdout.flush()
-    except BrokenPipeError:
-        if _is_heard():
-            raise
-        return 1
+        return int(room.main(words))
     except error_type as error:
         print(f"revolve: {error}", file=sys.stderr)
         return 2
-    else:
-        return code
     finally:
         if words[1:] in (["-h"], ["--help"]):
             print(_also(words[0]), end="")
@@ -98,15 +110,28 @@ def _is_interrupted(error: BaseException | None) -> bool:
     return error is not None
 
 
-def _is_heard() -> bool:
-    """Return whether whoever reads this output, ``head`` say, is still there."""
+def _keep_what_fails() -> None:
+    """Give standard output a buffer: what could not be written is found in it."""
+    if isinstance(getattr(sys.stdout, "buffer", None), io.RawIOBase):
+        sys.stdout = open(  # noqa: SIM115 - as long as the process
+            sys.stdout.fileno(),
+            "w",
+            buffering=1,
+            encoding=sys.stdout.encoding,
+            errors=sys.stdout.errors,
+            closefd=False,
+        )
+
+
+def _trouble_of_output() -> OSError | None:
+    """Return why standard output cannot be written, or None if it can."""
     try:
         sys.stdout.flush()
-    except BrokenPipeError:
+    except OSError as error:
         # Or the interpreter would complain of it once more when it ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return False
-    return True
+        return error
+    return None
 
 
 def _also(command: str) -> str:

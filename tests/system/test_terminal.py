@@ -58,3 +58,52 @@ def test_ctrl_c_while_an_engine_is_loaded(
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setitem(revolve.COMMANDS, "status", ("engine_of_a_test", "is odd"))
     assert revolve.main(["status"]) == 130
+
+
+def _said(
+    words: str, unbuffered: str = "", output: int | None = None
+) -> tuple[int, str]:
+    """Return exit code and standard error of ``revolve`` in a line of a shell."""
+    done = subprocess.run(
+        ["sh", "-c", f'"$1" -m revolve {words}', "sh", sys.executable],
+        stdout=output,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=ROOT,
+        env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+        check=False,
+    )
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize("words", ["--help", "run --help", "run scenario1 --out x"])
+def test_closed_output_is_refused_before_anything_is_done(words: str) -> None:
+    told = (2, "revolve: standard output is closed\n")
+    assert _said(f"{words} >&-") == told
+    assert not (ROOT / "x").exists()
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("words", ["--help", "run --help"])
+def test_output_on_a_full_device(words: str, unbuffered: str) -> None:
+    told = (2, "revolve: standard output: no space left on device\n")
+    assert _said(f"{words} > /dev/full", unbuffered) == told
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("words", ["--help", "run --help"])
+def test_nothing_is_said_to_who_reads_no_more(words: str, unbuffered: str) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        assert _said(words, unbuffered, writer) == (1, "")
+    finally:
+        os.close(writer)
+
+
+def test_an_error_that_is_not_of_the_output_is_none_of_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(revolve, "_overview", lambda: Path("/nowhere").read_text())
+    with pytest.raises(FileNotFoundError):
+        revolve.main([])
