@@ -88,11 +88,15 @@ def _read_scenery(document: dict[str, Any], where: str) -> None:
             continue
         path = Path(where).parent / named
         try:
-            environment["scenery"] = path.read_text(encoding="utf-8-sig")
+            text = path.read_text(encoding="utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             raise ExperimentError(
                 f"{where}: environment.scenery: {named}: cannot be read: {error}"
             ) from None
+        if not text.strip():
+            # Or it would be taken for no scenery at all.
+            raise ExperimentError(f"{where}: environment.scenery: {named}: is empty")
+        environment["scenery"] = text
 
 
 def _completed(document: dict[str, Any]) -> dict[str, Any]:

@@ -72,6 +72,14 @@ def test_what_is_refused(text: str, told: str) -> None:
     assert told in line
 
 
+@pytest.mark.parametrize("text", ["", " \n\t", "\ufeff"])
+def test_an_empty_file_is_no_scenery(tmp_path: Path, text: str) -> None:
+    (tmp_path / "empty.xml").write_text(text, encoding="utf-8")
+    document = 'name = "a"\n[environment]\nscenery = "empty.xml"\n'
+    with pytest.raises(ExperimentError, match=r"scenery: empty\.xml: is empty$"):
+        parse_experiment(document, str(tmp_path / "a.toml"))
+
+
 def test_scenery_is_read_from_beside_the_document_and_goes_along(
     tmp_path: Path,
 ) -> None:
