@@ -28,7 +28,11 @@ from schema.experiment import (
     with_births,
 )
 from schema.experiment_check import check_experiment
-from schema.experiment_file import experiment_from_text
+from schema.experiment_file import (
+    check_source,
+    experiment_from_text,
+    shipped_experiments,
+)
 from schema.service import tell_user
 from schema.settings import fitness_function
 
@@ -82,6 +86,9 @@ def _stoppable(folder: Path, evolve: Callable[[], int]) -> int:
 
 def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
     """Return what is to be run, checked as far as that goes without running it."""
+    shipped = [*shipped_experiments(), *shipped_campaigns()]
+    for source in options.experiments:
+        check_source(source, shipped)
     experiments = read_experiments(options.experiments)
     if options.births is not None:
         experiments = tuple(

@@ -1,11 +1,12 @@
 """Reads and writes experiment documents: TOML by people, JSON in a run's tables."""
 
 import tomllib
+from collections.abc import Collection
 from difflib import get_close_matches
 from importlib import resources
 from math import isfinite
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args, get_origin
 
 import msgspec
 from msgspec import Struct
@@ -31,16 +32,23 @@ def read_experiment(source: str) -> Experiment:
         except (OSError, UnicodeDecodeError) as error:
             raise ExperimentError(f"{source}: cannot be read: {error}") from None
         return parse_experiment(text, source)
-    shipped = shipped_experiments()
-    if source not in shipped:
-        near = nearest(source, shipped)
-        raise ExperimentError(
-            f"{source}: no such experiment{near}; "
-            f"shipped are {', '.join(shipped)}, or give a path to a .toml file"
-        )
+    check_source(source, shipped_experiments())
     folder = resources.files("coordinator") / "experiments"
     text = (folder / f"{source}.toml").read_text(encoding="utf-8")
     return parse_experiment(text, f"{source}.toml")
+
+
+def check_source(source: str, shipped: Collection[str]) -> None:
+    """Raise unless a word is a path of a TOML file or one of the shipped names.
+
+    Raises:
+        ExperimentError: it is neither; the nearest is named.
+    """
+    if not source.endswith(".toml") and source not in shipped:
+        raise ExperimentError(
+            f"{source}: no such experiment{nearest(source, shipped)}; "
+            f"shipped are {', '.join(shipped)}, or give a path to a .toml file"
+        )
 
 
 def shipped_experiments() -> list[str]:
@@ -132,9 +140,9 @@ def experiment_from_text(text: str) -> Experiment:
         raise ExperimentError(f"experiment of a run: {error}") from None
 
 
-def nearest(word: str, words: Any) -> str:  # noqa: ANN401 - any iterable of str
+def nearest(word: Any, words: Any) -> str:  # noqa: ANN401 - any iterable of str
     """Return ``; did you mean 'x'?`` for the nearest word, or nothing."""
-    found = get_close_matches(word, list(words), n=1, cutoff=0.5)
+    found = get_close_matches(str(word), list(words), n=1, cutoff=0.5)
     return f"; did you mean {found[0]!r}?" if found else ""
 
 
@@ -184,9 +192,24 @@ def _explain(error: msgspec.ValidationError, document: dict[str, Any]) -> str:
     message, _, path = str(error).partition(" - at `$.")
     key = path.rstrip("`")
     value: Any = document
+    kind: Any = Experiment
     for name in key.split(".") if key else ():
         word, *places = name.replace("]", "").split("[")
         value = value.get(word) if isinstance(value, dict) else None
+        kind = _type_of(kind, word)
         for place in places:
             value = value[int(place)] if isinstance(value, list) else None
-    return f"{key}: {message}, got {value!r}" if key else message
+    if not key:
+        return message
+    choices = get_args(kind) if get_origin(kind) is Literal else ()
+    if not choices:
+        return f"{key}: {message}, got {value!r}"
+    allowed = ", ".join(map(repr, choices))
+    return f"{key}: must be one of {allowed}, got {value!r}{nearest(value, choices)}"
+
+
+def _type_of(kind: Any, key: str) -> Any:  # noqa: ANN401 - any annotation
+    """Return the annotation of a key of the section that an annotation names."""
+    section = _section(kind)
+    fields = msgspec.structs.fields(section) if section else ()
+    return next((field.type for field in fields if field.name == key), None)

@@ -93,7 +93,22 @@ def test_window_may_be_narrower_than_a_brood() -> None:
             "simulation.actuator_noise: .*, got 'a'",
         ),
         ("[simulation]\nactor_noise = 1", "no such key; did you mean 'actuator_noise'"),
-        ('[selection]\nparents = "rank"', r"selection.parents: .*'rank'"),
+        (
+            '[selection]\nparents = "rank"',
+            "selection.parents: must be one of 'tournament', .*, 'none', got 'rank'",
+        ),
+        (
+            '[selection.reevaluation]\nfitness = "meen"',
+            r"selection.reevaluation.fitness: .*, got 'meen'; did you mean 'mean'\?",
+        ),
+        (
+            '[[islands]]\n[islands.selection]\nsurvivors = "bets"',
+            r"islands.0..selection.survivors: .*, got 'bets'; did you mean 'best'\?",
+        ),
+        (
+            "[vetting]\nmode = 3",
+            "vetting.mode: must be one of 'overlap', 'contact', got 3",
+        ),
         ("space = 3", "space: must be a table"),
         ("[space]\npart_types = [1]", r"space.part_types\[0\]: .*, got 1"),
         ("[[", "test.toml: not TOML: "),

@@ -65,6 +65,9 @@ def test_a_seed_that_no_message_can_hold(stage: Stage) -> None:
 def test_misspelt_command_and_experiment_get_the_nearest_name(stage: Stage) -> None:
     assert "'resume'" in _refused(stage, "resum", "x")
     assert "'scenario1'" in _refused(stage, "run", "senario1")
+    said = _refused(stage, "run", "thesys")
+    assert "; did you mean 'thesis'?" in said
+    assert "scenario3, thesis, or give a path" in said
 
 
 @pytest.mark.parametrize(
