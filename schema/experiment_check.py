@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from math import isclose, lcm
+from urllib.parse import quote
 
 from schema.bridge_check import (
     culling_problem,
@@ -13,16 +14,20 @@ from schema.errors import ExperimentError
 from schema.experiment import Experiment, body_space, island_experiment, steps_of
 from schema.migration_check import migration_problem
 
+# File systems hold names of 255 bytes, of which the run's folders need some.
+_LONGEST_NAME = 200
+
 
 def check_experiment(experiment: Experiment, where: str) -> None:
     """Raise unless the sections of an experiment fit each other.
 
     Raises:
-        ExperimentError: a restriction that no robot can meet, a selection that
-            cannot draw its parents, a window that ends between two samples, an
-            arena too small or with clocks that do not meet, rules that an arena
-            has no use for, rough ground that cannot be laid out, scenery that is
-            none, a plug-in that does not exist, a migration that can never happen.
+        ExperimentError: a name that no folder can have, a restriction that no robot
+            can meet, a selection that cannot draw its parents, a window that ends
+            between two samples, an arena too small or with clocks that do not
+            meet, rules that an arena has no use for, rough ground that cannot be
+            laid out, scenery that is none, a plug-in that does not exist, a
+            migration that can never happen.
     """
     checks: list[Callable[[Experiment], str]] = [
         _limits_problem,
@@ -46,7 +51,7 @@ def check_experiment(experiment: Experiment, where: str) -> None:
         for check in checks:
             if problem := check(experiment):
                 raise ExperimentError(f"{where}: {problem}")
-    if problem := migration_problem(experiment):
+    if problem := _name_problem(experiment.name) or migration_problem(experiment):
         raise ExperimentError(f"{where}: {problem}")
     types = body_space(experiment.space)
     core = next(kind for kind in types.values() if kind.is_root)
@@ -57,6 +62,19 @@ def check_experiment(experiment: Experiment, where: str) -> None:
         )
     if not any(kind.outputs for kind in types.values()):
         raise ExperimentError(f"{where}: space.part_types: none of them has a motor")
+
+
+def _name_problem(name: str) -> str:
+    """The name becomes a folder's, percent-encoded, below which its tables lie."""
+    if not name.strip():
+        return f"name: must not be empty, got {name!r}"
+    length = len(quote(name, safe=""))
+    if length > _LONGEST_NAME:
+        return (
+            f"name: must be <= {_LONGEST_NAME} bytes long where whatever no path may "
+            f"hold is percent-encoded, got {length}"
+        )
+    return ""
 
 
 def _limits_problem(experiment: Experiment) -> str:

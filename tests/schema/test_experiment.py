@@ -145,6 +145,25 @@ def test_impossible_experiment(text: str, message: str) -> None:
         parse(text)
 
 
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("", "test.toml: name: must not be empty, got ''"),
+        (" ", "name: must not be empty, got ' '"),
+        ("a" * 201, "name: must be <= 200 bytes .*, got 201"),
+        ("ä" * 34, "name: must be <= 200 bytes .*, got 204"),
+    ],
+)
+def test_a_name_that_no_folder_can_have(name: str, message: str) -> None:
+    with pytest.raises(ExperimentError, match=message):
+        parse_experiment(f'name = "{name}"', "test.toml")
+
+
+@pytest.mark.parametrize("name", ["a" * 200, "ä" * 33, "a/b c"])
+def test_a_name_that_a_folder_can_have(name: str) -> None:
+    assert parse_experiment(f'name = "{name}"', "test.toml").name == name
+
+
 def test_a_name_is_needed() -> None:
     with pytest.raises(ExperimentError, match="name"):
         parse_experiment("", "test.toml")
