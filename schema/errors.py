@@ -58,3 +58,8 @@ class SimulationDiverged(RevolveError):  # noqa: N818 - reads as what it says
 
 class StateDiffers(RevolveError):  # noqa: N818 - reads as what it says
     """A rebuilt arena is not what it was: this machine computes otherwise."""
+
+
+def one_line(error: Exception) -> str:
+    """Return what an error says, in a line: an engine takes several."""
+    return " ".join(str(error).split())

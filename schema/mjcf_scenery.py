@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 import mujoco
 import numpy as np
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, one_line
 from schema.evaluation import Floats
 from schema.experiment import Simulation
 
@@ -142,8 +142,9 @@ def scenery_model(scenery: str, simulation: Simulation) -> mujoco.MjModel:
         text = ET.tostring(root, encoding="unicode")
         model = mujoco.MjSpec.from_string(text).compile()
     except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise ExperimentError(f"environment.scenery: no MJCF: {reason}") from None
+        raise ExperimentError(
+            f"environment.scenery: no MJCF: {one_line(error)}"
+        ) from None
     _check_shapes(model)
     return model
 

@@ -2,13 +2,14 @@
 
 from collections.abc import Collection
 
+import mujoco
 import numpy as np
 
 from schema.arena import Casualty, Changes, Insertion
 from schema.birth import BirthId
 from schema.brain import Brain
 from schema.codec import encode_robot
-from schema.errors import UnexpectedEvent
+from schema.errors import UnexpectedEvent, one_line
 from schema.experiment import body_space
 from schema.robot import Robot, check_robot
 from worker.company import Company
@@ -84,7 +85,7 @@ def possible(changes: Changes, living: Collection[BirthId]) -> Changes:
 
 
 def newborn(insertion: Insertion, company: Company, step: int) -> Inhabitant | Casualty:
-    """Return a robot that has come into being at its place, or why it did not.
+    """Return a robot that feels for the first time, or why it never will.
 
     Args:
         insertion: who, what, where.
@@ -98,11 +99,17 @@ def newborn(insertion: Insertion, company: Company, step: int) -> Inhabitant | C
         body = company.shop.body(insertion.birth, insertion.robot)
     except ValueError as error:
         place = (*insertion.place, 0.0)
-        return Casualty(insertion.birth, step, f"cannot be built: {error}", place)
+        reason = f"cannot be built: {one_line(error)}"
+        return Casualty(insertion.birth, step, reason, place)
     seat = body.home.seats[0]
     x, y = insertion.place
     z = company.shop.height(body, insertion.place, insertion.heading)
     put(seat, (x, y, z), insertion.heading)
+    try:
+        seat.start()
+    except mujoco.FatalError as error:
+        reason = f"physics diverged: {one_line(error)}"
+        return Casualty(insertion.birth, step, reason, (x, y, z))
     window = Window(company.shop.settings.simulation, step)
     one = inhabitant(insertion.birth, insertion.robot, body, window, company)
     one.thinks_since, one.place = step, (x, y, z)

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from schema.birth import BirthId
+from schema.errors import one_line
 from schema.evaluation import Floats
 from schema.robot import Robot
 from worker.groups import Group, components
@@ -128,7 +129,7 @@ class Cluster:
             try:
                 mujoco.mj_step(model, data, nstep=plan[moment])
             except mujoco.FatalError as error:
-                self.failure, self.failed_at = str(error), moment
+                self.failure, self.failed_at = one_line(error), moment
                 self.keep(range(moment, len(plan)))
                 return
             keep(moment)

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from schema.environment import Environment
-from schema.errors import FitnessUndefined, SimulationDiverged
+from schema.errors import FitnessUndefined, SimulationDiverged, one_line
 from schema.evaluation import Evaluation, Track
 from schema.experiment import Fitness, Simulation, Space, body_space
 from schema.identity import NOBODY, Identity
@@ -104,13 +104,33 @@ def simulate(
         identity: which evaluation it is; nothing but noise depends on it.
 
     Raises:
-        SimulationDiverged: a number that is none, or a warning of the engine.
+        SimulationDiverged: a number that is none, a warning of the engine, or that
+            it gave up or cannot build the robot.
         ExperimentError: a sensor that the world has nothing for.
         InvalidRobot: more neurons than the limits.
     """
     silence_engine()
-    model = solo_model(robot, body_space(space), simulation, environment)
+    try:
+        model = solo_model(robot, body_space(space), simulation, environment)
+    except ValueError as error:
+        raise SimulationDiverged(f"cannot be built: {one_line(error)}") from None
     life = _Life(robot, space, simulation, model, identity=identity)
+    try:
+        return _live(life, model, simulation, watch)
+    except mujoco.FatalError as error:
+        # It cannot go on with this robot, say for want of room for all contacts.
+        raise SimulationDiverged(
+            f"physics diverged by {life.data.time:.3f} s: {one_line(error)}"
+        ) from None
+
+
+def _live(
+    life: "_Life",
+    model: mujoco.MjModel,
+    simulation: Simulation,
+    watch: Callable[[mujoco.MjData], None] | None,
+) -> Track:
+    """Let a robot live, and return where it goes."""
     start = simulation.warmup_steps
     end = start + simulation.window_steps
     positions: list[float] = []

@@ -91,7 +91,8 @@ class World:
     def apply(self, changes: Changes) -> None:
         """Take robots out, put robots in, replace brains, in this order.
 
-        A robot that the engine cannot build is a casualty of the next advance.
+        A robot that the engine cannot build, or gives up on at once, is a casualty of
+        the next advance.
 
         Args:
             changes: what is done before the next advance.
@@ -235,8 +236,6 @@ class World:
             else:
                 newcomers.append(one)
         self.company.add(newcomers)
-        for one in newcomers:
-            one.seat.start()
         light.shine(self.company, newcomers)
         for one in newcomers:
             self._minds.first_tick(self.step, one)

@@ -12,7 +12,14 @@ from schema.birth import BirthId
 from schema.brain import Brain, Connection
 from schema.parts import Box, Shape
 from schema.robot import Robot
-from tests.worker.arena_cases import SETTINGS, crowd, inhabited, seconds, state_of
+from tests.worker.arena_cases import (
+    SETTINGS,
+    crowd,
+    inhabited,
+    seconds,
+    settings_of,
+    state_of,
+)
 from worker.world import World
 
 Robots = Callable[[int], Robot]
@@ -111,6 +118,37 @@ def test_what_cannot_be_built_is_told_even_after_a_restore(turtle: Robot) -> Non
     assert isinstance(casualty, Casualty)
     assert casualty.birth == BAD
     assert seconds(restored, 1.0).casualties == ()
+
+
+@pytest.mark.parametrize(
+    ("memory", "drop_m", "told"),
+    [
+        (1 << 9, 0.25, "cannot be built: "),
+        (1 << 12, 0.25, "physics diverged: "),
+        (1 << 11, 0.0, "physics diverged: "),
+    ],
+)
+def test_an_engine_that_gives_up_on_a_robot_ends_it_and_nobody_else(
+    turtle: Robot,
+    monkeypatch: pytest.MonkeyPatch,
+    memory: int,
+    drop_m: float,
+    told: str,
+) -> None:
+    """When it is built, in the air, or at birth; the world goes on."""
+    world = inhabited(
+        settings_of(drop_m=drop_m), [Insertion(BirthId(0, 1), turtle, (0.0, 0.0))]
+    )
+    with monkeypatch.context() as patch:
+        patch.setattr("schema.mjcf.MEMORY_BYTES", memory)
+        world.apply(Changes(insertions=(Insertion(BAD, turtle, (1.5, 0.0)),)))
+    [casualty] = seconds(world, 1.0).casualties
+    assert casualty.birth == BAD
+    assert casualty.reason.startswith(told)
+    assert "out of memory" in casualty.reason
+    assert "\n" not in casualty.reason
+    assert world.births == (BirthId(0, 1),)
+    assert seconds(world, 1.0).casualties == ()
 
 
 def never(_track: object, _fitness: object) -> float:

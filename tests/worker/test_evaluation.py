@@ -165,6 +165,26 @@ def test_a_diverged_robot_does_not_harm_the_next(robot_of: RobotOf) -> None:
     assert bits(simulate(robot_of(4), Space(), WORLD, FLAT)) == before
 
 
+@pytest.mark.parametrize(
+    ("memory", "told"),
+    [
+        (1 << 9, "cannot be built: .*out of memory"),
+        (1 << 12, r"physics diverged by 0\.060 s: .*out of memory"),
+    ],
+)
+def test_an_engine_that_gives_up_on_a_robot_is_a_result(
+    turtle: Robot, monkeypatch: pytest.MonkeyPatch, memory: int, told: str
+) -> None:
+    """Too many contacts for the memory that a robot has; it is told in a line."""
+    before = bits(simulate(turtle, Space(), WORLD, FLAT))
+    with monkeypatch.context() as patch:
+        patch.setattr("schema.mjcf.MEMORY_BYTES", memory)
+        with pytest.raises(SimulationDiverged, match=told) as caught:
+            simulate(turtle, Space(), WORLD, FLAT)
+    assert "\n" not in str(caught.value)
+    assert bits(simulate(turtle, Space(), WORLD, FLAT)) == before
+
+
 def test_a_light_sensor_in_a_world_without_light_is_refused() -> None:
     grey = (0.5, 0.5, 0.5)
     parts = (
