@@ -8,9 +8,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from revolve import COMMANDS
+from schema.experiment import Arena
 from schema.experiment_file import parse_experiment
 
 pytestmark = pytest.mark.system
@@ -82,6 +84,15 @@ def test_experiments_of_the_experiments_page(tmp_path: Path) -> None:
         assert done.returncode == 0, f"{document}\n{done.stderr}"
         if "my_parts" not in document:
             parse_experiment(document, str(tmp_path / page.name))
+
+
+def test_the_keys_of_an_arena_are_all_told_with_their_defaults() -> None:
+    page = (TOP / "docs" / "arenas.md").read_text()
+    told = re.findall(r"^\| `(\w+)` \| (\S+) \|", page, re.MULTILINE)
+    assert told == [
+        (field.name, str(field.default).lower())
+        for field in msgspec.structs.fields(Arena)
+    ]
 
 
 def test_commands_of_the_robots_page(tmp_path: Path) -> None:
