@@ -9,7 +9,7 @@ time step five times finer (``worker.fidelity``); ``revolve bench arena`` and
 import argparse
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -17,6 +17,8 @@ from typing import cast
 import mujoco
 import numpy as np
 from msgspec.structs import replace
+from rich.console import Console
+from rich.progress import track
 
 from schema.birth import BirthId
 from schema.errors import SimulationDiverged
@@ -58,7 +60,7 @@ class Timing:
 
 
 def time_evaluations(
-    robots: Sequence[Robot], settings: EvaluationSettings, repeats: int = 7
+    robots: Iterable[Robot], settings: EvaluationSettings, repeats: int = 7
 ) -> Timing:
     """Return how long evaluations take beside the bare engine.
 
@@ -194,7 +196,7 @@ def _evaluate(options: argparse.Namespace) -> int:
         fitness=experiment.fitness,
         environment=experiment.environment,
     )
-    timing = time_evaluations(robots, settings)
+    timing = time_evaluations(_shown(robots, "random robots"), settings)
     each_s = timing.evaluation_s / timing.robots
     _say(
         f"{timing.robots} random robots: {1000 * each_s:.1f} ms CPU each, "
@@ -212,11 +214,13 @@ def _fidelity(options: argparse.Namespace) -> int:
         other = _changed(experiment, options.against)
     chosen = fidelity.sample_thirds(population.fitness, options.per_third, options.seed)
     best = fidelity.winners(population.fitness)
-    found = fidelity.compare(
-        [population.robots[index] for index in chosen], experiment, other
-    )
-    top = fidelity.compare(
-        [population.robots[index] for index in best], experiment, other
+    found, top = (
+        fidelity.compare(
+            _shown([population.robots[index] for index in which], name),
+            experiment,
+            other,
+        )
+        for which, name in ((chosen, "robots drawn"), (best, "winners"))
     )
     size = options.per_third
     thirds = [found.of(slice(k * size, (k + 1) * size)) for k in range(fidelity.THIRDS)]
@@ -243,6 +247,13 @@ def _changed(experiment: Experiment, settings: Sequence[str]) -> Simulation:
     wanted = parse_experiment(text, "--against").simulation
     keys = [setting.partition("=")[0].strip() for setting in settings]
     return replace(experiment.simulation, **{key: getattr(wanted, key) for key in keys})
+
+
+def _shown(robots: Sequence[Robot], what: str) -> Iterable[Robot]:
+    """Give robots one by one, and show on the terminal how many are done."""
+    # Nothing is drawn meanwhile: it would be measured, too.
+    console = Console(stderr=True)
+    return track(robots, what, console=console, transient=True, auto_refresh=False)
 
 
 def _say(*lines: str) -> None:

@@ -4,7 +4,7 @@ Robots of a run, drawn from each third of its fitness, are simulated anew with a
 finer time step, or with any other setting changed; their ranks are compared.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -128,7 +128,7 @@ def finer(simulation: Simulation, factor: int = 5) -> Simulation:
 
 
 def compare(
-    robots: Sequence[Robot], experiment: Experiment, other: Simulation
+    robots: Iterable[Robot], experiment: Experiment, other: Simulation
 ) -> Agreement:
     """Return the fitness of robots in their experiment's world and in another.
 
@@ -138,10 +138,10 @@ def compare(
         other: the world to compare with; a robot that diverges there counts 0.
     """
     worlds = (experiment.simulation, other)
-    first, second = (
-        np.array([_fitness(robot, experiment, world) for robot in robots])
-        for world in worlds
-    )
+    found = [
+        [_fitness(robot, experiment, world) for world in worlds] for robot in robots
+    ]
+    first, second = np.array(found).reshape(-1, 2).T
     return Agreement(first, second)
 
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -107,3 +108,28 @@ def test_an_error_that_is_not_of_the_output_is_none_of_it(
     monkeypatch.setattr(revolve, "_overview", lambda: Path("/nowhere").read_text())
     with pytest.raises(FileNotFoundError):
         revolve.main([])
+
+
+def _shown(*words: str) -> str:
+    """Return what a command shows on a terminal that is its standard error."""
+    screen, terminal = os.openpty()
+    with subprocess.Popen(
+        [sys.executable, "-m", "revolve", *words],
+        stdout=subprocess.DEVNULL,
+        stderr=terminal,
+        cwd=ROOT,
+    ):
+        os.close(terminal)
+        shown = b""
+        # A terminal whose last user is gone fails to be read.
+        with os.fdopen(screen, "rb", buffering=0) as file, suppress(OSError):
+            while more := file.read(4096):
+                shown += more
+    return shown.decode()
+
+
+def test_benches_show_how_far_they_are(undisturbed: Path) -> None:
+    assert "100%" in _shown("bench", "evaluate", "--robots", "1")
+    shown = _shown("bench", "fidelity", str(undisturbed), "--per-third", "1")
+    assert "robots drawn" in shown
+    assert "winners" in shown
