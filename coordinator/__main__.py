@@ -18,6 +18,7 @@ from coordinator.compare import compare
 from coordinator.events import AgentKind
 from coordinator.folder import DETAILS, read_details
 from coordinator.running import Deployment, resume, start, start_campaign
+from coordinator.wording import stopped
 from schema.agent_command import tls_of
 from schema.crew import cores
 from schema.errors import NetworkError, RunFolderError
@@ -80,7 +81,7 @@ def _stoppable(folder: Path, evolve: Callable[[], int]) -> int:
         return evolve()
     except KeyboardInterrupt:
         if is_campaign(folder) or (folder / DETAILS).exists():
-            tell_user(f"stopped; to go on: revolve resume {folder}")
+            tell_user(stopped(folder))
         raise
 
 

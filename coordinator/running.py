@@ -40,7 +40,7 @@ from coordinator.progress import Display
 from coordinator.reception import Reception
 from coordinator.service import Network
 from coordinator.summary import Conclusion, conclude
-from coordinator.wording import command
+from coordinator.wording import command, stopped
 from schema.crew import Crew, stop_on_signals
 from schema.errors import NetworkError, RevolveError
 from schema.experiment import Experiment
@@ -178,7 +178,7 @@ def _alone(folder: Path, held: RunFolder, deployment: Deployment) -> int:
     for _, error in conductor.failed:
         raise error
     if not conductor.is_finished:
-        tell_user(f"stopped; to go on: {command('resume', folder)}")
+        tell_user(stopped(folder))
         return 130
     print(said[0].text)  # noqa: T201 - the result of the command
     return 0 if said[0].is_judged else 1
@@ -232,7 +232,7 @@ def _together(folder: Path, planned: Sequence[Planned], deployment: Deployment) 
 
     conductor = _conduct(folder, planned, deployment, conclude_run)
     if not conductor.is_finished:
-        tell_user(f"stopped; to go on: {command('resume', folder)}")
+        tell_user(stopped(folder))
         return 130
     if conductor.failed:
         tell_user(
