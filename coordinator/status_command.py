@@ -25,6 +25,9 @@ from schema.operator_codec import (
 from schema.service import tell_user
 from schema.status import RunStatus, Status
 
+_WIDEST = 1000
+"""Characters of a line; it ends where its text does."""
+
 
 def main(arguments: list[str]) -> int:
     """Tell how far runs are.
@@ -143,9 +146,10 @@ def _show(status: Status, title: str, root: Path | None = None) -> None:
             f"{status.births_per_s:.1f} births/s, {status.workers} workers, "
             f"{status.analyzers} analyzers, {duration(status.left_s)} left"
         )
-    else:
+    elif done < len(status.runs):
         lines.append("nobody is at it, or nobody works for it")
-    console = Console(soft_wrap=True, highlight=False, markup=False)
+    # As wide as it takes: a narrow terminal wraps lines, and nothing is cut.
+    console = Console(width=_WIDEST, highlight=False, markup=False)
     for line in lines:
         console.print(line)
     console.print(table)

@@ -11,6 +11,7 @@ import pytest
 from coordinator.compare import compare
 from coordinator.folder import read_state
 from coordinator.folder_status import folder_status
+from coordinator.status_command import main as status
 from schema.errors import RunFolderError
 
 pytestmark = pytest.mark.system
@@ -140,6 +141,19 @@ def test_what_is_damaged_or_lost_of_a_run_is_told(
         path.write_text(content)
     with pytest.raises(RunFolderError, match=told):
         folder_status(run)
+
+
+def test_a_narrow_terminal_cuts_nothing_of_how_far_runs_are(
+    made: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    assert status(["status", str(made)]) == 0
+    said = capsys.readouterr().out
+    assert "2 of 2 runs finished, 24 of 24 births" in said
+    assert "nobody is at it" not in said
+    for name in ("twice/seeing-0", "twice/seeing-1"):
+        (line,) = [line for line in said.splitlines() if name in line]
+        assert line.split()[1:6] == ["finished", "12", "of", "12", "best"]
 
 
 def test_a_run_whose_journal_is_lost_does_not_begin_anew(
