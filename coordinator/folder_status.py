@@ -7,6 +7,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from coordinator.folder import RunDetails, read_details, read_holder, read_state
+from coordinator.wording import command
 from schema.errors import RunFolderError
 from schema.experiment import island_count, island_experiment
 from schema.experiment_file import experiment_from_text
@@ -28,7 +29,10 @@ def folder_status(folder: Path) -> RunStatus:
     status = unbegun_status(folder, details)
     births = _by_island(read_table(folder, "births").select(["island"]), "count")
     if state == "finished" and not births:
-        raise RunFolderError(f"{folder}: is finished, and its tables are gone")
+        raise RunFolderError(
+            f"{folder}: is finished, and its tables are gone; to have them written "
+            f"anew: {command('resume', folder)}"
+        )
     population = read_table(folder, "population").select(
         ["island", "births", "fitness"]
     )

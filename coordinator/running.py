@@ -47,6 +47,7 @@ from schema.experiment import Experiment
 from schema.experiment_file import experiment_from_text, experiment_text
 from schema.network import THIS_MACHINE, Agent, Tls
 from schema.platform_tag import platform_tag
+from schema.run_tables import read_table
 from schema.service import tell_user
 from schema.supervision import CPU_LIMIT_S, Post
 from schema.topics import unique_name
@@ -155,8 +156,10 @@ def resume(folder: Path, deployment: Deployment) -> int:
             planned = _plan(folder, read_campaign(folder))
             return _together(folder, planned, deployment)
     if read_state(folder) == "finished":
-        tell_user(f"{folder}: is finished; nothing is left to do")
-        return 0
+        if read_table(folder, "births").num_rows:
+            tell_user(f"{folder}: is finished; nothing is left to do")
+            return 0
+        tell_user(f"{folder}: its tables are gone: the journal gives them again")
     return _alone(folder, RunFolder(folder), deployment)
 
 

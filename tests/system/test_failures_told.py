@@ -156,6 +156,18 @@ def test_a_narrow_terminal_cuts_nothing_of_how_far_runs_are(
         assert line.split()[1:6] == ["finished", "12", "of", "12", "best"]
 
 
+def test_tables_that_are_gone_are_written_anew(stage: Stage, made: Path) -> None:
+    run = stage.folder / "run"
+    shutil.copytree(made / "twice" / "seeing-0", run)
+    words = ("resume", "run", "--in-process", "--quiet")
+    assert "nothing is left to do" in stage.run(*words)
+    shutil.rmtree(run / "tables")
+    said = stage.run(*words)
+    assert "its tables are gone: the journal gives them again" in said
+    assert "12 births" in said
+    assert compare(run, made / "twice" / "seeing-0") == []
+
+
 def test_a_run_whose_journal_is_lost_does_not_begin_anew(
     stage: Stage, made: Path
 ) -> None:
