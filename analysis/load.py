@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 from pyarrow.parquet import read_schema
 
 from schema.errors import RunFolderError
-from schema.run_tables import FINISHED, read_table, segments_of
+from schema.run_tables import FINISHED, has_rows, read_table
 from schema.tables import TABLES, VERSION
 
 TABLE = "table "
@@ -157,7 +157,7 @@ def _read_run(folder: Path) -> Run:
         document=str(details["document"]),
         islands=islands,
     )
-    if run.is_finished and not any(_is_there(folder, each) for each in TABLES):
+    if run.is_finished and not any(has_rows(folder, each) for each in TABLES):
         raise RunFolderError("is finished, but its tables are gone: none is there")
     return run
 
@@ -238,21 +238,16 @@ def _named(table: pa.Table) -> pa.Table:
 def _check_there(run: Run, name: str) -> None:
     """Raise if a finished run has lost a table: no rows would be taken for none."""
     online = [island.is_online for island in run.islands]
-    has_rows = {
+    expected = {
         "evaluations": not all(online),
         "fitness": any(online),
         "deaths": any(online),
         "touches": any(island.records_touches for island in run.islands),
         "migrations": len(run.islands) > 1,
     }
-    is_expected = run.is_finished and has_rows.get(name, True)
-    if is_expected and not _is_there(run.folder, name):
+    is_expected = run.is_finished and expected.get(name, True)
+    if is_expected and not has_rows(run.folder, name):
         raise RunFolderError("is not there, though the run is finished")
-
-
-def _is_there(folder: Path, name: str) -> bool:
-    finished = (folder / FINISHED).glob(f"*/*/{name}.parquet")
-    return any(finished) or bool(segments_of(folder, name))
 
 
 def _check_version(folder: Path, name: str) -> None:

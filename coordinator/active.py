@@ -11,7 +11,7 @@ from coordinator.arena import Arena
 from coordinator.audits import CARELESS, Caution
 from coordinator.events import Record
 from coordinator.fleet import Fleet
-from coordinator.folder import DETAILS, RunFolder
+from coordinator.folder import DETAILS, STATE, RunFolder
 from coordinator.island import Island
 from coordinator.journal import NAME as JOURNAL
 from coordinator.journal import Journal, is_begun
@@ -27,8 +27,10 @@ from schema.errors import RunFolderError
 from schema.experiment import Experiment, island_experiment
 from schema.experiment_file import experiment_from_text
 from schema.platform_tag import cpu_flags, our_version, platform_tag
+from schema.run_tables import has_rows
 from schema.service import tell_user
 from schema.status import IslandStatus, RunStatus
+from schema.tables import TABLES
 
 _LIBRARIES = ("mujoco-core", "eclipse-zenoh", "numpy", "pyarrow", "protobuf")
 
@@ -71,13 +73,7 @@ class ActiveRun:
         details = held.details
         with ExitStack() as stack:
             stack.callback(held.close)
-            self._recorder = Recorder(held.path, details, fsync=fsync)
-            stack.callback(self._recorder.close)
-            if not (self._recorder.is_empty or is_begun(held.path)):
-                raise RunFolderError(
-                    f"{held.path / JOURNAL}: is lost, and there are tables: put a "
-                    "sound copy of it in its place, or begin anew in another folder"
-                )
+            _check_journal(held.path)
             self._journal = stack.enter_context(
                 Journal.open(held.path, epoch=held.epoch, fsync=fsync)
             )
@@ -86,6 +82,8 @@ class ActiveRun:
                     f"{held.path}: journal: dropped a cut record of "
                     f"{self._journal.dropped} bytes at its end"
                 )
+            self._recorder = Recorder(held.path, details, fsync=fsync)
+            stack.callback(self._recorder.close)
             self.experiment = experiment_from_text(details.document)
             self.feed = Feed(held.name, held.epoch, details) if is_watched else None
             rows = Overheard(self._recorder, self.feed) if self.feed else self._recorder
@@ -176,6 +174,20 @@ class ActiveRun:
             births_per_s=self._births.per_s,
             islands=islands,
             simulated_per_s=self._simulated.per_s,
+        )
+
+
+def _check_journal(folder: Path) -> None:
+    """Raise if a run has lost its journal; nothing is touched before.
+
+    Raises:
+        RunFolderError: it has none, and had.
+    """
+    is_old = (folder / STATE).exists() or any(has_rows(folder, name) for name in TABLES)
+    if is_old and not is_begun(folder):
+        raise RunFolderError(
+            f"{folder / JOURNAL}: is lost: put a sound copy of it in its place, or "
+            "begin anew in another folder"
         )
 
 

@@ -83,6 +83,7 @@ class RunFolder:
                 used folder, no run in an old one, or a disk that fails.
         """
         self.path = path
+        self._is_new = details is not None
         if details is None:
             read_details(path)
         try:
@@ -133,12 +134,12 @@ class RunFolder:
             )
 
     def forget(self) -> None:
-        """Leave no trace of a run of which nothing has been done.
+        """Leave no trace of a run that this process described and did not begin.
 
-        The lock stays: it is a holder's even after a moment.
+        The lock stays: whoever waits for it would have one that nobody else sees.
         """
-        if self.epoch == 1 and not (self.path / JOURNAL).exists():
-            for name in (DETAILS, EPOCH):
+        if self._is_new and not (self.path / JOURNAL).exists():
+            for name in (EPOCH, DETAILS):
                 (self.path / name).unlink(missing_ok=True)
 
     def close(self) -> None:
@@ -157,6 +158,18 @@ class RunFolder:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def holds_run(path: Path) -> bool:
+    """Return whether a folder is one of a run, be it damaged.
+
+    Raises:
+        RunFolderError: it cannot be looked into.
+    """
+    try:
+        return (path / DETAILS).exists()
+    except OSError as error:
+        raise RunFolderError(f"{path}: cannot be read: {error.strerror}") from None
 
 
 def read_details(path: Path) -> RunDetails:

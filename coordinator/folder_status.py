@@ -7,11 +7,12 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from coordinator.folder import RunDetails, read_details, read_holder, read_state
+from coordinator.journal import is_begun
 from coordinator.wording import command
 from schema.errors import RunFolderError
 from schema.experiment import island_count, island_experiment
 from schema.experiment_file import experiment_from_text
-from schema.run_tables import read_table
+from schema.run_tables import has_rows, read_table
 from schema.status import IslandStatus, RunStatus
 
 
@@ -29,10 +30,11 @@ def folder_status(folder: Path) -> RunStatus:
     status = unbegun_status(folder, details)
     births = _by_island(read_table(folder, "births").select(["island"]), "count")
     if state == "finished" and not births:
-        raise RunFolderError(
-            f"{folder}: is finished, and its tables are gone; to have them written "
-            f"anew: {command('resume', folder)}"
-        )
+        what = f"{folder}: is finished, and its tables are gone"
+        if not can_rewrite(folder, details):
+            raise RunFolderError(f"{what}: put a copy of them in their place")
+        again = command("resume", folder)
+        raise RunFolderError(f"{what}; to have them written anew: {again}")
     population = read_table(folder, "population").select(
         ["island", "births", "fitness"]
     )
@@ -54,6 +56,21 @@ def folder_status(folder: Path) -> RunStatus:
             )
         )
     return replace(status, state=state, islands=tuple(islands))
+
+
+def can_rewrite(folder: Path, details: RunDetails) -> bool:
+    """Return whether the journal has all rows of a run: an arena's poses it has not.
+
+    Args:
+        folder: of the run.
+        details: what it is.
+    """
+    experiment = experiment_from_text(details.document)
+    has_arena = any(
+        island_experiment(experiment, number).arena is not None
+        for number in range(island_count(experiment))
+    )
+    return is_begun(folder) and (not has_arena or has_rows(folder, "poses"))
 
 
 def _by_island(table: pa.Table, what: str) -> dict[int, int]:

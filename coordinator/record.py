@@ -47,11 +47,6 @@ class Recorder:
             name: TableFile(folder, name, paths[name], fsync=fsync) for name in TABLES
         }
 
-    @property
-    def is_empty(self) -> bool:
-        """No row stands on disk."""
-        return not any(table.stored for table in self._tables.values())
-
     def write(self, record: Record) -> None:
         """Take one row; it may wait for others before it is on disk.
 

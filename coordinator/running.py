@@ -28,18 +28,18 @@ from coordinator.disk import replace_durably
 from coordinator.events import AgentKind
 from coordinator.fleet import Agents, Fleet
 from coordinator.folder import (
-    DETAILS,
     RunDetails,
     RunFolder,
+    holds_run,
     read_details,
     read_state,
 )
-from coordinator.folder_status import folder_status, unbegun_status
+from coordinator.folder_status import can_rewrite, folder_status, unbegun_status
 from coordinator.local import LocalAgents
 from coordinator.progress import Display
 from coordinator.reception import Reception
 from coordinator.service import Network
-from coordinator.summary import Conclusion, conclude
+from coordinator.summary import Conclusion, conclude, failures
 from coordinator.wording import command, stopped
 from schema.crew import Crew, stop_on_signals
 from schema.errors import NetworkError, RevolveError
@@ -47,7 +47,7 @@ from schema.experiment import Experiment
 from schema.experiment_file import experiment_from_text, experiment_text
 from schema.network import THIS_MACHINE, Agent, Tls
 from schema.platform_tag import platform_tag
-from schema.run_tables import read_table
+from schema.run_tables import has_rows
 from schema.service import tell_user
 from schema.supervision import CPU_LIMIT_S, Post
 from schema.topics import unique_name
@@ -126,11 +126,11 @@ def start_campaign(folder: Path, campaign: Campaign, deployment: Deployment) -> 
     """
     with CampaignFolder(folder):
         refuse_used(folder)
-        planned = _plan(folder, campaign)
+        planned, barren = _plan(folder, campaign)
         begun = _begun(folder, campaign)
         write_campaign(folder, campaign)
         try:
-            return _together(folder, planned, deployment)
+            return _together(folder, planned, barren, deployment)
         except NetworkError:
             if _begun(folder, campaign) == begun:
                 forget_campaign(folder)
@@ -139,7 +139,7 @@ def start_campaign(folder: Path, campaign: Campaign, deployment: Deployment) -> 
 
 def _begun(folder: Path, campaign: Campaign) -> int:
     """Return how many runs of a campaign are there, be it no more than a beginning."""
-    return sum((path / DETAILS).exists() for path, _ in campaign.runs(folder))
+    return sum(holds_run(path) for path, _ in campaign.runs(folder))
 
 
 def resume(folder: Path, deployment: Deployment) -> int:
@@ -153,12 +153,14 @@ def resume(folder: Path, deployment: Deployment) -> int:
     """
     if is_campaign(folder):
         with CampaignFolder(folder):
-            planned = _plan(folder, read_campaign(folder))
-            return _together(folder, planned, deployment)
+            planned, barren = _plan(folder, read_campaign(folder))
+            return _together(folder, planned, barren, deployment)
     if read_state(folder) == "finished":
-        if read_table(folder, "births").num_rows:
+        if has_rows(folder, "births"):
             tell_user(f"{folder}: is finished; nothing is left to do")
-            return 0
+            return 0 if _has_judged(folder) else 1
+        if not can_rewrite(folder, read_details(folder)):
+            folder_status(folder)  # says what is gone
         tell_user(f"{folder}: its tables are gone: the journal gives them again")
     return _alone(folder, RunFolder(folder), deployment)
 
@@ -174,6 +176,7 @@ def _alone(folder: Path, held: RunFolder, deployment: Deployment) -> int:
                 [Planned(held.details, status, lambda: held)],
                 deployment,
                 lambda run: said.append(_conclusion(run)),
+                lambda _details, _error: None,  # it is raised
             )
         except NetworkError:
             held.forget()
@@ -187,20 +190,23 @@ def _alone(folder: Path, held: RunFolder, deployment: Deployment) -> int:
     return 0 if said[0].is_judged else 1
 
 
-def _plan(folder: Path, campaign: Campaign) -> list[Planned]:
-    """Return all runs of a campaign, with what is there of them.
+def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
+    """Return all runs of a campaign, and where nobody could be judged of the finished.
 
     Raises:
         RunFolderError: a run that is there is another one.
     """
-    planned = []
+    planned, barren = [], []
     for path, details in campaign.runs(folder):
         status = unbegun_status(path, details)
-        if not (path / DETAILS).exists():
-            planned.append(Planned(details, status, partial(RunFolder, path, details)))
-            continue
         try:
+            if not holds_run(path):
+                take = partial(RunFolder, path, details)
+                planned.append(Planned(details, status, take))
+                continue
             found, status = read_details(path), folder_status(path)
+            if status.state == "finished" and not _has_judged(path):
+                barren.append(path)
         except RevolveError as error:
             # It cannot go on, and is no reason for the others not to.
             planned.append(Planned(details, status, partial(_refuse, error)))
@@ -212,19 +218,32 @@ def _plan(folder: Path, campaign: Campaign) -> list[Planned]:
         if theirs != ours:
             tell_user(f"{path}: is taken as it is, with {theirs} births, not {ours}")
         planned.append(Planned(found, status, partial(RunFolder, path)))
-    return planned
+    return planned, barren
+
+
+def _has_judged(folder: Path) -> bool:
+    """Return whether anybody of a finished run could be judged."""
+    return failures(folder)[1]
 
 
 def _refuse(error: RevolveError) -> RunFolder:
     raise error
 
 
-def _together(folder: Path, planned: Sequence[Planned], deployment: Deployment) -> int:
-    """Do all runs of a campaign, and tell what came of them."""
+def _together(
+    folder: Path, planned: Sequence[Planned], barren: list[Path], deployment: Deployment
+) -> int:
+    """Do all runs of a campaign, and tell what came of them.
+
+    Args:
+        folder: of the campaign.
+        planned: its runs.
+        barren: folders of finished ones in which nobody could be judged.
+        deployment: where and by whom.
+    """
     there = sum(one.status.state == "finished" for one in planned)
     if there:
         tell_user(f"{there} of {len(planned)} runs are finished already")
-    barren: list[Path] = []
 
     def conclude_run(run: ActiveRun) -> None:
         conclusion = _conclusion(run)
@@ -233,7 +252,7 @@ def _together(folder: Path, planned: Sequence[Planned], deployment: Deployment) 
         if not conclusion.is_judged:
             barren.append(run.held.path)
 
-    conductor = _conduct(folder, planned, deployment, conclude_run)
+    conductor = _conduct(folder, planned, deployment, conclude_run, _report)
     if not conductor.is_finished:
         tell_user(stopped(folder))
         return 130
@@ -258,6 +277,7 @@ def _conduct(
     planned: Sequence[Planned],
     deployment: Deployment,
     conclude_run: Callable[[ActiveRun], object],
+    report: Callable[[RunDetails, RevolveError], None],
 ) -> Conductor:
     """Do runs until all are done or somebody says stop.
 
@@ -266,11 +286,11 @@ def _conduct(
         planned: the runs.
         deployment: where and by whom.
         conclude_run: told of each run that is finished.
+        report: told of each run that cannot go on, and why.
     """
     stop = stop_on_signals()
     with ExitStack() as stack:
         agents, crews = stack.enter_context(_agents(place, deployment))
-        is_campaign_run = len(planned) > 1
         conductor = Conductor(
             planned,
             Fleet(agents, allows_drift=deployment.allows_drift),
@@ -284,7 +304,7 @@ def _conduct(
             ),
             most=_most_at_once(),
             conclude=conclude_run,
-            report=_report if is_campaign_run else lambda _details, _error: None,
+            report=report,
         )
         stack.callback(conductor.close)
         serve = _servant(conductor, agents)

@@ -9,8 +9,9 @@ from rich.table import Table
 
 from coordinator.campaign import CAMPAIGN, read_campaign
 from coordinator.client_service import ask_coordinators
-from coordinator.folder import DETAILS, RunDetails
+from coordinator.folder import DETAILS, EPOCH, LOCK, RunDetails, holds_run
 from coordinator.folder_status import folder_status, unbegun_status
+from coordinator.journal import NAME as JOURNAL
 from coordinator.running import ADDRESS
 from coordinator.wording import about_arenas, best_of, duration
 from schema.agent_command import add_network_flags, tls_of
@@ -22,6 +23,7 @@ from schema.operator_codec import (
     decode_operator_reply,
     encode_operator_request,
 )
+from schema.run_tables import FINISHED, SEGMENTS
 from schema.service import tell_user
 from schema.status import RunStatus, Status
 
@@ -36,7 +38,7 @@ def main(arguments: list[str]) -> int:
         arguments: the command's name first.
 
     Returns:
-        0 if done, 1 if a run is damaged.
+        0 if done, 1 if a run is damaged or has failed.
 
     Raises:
         NetworkError: no coordinator answers at an address that was given.
@@ -53,7 +55,7 @@ def main(arguments: list[str]) -> int:
     folder = Path(options.folder)
     status = _live(folder, options) or _by_folder(folder)
     _show(status, str(folder), folder)
-    return 1 if any(run.state == "damaged" for run in status.runs) else 0
+    return 1 if any(run.state in ("damaged", "failed") for run in status.runs) else 0
 
 
 def ask_status(options: argparse.Namespace) -> dict[str, Status]:
@@ -95,24 +97,38 @@ def _by_folder(folder: Path) -> Status:
     """
     planned: dict[Path, RunDetails] = {}
     runs: list[RunStatus] = []
-    for file in sorted(folder.glob(f"**/{CAMPAIGN}")):
+    for place in _below(folder, CAMPAIGN):
         try:
-            planned.update(read_campaign(file.parent).runs(file.parent))
+            planned.update(read_campaign(place).runs(place))
         except RunFolderError as error:
-            runs.append(_damaged(file.parent, error))
-    begun = {file.parent for file in folder.glob(f"**/{DETAILS}")}
-    for path in (*planned, *sorted(begun - planned.keys())):
+            runs.append(_damaged(place, error))
+    others = [path for path in _below(folder, DETAILS) if path not in planned]
+    for path in (*planned, *filter(_is_ours, others)):
         try:
-            is_begun = path in begun
-            told = (
+            is_begun = path not in planned or holds_run(path)
+            runs.append(
                 folder_status(path) if is_begun else unbegun_status(path, planned[path])
             )
-            runs.append(told)
         except RevolveError as error:
             runs.append(_damaged(path, error))
     if not runs:
         raise RunFolderError(f"{folder}: no run and no campaign is there or below")
     return Status(tuple(runs), 0, 0, 0.0)
+
+
+def _below(folder: Path, name: str) -> list[Path]:
+    """Return folders that hold a file of a name, at any depth; links are followed once.
+
+    Deeper ones are not, for they may lead back.
+    """
+    found = {*folder.glob(f"**/{name}"), *folder.glob(f"*/{name}")}
+    return sorted(path.parent for path in found)
+
+
+def _is_ours(folder: Path) -> bool:
+    """Return whether a folder with a description has anything else of a run."""
+    names = (LOCK, EPOCH, JOURNAL, SEGMENTS, FINISHED)
+    return any((folder / name).exists() for name in names)
 
 
 def _damaged(folder: Path, error: RevolveError) -> RunStatus:

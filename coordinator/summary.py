@@ -1,9 +1,11 @@
 """What a finished run comes to: the best robot, what failed, and where all is."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import pyarrow as pa
 import pyarrow.compute as pc
 
 from coordinator.arena import Arena
@@ -24,8 +26,8 @@ class Conclusion:
 
     Attributes:
         text: what there is to see.
-        failures: a line on evaluations that failed; empty if none did.
-        is_judged: not all of them did.
+        failures: a line on who could not be judged; empty if all could.
+        is_judged: somebody could.
     """
 
     text: str
@@ -46,15 +48,15 @@ def conclude(
     Raises:
         RunFolderError: a table cannot be read, or the robot not be written.
     """
-    failures, is_judged = _failures(folder)
+    told, is_judged = failures(folder)
     lines = [*_results(folder, experiment, islands), f"tables: {folder / 'tables'}"]
-    if failures:
-        lines.insert(1, failures)
+    if told:
+        lines.insert(1, told)
     lines.append("try next:")
     if (folder / BEST).exists():
         lines.append(f"  {command('robot', 'render', folder / BEST, 'best.gif')}")
     lines += [f"  {command(what, folder)}" for what in ("view", "analyze")]
-    return Conclusion("\n".join(lines), failures, is_judged)
+    return Conclusion("\n".join(lines), told, is_judged)
 
 
 def _results(
@@ -95,15 +97,35 @@ def _results(
     ]
 
 
-def _failures(folder: Path) -> tuple[str, bool]:
-    """Return a line on evaluations that failed, and whether any other is there."""
-    evaluations = read_table(folder, "evaluations").select(["status", "reason"])
-    failed = evaluations.filter(pc.equal(evaluations["status"], "failed"))
-    if not failed.num_rows:
-        return "", True
-    reasons = failed.group_by("reason").aggregate([("reason", "count")])
-    most = reasons.sort_by([("reason_count", "descending"), ("reason", "ascending")])
-    reason, count = most["reason"][0].as_py(), most["reason_count"][0].as_py()
-    share = "all" if count == failed.num_rows else f"{count} of them"
-    line = f"{failed.num_rows} of {evaluations.num_rows} evaluations failed"
-    return f"{line}, {share}: {reason}", failed.num_rows < evaluations.num_rows
+def failures(folder: Path) -> tuple[str, bool]:
+    """Return a line on who could not be judged, and whether anybody could.
+
+    Args:
+        folder: of a finished run.
+
+    Raises:
+        RunFolderError: a table cannot be read.
+    """
+    evaluations = read_table(folder, "evaluations")
+    failed = evaluations.filter(pc.field("status") == "failed")
+    deaths = read_table(folder, "deaths")
+    lost = deaths.filter(pc.field("reason") == "diverged")
+    told = []
+    if failed.num_rows:
+        what = f"{failed.num_rows} of {evaluations.num_rows} evaluations failed"
+        told.append(f"{what}, {_most_often(failed['reason'])}")
+    if lost.num_rows:
+        what = f"{lost.num_rows} of {deaths.num_rows} deaths were failures"
+        told.append(f"{what}, {_most_often(lost['detail'])}")
+    is_judged = (
+        failed.num_rows < evaluations.num_rows
+        or read_table(folder, "fitness").num_rows > 0
+    )
+    return "; ".join(told), is_judged
+
+
+def _most_often(reasons: pa.ChunkedArray) -> str:
+    """Return the most frequent of some reasons, and how many it is of."""
+    ((reason, count),) = Counter(reasons.to_pylist()).most_common(1)
+    share = "all" if count == len(reasons) else f"{count} of them"
+    return f"{share}: {reason}"

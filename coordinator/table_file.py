@@ -31,8 +31,7 @@ class TableFile:
     of one table all come in the same way.
 
     Attributes:
-        stored: how many rows are on disk.
-        waiting: rows that are not.
+        waiting: rows that are not on disk yet.
     """
 
     def __init__(self, folder: Path, name: str, parquet: Path, *, fsync: bool) -> None:
@@ -47,9 +46,9 @@ class TableFile:
         self._ahead = 0
         self.waiting: list[Mapping[str, Any]] = []
         if parquet.exists():
-            self.stored: int = read_table(folder, name).num_rows
+            self._stored: int = read_table(folder, name).num_rows
             return
-        self.stored, unused = stored_rows(folder, name)
+        self._stored, unused = stored_rows(folder, name)
         try:
             for _, path in unused:
                 path.unlink()
@@ -58,16 +57,16 @@ class TableFile:
 
     def take(self, row: Mapping[str, Any]) -> None:
         """Take the next row, unless it stands on disk already."""
-        if self._seen >= self.stored:
+        if self._seen >= self._stored:
             self.waiting.append(row)
         self._seen += 1
 
     def store(self, rows: int, columns: bytes) -> None:
         """Write bulk rows that nobody has counted yet."""
         known = self._seen + self._ahead
-        if self.stored > known:
+        if self._stored > known:
             cut_chain(self._folder, self._name, known)
-            self.stored = known
+            self._stored = known
         if rows:
             self._write(self._bulk(rows, columns))
             self._ahead += rows
@@ -75,10 +74,10 @@ class TableFile:
     def take_columns(self, rows: int, columns: bytes) -> None:
         """Count the next bulk rows; write them unless they stand on disk already."""
         end = self._seen + rows
-        if self.stored < end:
+        if self._stored < end:
             if not columns:
                 raise RunFolderError(
-                    f"{self._folder / SEGMENTS}: {self._name}: rows {self.stored} to "
+                    f"{self._folder / SEGMENTS}: {self._name}: rows {self._stored} to "
                     f"{end - 1} are missing, and the journal does not hold them: put "
                     "a sound copy of the segments in their place"
                 )
@@ -97,9 +96,9 @@ class TableFile:
         if self._parquet.exists():
             return
         rows, _ = stored_rows(self._folder, self._name)
-        if rows != self.stored:
+        if rows != self._stored:
             raise RunFolderError(
-                f"{self._folder / SEGMENTS}: {self._name}: must hold {self.stored} "
+                f"{self._folder / SEGMENTS}: {self._name}: must hold {self._stored} "
                 f"rows, got {rows}: resume the run to write them again"
             )
         replace_durably(self._parquet, self._write_parquet)
@@ -125,12 +124,12 @@ class TableFile:
         """Add a batch to the segment, whole or not at all."""
         if self._parquet.exists():
             raise RunFolderError(
-                f"{self._parquet}: finished with {self.stored} rows, and more came"
+                f"{self._parquet}: finished with {self._stored} rows, and more came"
             )
         if self._segment is None:
             self._segment = self._opened()
         self._segment.append(batch.serialize().to_pybytes())
-        self.stored += batch.num_rows
+        self._stored += batch.num_rows
 
     def _bulk(self, rows: int, columns: bytes) -> pa.RecordBatch:
         """Return bulk rows as one batch with their numbers."""
@@ -139,7 +138,7 @@ class TableFile:
             raise MalformedMessage(
                 f"{self._name}: must be {rows} rows, got {table.num_rows}"
             )
-        numbers = pa.array(range(self.stored, self.stored + rows), pa.int64())
+        numbers = pa.array(range(self._stored, self._stored + rows), pa.int64())
         arrays = [numbers, *(column.combine_chunks() for column in table.columns)]
         return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
 
@@ -155,7 +154,7 @@ class TableFile:
     def _batch(self) -> pa.RecordBatch:
         """Return the waiting rows as columns."""
         rows = self.waiting
-        numbers = range(self.stored, self.stored + len(rows))
+        numbers = range(self._stored, self._stored + len(rows))
         arrays = [pa.array(numbers, self._schema.field(0).type)]
         for index, column in enumerate(self._columns, start=1):
             kind = self._schema.field(index).type

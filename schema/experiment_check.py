@@ -68,6 +68,8 @@ def _name_problem(name: str) -> str:
     """The name becomes a folder's, percent-encoded, below which its tables lie."""
     if not name.strip():
         return f"name: must not be empty, got {name!r}"
+    if not name.isprintable():
+        return f"name: must be printable, got {name!r}"
     length = len(quote(name, safe=""))
     if length > _LONGEST_NAME:
         return (

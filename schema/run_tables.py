@@ -176,6 +176,12 @@ def _chain(folder: Path, table: str) -> Iterator[tuple[int, pa.RecordBatch | Non
                 yield index, batch.slice(batch.num_rows - new)
 
 
+def has_rows(folder: Path, table: str) -> bool:
+    """Return whether a run has begun to write a table, or has it finished."""
+    finished = (folder / FINISHED).glob(f"*/*/{table}.parquet")
+    return any(finished) or bool(segments_of(folder, table))
+
+
 def read_table(folder: Path, table: str) -> pa.Table:
     """Return all rows of a table of a run, finished or not, island by island.
 

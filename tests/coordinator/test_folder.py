@@ -109,6 +109,25 @@ def test_a_used_folder_is_refused(tmp_path: Path) -> None:
     assert RunFolder(tmp_path / "run").epoch == 2
 
 
+def test_only_who_described_a_run_and_did_not_begin_it_forgets_it(
+    tmp_path: Path,
+) -> None:
+    """One that was archived without its epoch and journal is still described."""
+    path = tmp_path / "run"
+    with RunFolder(path, DETAILS) as folder:
+        folder.forget()
+    assert [entry.name for entry in path.iterdir()] == ["lock"]
+    RunFolder(path, DETAILS).close()
+    (path / "epoch").unlink()
+    with RunFolder(path) as folder:
+        folder.forget()
+    assert read_details(path) == DETAILS
+    other = tmp_path / "other"
+    with RunFolder(other, DETAILS) as folder, Journal.open(other):
+        folder.forget()
+    assert read_details(other) == DETAILS
+
+
 def test_a_folder_with_something_else_is_refused_and_left_alone(
     tmp_path: Path,
 ) -> None:

@@ -150,6 +150,7 @@ def test_impossible_experiment(text: str, message: str) -> None:
     [
         ("", "test.toml: name: must not be empty, got ''"),
         (" ", "name: must not be empty, got ' '"),
+        ("a\\u0000b", "name: must be printable, got 'a\\\\x00b'"),
         ("a" * 201, "name: must be <= 200 bytes .*, got 201"),
         ("ä" * 34, "name: must be <= 200 bytes .*, got 204"),
     ],

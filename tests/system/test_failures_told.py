@@ -9,10 +9,14 @@ from typing import Any
 import pytest
 
 from coordinator.compare import compare
-from coordinator.folder import read_state
-from coordinator.folder_status import folder_status
+from coordinator.folder import RunDetails, RunFolder, read_state
+from coordinator.folder_status import can_rewrite, folder_status
+from coordinator.journal import Journal
 from coordinator.status_command import main as status
 from schema.errors import RunFolderError
+from schema.experiment_file import experiment_text, read_experiment
+from schema.run_tables import parquet_path
+from schema.tables import TABLES
 
 pytestmark = pytest.mark.system
 
@@ -27,6 +31,21 @@ population = 6
 children = 6
 [simulation]
 window_steps = 400
+[fitness]
+function = "{fitness}"
+"""
+
+ARENA = """
+name = "arena"
+births = 30
+[selection]
+population = 6
+[simulation]
+warmup_steps = 200
+window_steps = 400
+[arena]
+population_limit = 12
+population_floor = 5
 [fitness]
 function = "{fitness}"
 """
@@ -88,6 +107,16 @@ def test_a_campaign_tells_which_of_its_runs_judged_nobody(stage: Stage) -> None:
     assert "both/blind-0: 12 of 12 evaluations failed, all: " in said
     assert "seeing-0" not in said
     assert "2 runs are finished" in said
+    again = stage.run("resume", "both", "--in-process", "--quiet", code=1)
+    assert "2 of 2 runs are finished already" in again
+    # A campaign of one run has a reason to tell, too.
+    (stage.folder / "both" / "blind-0" / "state").write_text("tired")
+    shutil.rmtree(stage.folder / "both" / "seeing-0")
+    text = (stage.folder / "both" / "campaign.toml").read_text()
+    text = text[: text.rindex("[[experiments]]")]
+    (stage.folder / "both" / "campaign.toml").write_text(text)
+    alone = stage.run("resume", "both", "--in-process", "--quiet", code=1)
+    assert "blind-0 failed: both/blind-0/state: must be one of running" in alone
 
 
 @pytest.fixture(scope="module")
@@ -168,18 +197,81 @@ def test_tables_that_are_gone_are_written_anew(stage: Stage, made: Path) -> None
     assert compare(run, made / "twice" / "seeing-0") == []
 
 
+@pytest.mark.parametrize("tables", ["tables", "no tables"])
 def test_a_run_whose_journal_is_lost_does_not_begin_anew(
-    stage: Stage, made: Path
+    stage: Stage, made: Path, tables: str
 ) -> None:
     run = stage.folder / "run"
     shutil.copytree(made / "twice" / "seeing-0", run)
-    (run / "state").write_text("running")
     (run / "journal.bin").unlink()
-    told = "journal.bin: is lost, and there are tables"
     words = ("resume", "run", "--in-process", "--quiet")
+    if tables == "tables":
+        (run / "state").unlink()
+        told = "journal.bin: is lost"
+    else:
+        shutil.rmtree(run / "tables")
+        told = "its tables are gone: put a copy of them in their place"
     assert told in stage.run(*words, code=2)
     (run / "journal.bin").touch()
     assert told in stage.run(*words, code=2)
+
+
+def test_a_refusal_touches_nothing(stage: Stage, made: Path) -> None:
+    """Rows behind a gap come again from the journal, which has to be a sound one."""
+    run = stage.folder / "run"
+    shutil.copytree(made / "twice" / "seeing-0", run)
+    shutil.rmtree(run / "tables")
+    (run / "state").unlink()
+    (run / "segments").mkdir()
+    schema = TABLES["births"].serialize().to_pybytes()
+    (run / "segments" / "births-001.arrows").write_bytes(schema)
+    journal = bytearray((run / "journal.bin").read_bytes())
+    journal[40] ^= 1
+    (run / "journal.bin").write_bytes(journal)
+    said = stage.run("resume", "run", "--in-process", "--quiet", code=2)
+    assert "journal.bin: damaged at byte" in said
+    (run / "journal.bin").unlink()
+    said = stage.run("resume", "run", "--in-process", "--quiet", code=2)
+    assert "journal.bin: is lost" in said
+    assert [path.name for path in (run / "segments").iterdir()] == ["births-001.arrows"]
+
+
+def test_an_arenas_tables_are_promised_only_with_its_poses(tmp_path: Path) -> None:
+    experiment = read_experiment("scenario3")
+    details = RunDetails("scenario3", 0, 1, experiment_text(experiment))
+    with RunFolder(tmp_path, details), Journal.open(tmp_path):
+        pass
+    (tmp_path / "state").write_text("finished")
+    assert not can_rewrite(tmp_path, details)
+    with pytest.raises(RunFolderError, match="put a copy of them in their place"):
+        folder_status(tmp_path)
+    poses = parquet_path(tmp_path, "scenario3", 0, "poses")
+    poses.parent.mkdir(parents=True)
+    poses.touch()
+    assert can_rewrite(tmp_path, details)
+
+
+def test_status_follows_a_link_to_a_run(
+    tmp_path: Path, made: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "here").symlink_to(made / "twice" / "seeing-0")
+    (tmp_path / "stranger").mkdir()
+    (tmp_path / "stranger" / "run.json").write_text('{"name": "not ours"}')
+    (tmp_path / "again").symlink_to(tmp_path)
+    assert status(["status", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "1 of 1 runs finished, 12 of 12 births" in said
+
+
+def test_an_arena_that_judged_nobody_says_why(stage: Stage) -> None:
+    (stage.folder / "judge.py").write_text(FITNESS)
+    text = ARENA.format(fitness="judge:none")
+    (stage.folder / "arena.toml").write_text(text)
+    said = _run(stage, "arena.toml", "--out", "a", code=1)
+    assert "too few are left to mate" in said
+    assert "deaths were failures, all: " in said
+    assert "nobody looked" in said
+    assert "nothing is left to do" in stage.run("resume", "a", "--in-process", code=1)
 
 
 @pytest.mark.parametrize("repeats", [(), ("--repeats", "2")])
