@@ -16,7 +16,7 @@ from coordinator.campaign import (
 from coordinator.command_line import LISTEN, parser
 from coordinator.compare import compare
 from coordinator.events import AgentKind
-from coordinator.folder import DETAILS, read_details
+from coordinator.folder import holds_run, read_details
 from coordinator.running import Deployment, resume, start, start_campaign
 from coordinator.wording import stopped
 from schema.agent_command import tls_of
@@ -29,11 +29,7 @@ from schema.experiment import (
     with_births,
 )
 from schema.experiment_check import check_experiment
-from schema.experiment_file import (
-    check_source,
-    experiment_from_text,
-    shipped_experiments,
-)
+from schema.experiment_file import experiment_from_text
 from schema.service import tell_user
 from schema.settings import fitness_function
 
@@ -80,16 +76,13 @@ def _stoppable(folder: Path, evolve: Callable[[], int]) -> int:
     try:
         return evolve()
     except KeyboardInterrupt:
-        if is_campaign(folder) or (folder / DETAILS).exists():
+        if is_campaign(folder) or holds_run(folder):
             tell_user(stopped(folder))
         raise
 
 
 def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
     """Return what is to be run, checked as far as that goes without running it."""
-    shipped = [*shipped_experiments(), *shipped_campaigns()]
-    for source in options.experiments:
-        check_source(source, shipped)
     experiments = read_experiments(options.experiments)
     if options.births is not None:
         experiments = tuple(

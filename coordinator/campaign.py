@@ -17,8 +17,8 @@ from msgspec.structs import replace
 
 from coordinator.disk import replace_durably, storage_error
 from coordinator.folder import (
-    DETAILS,
     RunDetails,
+    holds_run,
     lock_folder,
     unlock_folder,
 )
@@ -26,9 +26,11 @@ from coordinator.wording import command
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment import Experiment
 from schema.experiment_file import (
+    check_source,
     experiment_from_text,
     experiment_text,
     read_experiment,
+    shipped_experiments,
 )
 
 CAMPAIGN = "campaign.toml"
@@ -122,6 +124,8 @@ def read_experiments(sources: Sequence[str]) -> tuple[Experiment, ...]:
             experiments of one name.
     """
     shipped = shipped_campaigns()
+    for source in sources:
+        check_source(source, [*shipped_experiments(), *shipped])
     words = [word for source in sources for word in shipped.get(source, (source,))]
     experiments = tuple(map(read_experiment, words))
     names = [experiment.name for experiment in experiments]
@@ -149,7 +153,7 @@ def refuse_used(folder: Path) -> None:
             f"{folder}: already holds a campaign; to go on with it: "
             f"{command('resume', folder)}; or choose another folder"
         )
-    if (folder / DETAILS).exists():
+    if holds_run(folder):
         raise RunFolderError(
             f"{folder}: already holds a run; choose another folder for a campaign"
         )

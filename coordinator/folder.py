@@ -299,7 +299,7 @@ def _holder(descriptor: int) -> str:
 
 def _refuse_used(path: Path) -> None:
     """Raise if a folder holds a run, or anything that is not ours."""
-    if (path / DETAILS).exists():
+    if holds_run(path):
         raise RunFolderError(
             f"{path}: already holds a run; to go on with it: "
             f"{command('resume', path)}; or choose another folder"

@@ -30,11 +30,12 @@ def folder_status(folder: Path) -> RunStatus:
     status = unbegun_status(folder, details)
     births = _by_island(read_table(folder, "births").select(["island"]), "count")
     if state == "finished" and not births:
-        what = f"{folder}: is finished, and its tables are gone"
-        if not can_rewrite(folder, details):
-            raise RunFolderError(f"{what}: put a copy of them in their place")
+        check_rewritable(folder, details)
         again = command("resume", folder)
-        raise RunFolderError(f"{what}; to have them written anew: {again}")
+        raise RunFolderError(
+            f"{folder}: is finished, and its tables are gone; to have them written "
+            f"anew: {again}"
+        )
     population = read_table(folder, "population").select(
         ["island", "births", "fitness"]
     )
@@ -58,19 +59,28 @@ def folder_status(folder: Path) -> RunStatus:
     return replace(status, state=state, islands=tuple(islands))
 
 
-def can_rewrite(folder: Path, details: RunDetails) -> bool:
-    """Return whether the journal has all rows of a run: an arena's poses it has not.
+def check_rewritable(folder: Path, details: RunDetails) -> None:
+    """Raise unless lost tables of a finished run can be written anew.
+
+    The journal has all rows but an arena's poses.
 
     Args:
         folder: of the run.
         details: what it is.
+
+    Raises:
+        RunFolderError: they cannot.
     """
     experiment = experiment_from_text(details.document)
     has_arena = any(
         island_experiment(experiment, number).arena is not None
         for number in range(island_count(experiment))
     )
-    return is_begun(folder) and (not has_arena or has_rows(folder, "poses"))
+    if not is_begun(folder) or (has_arena and not has_rows(folder, "poses")):
+        raise RunFolderError(
+            f"{folder}: is finished, and its tables are gone: put a copy of them in "
+            "their place"
+        )
 
 
 def _by_island(table: pa.Table, what: str) -> dict[int, int]:

@@ -34,7 +34,7 @@ from coordinator.folder import (
     read_details,
     read_state,
 )
-from coordinator.folder_status import can_rewrite, folder_status, unbegun_status
+from coordinator.folder_status import check_rewritable, folder_status, unbegun_status
 from coordinator.local import LocalAgents
 from coordinator.progress import Display
 from coordinator.reception import Reception
@@ -159,8 +159,7 @@ def resume(folder: Path, deployment: Deployment) -> int:
         if has_rows(folder, "births"):
             tell_user(f"{folder}: is finished; nothing is left to do")
             return 0 if _has_judged(folder) else 1
-        if not can_rewrite(folder, read_details(folder)):
-            folder_status(folder)  # says what is gone
+        check_rewritable(folder, read_details(folder))
         tell_user(f"{folder}: its tables are gone: the journal gives them again")
     return _alone(folder, RunFolder(folder), deployment)
 

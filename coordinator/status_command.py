@@ -140,11 +140,12 @@ def _damaged(folder: Path, error: RevolveError) -> RunStatus:
 def _show(status: Status, title: str, root: Path | None = None) -> None:
     """Print how far runs are, each by its path below ``root`` or its folder's name."""
     table = Table("run", "state", "births", "births/s", "best alive, arenas", box=None)
+    above = root and root.resolve()
     for run in status.runs:
         folder = Path(run.folder)
         what = f"{best_of(run)}{about_arenas(run)}"
-        if root is not None and root.resolve() in folder.parents:
-            name = str(folder.relative_to(root.resolve()))
+        if above and above in folder.parents:
+            name = str(folder.relative_to(above))
         else:
             name = folder.name
         table.add_row(

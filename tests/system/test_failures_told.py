@@ -10,7 +10,7 @@ import pytest
 
 from coordinator.compare import compare
 from coordinator.folder import RunDetails, RunFolder, read_state
-from coordinator.folder_status import can_rewrite, folder_status
+from coordinator.folder_status import check_rewritable, folder_status
 from coordinator.journal import Journal
 from coordinator.status_command import main as status
 from schema.errors import RunFolderError
@@ -242,13 +242,16 @@ def test_an_arenas_tables_are_promised_only_with_its_poses(tmp_path: Path) -> No
     with RunFolder(tmp_path, details), Journal.open(tmp_path):
         pass
     (tmp_path / "state").write_text("finished")
-    assert not can_rewrite(tmp_path, details)
+    with pytest.raises(RunFolderError, match="put a copy of them in their place"):
+        check_rewritable(tmp_path, details)
     with pytest.raises(RunFolderError, match="put a copy of them in their place"):
         folder_status(tmp_path)
     poses = parquet_path(tmp_path, "scenario3", 0, "poses")
     poses.parent.mkdir(parents=True)
     poses.touch()
-    assert can_rewrite(tmp_path, details)
+    check_rewritable(tmp_path, details)
+    with pytest.raises(RunFolderError, match="to have them written anew"):
+        folder_status(tmp_path)
 
 
 def test_status_follows_a_link_to_a_run(
