@@ -21,7 +21,7 @@ from analysis.outputs import OUTPUTS, schema
 from analysis.plates import draw_figures
 from analysis.progress import bars
 from analysis.progression import progression
-from analysis.render_command import Simulate
+from analysis.render import Simulate
 from analysis.report import Drawn, Making, report
 from analysis.study import gathered, measure_runs
 from analysis.summary import show

@@ -17,7 +17,7 @@ from analysis.graphviz import NoDot, ordered_by_dot
 from analysis.kin import LINEAGE, Best, best_robots, ordered
 from analysis.load import LeftOut, Run
 from analysis.portraits import Portrait, portrait
-from analysis.render_command import Simulate
+from analysis.render import Simulate
 from analysis.report import Drawn
 from schema.birth import BirthId
 from schema.errors import RevolveError

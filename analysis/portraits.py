@@ -10,8 +10,7 @@ import pyarrow as pa
 from msgspec.structs import replace
 
 from analysis.kin import Best, Family, family, lineage, row_of
-from analysis.render import Picture, Studio
-from analysis.render_command import Simulate
+from analysis.render import Picture, Simulate, Studio
 from schema.birth import BirthId
 from schema.codec import decode_genome
 from schema.errors import RunFolderError

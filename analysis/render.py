@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -18,8 +18,9 @@ from PIL import Image
 
 from schema.environment import Environment
 from schema.errors import RevolveError
-from schema.evaluation import Floats
-from schema.experiment import Simulation
+from schema.evaluation import Floats, Track
+from schema.experiment import Simulation, Space
+from schema.identity import NOBODY, Identity
 from schema.parts import BodySpace
 from schema.robot import Robot
 
@@ -262,3 +263,19 @@ def _write(path: Path, save: Callable[[], None]) -> None:
         raise NoPictures(f"{path}: cannot be written: {error.strerror}") from None
     except ValueError as error:
         raise NoPictures(f"{path}: {error}") from None
+
+
+class Simulate(Protocol):
+    """What the worker has: a robot, alone, through its life."""
+
+    def __call__(
+        self,
+        robot: Robot,
+        space: Space,
+        simulation: Simulation,
+        environment: Environment,
+        *,
+        identity: Identity = NOBODY,
+        watch: Callable[[Any], None],
+    ) -> Track:
+        """Return its track; ``watch`` is shown the engine's state at each tick."""

@@ -4,45 +4,26 @@ import argparse
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
 
 import numpy as np
 
 from analysis.progress import bars
 from analysis.render import (
     NoPictures,
+    Simulate,
     Studio,
     gait_strip,
     save_film,
     save_picture,
 )
-from schema.environment import Environment
-from schema.evaluation import Floats, Track
-from schema.experiment import Simulation, Space, body_space
+from schema.evaluation import Floats
+from schema.experiment import Simulation, body_space
 from schema.experiment_file import read_experiment
 from schema.flags import Flags, whole_number
-from schema.identity import NOBODY, Identity
-from schema.robot import Robot
 from schema.robot_file import read_robot, settings_of
 
 FILM_ENDING = ".gif"
 PICTURE_ENDING = ".png"
-
-
-class Simulate(Protocol):
-    """What the worker has: a robot, alone, through its life."""
-
-    def __call__(
-        self,
-        robot: Robot,
-        space: Space,
-        simulation: Simulation,
-        environment: Environment,
-        *,
-        identity: Identity = NOBODY,
-        watch: Callable[[Any], None],
-    ) -> Track:
-        """Return its track; ``watch`` is shown the engine's state at each tick."""
 
 
 def main(arguments: list[str], simulate: Simulate) -> int:

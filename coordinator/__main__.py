@@ -15,10 +15,10 @@ from coordinator.campaign import (
 )
 from coordinator.command_line import LISTEN, parser
 from coordinator.compare import compare
-from coordinator.events import AgentKind
+from coordinator.dispatch_events import AgentKind
 from coordinator.folder import holds_run, read_details
+from coordinator.hints import stopped
 from coordinator.running import Deployment, resume, start, start_campaign
-from coordinator.wording import stopped
 from schema.agent_command import tls_of
 from schema.crew import cores
 from schema.errors import NetworkError, RunFolderError

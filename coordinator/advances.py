@@ -8,15 +8,10 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import Protocol
 
-from coordinator.events import (
-    Advanced,
-    AdvanceShard,
-    Record,
-    Returned,
-)
+from coordinator.dispatch_events import Accept, Came, GiveUp, Hand, Returned
+from coordinator.events import Advanced, AdvanceShard, Record
 from coordinator.fleet import Fleet
 from coordinator.pose_columns import place_poses
-from coordinator.shards import Accept, Came, GiveUp, Hand
 from schema.arena import Advance, Casualty
 from schema.arena_codec import (
     AdvanceAnswer,

@@ -22,7 +22,7 @@ from coordinator.folder import (
     lock_folder,
     unlock_folder,
 )
-from coordinator.wording import command
+from coordinator.hints import command
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment import Experiment
 from schema.experiment_file import (

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from heapq import heappop, heappush
 from itertools import count
 
-from coordinator.events import (
+from coordinator.dispatch_events import (
     AgentKind,
     Assign,
     Cancel,

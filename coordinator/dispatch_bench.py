@@ -19,7 +19,7 @@ import msgspec
 import numpy as np
 
 from coordinator.active import ActiveRun
-from coordinator.events import AgentKind, Deliver, Job, Returned
+from coordinator.dispatch_events import AgentKind, Deliver, Job, Returned
 from coordinator.fleet import Fleet
 from coordinator.fleet_model import LEAST_UTILISATION, FleetModel, Setting, most_workers
 from coordinator.folder import RunDetails, RunFolder

@@ -1,11 +1,11 @@
-"""What the coordinator's machines are told (events) and ask for (commands).
+"""Events that islands and arenas handle, and the commands that they return.
 
 Events are past participles, commands imperatives; all are immutable.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 from coordinator.selection import Individual
 from schema.arena import Advance, Changes
@@ -15,7 +15,7 @@ from schema.evaluation import Evaluation, Provenance, Report
 from schema.genome import Genome
 from schema.robot import Robot
 
-# --- Islands: events --------------------------------------------------------
+# --- Events --------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,7 +222,7 @@ IslandEvent = Started | Answered | Travelled
 
 ArenaEvent = Started | Vetted | VettingFailed | Advanced | Commanded | Travelled
 
-# --- Islands: commands ------------------------------------------------------
+# --- Commands ------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,148 +331,3 @@ def asker_of(about: Vet | Evaluate | Answered) -> int:
     if isinstance(about, Vet | Vetted | VettingFailed) or about.asker is None:
         return about.birth.island
     return about.asker
-
-
-# --- Dispatch ---------------------------------------------------------------
-
-AgentKind = Literal["worker", "analyzer"]
-JobKind = Literal["vet", "evaluate"]
-
-
-@dataclass(frozen=True, slots=True)
-class Job:
-    """One piece of work, a pure function of its payload.
-
-    Attributes:
-        number: unique within the coordinator's incarnation, ascending.
-        kind: what it asks for; "vet" goes to analyzers, "evaluate" to workers.
-        birth: whom it is about.
-        attempt: mating attempt, for "vet"; trial, for "evaluate".
-        payload: the encoded request (schema.codec).
-        twin: number of a job that somebody else is to do, if there is anybody
-            else; -1 if none is.
-    """
-
-    number: int
-    kind: JobKind
-    birth: BirthId
-    attempt: int
-    payload: bytes
-    twin: int = -1
-
-
-@dataclass(frozen=True, slots=True)
-class Joined:
-    """A worker or an analyzer is there and takes jobs."""
-
-    agent: str
-    kind: AgentKind
-    slots: int
-    platform: str
-
-
-@dataclass(frozen=True, slots=True)
-class Left:
-    """A worker or an analyzer is gone; whatever it held is lost."""
-
-    agent: str
-
-
-@dataclass(frozen=True, slots=True)
-class Requested:
-    """Somebody wants a job done."""
-
-    job: Job
-
-
-@dataclass(frozen=True, slots=True)
-class Withdrawn:
-    """Nobody wants a job done any more; it may be done."""
-
-    number: int
-
-
-@dataclass(frozen=True, slots=True)
-class Returned:
-    """A job came back from an agent.
-
-    Attributes:
-        number: the job's.
-        agent: who had it.
-        outcome: "ok" with an answer, "error" with a reason (the agent could not
-            do it), or "lost" (no word: the agent died, froze or was cut off).
-        answer: encoded answer; empty unless ok.
-        reason: empty unless error.
-    """
-
-    number: int
-    agent: str
-    outcome: Literal["ok", "error", "lost"]
-    answer: bytes = b""
-    reason: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Died:
-    """A process ended by the doing of the job that it was at, not of its machine.
-
-    Attributes:
-        run, epoch: whose job.
-        number: the job's.
-        agent: the process, which never comes back.
-        cause: such as "SIGSEGV".
-    """
-
-    run: str
-    epoch: int
-    number: int
-    agent: str
-    cause: str
-
-
-@dataclass(frozen=True, slots=True)
-class Ticked:
-    """Time passed [s]; any monotonic origin."""
-
-    now_s: float
-
-
-DispatchEvent = Joined | Left | Requested | Withdrawn | Returned | Died | Ticked
-
-
-@dataclass(frozen=True, slots=True)
-class Assign:
-    """Send a job to an agent."""
-
-    job: Job
-    agent: str
-
-
-@dataclass(frozen=True, slots=True)
-class Deliver:
-    """A job is done for good: with an answer, or with a reason why never.
-
-    Attributes:
-        job: which.
-        agent: who had it last.
-        answer: empty if there is a reason.
-        reason: why nobody can do it.
-        is_deadly: it ends whoever tries it.
-    """
-
-    job: Job
-    agent: str
-    answer: bytes
-    reason: str = ""
-    is_deadly: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Cancel:
-    """Nobody waits for this job of this agent any more."""
-
-    job: Job
-    agent: str
-
-
-DispatchCommand = Assign | Deliver | Cancel

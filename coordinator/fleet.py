@@ -10,34 +10,32 @@ from itertools import count
 from typing import Protocol
 
 from coordinator.dispatch import Dispatch
-from coordinator.events import (
+from coordinator.dispatch_events import (
+    Accept,
     Assign,
+    Came,
     Cancel,
     Deliver,
     Died,
     DispatchCommand,
     DispatchEvent,
-    Job,
-    Joined,
-    Left,
-    Requested,
-    Returned,
-    Ticked,
-    Withdrawn,
-)
-from coordinator.shards import (
-    Accept,
-    Came,
     GiveUp,
     Hand,
+    Job,
+    Joined,
     Killed,
+    Left,
     Placed,
     Released,
+    Requested,
+    Returned,
     ShardCommand,
-    ShardDispatch,
     ShardEvent,
+    Ticked,
     Wanted,
+    Withdrawn,
 )
+from coordinator.shards import ShardDispatch
 
 
 class Agents(Protocol):

@@ -20,7 +20,7 @@ from math import log
 import numpy as np
 
 from coordinator.dispatch import Dispatch
-from coordinator.events import (
+from coordinator.dispatch_events import (
     Assign,
     Deliver,
     DispatchEvent,

@@ -18,9 +18,9 @@ from types import TracebackType
 from typing import Any, Literal, Self
 
 from coordinator.disk import replace_durably, storage_error
+from coordinator.hints import command
 from coordinator.journal import NAME as JOURNAL
 from coordinator.journal import newest_epoch
-from coordinator.wording import command
 from schema.errors import RunFolderError
 from schema.identity import Origin
 

@@ -7,8 +7,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from coordinator.folder import RunDetails, read_details, read_holder, read_state
+from coordinator.hints import command
 from coordinator.journal import is_begun
-from coordinator.wording import command
 from schema.errors import RunFolderError
 from schema.experiment import island_count, island_experiment
 from schema.experiment_file import experiment_from_text

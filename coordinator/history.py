@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from coordinator.archipelago import archipelago
-from coordinator.events import Append, DispatchEvent, Journalled, Record
+from coordinator.dispatch_events import DispatchEvent
+from coordinator.events import Append, Journalled, Record
 from coordinator.fleet import Fleet
 from coordinator.folder import read_details
 from coordinator.journal import NAME, Journal

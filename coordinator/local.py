@@ -4,7 +4,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
-from coordinator.events import AgentKind, DispatchEvent, Joined, Returned
+from coordinator.dispatch_events import AgentKind, DispatchEvent, Joined, Returned
 from schema.errors import RevolveError
 
 

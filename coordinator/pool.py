@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
 from math import inf
 
-from coordinator.events import Job, Joined
+from coordinator.dispatch_events import Job, Joined
 
 MOST_AHEAD = 16
 """Jobs more than the one that is always at hand."""

@@ -8,16 +8,13 @@ from typing import Self
 from msgspec import structs
 
 from coordinator.audits import Audits
+from coordinator.dispatch_events import Deliver, Job, JobKind, Returned
 from coordinator.events import (
     Answered,
     Audited,
-    Deliver,
     Evaluate,
     Evaluated,
     EvaluationFailed,
-    Job,
-    JobKind,
-    Returned,
     Vet,
     Vetted,
     VettingFailed,

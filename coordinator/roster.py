@@ -5,7 +5,7 @@ Pure: tokens and introductions in, news for the dispatch machine out.
 
 from google.protobuf.message import DecodeError
 
-from coordinator.events import AgentKind, Died, Joined, Left
+from coordinator.dispatch_events import AgentKind, Died, Joined, Left
 from schema import revolve_pb2 as pb
 from schema.errors import MalformedMessage
 from schema.topics import Member, member_of

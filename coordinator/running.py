@@ -25,7 +25,7 @@ from coordinator.campaign import (
 )
 from coordinator.conductor import Conductor, Planned
 from coordinator.disk import replace_durably
-from coordinator.events import AgentKind
+from coordinator.dispatch_events import AgentKind
 from coordinator.fleet import Agents, Fleet
 from coordinator.folder import (
     RunDetails,
@@ -35,12 +35,12 @@ from coordinator.folder import (
     read_state,
 )
 from coordinator.folder_status import check_rewritable, folder_status, unbegun_status
+from coordinator.hints import command, stopped
 from coordinator.local import LocalAgents
 from coordinator.progress import Display
 from coordinator.reception import Reception
 from coordinator.service import Network
 from coordinator.summary import Conclusion, conclude, failures
-from coordinator.wording import command, stopped
 from schema.crew import Crew, stop_on_signals
 from schema.errors import NetworkError, RevolveError
 from schema.experiment import Experiment

@@ -15,7 +15,7 @@ from typing import Self
 
 import zenoh
 
-from coordinator.events import AgentKind, DispatchEvent, Left, Returned
+from coordinator.dispatch_events import AgentKind, DispatchEvent, Left, Returned
 from coordinator.roster import Roster
 from schema.errors import MalformedMessage, NetworkError
 from schema.network import (

@@ -9,9 +9,22 @@ unless the user allows a drift: then one of another platform gets it after a whi
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Literal
 
-from coordinator.events import Joined, Left, Ticked
+from coordinator.dispatch_events import (
+    Accept,
+    Came,
+    GiveUp,
+    Hand,
+    Joined,
+    Killed,
+    Left,
+    Placed,
+    Released,
+    ShardCommand,
+    ShardEvent,
+    Ticked,
+    Wanted,
+)
 from schema.errors import UnexpectedEvent
 
 MAX_ERRORS = 3
@@ -19,99 +32,6 @@ REST_S = 0.05
 LONGEST_REST_S = 3.2
 DRIFT_S = 30.0
 """A shard waits so long for its own platform before it may drift to another."""
-
-
-@dataclass(frozen=True, slots=True)
-class Placed:
-    """A journal tells on what platform a shard has been advanced."""
-
-    shard: int
-    platform: str
-
-
-@dataclass(frozen=True, slots=True)
-class Wanted:
-    """A shard is to be advanced; comes again only after ``Accept``."""
-
-    shard: int
-
-
-@dataclass(frozen=True, slots=True)
-class Came:
-    """What became of an advance that was handed out.
-
-    Attributes:
-        number: of the ``Hand``.
-        outcome: "done"; "stateless" (the worker does not have the state); "error"
-            with a reason; "lost" (no word).
-        reason: empty unless error.
-    """
-
-    number: int
-    outcome: Literal["done", "stateless", "error", "lost"]
-    reason: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Released:
-    """A shard needs nothing more; whoever holds it may take another."""
-
-    shard: int
-
-
-@dataclass(frozen=True, slots=True)
-class Killed:
-    """An advance that was handed out ended its worker, by its own doing.
-
-    Attributes:
-        number: of the ``Hand``.
-        agent: who died, once.
-        cause: of what.
-    """
-
-    number: int
-    agent: str
-    cause: str
-
-
-ShardEvent = Joined | Left | Ticked | Placed | Wanted | Came | Killed | Released
-
-
-@dataclass(frozen=True, slots=True)
-class Hand:
-    """Send a shard's advance to a worker.
-
-    Attributes:
-        number: of the job, used once.
-        shard: whose advance.
-        agent: the worker.
-        is_whole: with what it takes to rebuild the state.
-    """
-
-    number: int
-    shard: int
-    agent: str
-    is_whole: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Accept:
-    """The advance of a shard is done, by this worker."""
-
-    shard: int
-    agent: str
-
-
-@dataclass(frozen=True, slots=True)
-class GiveUp:
-    """Several workers cannot advance a shard, the last of them this one."""
-
-    shard: int
-    agent: str
-    reason: str
-
-
-ShardCommand = Hand | Accept | GiveUp
 
 
 @dataclass(slots=True)

@@ -4,7 +4,7 @@ Pure: it counts on a clock that it is told and decides nothing about results, fo
 whoever answers first answers the same.
 """
 
-from coordinator.events import JobKind
+from coordinator.dispatch_events import JobKind
 
 PATIENCE = 4.0
 """A job is late after so many times the typical duration of its kind."""

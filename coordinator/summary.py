@@ -9,9 +9,9 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from coordinator.arena import Arena
+from coordinator.hints import command
 from coordinator.island import Island
 from coordinator.selection import fittest_first
-from coordinator.wording import command
 from schema.experiment import Experiment, body_space
 from schema.genome import develop
 from schema.robot_file import write_robot

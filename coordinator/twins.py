@@ -1,6 +1,6 @@
 """Jobs that come in pairs, the same question to two agents: who did which. Pure."""
 
-from coordinator.events import Job
+from coordinator.dispatch_events import Job
 from coordinator.pool import Pending
 
 

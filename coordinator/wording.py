@@ -1,21 +1,8 @@
 """How figures of runs, and what to do next, are said on a terminal."""
 
-import shlex
-from pathlib import Path
-
 from schema.status import IslandStatus, RunStatus
 
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
-
-
-def command(*words: object) -> str:
-    """Return a command of ours, as it can be pasted into a shell."""
-    return shlex.join(["revolve", *map(str, words)])
-
-
-def stopped(folder: Path) -> str:
-    """Return what is said of a run or campaign that was stopped."""
-    return f"stopped; to go on: {command('resume', folder)}"
 
 
 def duration(seconds: float | None) -> str:

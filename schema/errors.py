@@ -3,6 +3,9 @@
 Whose fault an error is decides its class, and the class decides what is done.
 """
 
+from difflib import get_close_matches
+from typing import Any
+
 
 class RevolveError(Exception):
     """Base of all errors that a user may see as one line."""
@@ -63,3 +66,9 @@ class StateDiffers(RevolveError):  # noqa: N818 - reads as what it says
 def one_line(error: Exception) -> str:
     """Return what an error says, in a line: an engine takes several."""
     return " ".join(str(error).split())
+
+
+def nearest(word: Any, words: Any) -> str:  # noqa: ANN401 - any iterable of str
+    """Return ``; did you mean 'x'?`` for the nearest word, or nothing."""
+    found = get_close_matches(str(word), list(words), n=1, cutoff=0.5)
+    return f"; did you mean {found[0]!r}?" if found else ""

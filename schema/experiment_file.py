@@ -2,7 +2,6 @@
 
 import tomllib
 from collections.abc import Collection
-from difflib import get_close_matches
 from importlib import resources
 from math import isfinite
 from pathlib import Path
@@ -12,7 +11,7 @@ import msgspec
 from msgspec import Struct
 
 from schema.environment import is_mjcf
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, nearest
 from schema.experiment import Experiment
 from schema.experiment_check import check_experiment
 
@@ -138,12 +137,6 @@ def experiment_from_text(text: str) -> Experiment:
         return msgspec.json.decode(text.encode(), type=Experiment)
     except msgspec.MsgspecError as error:
         raise ExperimentError(f"experiment of a run: {error}") from None
-
-
-def nearest(word: Any, words: Any) -> str:  # noqa: ANN401 - any iterable of str
-    """Return ``; did you mean 'x'?`` for the nearest word, or nothing."""
-    found = get_close_matches(str(word), list(words), n=1, cutoff=0.5)
-    return f"; did you mean {found[0]!r}?" if found else ""
 
 
 def _refuse_unknown(

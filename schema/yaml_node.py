@@ -13,8 +13,7 @@ from typing import NoReturn
 
 import yaml
 
-from schema.errors import InvalidRobot
-from schema.experiment_file import nearest
+from schema.errors import InvalidRobot, nearest
 
 _SLOT = re.compile("0|[1-9][0-9]{0,3}")
 

@@ -29,7 +29,7 @@ from coordinator.dispatch_bench import (
     birth_cost,
     null_rate,
 )
-from coordinator.events import DispatchEvent, Returned
+from coordinator.dispatch_events import DispatchEvent, Returned
 from coordinator.fleet import Fleet
 from coordinator.fleet_model import Setting, most_workers
 from coordinator.folder import RunFolder

@@ -13,14 +13,13 @@ from msgspec.structs import replace
 import analyzer.service
 import worker.null
 import worker.service
+from coordinator.dispatch_events import Joined, Left
 from coordinator.events import (
     Evaluate,
     Evaluated,
     IslandCommand,
     IslandEvent,
-    Joined,
     Journalled,
-    Left,
     Started,
 )
 from coordinator.fleet import Fleet

@@ -16,7 +16,7 @@ import pytest
 import analyzer.jobs
 from coordinator.arena import Arena
 from coordinator.compare import compare
-from coordinator.events import DispatchEvent, Returned
+from coordinator.dispatch_events import DispatchEvent, Returned
 from coordinator.fleet import Fleet
 from coordinator.folder import RunDetails, RunFolder
 from coordinator.journal import NAME, Journal

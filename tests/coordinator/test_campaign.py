@@ -19,8 +19,9 @@ from coordinator.campaign import (
     write_campaign,
 )
 from coordinator.folder import RunDetails, RunFolder
+from coordinator.hints import command
 from coordinator.tempo import Tempo
-from coordinator.wording import about_arenas, best_of, command, duration
+from coordinator.wording import about_arenas, best_of, duration
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment_file import experiment_text, read_experiment
 from schema.status import IslandStatus, RunStatus

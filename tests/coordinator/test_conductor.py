@@ -14,7 +14,7 @@ from coordinator.active import ActiveRun
 from coordinator.campaign import Campaign
 from coordinator.compare import compare
 from coordinator.conductor import SLACK, Conductor, Planned
-from coordinator.events import DispatchEvent, Joined
+from coordinator.dispatch_events import DispatchEvent, Joined
 from coordinator.fleet import Agents, Fleet
 from coordinator.folder import LOCK, RunDetails, RunFolder, read_state
 from coordinator.folder_status import folder_status, unbegun_status

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordinator.dispatch import MAX_DEATHS, MAX_ERRORS, VETS_AT_HAND, Dispatch
-from coordinator.events import (
+from coordinator.dispatch_events import (
     AgentKind,
     Assign,
     Cancel,

@@ -2,9 +2,20 @@
 
 import pytest
 
-from coordinator.events import Deliver, Died, DispatchEvent, Job, Joined, Left, Returned
+from coordinator.dispatch_events import (
+    Accept,
+    Came,
+    Deliver,
+    Died,
+    DispatchEvent,
+    GiveUp,
+    Hand,
+    Job,
+    Joined,
+    Left,
+    Returned,
+)
 from coordinator.fleet import Fleet
-from coordinator.shards import Accept, Came, GiveUp, Hand
 from schema.birth import BirthId
 
 

@@ -5,18 +5,20 @@ from collections.abc import Callable
 import pytest
 from msgspec.structs import replace
 
-from coordinator.events import (
-    Answered,
-    Audited,
+from coordinator.dispatch_events import (
     Died,
     DispatchEvent,
-    Evaluate,
-    Evaluated,
-    EvaluationFailed,
     Joined,
     Left,
     Returned,
     Ticked,
+)
+from coordinator.events import (
+    Answered,
+    Audited,
+    Evaluate,
+    Evaluated,
+    EvaluationFailed,
     Vet,
     Vetted,
     VettingFailed,

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.events import Died, Joined, Left
+from coordinator.dispatch_events import Died, Joined, Left
 from coordinator.roster import Roster
 from schema import revolve_pb2 as pb
 from schema.errors import MalformedMessage

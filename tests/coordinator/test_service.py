@@ -14,7 +14,7 @@ import pytest
 import zenoh
 
 from coordinator.dispatch import Dispatch
-from coordinator.events import (
+from coordinator.dispatch_events import (
     Assign,
     Deliver,
     DispatchEvent,

@@ -4,19 +4,19 @@ from itertools import count
 
 import pytest
 
-from coordinator.events import Joined, Left, Ticked
-from coordinator.shards import (
-    DRIFT_S,
-    MAX_ERRORS,
+from coordinator.dispatch_events import (
     Accept,
     Came,
     GiveUp,
     Hand,
+    Joined,
     Killed,
+    Left,
     Placed,
-    ShardDispatch,
+    Ticked,
     Wanted,
 )
+from coordinator.shards import DRIFT_S, MAX_ERRORS, ShardDispatch
 from schema.errors import UnexpectedEvent
 
 

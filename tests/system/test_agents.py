@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from coordinator.events import DispatchEvent, Joined, Left, Returned
+from coordinator.dispatch_events import DispatchEvent, Joined, Left, Returned
 from coordinator.service import Network
 from schema.network import Tls
 
