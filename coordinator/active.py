@@ -17,7 +17,6 @@ from coordinator.journal import NAME as JOURNAL
 from coordinator.journal import Journal, is_begun
 from coordinator.live import Feed, Overheard
 from coordinator.loop import Loop
-from coordinator.operator import Desk
 from coordinator.pacing import Pace
 from coordinator.questions import Question
 from coordinator.record import Recorder
@@ -42,7 +41,6 @@ class ActiveRun:
         held: its folder, which this process holds.
         experiment: what is run.
         loop: its machines, and what connects them to the world.
-        desk: where its operators are served.
         feed: hears of its rows for those who watch; None if nobody can.
     """
 
@@ -100,7 +98,6 @@ class ActiveRun:
                 caution=caution,
                 confirm=held.confirm,
             )
-            self.desk = Desk(self.loop, self.experiment)
             self._births, self._simulated = Tempo(), Tempo()
             self._owns = {
                 number: island_experiment(self.experiment, number)

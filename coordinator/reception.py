@@ -3,7 +3,7 @@
 from coordinator.active import ActiveRun
 from coordinator.arena import Arena
 from coordinator.conductor import Conductor
-from coordinator.operator import Refused
+from coordinator.operator import Desk, Refused
 from schema.errors import MalformedMessage
 from schema.operator_codec import (
     OperatorReply,
@@ -36,7 +36,8 @@ class Reception:
         except (MalformedMessage, Refused) as error:
             return encode_operator_reply(OperatorReply(str(error), is_refused=True))
         replies: list[bytes] = []
-        self._conductor.guard(run, lambda: replies.append(run.desk.answer(data)))
+        desk = Desk(run.loop, run.experiment)
+        self._conductor.guard(run, lambda: replies.append(desk.answer(data)))
         if replies:
             return replies[0]
         failed = OperatorReply("the run cannot go on", is_refused=True)
