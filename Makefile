@@ -21,7 +21,7 @@ help:
 	@echo 'make lint         ruff, mypy, import contracts'
 	@echo 'make check        lint and test'
 	@echo 'make format       let ruff format and mend'
-	@echo 'make proto        write schema/revolve_pb2.py(i) from revolve.proto'
+	@echo 'make proto        write schema/wire/revolve_pb2.py(i) from revolve.proto'
 	@echo 'make constraints  write constraints.txt anew from this environment'
 	@echo 'make clean        remove the environment and all caches'
 
@@ -56,7 +56,7 @@ check: lint test
 
 proto: $(STAMP)
 	$(BIN)/python -m grpc_tools.protoc -I. --python_out=. --pyi_out=. \
-		schema/revolve.proto
+		schema/wire/revolve.proto
 
 # Only names and versions: where they come from is each machine's own matter.
 constraints: $(STAMP)

@@ -12,18 +12,18 @@ COMMANDS = {
     "run": (_COORDINATOR, "evolve experiments on this machine"),
     "resume": (_COORDINATOR, "go on with a run or campaign after any crash"),
     "coordinator": (_COORDINATOR, "run experiments for remote workers"),
-    "status": ("coordinator.status_command", "tell how far runs are"),
-    "arena": ("coordinator.arena_command", "give orders to a running arena"),
+    "status": ("coordinator.cli.status", "tell how far runs are"),
+    "arena": ("coordinator.cli.arena", "give orders to a running arena"),
     "compare": (_COORDINATOR, "tell whether two runs are equal"),
     "worker": ("worker.__main__", "simulate robots for a coordinator"),
     "analyzer": ("analyzer.__main__", "vet bodies for a coordinator"),
     "robot": ("schema.__main__", "check, convert or show a robot file"),
-    "robot random": ("coordinator.robot_command", "make up a robot"),
+    "robot random": ("coordinator.cli.robot", "make up a robot"),
     "robot render": ("analysis.__main__", "draw the robot of a file"),
     "robot simulate": ("worker.robot_command", "judge the robot of a file"),
     "view": ("analysis.__main__", "watch a run, live or again"),
     "analyze": ("analysis.__main__", "tables to measures, figures and a report"),
-    "bench": ("worker.bench", "measure this machine"),
+    "bench": ("worker.bench.command", "measure this machine"),
     "bench dispatch": (_COORDINATOR, "measure how far a coordinator reaches"),
 }
 """Module whose ``main`` takes the words, the command first; and what it does.
@@ -83,14 +83,14 @@ def _obey(words: list[str]) -> int:
     if name in COMMANDS:
         words = [name, *words[2:]]
     if words[0] not in COMMANDS:
-        near = import_module("schema.experiment_file").nearest(words[0], COMMANDS)
+        near = import_module("schema.experiment.file").nearest(words[0], COMMANDS)
         print(
             f"revolve: no command {words[0]!r}{near}; allowed: {', '.join(COMMANDS)}",
             file=sys.stderr,
         )
         return 2
     # Before NumPy is first imported: a robot's arithmetic must not depend on cores.
-    import_module("schema.crew").prepare_process()
+    import_module("schema.agent.crew").prepare_process()
     error_type = import_module("schema.errors").RevolveError
     try:
         room = import_module(COMMANDS[words[0]][0])

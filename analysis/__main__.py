@@ -73,7 +73,7 @@ def _flags() -> Flags:
 def _render(arguments: list[str]) -> int:
     """Draw a robot, by the worker's simulation if it is to move."""
     simulate = _simulation()
-    from analysis.render_command import main as render
+    from analysis.render.command import main as render
 
     return render(arguments, simulate)
 
@@ -86,11 +86,11 @@ def _simulation() -> Callable[..., Any]:
         NoPictures: nothing here can draw.
     """
     try:
-        from analysis.render import choose_engine
+        from analysis.render.picture import choose_engine
 
         # Before anything loads the engine.
         choose_engine()
-        from worker.evaluation import simulate
+        from worker.robot.evaluation import simulate
     except ImportError as error:
         raise MissingExtra(
             f"pictures need {error.name}: pip install 'revolve-islands[view]'"
@@ -101,14 +101,14 @@ def _simulation() -> Callable[..., Any]:
 def _view(arguments: list[str]) -> int:
     """Show a run, by the worker's and the coordinator's word if robots are to move."""
     try:
-        from analysis.view import main as view
+        from analysis.viewer.command import main as view
     except ImportError as error:
         raise MissingExtra(
             f"the viewer needs {error.name}: pip install 'revolve-islands[view]'"
         ) from None
-    from analysis.view_again import Simulators
-    from coordinator.history import arena_history
-    from worker.again import alone, together
+    from analysis.viewer.resimulate import Simulators
+    from coordinator.run.history import arena_history
+    from worker.arena.replay import alone, together
 
     return view(arguments, Simulators(alone, arena_history, together))
 

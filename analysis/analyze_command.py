@@ -13,17 +13,17 @@ import pyarrow.parquet as pq
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
 
-from analysis.benchmarks import read_benchmarks
-from analysis.comparison import Outcomes, comparison, findings
-from analysis.load import LeftOut, Run, read_runs
-from analysis.namesakes import told_apart
-from analysis.outputs import OUTPUTS, schema
-from analysis.plates import draw_figures
+from analysis.comparison.comparison import Outcomes, comparison, findings
+from analysis.comparison.progression import progression
+from analysis.figures.draw import draw_figures
+from analysis.figures.report import Drawn, Making, report
+from analysis.measures.benchmarks import read_benchmarks
+from analysis.measures.load import LeftOut, Run, read_runs
+from analysis.measures.namesakes import told_apart
+from analysis.measures.outputs import OUTPUTS, schema
+from analysis.measures.study import gathered, measure_runs
 from analysis.progress import bars
-from analysis.progression import progression
-from analysis.render import Simulate
-from analysis.report import Drawn, Making, report
-from analysis.study import gathered, measure_runs
+from analysis.render.picture import Simulate
 from analysis.summary import show
 from schema.errors import RunFolderError
 

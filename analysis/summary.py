@@ -21,7 +21,7 @@ def show(tables: dict[str, pa.Table], console: Console) -> None:
     """Print each run's last populations, the findings, and what was left out.
 
     Args:
-        tables: as ``analysis.outputs`` names them.
+        tables: as ``analysis.measures.outputs`` names them.
         console: to print on; however narrow, nothing is cut.
     """
     populations = _last_populations(tables["populations"])

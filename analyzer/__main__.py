@@ -2,7 +2,7 @@
 
 import sys
 
-from schema.crew import prepare_process
+from schema.agent.crew import prepare_process
 
 
 def main(arguments: list[str]) -> int:
@@ -16,7 +16,7 @@ def main(arguments: list[str]) -> int:
     """
     prepare_process()  # before anything imports numpy
     from analyzer.service import process
-    from schema.agent_command import run_crew
+    from schema.agent.command import run_crew
 
     return run_crew("analyzer", process, arguments[1:], processes=1)
 

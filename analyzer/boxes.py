@@ -8,10 +8,10 @@ from itertools import chain
 import numpy as np
 import numpy.typing as npt
 
-from schema.assembly import place_parts, shapes_of
-from schema.evaluation import Floats
 from schema.parts import IDENTITY, BodySpace, Shape, Vector
-from schema.robot import Robot
+from schema.robot.frames import place_parts, shapes_of
+from schema.robot.results import Floats
+from schema.robot.robot import Robot
 
 Indices = npt.NDArray[np.intp]
 

@@ -3,10 +3,10 @@
 import time
 
 from analyzer.report import analyze
-from schema.codec import Answer, decode_body, decode_request, encode_answer
-from schema.experiment import body_space
-from schema.robot import check_body
-from schema.settings import read_vetting_settings
+from schema.experiment.document import body_space
+from schema.experiment.settings import read_vetting_settings
+from schema.robot.robot import check_body
+from schema.wire.codec import Answer, decode_body, decode_request, encode_answer
 
 
 def answer(request: bytes) -> bytes:

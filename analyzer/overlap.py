@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from analyzer.boxes import Boxes
-from schema.evaluation import Floats
-from schema.experiment import Vetting
-from schema.robot import Robot
+from schema.experiment.document import Vetting
+from schema.robot.results import Floats
+from schema.robot.robot import Robot
 
 Indices = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]

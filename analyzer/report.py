@@ -2,10 +2,10 @@
 
 from analyzer.boxes import bounding_box, place_boxes
 from analyzer.overlap import intersecting_parts
-from schema.evaluation import Report
-from schema.experiment import Vetting
+from schema.experiment.document import Vetting
 from schema.parts import BodySpace
-from schema.robot import Robot
+from schema.robot.results import Report
+from schema.robot.robot import Robot
 
 
 def analyze(robot: Robot, space: BodySpace, vetting: Vetting) -> Report:

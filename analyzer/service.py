@@ -1,9 +1,9 @@
 """The analyzer on the network: one process that vets bodies until told to end."""
 
 from analyzer.jobs import answer
-from schema.network import Agent
-from schema.service import serve_as_process
-from schema.supervision import Post
+from schema.agent.network import Agent
+from schema.agent.service import serve_as_process
+from schema.agent.supervision import Post
 
 
 def process(agent: Agent, post: Post) -> None:

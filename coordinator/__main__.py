@@ -5,33 +5,33 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from coordinator.audits import Caution
-from coordinator.campaign import (
+from coordinator.cli.flags import LISTEN, parser
+from coordinator.cli.running import Deployment, resume, start, start_campaign
+from coordinator.dispatch.events import AgentKind
+from coordinator.run.audits import Caution
+from coordinator.storage.campaign import (
     Campaign,
     is_campaign,
     read_campaign,
     read_experiments,
     shipped_campaigns,
 )
-from coordinator.command_line import LISTEN, parser
-from coordinator.compare import compare
-from coordinator.dispatch_events import AgentKind
-from coordinator.folder import holds_run, read_details
-from coordinator.hints import stopped
-from coordinator.running import Deployment, resume, start, start_campaign
-from schema.agent_command import tls_of
-from schema.crew import cores
+from coordinator.storage.compare import compare
+from coordinator.storage.folder import holds_run, read_details
+from coordinator.storage.hints import stopped
+from schema.agent.command import tls_of
+from schema.agent.crew import cores
+from schema.agent.service import tell_user
 from schema.errors import NetworkError, RunFolderError
-from schema.experiment import (
+from schema.experiment.check import check_experiment
+from schema.experiment.document import (
     Experiment,
     island_count,
     island_experiment,
     with_births,
 )
-from schema.experiment_check import check_experiment
-from schema.experiment_file import experiment_from_text
-from schema.service import tell_user
-from schema.settings import fitness_function
+from schema.experiment.file import experiment_from_text
+from schema.experiment.settings import fitness_function
 
 
 def main(arguments: list[str]) -> int:
@@ -108,8 +108,8 @@ def _deployment(
     """Return who does the work; this names the other rooms."""
     import analyzer.jobs
     import analyzer.service
-    import worker.jobs
-    import worker.service
+    import worker.serve.jobs
+    import worker.serve.service
 
     if options.connect and options.listen:
         raise NetworkError("--listen and --connect: a hub is here or elsewhere")
@@ -124,13 +124,13 @@ def _deployment(
     threads = options.threads or (cores() if is_one_arena else 1)
     answers: dict[AgentKind, Callable[[bytes], bytes]] = {
         "analyzer": analyzer.jobs.answer,
-        "worker": worker.jobs.Jobs(threads=threads).answer,
+        "worker": worker.serve.jobs.Jobs(threads=threads).answer,
     }
     return Deployment(
         workers=workers,
         bodies={
             "analyzer": analyzer.service.process,
-            "worker": worker.service.process,
+            "worker": worker.serve.service.process,
         },
         answers=answers if options.in_process else None,
         listen=options.listen or (LISTEN if is_for_others else None),
@@ -157,10 +157,14 @@ def _has_one_arena(experiment: Experiment, options: argparse.Namespace) -> bool:
 def _bench(options: argparse.Namespace) -> int:
     """Measure; another one that names the other rooms."""
     import analyzer.service
-    import worker.null
-    from coordinator import dispatch_bench
+    import worker.serve.null
+    from coordinator.cli import dispatch_bench
 
-    bodies = (worker.null.process, worker.null.timed_process, analyzer.service.process)
+    bodies = (
+        worker.serve.null.process,
+        worker.serve.null.timed_process,
+        analyzer.service.process,
+    )
     return dispatch_bench.run(options, *bodies)
 
 

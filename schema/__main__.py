@@ -4,14 +4,14 @@ import argparse
 import sys
 from pathlib import Path
 
-from schema.brain import neuron_names
 from schema.errors import RevolveError
-from schema.experiment import body_space
-from schema.experiment_file import read_experiment
+from schema.experiment.document import body_space
+from schema.experiment.file import read_experiment
 from schema.flags import Flags
+from schema.formats.files import read_robot, settings_of, write_robot
 from schema.parts import BUILT_IN, BodySpace
-from schema.robot import Robot
-from schema.robot_file import read_robot, settings_of, write_robot
+from schema.robot.brain import neuron_names
+from schema.robot.robot import Robot
 
 
 def main(argv: list[str] | None = None) -> int:

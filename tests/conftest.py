@@ -5,7 +5,7 @@ from contextlib import suppress
 
 from hypothesis import settings
 
-from analysis.render import NoPictures, choose_engine
+from analysis.render.picture import NoPictures, choose_engine
 
 # MuJoCo settles what draws when it is first imported, and some test or other imports
 # it first. Processes that tests start choose for themselves.

@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 
 from schema.errors import ExperimentError
-from schema.evaluation import Floats, Track
-from schema.experiment import Fitness
+from schema.experiment.document import Fitness
+from schema.robot.results import Floats, Track
 
 
 class FitnessFunction(Protocol):

@@ -4,15 +4,15 @@ import argparse
 import sys
 from pathlib import Path
 
-from schema.experiment import body_space
-from schema.experiment_file import read_experiment
+from schema.experiment.document import body_space
+from schema.experiment.file import read_experiment
+from schema.experiment.settings import EvaluationSettings
 from schema.flags import Flags
-from schema.mjcf_file import read_mjcf
-from schema.robot import Robot
-from schema.robot_file import MJCF_ENDING, read_robot, settings_of
-from schema.settings import EvaluationSettings
-from worker.evaluation import judge, simulate
+from schema.formats.files import MJCF_ENDING, read_robot, settings_of
+from schema.formats.mjcf import read_mjcf
+from schema.robot.robot import Robot
 from worker.fitness import path_velocity, straight_velocity
+from worker.robot.evaluation import judge, simulate
 
 
 def main(arguments: list[str]) -> int:

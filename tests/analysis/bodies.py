@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from schema.tables import BIRTHS
+from schema.tables.columns import BIRTHS
 
 Body = list[dict[str, Any]]
 KINDS = ("FixedBrick", "ActiveHinge", "Hinge", "ParametricBarJoint", "TouchSensor")

@@ -7,8 +7,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from schema.run_tables import parquet_path
-from schema.tables import TABLES
+from schema.tables.columns import TABLES
+from schema.tables.files import parquet_path
 from tests.analysis.bodies import Body, random_body
 
 FOUNDERS = 15

@@ -5,7 +5,7 @@ from typing import Any
 import plotnine as p9
 import pyarrow as pa
 
-from analysis.outputs import schema
+from analysis.measures.outputs import schema
 
 Row = dict[str, Any]
 

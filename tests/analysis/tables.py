@@ -4,7 +4,7 @@ from typing import Any
 
 import pyarrow as pa
 
-from schema.tables import TABLES
+from schema.tables.columns import TABLES
 from tests.analysis.bodies import Body, part
 
 CORE: Body = [part(0, -1, -1, "Core")]

@@ -9,9 +9,9 @@ import pyarrow as pa
 import pytest
 
 from analysis.analyze_command import analyze
-from analysis.render import NoPictures
-from schema.run_tables import parquet_path
-from schema.tables import TABLES
+from analysis.render.picture import NoPictures
+from schema.tables.columns import TABLES
+from schema.tables.files import parquet_path
 from tests.analysis.campaign import random_bodies, write_run
 
 

@@ -7,7 +7,7 @@ import pyarrow as pa
 import pytest
 from rich.console import Console
 
-from analysis.outputs import schema
+from analysis.measures.outputs import schema
 from analysis.summary import show
 
 NAME = "archipelago-of-many-islands"

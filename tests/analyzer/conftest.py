@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from schema.parts import BUILT_IN, BodySpace
-from schema.robot import ORIENTATIONS, Part, Robot
+from schema.robot.robot import ORIENTATIONS, Part, Robot
 
 KINDS = ("FixedBrick", "ActiveHinge", "Hinge", "ParametricBarJoint", "TouchSensor")
 

@@ -4,12 +4,12 @@ import pytest
 
 from analyzer.jobs import answer
 from analyzer.report import analyze
-from schema.brain import Brain, Neuron
-from schema.codec import decode_answer, encode_request, encode_robot
 from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
-from schema.experiment import Experiment, body_space
-from schema.robot import Part, Robot
-from schema.settings import vetting_settings
+from schema.experiment.document import Experiment, body_space
+from schema.experiment.settings import vetting_settings
+from schema.robot.brain import Brain, Neuron
+from schema.robot.robot import Part, Robot
+from schema.wire.codec import decode_answer, encode_request, encode_robot
 
 GREY = (0.5, 0.5, 0.5)
 EXPERIMENT = Experiment(name="test")

@@ -10,10 +10,10 @@ from scipy.optimize import linprog
 
 from analyzer.boxes import Boxes, place_boxes
 from analyzer.overlap import intersecting_parts, separation
-from schema.evaluation import Floats
-from schema.experiment import Vetting
+from schema.experiment.document import Vetting
 from schema.parts import BUILT_IN, Box, Shape
-from schema.robot import Part, Robot
+from schema.robot.results import Floats
+from schema.robot.robot import Part, Robot
 
 OVERLAP = Vetting(mode="overlap", tolerance_m=1e-6)
 CONTACT = Vetting(mode="contact", tolerance_m=1e-6)

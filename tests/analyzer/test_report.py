@@ -3,9 +3,9 @@
 import pytest
 
 from analyzer.report import analyze
-from schema.experiment import Vetting
+from schema.experiment.document import Vetting
 from schema.parts import BUILT_IN
-from schema.robot import Part, Robot
+from schema.robot.robot import Part, Robot
 
 GREY = (0.5, 0.5, 0.5)
 CORE = Part("Core", -1, -1, -1, 0, GREY)

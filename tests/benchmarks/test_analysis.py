@@ -12,9 +12,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.distance import tree_distances
-from analysis.trees import encode
-from schema.tables import BIRTHS
+from analysis.measures.distance import tree_distances
+from analysis.measures.trees import encode
+from schema.tables.columns import BIRTHS
 from tests.analysis.bodies import column, random_body
 from tests.analysis.campaign import BROODS, random_bodies, write_run
 

@@ -11,9 +11,9 @@ import sys
 import numpy as np
 import pytest
 
-from schema.experiment_file import read_experiment
-from worker.arena_bench import arena_settings_of, vetted_robots
-from worker.arena_timing import (
+from schema.experiment.file import read_experiment
+from worker.bench.arena_bench import arena_settings_of, vetted_robots
+from worker.bench.arena_timing import (
     ArenaTiming,
     even_places,
     insertions,

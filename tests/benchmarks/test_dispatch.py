@@ -17,29 +17,29 @@ import pytest
 from msgspec.structs import replace
 
 import analyzer.service
-import worker.null
-import worker.service
-from coordinator.active import ActiveRun
-from coordinator.campaign import Campaign
-from coordinator.conductor import Conductor, Planned
-from coordinator.dispatch_bench import (
+import worker.serve.null
+import worker.serve.service
+from coordinator.cli.dispatch_bench import (
     LEAST_NULL_PER_S,
     LEAST_WORKERS,
     MOST_NULL_CPU_S,
     birth_cost,
     null_rate,
 )
-from coordinator.dispatch_events import DispatchEvent, Returned
-from coordinator.fleet import Fleet
-from coordinator.fleet_model import Setting, most_workers
-from coordinator.folder import RunFolder
-from coordinator.folder_status import unbegun_status
-from coordinator.service import Network
-from schema.codec import decode_answer
-from schema.crew import Crew, prepare_process
-from schema.experiment_file import read_experiment
-from schema.network import Agent
-from schema.topics import unique_name
+from coordinator.cli.fleet_model import Setting, most_workers
+from coordinator.dispatch.events import DispatchEvent, Returned
+from coordinator.dispatch.fleet import Fleet
+from coordinator.network.service import Network
+from coordinator.run.active import ActiveRun
+from coordinator.run.conductor import Conductor, Planned
+from coordinator.storage.campaign import Campaign
+from coordinator.storage.folder import RunFolder
+from coordinator.storage.folder_status import unbegun_status
+from schema.agent.crew import Crew, prepare_process
+from schema.agent.network import Agent
+from schema.agent.topics import unique_name
+from schema.experiment.file import read_experiment
+from schema.wire.codec import decode_answer
 
 prepare_process()  # as the command does, before anybody opens a session
 
@@ -86,7 +86,7 @@ def campaign(folder: Path) -> Iterator[tuple[Conductor, Watched]]:
         judge = Agent("analyzer", "analyzer", network.address)
         stack.enter_context(Crew(analyzer.service.process, (judge,), size=1))
         hand = Agent("worker", "worker", network.address)
-        stack.enter_context(Crew(worker.service.process, (hand,), size=2))
+        stack.enter_context(Crew(worker.serve.service.process, (hand,), size=2))
         watched = Watched(network)
         fleet = Fleet(watched)
         conductor = Conductor(
@@ -121,7 +121,7 @@ def test_two_workers_of_a_campaign_are_busy(tmp_path: Path) -> None:
 
 def test_null_evaluations() -> None:
     best = max(
-        (null_rate(worker.null.process, 1, 3.0) for _ in range(3)),
+        (null_rate(worker.serve.null.process, 1, 3.0) for _ in range(3)),
         key=lambda rate: rate.per_s,
     )
     print(f"\n{best.per_s:.0f} null evaluations/s, {1e3 * best.cpu_s:.3f} ms CPU each")
@@ -130,7 +130,7 @@ def test_null_evaluations() -> None:
 
 
 def test_a_thousand_workers_with_evaluations_of_ten_seconds() -> None:
-    cost = birth_cost(worker.null.process, analyzer.service.process, 600).cpu_s
+    cost = birth_cost(worker.serve.null.process, analyzer.service.process, 600).cpu_s
     setting = Setting(1, 10.0, cost)
     reached, outcome = most_workers(setting)
     rate = outcome.births_per_s

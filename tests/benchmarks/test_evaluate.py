@@ -2,9 +2,9 @@
 
 import pytest
 
-from schema.experiment import Experiment
-from schema.settings import EvaluationSettings
-from worker.bench import LEAST_RATIO, Timing, random_robots, time_evaluations
+from schema.experiment.document import Experiment
+from schema.experiment.settings import EvaluationSettings
+from worker.bench.command import LEAST_RATIO, Timing, random_robots, time_evaluations
 
 EXPERIMENT = Experiment(name="test")
 SETTINGS = EvaluationSettings(

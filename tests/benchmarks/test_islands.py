@@ -5,8 +5,8 @@ import time
 import msgspec
 import pytest
 
-from schema.experiment import Experiment, Islands, Selection
-from schema.migration import Migration
+from schema.experiment.document import Experiment, Islands, Selection
+from schema.experiment.migration import Migration
 from tests.coordinator.sea import Sea
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]

@@ -11,10 +11,13 @@ import pytest
 from msgspec.structs import replace
 
 import analyzer.service
-import worker.null
-import worker.service
-from coordinator.dispatch_events import Joined, Left
-from coordinator.events import (
+import worker.serve.null
+import worker.serve.service
+from coordinator.dispatch.events import Joined, Left
+from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.pool import AHEAD_S
+from coordinator.evolution.generation import generate
+from coordinator.islands.events import (
     Evaluate,
     Evaluated,
     IslandCommand,
@@ -22,27 +25,24 @@ from coordinator.events import (
     Journalled,
     Started,
 )
-from coordinator.fleet import Fleet
-from coordinator.folder import RunDetails, RunFolder
-from coordinator.generation import generate
-from coordinator.island import Island
-from coordinator.journal import Journal
-from coordinator.loop import Loop
-from coordinator.pool import AHEAD_S
-from coordinator.questions import Question
-from coordinator.record import Recorder
-from coordinator.rows import evaluation_record
-from coordinator.service import Network
-from coordinator.snapshots import Snapshots
-from schema.birth import BirthId
-from schema.crew import Crew, prepare_process
-from schema.experiment import Experiment, body_space
-from schema.experiment_file import experiment_text, read_experiment
-from schema.genome import develop
-from schema.network import Agent
-from schema.robot import Robot
-from schema.supervision import Post
-from schema.topics import unique_name
+from coordinator.islands.island import Island
+from coordinator.islands.rows import evaluation_record
+from coordinator.network.service import Network
+from coordinator.run.loop import Loop
+from coordinator.run.questions import Question
+from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.journal import Journal
+from coordinator.storage.recorder import Recorder
+from coordinator.storage.snapshots import Snapshots
+from schema.agent.crew import Crew, prepare_process
+from schema.agent.network import Agent
+from schema.agent.supervision import Post
+from schema.agent.topics import unique_name
+from schema.experiment.document import Experiment, body_space
+from schema.experiment.file import experiment_text, read_experiment
+from schema.robot.genome import develop
+from schema.robot.names import BirthId
+from schema.robot.robot import Robot
 
 prepare_process()  # as the command does, before anybody opens a session
 
@@ -184,7 +184,7 @@ def _experiment(births: int, brood: int) -> Experiment:
 def test_coordinator_cpu_per_birth(tmp_path: Path) -> None:
     experiment = _experiment(1500, 15)
     island = Island(experiment, 1, 0)
-    found = whole(tmp_path / "run", island, experiment, 1, worker.null.process)
+    found = whole(tmp_path / "run", island, experiment, 1, worker.serve.null.process)
     print(
         f"\nwhole births without physics: {found.per_s:.0f}/s, "
         f"coordinator {1e3 * found.cpu_s:.2f} ms CPU per birth"
@@ -200,7 +200,7 @@ def test_null_evaluations_per_second(tmp_path: Path) -> None:
         for seed in range(50)
     ]
     island = Judged(experiment, robots)
-    found = whole(tmp_path / "run", island, experiment, 1, worker.null.process)
+    found = whole(tmp_path / "run", island, experiment, 1, worker.serve.null.process)
     print(
         f"\nnull evaluations, journal and tables on: {found.per_s:.0f}/s, "
         f"coordinator {1e3 * found.cpu_s:.2f} ms CPU each"
@@ -225,7 +225,7 @@ def test_second_worker(tmp_path: Path) -> None:
     wide = replace(experiment.selection, window=60)
     experiment = replace(experiment, selection=wide)
     island = Island(experiment, 1, 0)
-    body = worker.service.process
+    body = worker.serve.service.process
     rates: dict[int, list[float]] = {1: [], 2: []}
     cpu_s = []
     with started(tmp_path / "run", island, experiment, 2, body) as bench:

@@ -12,21 +12,21 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from analysis.view_blueprint import layout
-from analysis.view_recording import Recording
-from analysis.view_show import Show
-from analysis.view_watch import Spectator
-from schema.arena import Advance
-from schema.arena_codec import Live, decode_live, encode_live
-from schema.birth import BirthId
-from schema.experiment import Space, body_space
-from schema.experiment_file import read_experiment
-from schema.identity import NOBODY
-from schema.live import Newborn, News
-from schema.robot import Robot
-from schema.settings import EvaluationSettings
-from worker.again import alone
-from worker.spider import spider
+from analysis.viewer.blueprint import layout
+from analysis.viewer.recording import Recording
+from analysis.viewer.show import Show
+from analysis.viewer.watch import Spectator
+from schema.experiment.document import Space, body_space
+from schema.experiment.file import read_experiment
+from schema.experiment.identity import NOBODY
+from schema.experiment.settings import EvaluationSettings
+from schema.robot.names import BirthId
+from schema.robot.robot import Robot
+from schema.wire.arena import Advance
+from schema.wire.arena_codec import Live, decode_live, encode_live
+from schema.wire.news import Newborn, News
+from worker.arena.replay import alone
+from worker.bench.spider import spider
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(900)]
 

@@ -9,8 +9,8 @@ from typing import Any
 import msgspec
 import pyarrow as pa
 
-from coordinator.arena import Arena
-from coordinator.events import (
+from coordinator.arena.arena import Arena
+from coordinator.islands.events import (
     Advanced,
     AdvanceShard,
     Append,
@@ -23,12 +23,12 @@ from coordinator.events import (
     Vetted,
     VettingFailed,
 )
-from schema.arena import Advance, Casualty, Judgement, Touch
-from schema.birth import BirthId
-from schema.evaluation import Provenance, Report
-from schema.experiment import Experiment
-from schema.experiment_file import read_experiment
-from schema.tables import POSES
+from schema.experiment.document import Experiment
+from schema.experiment.file import read_experiment
+from schema.robot.names import BirthId
+from schema.robot.results import Provenance, Report
+from schema.tables.columns import POSES
+from schema.wire.arena import Advance, Casualty, Judgement, Touch
 
 ORIGIN = (0.0, 0.0, 0.0)
 VIABLE = Report(

@@ -9,11 +9,11 @@ from typing import Any
 import pyarrow as pa
 import pytest
 
-from coordinator.events import Record
-from coordinator.folder import RunDetails
-from coordinator.record import Recorder
-from schema.run_tables import read_table
-from schema.tables import TABLES
+from coordinator.islands.events import Record
+from coordinator.storage.folder import RunDetails
+from coordinator.storage.recorder import Recorder
+from schema.tables.columns import TABLES
+from schema.tables.files import read_table
 
 DETAILS = RunDetails("a/b c", 2, 1, "{}")
 

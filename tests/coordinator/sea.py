@@ -5,9 +5,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from coordinator.archipelago import archipelago
-from coordinator.arena import Arena
-from coordinator.events import (
+from coordinator.arena.arena import Arena
+from coordinator.islands.events import (
     AdvanceShard,
     ArenaCommand,
     Emigrate,
@@ -22,10 +21,11 @@ from coordinator.events import (
     Vet,
     Vetted,
 )
-from coordinator.island import Island
-from schema.birth import BirthId
-from schema.evaluation import Evaluation, Provenance
-from schema.experiment import Experiment
+from coordinator.islands.island import Island
+from coordinator.run.archipelago import archipelago
+from schema.experiment.document import Experiment
+from schema.robot.names import BirthId
+from schema.robot.results import Evaluation, Provenance
 from tests.coordinator.arena_world import VIABLE, World, golden
 
 SOMEBODY = Provenance("worker-1", "x86", 0.5)

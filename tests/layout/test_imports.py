@@ -18,18 +18,20 @@ ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis")
 
 # Library -> the files, as patterns from the root, that may import it.
 HOMES = {
-    "zenoh": ("*/service.py", "*/client_service.py", "analysis/view_live.py"),
+    "zenoh": ("*/**/service.py", "*/**/client_service.py", "analysis/viewer/live.py"),
     "mujoco": (
-        "schema/mjcf*.py",
-        "schema/urdf.py",
+        "schema/mjcf/*.py",
+        "schema/experiment/scenery.py",
+        "schema/formats/mjcf.py",
+        "schema/formats/urdf.py",
         "worker/**/*.py",
-        "analysis/render*.py",
+        "analysis/render/picture.py",
     ),
-    "rerun": ("analysis/view*.py",),
-    "plotnine": ("analysis/figure*.py",),
-    "numba": ("analysis/distance.py",),
-    "matplotlib": ("analysis/figure*.py",),
-    "networkx": ("coordinator/topology.py",),
+    "rerun": ("analysis/viewer/*.py",),
+    "plotnine": ("analysis/figures/*.py",),
+    "numba": ("analysis/measures/distance.py",),
+    "matplotlib": ("analysis/figures/*.py",),
+    "networkx": ("coordinator/islands/topology.py",),
 }
 # Second opinions for tests and tools for developers: no room leans on them.
 NEVER = {

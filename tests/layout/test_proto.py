@@ -14,12 +14,16 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with what `make proto` would write now."""
     folder = tmp_path_factory.mktemp("proto")
     command = [sys.executable, "-m", "grpc_tools.protoc", f"-I{ROOT}"]
-    outputs = [f"--python_out={folder}", f"--pyi_out={folder}", "schema/revolve.proto"]
+    outputs = [
+        f"--python_out={folder}",
+        f"--pyi_out={folder}",
+        "schema/wire/revolve.proto",
+    ]
     subprocess.run([*command, *outputs], cwd=ROOT, check=True, capture_output=True)
-    return folder / "schema"
+    return folder / "schema" / "wire"
 
 
 @pytest.mark.parametrize("name", ["revolve_pb2.py", "revolve_pb2.pyi"])
 def test_generated_code_is_up_to_date(name: str, fresh: Path) -> None:
-    committed = (ROOT / "schema" / name).read_bytes()
+    committed = (ROOT / "schema" / "wire" / name).read_bytes()
     assert (fresh / name).read_bytes() == committed, "run make proto"

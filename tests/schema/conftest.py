@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 from msgspec.structs import replace
 
-from schema.brain import NEURON_TYPES, Layer
-from schema.genome import ConnectionGene, Genome, NeuronGene, Node, develop
 from schema.parts import BUILT_IN, Parameter
-from schema.robot import ORIENTATIONS, Robot
+from schema.robot.brain import NEURON_TYPES, Layer
+from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop
+from schema.robot.robot import ORIENTATIONS, Robot
 
 CHILD_TYPES = [kind for kind in BUILT_IN.values() if not kind.is_root]
 FINITE = st.floats(allow_nan=False, allow_infinity=False)

@@ -6,7 +6,7 @@ import pytest
 
 from schema.__main__ import main
 from schema.errors import InvalidRobot
-from schema.robot_file import read_robot
+from schema.formats.files import read_robot
 
 TEXT = """\
 body:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from schema.network import Tls
+from schema.agent.network import Tls
 from tests.system.fleet import Fleet, make_certificate
 from tests.system.stage import Stage, wait_until
 

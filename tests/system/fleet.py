@@ -8,8 +8,8 @@ from typing import Any
 
 import zenoh
 
-from schema.network import Tls, client_config
-from schema.topics import agents_alive
+from schema.agent.network import Tls, client_config
+from schema.agent.topics import agents_alive
 from tests.system.stage import Stage, wait_until
 
 

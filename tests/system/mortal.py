@@ -16,15 +16,15 @@ from pathlib import Path
 
 import numpy as np
 
-from schema.crew import prepare_process
+from schema.agent.crew import prepare_process
 
 prepare_process()
 
 import analyzer.service  # noqa: E402, F401 - before the first fork
-import worker.service  # noqa: E402, F401
+import worker.serve.service  # noqa: E402, F401
 from coordinator.__main__ import main  # noqa: E402
-from coordinator.folder import DETAILS  # noqa: E402
-from coordinator.journal import NAME  # noqa: E402
+from coordinator.storage.folder import DETAILS  # noqa: E402
+from coordinator.storage.journal import NAME  # noqa: E402
 
 FLAGS = ["--in-process", "--threads", "1", "--quiet"]
 

@@ -12,11 +12,11 @@ from queue import Empty, SimpleQueue
 
 import zenoh
 
-from schema import revolve_pb2 as pb
-from schema.crew import prepare_process
-from schema.network import Agent, client_config
-from schema.platform_tag import platform_tag, wire_version
-from schema.topics import Member, unique_name
+from schema.agent.crew import prepare_process
+from schema.agent.network import Agent, client_config
+from schema.agent.platform_tag import platform_tag, wire_version
+from schema.agent.topics import Member, unique_name
+from schema.wire import revolve_pb2 as pb
 
 GONE_S = 0.3
 
@@ -24,7 +24,7 @@ GONE_S = 0.3
 def main(address: str, behaviour: str) -> None:
     """Serve until SIGTERM."""
     prepare_process()
-    from worker.jobs import answer  # noqa: PLC0415 - numpy comes with it
+    from worker.serve.jobs import answer  # noqa: PLC0415 - numpy comes with it
 
     stop = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stop.set())

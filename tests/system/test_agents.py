@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from coordinator.dispatch_events import DispatchEvent, Joined, Left, Returned
-from coordinator.service import Network
-from schema.network import Tls
+from coordinator.dispatch.events import DispatchEvent, Joined, Left, Returned
+from coordinator.network.service import Network
+from schema.agent.network import Tls
 
 pytestmark = pytest.mark.system
 

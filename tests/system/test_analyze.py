@@ -10,8 +10,8 @@ import polars as pl
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.figures import FIGURES
-from analysis.outputs import OUTPUTS, schema
+from analysis.figures.catalogue import FIGURES
+from analysis.measures.outputs import OUTPUTS, schema
 from tests.system.stage import Stage
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]

@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 import zenoh
 
-from coordinator.compare import compare
-from coordinator.events import Advanced, Commanded
-from coordinator.journal import Journal
-from schema.arena_codec import Live, decode_live
-from schema.network import client_config
-from schema.run_tables import read_table
-from schema.tables import read_columns
+from coordinator.islands.events import Advanced, Commanded
+from coordinator.storage.compare import compare
+from coordinator.storage.journal import Journal
+from schema.agent.network import client_config
+from schema.tables.columns import read_columns
+from schema.tables.files import read_table
+from schema.wire.arena_codec import Live, decode_live
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 

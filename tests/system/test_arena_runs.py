@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coordinator.compare import compare
-from coordinator.events import Advanced
-from coordinator.folder import EPOCH
-from coordinator.journal import NAME, Journal
-from schema.run_tables import read_table, segments_of
-from schema.tables import TABLES
+from coordinator.islands.events import Advanced
+from coordinator.storage.compare import compare
+from coordinator.storage.folder import EPOCH
+from coordinator.storage.journal import NAME, Journal
+from schema.tables.columns import TABLES
+from schema.tables.files import read_table, segments_of
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 import zenoh
 
-from coordinator.compare import compare
-from coordinator.folder import RunDetails, RunFolder, read_state
-from schema.experiment_file import experiment_text, read_experiment
-from schema.network import hub_config
+from coordinator.storage.compare import compare
+from coordinator.storage.folder import RunDetails, RunFolder, read_state
+from schema.agent.network import hub_config
+from schema.experiment.file import experiment_text, read_experiment
 from tests.system.stage import Stage
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]

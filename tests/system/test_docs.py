@@ -12,8 +12,8 @@ import msgspec
 import pytest
 
 from revolve import COMMANDS
-from schema.experiment import Arena
-from schema.experiment_file import parse_experiment
+from schema.experiment.document import Arena
+from schema.experiment.file import parse_experiment
 
 pytestmark = pytest.mark.system
 

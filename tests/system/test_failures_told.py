@@ -8,15 +8,15 @@ from typing import Any
 
 import pytest
 
-from coordinator.compare import compare
-from coordinator.folder import RunDetails, RunFolder, read_state
-from coordinator.folder_status import check_rewritable, folder_status
-from coordinator.journal import Journal
-from coordinator.status_command import main as status
+from coordinator.cli.status import main as status
+from coordinator.storage.compare import compare
+from coordinator.storage.folder import RunDetails, RunFolder, read_state
+from coordinator.storage.folder_status import check_rewritable, folder_status
+from coordinator.storage.journal import Journal
 from schema.errors import RunFolderError
-from schema.experiment_file import experiment_text, read_experiment
-from schema.run_tables import parquet_path
-from schema.tables import TABLES
+from schema.experiment.file import experiment_text, read_experiment
+from schema.tables.columns import TABLES
+from schema.tables.files import parquet_path
 
 pytestmark = pytest.mark.system
 

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coordinator.compare import compare
-from coordinator.events import Advanced
-from coordinator.journal import NAME, Journal
+from coordinator.islands.events import Advanced
+from coordinator.storage.compare import compare
+from coordinator.storage.journal import NAME, Journal
 from tests.system.fleet import Fleet, agent_processes, size
 from tests.system.stage import wait_until
 

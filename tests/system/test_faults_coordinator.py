@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coordinator.compare import compare
-from coordinator.folder import LOCK
-from coordinator.journal import NAME
+from coordinator.storage.compare import compare
+from coordinator.storage.folder import LOCK
+from coordinator.storage.journal import NAME
 
 pytestmark = [
     pytest.mark.system,

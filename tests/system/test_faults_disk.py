@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coordinator.compare import compare
-from coordinator.journal import NAME
+from coordinator.storage.compare import compare
+from coordinator.storage.journal import NAME
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 

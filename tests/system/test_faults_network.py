@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coordinator.compare import compare
-from coordinator.events import Advanced
-from coordinator.journal import NAME, Journal
-from schema.network import Tls
+from coordinator.islands.events import Advanced
+from coordinator.storage.compare import compare
+from coordinator.storage.journal import NAME, Journal
+from schema.agent.network import Tls
 
 Stage = Any
 Fleets = Callable[..., Any]

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coordinator.compare import compare
-from coordinator.journal import NAME
-from schema.run_tables import read_table
+from coordinator.storage.compare import compare
+from coordinator.storage.journal import NAME
+from schema.tables.files import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 

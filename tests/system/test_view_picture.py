@@ -18,7 +18,7 @@ import pytest
 from PIL import Image
 from rerun.experimental import ViewerClient
 
-from schema.run_tables import read_table
+from schema.tables.files import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from schema.arena import Advance, Changes, Insertion
-from schema.birth import BirthId
-from schema.experiment import Arena, Experiment
-from schema.robot import Robot
-from schema.settings import ArenaSettings
-from worker.world import World
+from schema.experiment.document import Arena, Experiment
+from schema.experiment.settings import ArenaSettings
+from schema.robot.names import BirthId
+from schema.robot.robot import Robot
+from schema.wire.arena import Advance, Changes, Insertion
+from worker.arena.world import World
 
 EXPERIMENT = Experiment(name="test")
 SECOND = 200

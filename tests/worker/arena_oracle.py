@@ -5,12 +5,12 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from schema.birth import BirthId
-from schema.evaluation import Floats
-from schema.experiment import body_space
-from schema.mjcf import robot_spec, shared_model
-from worker.stride import Stride
-from worker.world import World
+from schema.experiment.document import body_space
+from schema.mjcf.model import robot_spec, shared_model
+from schema.robot.names import BirthId
+from schema.robot.results import Floats
+from worker.arena.world import World
+from worker.clusters.interval import Stride
 
 
 class Oracle:

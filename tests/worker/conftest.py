@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from schema.brain import INPUT, NEURON_TYPES, Brain, Connection, Neuron
-from schema.experiment import Experiment, body_space
+from schema.experiment.document import Experiment, body_space
 from schema.parts import BodySpace
-from schema.robot import Part, Robot, check_robot
+from schema.robot.brain import INPUT, NEURON_TYPES, Brain, Connection, Neuron
+from schema.robot.robot import Part, Robot, check_robot
 
 GREY = (0.5, 0.5, 0.5)
 

@@ -7,9 +7,9 @@ import hashlib
 import json
 from typing import Self
 
-from schema.arena import Advance, Casualty, Changes, Judgement
-from schema.birth import BirthId
-from schema.settings import ArenaSettings
+from schema.experiment.settings import ArenaSettings
+from schema.robot.names import BirthId
+from schema.wire.arena import Advance, Casualty, Changes, Judgement
 from tests.coordinator.arena_world import DT, MATURE, poses
 
 

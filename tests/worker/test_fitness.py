@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from schema.errors import ExperimentError
-from schema.evaluation import Track
-from schema.experiment import Experiment, Fitness
-from schema.settings import fitness_function
+from schema.experiment.document import Experiment, Fitness
+from schema.experiment.settings import fitness_function
+from schema.robot.results import Track
 from worker.fitness import (
     FitnessFunction,
     check_fitness,

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from schema.formats.files import settings_of, write_robot
 from schema.parts import BUILT_IN
-from schema.robot_file import settings_of, write_robot
-from worker.evaluation import evaluate
+from worker.bench.spider import spider
+from worker.robot.evaluation import evaluate
 from worker.robot_command import main
-from worker.spider import spider
 
 
 def test_a_file_is_judged_as_its_robot_is(

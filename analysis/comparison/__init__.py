@@ -1,0 +1,1 @@
+"""Measures of many runs into statistics and findings."""

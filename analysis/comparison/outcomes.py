@@ -1,0 +1,131 @@
+"""One number of each run for everything that experiments are compared by."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pyarrow as pa
+
+from analysis.comparison.statistics import ranks
+from analysis.measures.outputs import BODY, POPULATION
+from analysis.measures.populations_table import Numbers, Truths
+
+FOUNDERS = 15
+"""Births that are founders in the thesis's experiments."""
+
+
+def outcome(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
+    """Return what a run had come to at a number of births.
+
+    Args:
+        tables: of one run, as ``outputs`` names their columns.
+        births: on each island; the last population at or before counts.
+
+    Returns:
+        Numbers by the names of ``outputs.OUTCOME``; of several islands
+        their mean; NaN where there is none.
+    """
+    populations = tables["populations"]
+    islands = np.asarray(populations["island"], np.int64)
+    counts = _column(populations, "births")
+    each = []
+    for island in np.unique(islands):
+        rows = np.flatnonzero((islands == island) & (counts <= births))
+        if len(rows):
+            columns = {name: _column(populations, name)[rows] for name in POPULATION}
+            each.append(_of_island(columns, counts[rows], births))
+    found = {"births": float(births)}
+    for name in each[0] if each else ():
+        found[name] = _mean(np.array([one[name] for one in each]))
+    if "robots" in tables:
+        found |= _of_robots(tables["robots"], found, births)
+    return found | _of_arena(tables, births)
+
+
+def _of_island(
+    columns: dict[str, Numbers], counts: Numbers, births: int
+) -> dict[str, float]:
+    found = {name: float(values[-1]) for name, values in columns.items()}
+    found["retention"] = _mean(columns["retention"])
+    found["late_gain"] = _share(columns["fitness"], counts, births / 2, is_late=True)
+    first = int(np.searchsorted(counts, min(FOUNDERS, counts[-1])))
+    diversity = columns["diversity"][first:]
+    drop = _share(diversity, counts[first:], births / 10, is_late=False)
+    found["early_drop"] = drop
+    found["diversity_change"] = float(diversity[-1] - diversity[0])
+    return found
+
+
+def _share(values: Numbers, counts: Numbers, middle: float, *, is_late: bool) -> float:
+    """Return the share of a change from first to last that came late, or early.
+
+    NaN where fitness (late) did not rise or diversity (early) did not fall.
+    """
+    known = ~np.isnan(values)
+    values, counts = values[known], counts[known]
+    if not len(values):
+        return math.nan
+    until = max(int(np.searchsorted(counts, middle, side="right")) - 1, 0)
+    change = values[-1] - values[0]
+    if change <= 0 if is_late else change >= 0:
+        return math.nan
+    part = values[-1] - values[until] if is_late else values[until] - values[0]
+    return float(part / change)
+
+
+def _of_robots(
+    robots: pa.Table, last: dict[str, float], births: int
+) -> dict[str, float]:
+    is_born = np.asarray(robots["birth"], np.int64) < births
+    found = _changes(robots, last, is_born)
+    for name in ("extremities", "extremities_per_part"):
+        values, fitness = (_column(robots, key)[is_born] for key in (name, "fitness"))
+        found[f"{name}_fitness"] = _correlation(values, fitness)
+    return found
+
+
+def _changes(
+    robots: pa.Table, last: dict[str, float], is_born: Truths
+) -> dict[str, float]:
+    """Return how far the last population is from robots that nobody begot."""
+    is_random = is_born & (_column(robots, "ancestors") == 0)
+    return {
+        f"{name}_change": last.get(name, math.nan)
+        - _mean(_column(robots, name)[is_random])
+        for name in BODY
+        if name in {"parts", "touch_sensors", "hidden"}
+    }
+
+
+def _of_arena(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
+    found = dict.fromkeys(("variability", "touched", "between"), math.nan)
+    if "variability" in tables:
+        table = tables["variability"]
+        values = _column(table, "variability")
+        values = values[np.asarray(table["birth"], np.int64) < births]
+        values = values[~np.isnan(values)]
+        found["variability"] = float(np.median(values)) if len(values) else math.nan
+    if "interactions" in tables:
+        found["touched"] = _mean(_column(tables["interactions"], "touched"))
+    if "between" in tables:
+        table = tables["between"]
+        values = _column(table, "between")
+        values = values[np.asarray(table["births"], np.int64) <= births]
+        found["between"] = float(values[-1]) if len(values) else math.nan
+    return found
+
+
+def _correlation(first: Numbers, second: Numbers) -> float:
+    """Return Spearman's rank correlation; NaN where one of the two does not vary."""
+    if len(first) < 2 or not np.ptp(first) or not np.ptp(second):  # noqa: PLR2004
+        return math.nan
+    return float(np.corrcoef(ranks(first), ranks(second))[0, 1])
+
+
+def _column(table: pa.Table, name: str) -> Numbers:
+    return np.asarray(table[name].to_numpy(), np.float64)
+
+
+def _mean(values: Numbers) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else math.nan

@@ -1,0 +1,90 @@
+"""Figures of the arena's speed: of random robots, and of spiders."""
+
+import numpy as np
+import plotnine as p9
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from analysis.figures.forms import NothingToDraw, Tables
+from analysis.figures.style import paper
+
+_THESIS = (-0.26, 34.78, 20.41)
+"""Real-time factor a + b / p + c / p^2 on an i7-4790K. Source: Hupkes 2016, 6.1."""
+_OURS, _THEIRS = "this machine", "thesis, i7-4790K"
+
+
+def arena_speed(tables: Tables) -> p9.ggplot:
+    """Return the real-time factor of arenas of random robots by population.
+
+    Args:
+        tables: ``benchmark``, rows of ``revolve bench arena --out``.
+
+    Raises:
+        NothingToDraw: there are none.
+
+    Source: Hupkes 2016, figure 6.1.
+    """
+    rows = _rows(tables, "arena")
+    sizes = np.unique(np.asarray(rows["population"], np.float64))
+    line = np.linspace(sizes.min(), max(sizes.max(), sizes.min() + 1), 100)
+    a, b, c = _THESIS
+    fit = pa.table({"population": line, "factor": a + b / line + c / line**2})
+    named = fit.append_column("of", pa.repeat(pa.scalar(_THEIRS), fit.num_rows))
+    dashes = p9.geom_line(data=named.to_pandas(), size=0.7)
+    return _speed(rows) + dashes
+
+
+def spider_speed(tables: Tables) -> p9.ggplot:
+    """Return the real-time factor of arenas of spiders by population.
+
+    Args:
+        tables: ``benchmark``, rows of ``revolve bench spider --out``.
+
+    Raises:
+        NothingToDraw: there are none.
+
+    Source: Hupkes 2016, figure 7.1; RoboGen, which it is held against there, is not
+    run here.
+    """
+    return _speed(_rows(tables, "spider"))
+
+
+def _rows(tables: Tables, kind: str) -> pa.Table:
+    rows = tables.get("benchmark")
+    if rows is not None:
+        rows = rows.filter(pc.field("benchmark") == kind)
+    if not rows:
+        raise NothingToDraw(
+            f"no benchmark is among what is read: revolve bench {kind} --out "
+            f"RUNS/{kind}.parquet makes one"
+        )
+    return rows
+
+
+def _speed(rows: pa.Table) -> p9.ggplot:
+    means = rows.group_by("population").aggregate([("factor", "mean")])
+    named = means.rename_columns(["population", "factor"]).append_column(
+        "of", pa.repeat(pa.scalar(_OURS), means.num_rows)
+    )
+    return (
+        p9.ggplot(
+            named.to_pandas(),
+            p9.aes("population", "factor", colour="of", linetype="of"),
+        )
+        + p9.geom_hline(yintercept=1.0, colour="#999999", size=0.5)
+        + p9.geom_line(size=0.9)
+        + p9.geom_point(
+            p9.aes("population", "factor"),
+            data=rows.to_pandas(),
+            inherit_aes=False,
+            fill="#0072B2",
+            colour="white",
+            size=1.8,
+            stroke=0.2,
+        )
+        + p9.scale_colour_manual({_OURS: "#0072B2", _THEIRS: "#7F7F7F"}, name="")
+        + p9.scale_linetype_manual({_OURS: "-", _THEIRS: "--"}, name="")
+        + p9.expand_limits(y=0)
+        + p9.labs(x="robots", y="simulated by wall time")
+        + paper(3.6)
+    )

@@ -1,0 +1,154 @@
+"""Figures of runs of several islands."""
+
+import math
+
+import numpy as np
+import plotnine as p9
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from analysis.figures.forms import NothingToDraw, Tables
+from analysis.figures.style import OTHERS, in_order, label, paper, scales, whole
+
+_PAIRS = {"within islands": "within", "between islands": "between"}
+_IN_A_ROW = 12
+_NO_ISLANDS = "no run has several islands"
+
+
+def fitness_by_island(tables: Tables) -> p9.ggplot:
+    """Return the mean fitness of each island over births.
+
+    Args:
+        tables: ``runs`` and ``populations``.
+
+    Raises:
+        NothingToDraw: no run has several islands.
+    """
+    several = tables["runs"].filter(pc.field("islands") > 1)["folder"]
+    rows = tables["populations"]
+    chosen = pc.is_in(rows["folder"], several.combine_chunks())
+    rows = rows.filter(chosen).filter(pc.field("fitness").is_valid())
+    if not rows.num_rows:
+        raise NothingToDraw(_NO_ISLANDS)
+    lines = pc.binary_join_element_wise(
+        rows["folder"], rows["island"].cast(pa.string()), " "
+    )
+    islands = rows["island"].cast(pa.string())
+    shown = rows.select(["experiment", "births", "fitness"])
+    shown = shown.append_column("line", lines).append_column("island", islands)
+    names = sorted(set(islands.to_pylist()), key=int)
+    hues = OTHERS * -(-len(names) // len(OTHERS))
+    return (
+        p9.ggplot(shown.to_pandas(), p9.aes("births", "fitness"))
+        + p9.geom_line(p9.aes(colour="island", group="line"), size=0.7, alpha=0.85)
+        + p9.facet_wrap("experiment", labeller=label)
+        + p9.scale_colour_manual(hues[: len(names)], limits=names)
+        + p9.guides(colour=p9.guide_legend(nrow=-(-len(names) // _IN_A_ROW)))
+        + p9.expand_limits(y=0)
+        + p9.labs(x="births on the island", y="mean fitness [m/s]", colour="island ")
+        + paper(3.8)
+        + p9.theme(legend_title=p9.element_text())
+    )
+
+
+def between(tables: Tables) -> p9.ggplot:
+    """Return how different bodies are within and between islands, over runs.
+
+    Args:
+        tables: ``between``.
+
+    Raises:
+        NothingToDraw: no run has several islands.
+    """
+    rows = tables.get("between")
+    if not rows:
+        raise NothingToDraw(_NO_ISLANDS)
+    pieces = []
+    for said, name in _PAIRS.items():
+        known = rows.filter(rows[name].is_valid())
+        grouped = known.group_by(["experiment", "births"]).aggregate([(name, "mean")])
+        renamed = grouped.rename_columns(["experiment", "births", "distance"])
+        pairs = pa.repeat(pa.scalar(said), renamed.num_rows)
+        pieces.append(renamed.append_column("pairs", pairs))
+    shown = pa.concat_tables(pieces)
+    return (
+        p9.ggplot(shown.to_pandas(), p9.aes("births", "distance"))
+        + p9.geom_line(p9.aes(colour="experiment", linetype="pairs"), size=0.8)
+        + p9.scale_linetype_manual(["-", "--"], limits=list(_PAIRS))
+        + scales(rows["experiment"].to_pylist(), is_filled=False)
+        + p9.expand_limits(y=0)
+        + p9.labs(x="births on each island", y="mean tree edit distance", linetype="")
+        + paper(3.8)
+    )
+
+
+def migration_graph(tables: Tables) -> p9.ggplot:
+    """Return who sent how many to whom, and what share of them left a line.
+
+    Args:
+        tables: ``migrants``.
+
+    Raises:
+        NothingToDraw: nobody migrated.
+    """
+    rows = tables.get("migrants")
+    if not rows:
+        raise NothingToDraw(f"{_NO_ISLANDS} between which somebody went")
+    left = pc.greater(rows["living"], 0).cast(pa.float64())
+    edges = (
+        rows.append_column("line", left)
+        .group_by(["experiment", "island", "to"])
+        .aggregate([("line", "count"), ("line", "mean")])
+    )
+    places = [
+        row | _arrow(*(_spots(rows, row["experiment"])[row[end]] for end in
+                       ("island", "to")))
+        for row in edges.to_pylist()
+    ]  # fmt: skip
+    islands = [
+        {"experiment": name, "island": island, "x": x, "y": y}
+        for name in in_order(rows["experiment"].to_pylist())
+        for island, (x, y) in _spots(rows, name).items()
+    ]
+    nodes = pa.Table.from_pylist(islands).to_pandas()
+    return (
+        p9.ggplot(pa.Table.from_pylist(places).to_pandas())
+        + p9.geom_segment(
+            p9.aes("x", "y", xend="xend", yend="yend", size="line_count",
+                   colour="line_mean"),
+            arrow=p9.arrow(length=0.1, type="closed", angle=22),
+        )
+        + p9.geom_point(p9.aes("x", "y"), data=nodes, size=9, fill="white", stroke=0.6)
+        + p9.geom_text(p9.aes("x", "y", label="island"), data=nodes, size=9)
+        + p9.facet_wrap("experiment", labeller=label)
+        + p9.scale_size_continuous(range=(0.5, 2.0), breaks=whole, name="migrants")
+        + p9.scale_colour_gradient("#C6DBEF", "#084594", limits=(0, 1),
+                                   name="share that\nleft a line")
+        + p9.coord_fixed(xlim=(-1.25, 1.25), ylim=(-1.25, 1.25))
+        + paper(4.6)
+        + p9.theme_void()
+        + p9.theme(figure_size=(7.0, 4.6), legend_position="right")
+    )  # fmt: skip
+
+
+Spot = tuple[float, float]
+
+
+def _spots(rows: pa.Table, experiment: str) -> dict[int, Spot]:
+    """Return where an experiment's islands stand: on a circle, from its top."""
+    mine = rows.filter(pc.field("experiment") == experiment)
+    islands = sorted({*mine["island"].to_pylist(), *mine["to"].to_pylist()})
+    angles = 2 * math.pi * np.arange(len(islands)) / len(islands)
+    return {
+        island: (math.sin(angle), math.cos(angle))
+        for island, angle in zip(islands, angles.tolist(), strict=True)
+    }
+
+
+def _arrow(start: Spot, end: Spot) -> dict[str, float]:
+    """Return an arrow that ends short of both, a little to the right of the middle."""
+    along = np.subtract(end, start)
+    along = along / (np.linalg.norm(along) or 1.0)
+    aside = 0.04 * np.array([along[1], -along[0]])
+    (x, y), (xend, yend) = start + 0.17 * along + aside, end - 0.19 * along + aside
+    return {"x": float(x), "y": float(y), "xend": float(xend), "yend": float(yend)}

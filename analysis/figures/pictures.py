@@ -1,0 +1,157 @@
+"""Figures that are made of pictures: gaits, and families of robots."""
+
+from collections.abc import Mapping, Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import ConnectionPatch, Rectangle
+
+from analysis.figures.family import Family
+from analysis.figures.portraits import Colour, Portrait
+from analysis.figures.style import label
+from schema.robot.names import BirthId
+
+_INK, _FAINT = "#333333", "#9A9A9A"
+FOUNDERS: tuple[Colour, ...] = (
+    (0.00, 0.45, 0.70), (0.90, 0.62, 0.00), (0.00, 0.62, 0.45), (0.80, 0.47, 0.65),
+    (0.84, 0.37, 0.00), (0.34, 0.71, 0.91), (0.94, 0.89, 0.26), (0.45, 0.45, 0.45),
+)  # fmt: skip
+"""Colours of founders, by their share in a family; the last is of all others.
+
+Source: Okabe and Ito, 2008.
+"""
+_HEIGHT = 0.53
+"""Of a picture in a tree where somebody has a width of 1."""
+_WIDTH = 0.94
+_STEP = 1.0
+"""From one level to the next."""
+
+
+def gaits(portraits: Sequence[Portrait]) -> Figure:
+    """Return how robots move: a row of consecutive pictures each.
+
+    Args:
+        portraits: of the best robots; at least one.
+
+    Source: Hupkes 2016, figure 6.10.
+    """
+    columns = max(len(one.gait) for one in portraits)
+    figure = Figure(
+        figsize=(8.0, 0.25 + len(portraits) * (8.0 / columns * 0.525 + 0.26))
+    )
+    axes = figure.subplots(len(portraits), columns, squeeze=False)
+    figure.subplots_adjust(0, 0, 1, 0.97, wspace=0.02, hspace=0.18)
+    for row, one in zip(axes, portraits, strict=True):
+        for axis in row:
+            axis.set_axis_off()
+        for axis, picture, time_s in zip(row, one.gait, one.times_s, strict=False):
+            axis.imshow(picture)
+            axis.set_title(f"{time_s:.1f} s", fontsize=7, color=_FAINT, pad=2)
+        said = f"{label(one.best.experiment)}, {one.best.fitness:.3f} m/s"
+        row[0].set_title(said, loc="left", fontsize=8, color=_INK, pad=2)
+    for row in axes:
+        if row[0].get_title() and row[0].get_title(loc="left"):
+            row[0].set_title("")
+    return figure
+
+
+def family_tree(
+    one: Portrait, levels: Sequence[Sequence[int]], fitness: Mapping[BirthId, float]
+) -> Figure:
+    """Return a robot, its parents above it, and so on, and the founders on top.
+
+    Args:
+        one: of the robot.
+        levels: of its family, as they are to stand from left to right.
+        fitness: of its relatives [m/s].
+
+    Source: Hupkes 2016, figures 6.18 to 6.20.
+    """
+    kin = one.family or Family((), (), (), {})
+    width = float(max(5, *map(len, levels), len(kin.founders)))
+    spots = {
+        who: ((at + 0.5) * width / len(level), _STEP * height)
+        for height, level in enumerate(levels)
+        for at, who in enumerate(level)
+    }
+    top = _STEP * (len(levels) - 1) + _HEIGHT
+    figure = Figure(figsize=(8.0, 8.0 / width * (top + 1.75)))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    for child, parent in kin.edges:
+        _line(axes, spots[child], spots[parent])
+    for who, spot in spots.items():
+        said = fitness.get(one.births[who])
+        worth = "" if said is None else f"{said:.3f} m/s"
+        _hang(axes, one, who, spot, said=f"{_name(one, who)}  {worth}")
+    line = top + 0.35
+    axes.plot([0, width], [line, line], "--", color=_FAINT, linewidth=0.8)
+    for at, who in enumerate(kin.founders):
+        spot = ((at + 0.5) * width / len(kin.founders), line + 0.35)
+        colour = FOUNDERS[min(at, len(FOUNDERS) - 1)]
+        _hang(axes, one, who, spot, said=f"founder {_name(one, who)}", colour=colour)
+    axes.set_xlim(0, width)
+    axes.set_ylim(-0.25, line + 0.35 + _HEIGHT + 0.1)
+    axes.set_aspect("equal")
+    return figure
+
+
+def _name(one: Portrait, who: int) -> str:
+    """Return a number of birth, and the island's of those of other islands."""
+    island, number = one.births[who]
+    return f"{number}" if island == one.best.birth_island else f"{island}:{number}"
+
+
+Spot = tuple[float, float]
+"""The middle of a picture's lower edge."""
+
+
+def _hang(
+    axes: Axes,
+    one: Portrait,
+    who: int,
+    spot: Spot,
+    *,
+    said: str,
+    colour: Colour | None = None,
+) -> None:
+    """Put somebody's picture into a figure, with its name below."""
+    x, y = spot
+    edges = (x - _WIDTH / 2, x + _WIDTH / 2, y, y + _HEIGHT)
+    axes.imshow(one.pictures[who], extent=edges, zorder=2, interpolation="antialiased")
+    axes.add_patch(
+        Rectangle(
+            (edges[0], edges[2]), edges[1] - edges[0], edges[3] - edges[2],
+            fill=False, zorder=3, edgecolor=colour or _FAINT,
+            linewidth=2.0 if colour else 0.6,
+        )
+    )  # fmt: skip
+    axes.text(
+        x, y - 0.03, said, ha="center", va="top", fontsize=6.5, color=_INK, zorder=4,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
+    )  # fmt: skip
+
+
+def _line(axes: Axes, child: Spot, parent: Spot) -> None:
+    """Draw a line from a child up to its parent; around, if that is not above it."""
+    start = (child[0], child[1] + _HEIGHT)
+    if parent[1] > child[1]:
+        end = (parent[0], parent[1] - 0.18)
+        axes.plot(
+            [start[0], end[0]],
+            [start[1], end[1]],
+            color=_FAINT,
+            linewidth=0.9,
+            zorder=1,
+        )
+        return
+    end = (parent[0], parent[1] + _HEIGHT)
+    # Flat enough to stay below the row above.
+    away = max(abs(end[0] - start[0]), abs(end[1] - start[1]))
+    bend = min(0.25, 0.45 / max(away, 1.0)) * (1 if end[0] < start[0] else -1)
+    axes.add_patch(
+        ConnectionPatch(
+            start, end, "data", "data", linestyle=":", linewidth=0.9, zorder=1,
+            connectionstyle=f"arc3,rad={bend}", color=_FAINT,
+        )
+    )  # fmt: skip

@@ -1,0 +1,243 @@
+"""The report: one HTML file that holds all it shows and asks nothing of the network."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+import pyarrow as pa
+
+from analysis.figures.style import in_order, label
+from analysis.measures.outputs import OUTPUTS
+
+_STYLE = """
+:root { --ink: #24292f; --faint: #6b7280; --line: #e5e7eb; --pale: #f6f7f9; }
+* { box-sizing: border-box; }
+body { margin: 0; color: var(--ink); background: #fff;
+  font: 16px/1.55 system-ui, -apple-system, "Segoe UI", Roboto, sans-serif; }
+main { max-width: 60rem; margin: 0 auto; padding: 2.5rem 1.5rem 5rem; }
+h1 { font-size: 2rem; line-height: 1.2; margin: 0 0 .3rem; }
+h2 { font-size: 1.3rem; margin: 3rem 0 .8rem; padding-bottom: .3rem;
+  border-bottom: 2px solid var(--line); }
+p.lead, figcaption, .note { color: var(--faint); }
+figure { margin: 2.2rem 0 2.8rem; }
+figure img { width: 100%; max-width: 52rem; display: block; margin: 0 auto .6rem; }
+figcaption { font-size: .9rem; max-width: 46rem; margin: 0 auto; }
+figcaption b { color: var(--ink); }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-size: .86rem; width: 100%; }
+th, td { text-align: left; padding: .35rem .6rem; vertical-align: top;
+  border-bottom: 1px solid var(--line); }
+th { background: var(--pale); font-weight: 600; white-space: nowrap; }
+td.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+.v { display: inline-block; padding: 0 .5rem; border-radius: .7rem; color: #fff;
+  font-size: .78rem; white-space: nowrap; }
+.v.reproduced { background: #0072b2; } .v.not { background: #d55e00; }
+.v.undecided { background: #8a8f98; }
+pre { background: var(--pale); padding: .8rem 1rem; overflow-x: auto;
+  border-radius: .4rem; font-size: .85rem; }
+code { overflow-wrap: anywhere; }
+@media print { main { max-width: none; padding: 0; } figure { break-inside: avoid; } }
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A figure that was drawn.
+
+    Attributes:
+        number: of the thesis, or a letter of ours.
+        title: what it is about.
+        caption: what is seen.
+        source: the tables whose rows it shows.
+        picture: the PNG file.
+    """
+
+    number: str
+    title: str
+    caption: str
+    source: tuple[str, ...]
+    picture: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Making:
+    """How a report came about: the command, when, and versions by name."""
+
+    command: str
+    when: str
+    versions: Mapping[str, str]
+
+
+def report(
+    tables: Mapping[str, pa.Table], figures: Sequence[Drawn], making: Making
+) -> str:
+    """Return the report as HTML.
+
+    Args:
+        tables: as ``outputs`` names them; ``left_out`` names figures too.
+        figures: in order.
+        making: of the report.
+    """
+    runs = tables["runs"].to_pylist()
+    names = [label(name) for name in in_order(row["experiment"] for row in runs)]
+    title = f"Revolve Islands: {', '.join(names)}" if names else "Revolve Islands"
+    lead = (
+        f"{len(runs)} runs, {sum(row['births'] for row in runs)} births; "
+        f"written {making.when}"
+    )
+    sections = [
+        f"<h1>{escape(title)}</h1>",
+        f'<p class="lead">{escape(lead)}</p>',
+        *_section("Runs", _runs(runs)),
+        *_section("Findings of the thesis", _findings(tables["findings"].to_pylist())),
+        *_section("Figures", *map(_figure, figures)),
+        *_section("Left out", _left_out(tables["left_out"].to_pylist())),
+        *_section("Tables", _contents(tables)),
+        *_section("How this was made", _making(making)),
+    ]
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>{_STYLE}</style>\n</head>\n"
+        f"<body>\n<main>\n{chr(10).join(sections)}\n</main>\n</body>\n</html>\n"
+    )
+
+
+def _section(title: str, *content: str) -> list[str]:
+    return [f"<h2>{title}</h2>", *content] if any(content) else []
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table of cells that are HTML already."""
+    head = "".join(f"<th>{escape(name)}</th>" for name in heads)
+    body = "\n".join(f"<tr>{''.join(row)}</tr>" for row in rows)
+    return (
+        f'<div class="scroll"><table><thead><tr>{head}</tr></thead>\n'
+        f"<tbody>\n{body}\n</tbody></table></div>"
+    )
+
+
+def _cell(value: object, kind: str = "") -> str:
+    """Return a cell; numbers stand right, with three digits that count."""
+    if isinstance(value, bool | str):
+        return f"<td{kind}>{escape(str(value))}</td>"
+    if value is None:
+        return '<td class="n">–</td>'
+    text = f"{value:.3g}" if isinstance(value, float) else str(value)
+    return f'<td class="n">{text.replace("-", "&minus;")}</td>'
+
+
+def _runs(runs: Sequence[Mapping[str, object]]) -> str:
+    heads = ["experiment", "runs", "births of a run", "islands", "seeds"]
+    heads += ["settings"] if any(row["differs"] for row in runs) else []
+    rows = []
+    for name in in_order(str(row["experiment"]) for row in runs):
+        mine = [row for row in runs if row["experiment"] == name]
+        # Whether somebody still works on the others, their folders do not tell.
+        states = [
+            "finished" if row["state"] == "finished" else "not finished" for row in mine
+        ]
+        counts = [
+            f"{states.count(state)} {state}" for state in dict.fromkeys(sorted(states))
+        ]
+        births = sorted({int(str(row["births"])) for row in mine})
+        reach = f"{births[0]}" if len(births) == 1 else f"{births[0]} to {births[-1]}"
+        islands = max(int(str(row["islands"])) for row in mine)
+        cells = (label(name), ", ".join(counts), f"{reach}", islands, _seeds(mine))
+        whole = (*cells, mine[0]["differs"] or "")
+        rows.append([_cell(value) for value in whole[: len(heads)]])
+    return _table(heads, rows) if rows else ""
+
+
+def _seeds(runs: Sequence[Mapping[str, object]]) -> str:
+    """Return the seeds of an experiment's runs, and which repeats of each."""
+    said = []
+    for seed in dict.fromkeys(row["seed"] for row in runs):
+        repeats = sorted(int(str(row["run"])) for row in runs if row["seed"] == seed)
+        which = f": repeats {', '.join(map(str, repeats))}" if any(repeats) else ""
+        said.append(f"{seed}{which}")
+    return "; ".join(said)
+
+
+def _findings(rows: Sequence[Mapping[str, object]]) -> str:
+    if not rows:
+        return ""
+    verdicts = [str(row["verdict"]) for row in rows]
+    counts = ", ".join(
+        f"{verdicts.count(verdict)} {verdict}"
+        for verdict in ("reproduced", "not reproduced", "undecided")
+    )
+    numbers = ("mean_a", "mean_b", "effect", "effect_low", "effect_high", "q")
+    lines = []
+    for row in rows:
+        verdict = str(row["verdict"])
+        kind = verdict.split(maxsplit=1)[0]
+        badge = f'<span class="v {kind}">{escape(verdict)}</span>'
+        runs = "–" if row["runs_a"] is None else f"{row['runs_a']}"
+        runs += "" if row["runs_b"] is None else f" / {row['runs_b']}"
+        lines.append(
+            [
+                _cell(row["figure"]),
+                _cell(row["claim"]),
+                _cell(row["expected"]),
+                _cell(runs),
+                *(_cell(row[name]) for name in numbers),
+                f"<td>{badge}</td>",
+                _cell(row["why"]),
+            ]
+        )
+    heads = ("figure", "finding", "a ? b", "runs", "mean a", "mean b", "effect",
+             "low", "high", "q", "verdict", "why")  # fmt: skip
+    note = (
+        "The unit is the run. Effects are Cliff's delta of a over b with its 95 % "
+        "interval, or of one experiment against a number the rank-biserial "
+        "correlation; q is p, corrected for all tests of the table."
+    )
+    return f"<p><b>{counts}.</b> <span class=note>{escape(note)}</span></p>" + _table(
+        heads, lines
+    )
+
+
+def _figure(one: Drawn) -> str:
+    picture = base64.b64encode(one.picture.read_bytes()).decode()
+    tables = ", ".join(map(_source, one.source))
+    name = f"Figure {one.number}. {one.title}."
+    return (
+        f'<figure id="figure-{escape(one.number)}">'
+        f'<img alt="{escape(name)}" src="data:image/png;base64,{picture}">'
+        f"<figcaption><b>{escape(name)}</b> {escape(one.caption)} "
+        f"Rows of {tables}.</figcaption></figure>"
+    )
+
+
+def _source(name: str) -> str:
+    """Return a source: measures by their file's name, others in words."""
+    said = escape(name)
+    return f"<code>{said}</code>" if name in OUTPUTS else said
+
+
+def _left_out(rows: Sequence[Mapping[str, object]]) -> str:
+    lines = [[_cell(row[name]) for name in ("what", "folder", "why")] for row in rows]
+    return _table(("what", "of", "why"), lines) if lines else ""
+
+
+def _contents(tables: Mapping[str, pa.Table]) -> str:
+    rows = [
+        [
+            f"<td><code>measures/{name}.parquet</code></td>",
+            _cell(tables[name].num_rows),
+            _cell(", ".join(OUTPUTS[name])),
+        ]
+        for name in OUTPUTS
+        if name in tables
+    ]
+    return _table(("file", "rows", "columns"), rows)
+
+
+def _making(making: Making) -> str:
+    versions = [[_cell(name), _cell(text)] for name, text in making.versions.items()]
+    return f"<pre>{escape(making.command)}</pre>" + _table(
+        ("what", "version"), versions
+    )

@@ -1,0 +1,80 @@
+"""How large robots are, part by part."""
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from analysis.measures.outputs import BODY, PER_PART
+from analysis.measures.populations_table import Numbers
+
+TOUCH = ("TouchSensor",)
+"""Part types that feel touch."""
+
+
+def body_sizes(births: pa.Table, touch: tuple[str, ...] = TOUCH) -> dict[str, Numbers]:
+    """Return the sizes of every individual, absolute and by its number of parts.
+
+    Args:
+        births: of one run: ``parts``, ``joints``, ``motors``, ``extremities``,
+            ``hidden``, ``connections``, ``body``.
+        touch: names of the part types that feel touch.
+
+    Returns:
+        Arrays (B,) by the names of ``outputs.BODY`` and ``PER_PART``. A
+        joint with a motor is active, any other passive.
+
+    Source: Hupkes 2016, figures 6.9 to 6.16. Touch sensors are counted as parts; the
+    axis of figure 6.15 seems to count their inputs, two of each.
+    """
+    found = {
+        name: np.asarray(births[name], np.float64)
+        for name in ("parts", "joints", "extremities", "hidden", "connections")
+    }
+    found["active_joints"] = np.asarray(births["motors"], np.float64)
+    found["passive_joints"] = found["joints"] - found["active_joints"]
+    lists = births["body"].combine_chunks()
+    owners = np.asarray(pc.list_parent_indices(lists), np.int64)
+    kinds = lists.flatten().field("kind")
+    feels = np.asarray(pc.is_in(kinds, pa.array(touch, pa.string())), np.bool_)
+    count = np.bincount(owners[feels], minlength=births.num_rows)
+    found["touch_sensors"] = count.astype(np.float64)
+    for name in PER_PART:
+        found[name] = found[name.removesuffix("_per_part")] / found["parts"]
+    return {name: found[name] for name in (*BODY, *PER_PART)}
+
+
+def extremity_bins(robots: pa.Table) -> pa.Table:
+    """Return how fit robots are by how many extremities they have.
+
+    Args:
+        robots: ``is_last``, ``parts``, ``extremities``, ``fitness`` [m/s].
+
+    Returns:
+        One row per ``population`` ("final" or "born"), ``by`` ("count", or "per_part"
+        in bins of 0.1) and ``bin`` (the count, or the bin's lower end): ``robots`` and
+        ``fitness``, their mean [m/s].
+
+    Source: Hupkes 2016, figure 6.14.
+    """
+    count = np.asarray(robots["extremities"], np.int64)
+    # Whole numbers, so that 3 of 10 falls into the bin that starts with 0.3.
+    tenths = count * 10 // np.maximum(np.asarray(robots["parts"], np.int64), 1)
+    born = pa.table(
+        {
+            "is_last": robots["is_last"],
+            "fitness": robots["fitness"],
+            "count": count.astype(np.float64),
+            "per_part": tenths / 10,
+        }
+    )
+    pieces = []
+    for population, rows in (("final", born.filter(born["is_last"])), ("born", born)):
+        for by in ("count", "per_part"):
+            groups = rows.group_by(by)
+            totals = groups.aggregate([("fitness", "count"), ("fitness", "mean")])
+            binned = totals.rename_columns(["bin", "robots", "fitness"]).sort_by("bin")
+            for name, value in (("by", by), ("population", population)):
+                repeated = pa.repeat(pa.scalar(value), binned.num_rows)
+                binned = binned.add_column(0, name, repeated)
+            pieces.append(binned)
+    return pa.concat_tables(pieces)

@@ -1,0 +1,99 @@
+"""How far apart two bodies are: tree edit distance, compiled.
+
+Inserting or deleting a part costs 1; turning one into another costs 1 if their
+types differ and 1 if their slots differ, the latter only where both have a parent.
+As only a core has none, and no other part is of its type, this is a metric.
+
+The loops are compiled when first called, and kept on disk from then on.
+"""
+
+import numba
+import numpy as np
+
+from analysis.measures.trees import Integers, Trees
+
+
+def tree_distances(trees: Trees, first: Integers, second: Integers) -> Integers:
+    """Return the edit distances of pairs of trees.
+
+    Args:
+        trees: as ``analysis.measures.trees.encode`` returns them.
+        first: (P,) numbers of trees.
+        second: (P,) the others of the pairs.
+
+    Returns:
+        (P,) least total cost of edits that turn one tree into the other; >= 0.
+
+    Source: Zhang and Shasha, *Simple fast algorithms for the editing distance
+    between trees and related problems*, SIAM J. Comput. 18(6), 1989; costs: Hupkes
+    2016, section 6.2.1.
+    """
+    # Small numbers, few bytes: a pair's arrays stay in the nearest cache.
+    kinds, slots, lefts = (
+        np.ascontiguousarray(column, np.int32)
+        for column in (trees.kinds, trees.slots, trees.lefts)
+    )
+    pairs = np.ascontiguousarray(np.stack([first, second], axis=1), np.int64)
+    nodes = (kinds, slots, lefts, trees.key_roots)
+    found: Integers = _distances(trees.starts, nodes, pairs)
+    return found
+
+
+@numba.njit(cache=True, nogil=True)
+def _distances(starts, nodes, pairs):  # type: ignore[no-untyped-def] # noqa: ANN001, ANN202
+    kinds, slots, lefts, key_roots = nodes
+    largest = 0
+    for tree in range(len(starts) - 1):
+        largest = max(largest, starts[tree + 1] - starts[tree])
+    costs = np.zeros((largest, largest), np.int32)
+    subtrees = np.zeros((largest, largest), np.int32)
+    forests = np.zeros((largest + 1, largest + 1), np.int32)
+    found = np.zeros(len(pairs), np.int64)
+    for pair in range(len(pairs)):
+        first, second = pairs[pair]
+        if first == second:
+            continue
+        a, a_end = starts[first], starts[first + 1]
+        b, b_end = starts[second], starts[second + 1]
+        for i in range(a, a_end):
+            for j in range(b, b_end):
+                has_moved = slots[i] != slots[j] and slots[i] >= 0 and slots[j] >= 0
+                costs[i - a, j - b] = (kinds[i] != kinds[j]) + has_moved
+        a_lefts, b_lefts = lefts[a:a_end], lefts[b:b_end]
+        for i in range(a_end - a):
+            for j in range(b_end - b):
+                if key_roots[a + i] and key_roots[b + j]:
+                    _fill(costs, (a_lefts, i), (b_lefts, j), subtrees, forests)
+        found[pair] = subtrees[a_end - a - 1, b_end - b - 1]
+    return found
+
+
+@numba.njit(cache=True, nogil=True)
+def _fill(costs, a, b, subtrees, forests):  # type: ignore[no-untyped-def] # noqa: ANN001, ANN202
+    """Fill in the distances of the subtrees that end with two key roots.
+
+    Unsigned indices spare the loop a test for counting from the end.
+    """
+    (a_lefts, i), (b_lefts, j) = a, b
+    one = np.uint32(1)
+    i_left, j_left = np.uint32(a_lefts[i]), np.uint32(b_lefts[j])
+    rows, columns = np.uint32(i) - i_left + one, np.uint32(j) - j_left + one
+    for y in range(columns + one):
+        forests[0, y] = y
+    for x in range(one, rows + one):
+        node = i_left + x - one
+        left = np.uint32(a_lefts[node]) - i_left
+        row, above, joined = forests[x], forests[x - one], forests[left]
+        beside = np.int32(x)
+        row[0] = beside
+        for y in range(one, columns + one):
+            other = j_left + y - one
+            other_left = np.uint32(b_lefts[other]) - j_left
+            least = min(above[y], beside) + np.int32(1)
+            if left == 0 and other_left == 0:
+                least = min(least, above[y - one] + costs[node, other])
+                subtrees[node, other] = least
+            else:
+                least = min(least, joined[other_left] + subtrees[node, other])
+            beside = np.int32(least)
+            row[y] = beside

@@ -1,0 +1,85 @@
+"""How much a robot's fitness changes while it lives in an arena."""
+
+import numpy as np
+import pyarrow as pa
+
+from analysis.measures.populations_table import Numbers, names, stays, unnamed
+from analysis.measures.trees import Integers
+
+
+def variability(fitness: pa.Table) -> pa.Table:
+    """Return how far each robot's fitness ranged, by that of its contemporaries.
+
+    Only what was recorded while mature counts: before that a robot has no window to
+    be judged by. A robot with less than two such samples has no row.
+
+    Args:
+        fitness: samples of one run's arenas: ``island``, ``birth_island`` and
+            ``birth``, ``sim_time_s`` [s], ``fitness`` [m/s], ``is_mature``.
+
+    Returns:
+        One row per ``island`` and robot there (``birth_island``, ``birth``):
+        ``samples``, ``fitness_range`` [m/s], ``population_range`` (greatest less least
+        recorded on the island from its first sample there to its last) [m/s],
+        ``variability``, the first by the second; null where all were equal.
+
+    Source: Hupkes 2016, figure 6.8: defined after its caption, the code of the figure
+    was never published.
+    """
+    mature = fitness.filter(fitness["is_mature"])
+    times = np.asarray(mature["sim_time_s"], np.float64)
+    values = np.asarray(mature["fitness"], np.float64)
+    robots = stays(mature)
+    order = np.lexsort((times, robots))
+    found, firsts, samples = np.unique(
+        robots[order], return_index=True, return_counts=True
+    )
+    islands = np.asarray(mature["island"], np.int64)
+    moments = {
+        island: _moments(times[islands == island], values[islands == island])
+        for island in np.unique(islands).tolist()
+    }
+    own, population = np.zeros(len(found)), np.zeros(len(found))
+    for robot, (first, count) in enumerate(zip(firsts, samples, strict=True)):
+        mine = order[first : first + count]
+        own[robot] = np.ptp(values[mine])
+        clock, least, greatest = moments[int(islands[mine[0]])]
+        begin = np.searchsorted(clock, times[mine[0]], side="left")
+        until = np.searchsorted(clock, times[mine[-1]], side="right")
+        population[robot] = greatest[begin:until].max() - least[begin:until].min()
+    unknown = np.full(len(own), np.nan)
+    ratio = np.divide(own, population, out=unknown, where=population > 0)
+    table = pa.table(
+        {
+            **unnamed(found),
+            "samples": samples,
+            "fitness_range": own,
+            "population_range": population,
+            "variability": pa.array(ratio, from_pandas=True),
+        }
+    )
+    return table.filter(pa.array(samples > 1))
+
+
+def _moments(times: Numbers, values: Numbers) -> tuple[Numbers, Numbers, Numbers]:
+    """Return when an island's mature were judged, the least and the greatest then."""
+    clock, where = np.unique(times, return_inverse=True)
+    least, greatest = np.full(len(clock), np.inf), np.full(len(clock), -np.inf)
+    np.minimum.at(least, where, values)
+    np.maximum.at(greatest, where, values)
+    return clock, least, greatest
+
+
+def last_fitness(fitness: pa.Table) -> tuple[Integers, Numbers]:
+    """Return who was ever judged in an arena, (R,), and its last fitness, (R,) [m/s].
+
+    Args:
+        fitness: samples, as for ``variability``.
+    """
+    mature = fitness.filter(fitness["is_mature"])
+    robots = names(mature)
+    times = np.asarray(mature["sim_time_s"], np.float64)
+    order = np.lexsort((times, robots))
+    is_last = np.append(robots[order][1:] != robots[order][:-1], True)[: len(order)]
+    chosen = order[is_last]
+    return robots[chosen], np.asarray(mature["fitness"], np.float64)[chosen]

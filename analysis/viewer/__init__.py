@@ -1,0 +1,1 @@
+"""Rerun viewer, live and replay."""

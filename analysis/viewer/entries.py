@@ -1,0 +1,53 @@
+"""What is told to a recording: moments, motion, kinship, and the names of entities."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from analysis.viewer.body import Singles
+from schema.robot.names import BirthId
+
+
+@dataclass(frozen=True, slots=True)
+class When:
+    """A moment: simulated time [s], None off-line, and births so far, if known."""
+
+    sim_time_s: float | None = None
+    births: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Moves:
+    """T poses of one robot, at times (T,) [s] and after so many births (T,), if any."""
+
+    sim_time_s: npt.NDArray[np.float64]
+    births: npt.NDArray[np.int64] | None
+    centres: Singles
+    attitudes: Singles
+
+
+@dataclass(frozen=True, slots=True)
+class Kin:
+    """One individual in the ancestry: column and row in the picture, and parents."""
+
+    birth: BirthId
+    order: int
+    rank: int
+    parents: tuple[BirthId, ...]
+    is_alive: bool
+
+
+def island_path(island: int) -> str:
+    """Return the entity of an island."""
+    return f"islands/{island}"
+
+
+def robot_path(island: int, birth: BirthId) -> str:
+    """Return the entity of a robot that lives on an island."""
+    return f"islands/{island}/robots/{birth.island}-{birth.number}"
+
+
+def motion_path(birth: BirthId) -> str:
+    """Return the entity of a robot that does again what it did."""
+    return f"motion/{birth.island}-{birth.number}"

@@ -1,0 +1,123 @@
+"""What rises above the plane of an arena, as triangles to draw."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+
+from analysis.viewer.body import Singles
+from schema.experiment.document import Simulation
+from schema.experiment.environment import Environment, relief
+from schema.robot.results import Floats
+
+_EARTH = (0.78, 0.76, 0.72, 1.0)
+_AROUND, _ACROSS = 24, 14
+"""Faces of round shapes: about their axis, and from pole to pole."""
+_LID: Floats = np.array([(0.0, -1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 1.0)])
+"""Distances from the axis and heights of what is straight."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Flat triangles of one colour.
+
+    Attributes:
+        corners: (T, 3, 3) of each triangle, counter-clockwise from outside, world
+            frame [m].
+        colour: red, green, blue, opacity, 0 to 1.
+    """
+
+    corners: Singles
+    colour: tuple[float, ...]
+
+    @property
+    def normals(self) -> Singles:
+        """Which way each triangle faces, (T, 3) of length 1; 0 if it is a line."""
+        first, second, third = self.corners.transpose(1, 0, 2)
+        normals: Singles = np.cross(second - first, third - first)
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        np.divide(normals, lengths, out=normals, where=lengths > 0.0)
+        return normals
+
+
+def surfaces(environment: Environment, simulation: Simulation) -> tuple[Surface, ...]:
+    """Return rough ground and scenery.
+
+    Raises:
+        ExperimentError: scenery that is none.
+    """
+    found = []
+    if environment.roughness_m:
+        found.append(_rough(environment))
+    if environment.scenery:
+        # The engine is loaded for scenery only: nothing else here needs it.
+        from schema.experiment.scenery import solids  # noqa: PLC0415
+
+        for solid in solids(environment.scenery, simulation):
+            corners = _solid(solid.shape, solid.size.tolist())
+            placed = corners @ solid.rotation.T + solid.centre
+            found.append(Surface(placed.astype(np.float32), solid.colour))
+    return tuple(found)
+
+
+def _rough(environment: Environment) -> Surface:
+    shares = relief(environment)
+    along = np.linspace(-environment.extent_m, environment.extent_m, len(shares))
+    x, y = np.meshgrid(along, along)
+    nodes = np.stack([x, y, environment.roughness_m * shares], axis=-1)
+    return Surface(_triangles(nodes).astype(np.float32), _EARTH)
+
+
+def _solid(shape: str, size: Sequence[float]) -> Floats:
+    """Return the triangles of a shape in its own frame, (T, 3, 3) [m].
+
+    All shapes are outlines that are turned about z, and stretched: a box is one of
+    four faces.
+
+    Args:
+        shape: as ``schema.experiment.scenery.Solid`` has it.
+        size: likewise.
+    """
+    a, b, c = size
+    angles = np.linspace(-0.5 * pi, 0.5 * pi, _ACROSS)
+    outline: Floats = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    faces, stretch = _AROUND, (a, a, a)
+    if shape == "box":
+        outline, faces = _LID, 4
+        stretch = (a * sqrt(2.0), b * sqrt(2.0), c)
+    elif shape == "cylinder":
+        outline, stretch = _LID, (a, a, b)
+    elif shape == "capsule":
+        # Half of an even number of points is above, half below.
+        outline[:, 1] += b / a * np.sign(outline[:, 1])
+    elif shape == "ellipsoid":
+        stretch = (a, b, c)
+    triangles: Floats = _turned(outline, faces) * stretch
+    return triangles
+
+
+def _turned(outline: Floats, faces: int) -> Floats:
+    """Return the triangles of an outline, from below, that is turned about z.
+
+    Args:
+        outline: (K, 2) distances from the axis, and heights.
+        faces: about the axis, the first centred on x.
+    """
+    reach, height = outline.T[:, :, None]
+    angles = 2.0 * pi * (np.arange(faces + 1) - 0.5) / faces
+    x, y = reach * np.cos(angles), reach * np.sin(angles)
+    return _triangles(np.stack([x, y, height + 0.0 * x], axis=-1))
+
+
+def _triangles(nodes: Floats) -> Floats:
+    """Return two triangles for each mesh of a net, (2 (K - 1) (L - 1), 3, 3).
+
+    Args:
+        nodes: (K, L, 3) of the net; seen from outside, columns go right, rows up.
+    """
+    here, right = nodes[:-1, :-1], nodes[:-1, 1:]
+    above, across = nodes[1:, :-1], nodes[1:, 1:]
+    first = np.stack([here, right, across], axis=2)
+    second = np.stack([here, across, above], axis=2)
+    return np.concatenate([first, second]).reshape(-1, 3, 3)

@@ -1,0 +1,83 @@
+"""The ancestry as a picture: the newest births in a row, each at its rank."""
+
+from collections import OrderedDict
+from dataclasses import dataclass
+
+from analysis.viewer.entries import Kin, When
+from analysis.viewer.recording import Recording
+from schema.robot.names import BirthId
+from schema.wire.news import Departed, Level, Newborn
+
+_MOST = 150
+"""Births that are shown; more are neither seen nor drawn in time."""
+_EVERY = 10
+"""A graph is told whole, so only every so many births."""
+
+
+@dataclass(slots=True)
+class _Person:
+    newborn: Newborn
+    order: int
+    is_alive: bool = True
+
+
+class Lineage:
+    """Who descends from whom, as far as it is shown."""
+
+    def __init__(self, recording: Recording) -> None:
+        """Know nobody yet."""
+        self._recording = recording
+        self._people: OrderedDict[BirthId, _Person] = OrderedDict()
+        self._known: set[BirthId] = set()
+        self._latest = When()
+        self._undrawn = 0
+
+    def add(self, one: Newborn) -> bool:
+        """Add a birth; return whether it is new."""
+        if one.birth in self._known:
+            return False
+        if self._undrawn >= _EVERY:
+            self.draw()
+        self._people[one.birth] = _Person(one, len(self._known))
+        self._known.add(one.birth)
+        if len(self._people) > _MOST:
+            self._people.popitem(last=False)
+        self._latest = When(one.sim_time_s, one.births)
+        self._undrawn += 1
+        return True
+
+    def remove(self, gone: Departed) -> None:
+        """Note that somebody does not live any more."""
+        self._die(gone.birth)
+
+    def keep(self, level: Level) -> None:
+        """Note that of an island's births only those of a level live."""
+        members = set(level.members)
+        for birth, person in self._people.items():
+            is_here = birth.island == level.island
+            if is_here and person.newborn.births <= level.births:
+                person.is_alive = birth in members
+
+    def draw(self) -> None:
+        """Draw what is new."""
+        if not self._undrawn:
+            return
+        self._undrawn = 0
+        first = next(iter(self._people.values())).order
+        self._recording.ancestry(
+            [
+                Kin(
+                    birth,
+                    person.order - first,
+                    person.newborn.rank,
+                    person.newborn.parents,
+                    person.is_alive,
+                )
+                for birth, person in self._people.items()
+            ],
+            self._latest,
+        )
+
+    def _die(self, birth: BirthId) -> None:
+        if birth in self._people:
+            self._people[birth].is_alive = False

@@ -1,0 +1,187 @@
+"""What comes over the network from a run that is watched.
+
+The network's threads only put aside; what is not fetched in time is dropped, oldest
+first, so that a slow viewer needs no more memory and holds nobody up.
+"""
+
+import threading
+from collections import deque
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Self
+
+import zenoh
+
+from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
+from schema.agent.topics import (
+    Member,
+    agents_alive,
+    check_name,
+    member_of,
+    news_of_all,
+    poses_of_all,
+)
+from schema.errors import MalformedMessage, NetworkError
+from schema.wire.arena_codec import Live, decode_live
+from schema.wire.news import News
+from schema.wire.news_codec import decode_news
+
+_MOST = 2000
+"""Messages that wait at most."""
+_ASK_AGAIN_S = 3.0
+
+
+class Sequel:
+    """Tells from the numbers of news whether some were lost.
+
+    Attributes:
+        is_behind: all there is should be asked for.
+    """
+
+    def __init__(self) -> None:
+        """Know of nothing: all is to be asked for."""
+        self.is_behind = True
+        self._run = ""
+        self._last = (0, 0)
+
+    def take(self, news: News) -> bool:
+        """Note news; return whether they are of the run that is watched."""
+        place = (news.epoch, news.sequence)
+        if news.is_whole:
+            if self._run not in ("", news.run):
+                return False
+            self._run, self._last, self.is_behind = news.run, place, False
+            return True
+        if news.run != self._run:
+            return False
+        if place > self._last:
+            is_next = place == (self._last[0], self._last[1] + 1)
+            self.is_behind = self.is_behind or not is_next
+            self._last = place
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """The coordinator is gone."""
+
+
+Told = News | Live | Ended
+
+
+class LiveSource:
+    """A viewer's end of the network; use it in a ``with``.
+
+    Attributes:
+        malformed: messages that did not decode; they were dropped.
+    """
+
+    def __init__(self, connect: str, fleet: str, tls: Tls | None) -> None:
+        """Prepare, open nothing.
+
+        Args:
+            connect: address of the hub.
+            fleet: name of the fleet.
+            tls: files, for a ``tls/`` address.
+
+        Raises:
+            NetworkError: a name or an address that is none.
+        """
+        self.malformed = 0
+        self._fleet = check_name(fleet, "fleet")
+        self._connect = connect
+        self._config = client_config(connect, tls)
+        self._waiting: deque[zenoh.Sample | zenoh.Reply] = deque(maxlen=_MOST)
+        self._has_news = threading.Event()
+        self._coordinators: dict[str, Member] = {}
+        self._sequel = Sequel()
+        self._asked_s = -_ASK_AGAIN_S
+
+    def __enter__(self) -> Self:
+        """Open the session and listen.
+
+        Raises:
+            NetworkError: no hub is there.
+        """
+        zenoh.init_log_from_env_or("error")
+        with ExitStack() as opened:
+            try:
+                config = zenoh.Config.from_json5(self._config)
+                self._session = opened.enter_context(zenoh.open(config))
+            except zenoh.ZError:
+                raise NetworkError(f"no coordinator at {self._connect}") from None
+            put = zenoh.handlers.Callback(self._put, indirect=False)
+            tokens = agents_alive(self._fleet, "coordinator")
+            self._declared = [
+                self._session.declare_subscriber(poses_of_all(self._fleet), put),
+                self._session.declare_subscriber(news_of_all(self._fleet), put),
+                self._session.liveliness().declare_subscriber(
+                    tokens, put, history=True
+                ),
+            ]
+            self._opened = opened.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._opened.close()
+
+    def _put(self, message: zenoh.Sample | zenoh.Reply) -> None:
+        self._waiting.append(message)
+        self._has_news.set()
+
+    def receive(self, timeout_s: float, now_s: float) -> list[Told]:
+        """Return what came, in order; ask for all there is where some was lost.
+
+        Args:
+            timeout_s: how long to wait when nothing is there [s].
+            now_s: the time, of any clock that only goes forward [s].
+        """
+        self._has_news.wait(timeout_s)
+        self._has_news.clear()
+        told: list[Told] = []
+        while self._waiting:
+            try:
+                each = self._understood(self._waiting.popleft())
+            except MalformedMessage:
+                self.malformed += 1
+                continue
+            if each is not None:
+                told.append(each)
+        if self._sequel.is_behind and now_s - self._asked_s >= _ASK_AGAIN_S:
+            self._asked_s = now_s
+            self._ask()
+        return told
+
+    def _understood(self, message: zenoh.Sample | zenoh.Reply) -> Told | None:
+        if isinstance(message, zenoh.Reply):
+            if message.ok is None:
+                return None
+            return self._news(message.ok.payload.to_bytes())
+        key = str(message.key_expr)
+        if key.endswith("/alive"):
+            return self._token(key, message.kind == zenoh.SampleKind.PUT)
+        data = message.payload.to_bytes()
+        return self._news(data) if key.endswith("/events") else decode_live(data)
+
+    def _news(self, data: bytes) -> News | None:
+        news = decode_news(data)
+        return news if self._sequel.take(news) else None
+
+    def _token(self, key: str, is_there: bool) -> Ended | None:  # noqa: FBT001 - a word
+        if is_there:
+            self._coordinators[key] = member_of(key)
+            self._asked_s = -_ASK_AGAIN_S
+            self._sequel.is_behind = True
+            return None
+        self._coordinators.pop(key, None)
+        return None if self._coordinators else Ended()
+
+    def _ask(self) -> None:
+        """Ask all coordinators; no thread of this process waits for it."""
+        for member in self._coordinators.values():
+            self._session.get(
+                member.state,
+                zenoh.handlers.Callback(self._put, indirect=False),
+                timeout=ASK_TIMEOUT_S,
+                consolidation=zenoh.ConsolidationMode.NONE,
+            )

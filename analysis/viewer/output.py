@@ -1,0 +1,135 @@
+"""Where a recording goes: a file, viewers that come, or a window that is opened."""
+
+import contextlib
+import shlex
+import socket
+import subprocess
+import sys
+import threading
+from dataclasses import dataclass
+from pathlib import Path
+
+from analysis.viewer.recording import Recording, ViewerError
+from schema.agent.service import tell_user
+
+HOST, PORT = "127.0.0.1", 9876
+_ENDING = ".rrd"
+_WINDOW_S = 3.0
+_POLL_S = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Output:
+    """Where a recording is to go.
+
+    Attributes:
+        file: to write, or None.
+        serve: host and port for viewers to come to, or None.
+        has_window: a viewer's window is to be opened.
+    """
+
+    file: Path | None
+    serve: tuple[str, int] | None
+    has_window: bool
+
+    @classmethod
+    def of(cls, save: Path | None, serve: str | None) -> "Output":
+        """Return what two flags ask for; a window if neither is given.
+
+        Raises:
+            ViewerError: an address that is none or in use; a folder that is not
+                there, or a file that no viewer would take for a recording.
+        """
+        if save is not None and save.suffix != _ENDING:
+            raise ViewerError(f"--save {save}: must end in {_ENDING}")
+        if save is not None and not save.absolute().parent.is_dir():
+            raise ViewerError(f"--save {save}: there is no folder {save.parent}")
+        if serve is not None:
+            return cls(save, _address(serve), has_window=False)
+        if save is not None:
+            return cls(save, None, has_window=False)
+        return cls(None, (HOST, _free_port()), has_window=True)
+
+    @property
+    def url(self) -> str:
+        """Return where viewers connect to; empty if nobody can."""
+        if self.serve is None:
+            return ""
+        return f"rerun+http://{self.serve[0]}:{self.serve[1]}/proxy"
+
+
+class Window:
+    """A viewer's window, if one was asked for; it outlives this process."""
+
+    def __init__(self, output: Output) -> None:
+        """Open it, or say where viewers may connect to.
+
+        Raises:
+            ViewerError: there is no screen, most likely.
+        """
+        self._process: subprocess.Popen[bytes] | None = None
+        if not output.has_window:
+            if output.url:
+                tell_user(f"serving; to look: rerun --connect {output.url}")
+            return
+        # Its own server, which nothing here needs, stays on this machine.
+        command = [sys.executable, "-m", "rerun", "--bind", HOST, "--connect"]
+        self._process = subprocess.Popen(  # noqa: S603 - our own interpreter
+            [*command, output.url],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(_WINDOW_S)
+        _ = self.was_closed
+
+    @property
+    def was_closed(self) -> bool:
+        """A window was opened and has been closed.
+
+        Raises:
+            ViewerError: it never opened, which a slow machine may tell late.
+        """
+        ended = None if self._process is None else self._process.poll()
+        if ended is not None and ended > 0:
+            raise ViewerError(
+                "the viewer cannot open a window: without a screen use --save FILE, or "
+                "--serve and look from another machine"
+            )
+        return ended is not None
+
+
+def linger(
+    output: Output, window: Window, recording: Recording, stop: threading.Event
+) -> None:
+    """Keep serving what is complete, for as long as somebody may look at it."""
+    recording.flush()
+    if output.file is not None:
+        command = shlex.join(["rerun", str(output.file)])
+        tell_user(f"saved {output.file}; to look: {command}")
+    if output.serve is None:
+        return
+    if not (output.has_window or stop.is_set()):
+        tell_user("all is there; Ctrl-C ends")
+    while not (stop.is_set() or window.was_closed):
+        stop.wait(_POLL_S)
+
+
+def _address(text: str) -> tuple[str, int]:
+    host, _, port = text.rpartition(":")
+    if not (host and port.isdigit() and int(port) < 1 << 16):
+        raise ViewerError(f"--serve: must be HOST:PORT, got {text!r}")
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, int(port)))
+        except OSError as error:
+            raise ViewerError(f"--serve {text}: {error.strerror}") from None
+    return host, int(port)
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((HOST, 0))
+        port: int = probe.getsockname()[1]
+        return port

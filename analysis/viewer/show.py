@@ -1,0 +1,248 @@
+"""Puts what is told of a run, live or from its tables, into a recording.
+
+Who lives where is kept here, so that a robot's boxes come with its first pose, and
+go with its death; whatever is told twice is shown once.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from analysis.viewer.body import Singles, place_rows
+from analysis.viewer.entries import Moves, When, robot_path
+from analysis.viewer.gallery import Gallery
+from analysis.viewer.lineage import Lineage
+from analysis.viewer.looks import Figures, rows_by_robot
+from analysis.viewer.recording import Recording
+from schema.parts import BodySpace
+from schema.robot.names import BirthId
+from schema.wire.news import Crewman, Departed, Level, Migrant, Newborn, News
+
+_REPEAT_S = 10.0
+"""A server forgets its oldest; a robot's boxes are told again every so often [s]."""
+_PER_M, _PER_TURN = 2048.0, 1024.0
+"""Half a millimetre and a tenth of a degree are not seen: a third less to store."""
+_BLINK_S = 0.1
+"""Who is not told of any more vanishes so long after the last pose [s]."""
+
+
+@dataclass(slots=True)
+class _Clock:
+    """When births happened on one island: times [s], ascending."""
+
+    times_s: list[float] = field(default_factory=list)
+    births: list[int] = field(default_factory=list)
+
+    def births_at(self, times_s: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
+        """Return how many had been born at some times."""
+        after = np.searchsorted(self.times_s, times_s, side="right")
+        return np.array([0, *self.births], dtype=np.int64)[after]
+
+    def when(self, births: int) -> When:
+        """Return the moment of a birth by its number on the island, from 1."""
+        index = int(np.searchsorted(self.births, births))
+        if index < len(self.births) and self.births[index] == births:
+            return When(self.times_s[index], births)
+        return When(None, births)
+
+
+@dataclass(slots=True)
+class _Resident:
+    """A robot that is shown in an arena.
+
+    ``drawn_s`` is when its boxes were told last, ``seen_s`` its last pose's time.
+    """
+
+    path: str
+    drawn_s: float
+    seen_s: float
+    is_gone: bool = False
+
+
+class Show:
+    """One run in one recording."""
+
+    def __init__(self, recording: Recording, space: BodySpace) -> None:
+        """Show nothing yet.
+
+        Args:
+            recording: to fill.
+            space: the part types.
+        """
+        self._recording = recording
+        self._lineage = Lineage(recording)
+        self._gallery = Gallery(recording)
+        self._figures = Figures(space)
+        self._clocks: dict[int, _Clock] = {}
+        self._residents: dict[tuple[int, BirthId], _Resident] = {}
+        self._gone: dict[tuple[int, BirthId], Departed] = {}
+        self._levels: set[tuple[int, int]] = set()
+        self._moves: set[tuple[BirthId, int, int]] = set()
+        self._workers: tuple[Crewman, ...] | None = None
+
+    def tell(self, news: News) -> None:
+        """Show what is new in some news."""
+        for each in _in_order(news):
+            match each:
+                case Newborn():
+                    self._born(each)
+                case Level():
+                    self._level(each)
+                case Departed():
+                    self._departed(each)
+        for migrant in news.migrants:
+            self._migrated(migrant)
+        self._lineage.draw()
+        if news.workers != self._workers:
+            self._workers = news.workers
+            self._recording.crew(_crew(news.workers))
+
+    def move(
+        self, arena: int, poses: pa.Table, *, has_all: bool = True
+    ) -> list[BirthId]:
+        """Show robots' poses in an arena.
+
+        Args:
+            arena: the number of its island.
+            poses: rows of the poses table, by time; ``record`` is not looked at.
+            has_all: of all who live there; who is not among them is gone.
+
+        Returns:
+            Whose poses were left out, for their births have not been told.
+        """
+        strangers: list[BirthId] = []
+        shown: set[BirthId] = set()
+        for birth, rows in rows_by_robot(poses):
+            shown.add(birth)
+            if birth not in self._figures:
+                strangers.append(birth)
+                continue
+            times = rows["sim_time_s"].to_numpy()
+            path = self._settle(arena, birth, times)
+            centres, attitudes = place_rows(self._figures[birth], rows)
+            births = self._clock(arena).births_at(times)
+            moves = Moves(
+                times, births, _coarse(centres, _PER_M), _coarse(attitudes, _PER_TURN)
+            )
+            self._recording.moved(path, moves)
+        if has_all:
+            self._take_away(arena, shown)
+        return strangers
+
+    def _clock(self, island: int) -> _Clock:
+        return self._clocks.setdefault(island, _Clock())
+
+    def _at(self, island: int, time_s: float) -> When:
+        """Return a moment of an arena, with its births until then."""
+        births = self._clock(island).births_at(np.array([time_s]))
+        return When(time_s, int(births[0]))
+
+    def _settle(
+        self, arena: int, birth: BirthId, times_s: npt.NDArray[np.float64]
+    ) -> str:
+        """See to it that a robot has its boxes in an arena; return its path."""
+        key, path = (arena, birth), robot_path(arena, birth)
+        first_s, last_s = float(times_s[0]), float(times_s[-1])
+        resident = self._residents.get(key)
+        if resident is None or first_s - resident.drawn_s >= _REPEAT_S:
+            when = self._at(arena, first_s)
+            self._recording.born(path, self._figures[birth], when)
+            was_gone = resident is not None and resident.is_gone
+            self._residents[key] = _Resident(path, first_s, last_s, was_gone)
+        self._residents[key].seen_s = last_s
+        return path
+
+    def _take_away(self, arena: int, shown: set[BirthId]) -> None:
+        """Take the boxes of those away who died, or are not in the arena any more."""
+        here = [key for key in self._residents if key[0] == arena]
+        for key in here:
+            if key in self._gone:
+                self._leave(self._gone[key])
+            elif key[1] not in shown:
+                resident = self._residents.pop(key)
+                births = self._at(arena, resident.seen_s).births
+                when = When(resident.seen_s + _BLINK_S, births)
+                self._recording.died(resident.path, when)
+            if key in self._residents and key[1] not in shown:
+                del self._residents[key]
+
+    def _leave(self, gone: Departed) -> None:
+        """Take a robot's boxes away, once."""
+        resident = self._residents.get((gone.island, gone.birth))
+        if resident is not None and not resident.is_gone:
+            resident.is_gone = True
+            # As many births as its last pose has: who is born then counts already.
+            when = self._at(gone.island, gone.sim_time_s)
+            self._recording.died(resident.path, when)
+
+    def _born(self, one: Newborn) -> None:
+        if one.body is not None:
+            self._figures.add(one.birth, one.body)
+        if not self._lineage.add(one):
+            return
+        clock = self._clock(one.birth.island)
+        if one.sim_time_s is not None:
+            clock.times_s.append(one.sim_time_s)
+            clock.births.append(one.births)
+        whose = " and ".join(f"{each.island}:{each.number}" for each in one.parents)
+        text = f"{one.birth.island}:{one.birth.number} is born"
+        when = When(one.sim_time_s, one.births)
+        self._recording.said(f"{text} to {whose}" if whose else text, when, "INFO")
+
+    def _departed(self, gone: Departed) -> None:
+        if (gone.island, gone.birth) in self._gone:
+            return
+        self._gone[gone.island, gone.birth] = gone
+        self._leave(gone)
+        self._lineage.remove(gone)
+        text = f"{gone.birth.island}:{gone.birth.number} is gone: {gone.reason}"
+        self._recording.said(text, When(gone.sim_time_s, gone.births), "WARN")
+
+    def _level(self, level: Level) -> None:
+        if (level.island, level.births) in self._levels:
+            return
+        self._levels.add((level.island, level.births))
+        when = self._clock(level.island).when(level.births)
+        fitness = (level.mean, level.best) if level.judged else ()
+        self._recording.level(level.island, when, level.size, fitness)
+        if when.sim_time_s is None and level.members:
+            self._lineage.keep(level)
+            self._gallery.hang(level, self._figures)
+
+    def _migrated(self, migrant: Migrant) -> None:
+        key = (migrant.birth, migrant.to, migrant.epoch)
+        if key in self._moves:
+            return
+        self._moves.add(key)
+        name = f"{migrant.birth.island}:{migrant.birth.number}"
+        text = f"{name} goes from island {migrant.island} to {migrant.to}"
+        when = When(migrant.sim_time_s, migrant.births)
+        self._recording.said(text, when, "INFO")
+
+
+def _coarse(numbers: Singles, grains: float) -> Singles:
+    """Return numbers of which so many fit into 1; they take less room in a file."""
+    return (np.round(numbers * grains) / grains).astype(np.float32)
+
+
+def _in_order(news: News) -> list[Newborn | Level | Departed]:
+    """Return births and levels as they came, by births on their island, then deaths.
+
+    Who is born at the instant of a death counts as born by then.
+    """
+    births = [((one.births, 0), one) for one in news.births]
+    levels = [((level.births, 1), level) for level in news.levels]
+    keyed: list[tuple[tuple[int, int], Newborn | Level]] = [*births, *levels]
+    came = [each for _, each in sorted(keyed, key=lambda pair: pair[0])]
+    return [*came, *sorted(news.deaths, key=lambda gone: gone.births)]
+
+
+def _crew(workers: tuple[Crewman, ...]) -> str:
+    """Return a table of who works, as Markdown."""
+    lines = ["| worker | platform | arenas |", "|---|---|---|"]
+    for man in workers:
+        arenas = ", ".join(map(str, man.shards)) or "-"
+        lines.append(f"| {man.name} | {man.platform} | {arenas} |")
+    return "\n".join(lines)

@@ -1,0 +1,92 @@
+"""What a viewer needs to know of an experiment before anything happens in it."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import cos, pi, sin, tan
+
+import numpy as np
+
+from analysis.viewer.body import Singles
+from analysis.viewer.ground import Surface, surfaces
+from schema.experiment.document import Arena, Experiment, body_space, island_count
+from schema.experiment.document import island_experiment as of_island
+from schema.parts import BodySpace
+from schema.robot.names import BirthId
+
+_MARGIN = 1.3
+_GALLERY_M = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """Where a run takes place.
+
+    Attributes:
+        islands: their numbers.
+        arenas: those on which robots live together, in simulated time.
+        extent_m: how far from its middle an arena or a gallery reaches [m].
+        space: the part types.
+        walls: of each island: place and attitude (7,) and half sizes (3,) of each.
+        surfaces: of each island: of what rises above its plane.
+    """
+
+    islands: tuple[int, ...]
+    arenas: frozenset[int]
+    extent_m: float
+    space: BodySpace
+    walls: tuple[tuple[tuple[Singles, Singles], ...], ...]
+    surfaces: tuple[tuple[Surface, ...], ...]
+
+    def below(self, births: Iterable[BirthId]) -> tuple[Surface, ...]:
+        """Return the ground below robots, if they are shown where they were.
+
+        So are those of one arena, and one robot that was alone.
+        """
+        islands = [birth.island for birth in births]
+        is_one_place = len(set(islands)) == 1
+        if not is_one_place or (len(islands) > 1 and islands[0] not in self.arenas):
+            return ()
+        return self.surfaces[self.islands.index(islands[0])]
+
+
+def stage(experiment: Experiment) -> Stage:
+    """Return where an experiment takes place.
+
+    Raises:
+        ExperimentError: a part type of a plug-in that is not here, or scenery that
+            is none.
+    """
+    islands = tuple(range(island_count(experiment)))
+    settings = [of_island(experiment, each) for each in islands]
+    arenas = [each.arena for each in settings]
+    reaches = [_reach(arena) if arena else _GALLERY_M for arena in arenas]
+    return Stage(
+        islands,
+        frozenset(each for each in islands if arenas[each] is not None),
+        max(reaches),
+        body_space(experiment.space),
+        tuple(_ring_wall(arena) if arena else () for arena in arenas),
+        tuple(surfaces(each.environment, each.simulation) for each in settings),
+    )
+
+
+def _reach(arena: Arena) -> float:
+    """Return how far from its middle an arena is looked at [m]."""
+    return _MARGIN * max(0.5 * arena.wall_diameter_m, arena.birth_radius_m)
+
+
+def _ring_wall(arena: Arena) -> tuple[tuple[Singles, Singles], ...]:
+    """Return the walls of an arena, as ``schema.mjcf.model`` puts them."""
+    if not arena.wall_diameter_m:
+        return ()
+    half, height = 0.5 * arena.wall_thickness_m, 0.5 * arena.wall_height_m
+    centre = 0.5 * arena.wall_diameter_m + half
+    length = (centre + half) * tan(pi / arena.wall_segments)
+    size = np.array([half, length, height], dtype=np.float32)
+    walls = []
+    for index in range(arena.wall_segments):
+        angle = 2.0 * pi * index / arena.wall_segments
+        turn = (0.0, 0.0, sin(0.5 * angle), cos(0.5 * angle))
+        place = (centre * cos(angle), centre * sin(angle), height, *turn)
+        walls.append((np.array(place, dtype=np.float32), size))
+    return tuple(walls)

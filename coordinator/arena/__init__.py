@@ -1,0 +1,1 @@
+"""Pure machine of an on-line island."""

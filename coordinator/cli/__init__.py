@@ -1,0 +1,1 @@
+"""Commands of the coordinator, their flags and progress display."""

@@ -1,0 +1,46 @@
+"""How figures of runs, and what to do next, are said on a terminal."""
+
+from schema.wire.status import IslandStatus, RunStatus
+
+_MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
+
+
+def duration(seconds: float | None) -> str:
+    """Return a time in words, as "2 h 05 min"; "?" if nobody knows."""
+    if seconds is None:
+        return "?"
+    whole = round(seconds)
+    if whole >= _DAY_S:
+        return f"{whole // _DAY_S} d {whole % _DAY_S // _HOUR_S} h"
+    if whole >= _HOUR_S:
+        return f"{whole // _HOUR_S} h {whole % _HOUR_S // _MINUTE_S:02} min"
+    if whole >= _MINUTE_S:
+        return f"{whole // _MINUTE_S} min {whole % _MINUTE_S:02} s"
+    return f"{whole} s"
+
+
+def best_of(counted: RunStatus | IslandStatus) -> str:
+    """Return the greatest fitness of the living, of every island if there are few."""
+    islands = counted.islands if isinstance(counted, RunStatus) else (counted,)
+    bests = [island.best for island in islands]
+    judged = [best for best in bests if best is not None]
+    if not judged:
+        return "best -"
+    if 1 < len(bests) <= 8:  # noqa: PLR2004 - as many as a line holds
+        each = " ".join("-" if best is None else f"{best:.3f}" for best in bests)
+        return f"best {each}"
+    return f"best {max(judged):.3f}"
+
+
+def about_arenas(run: RunStatus) -> str:
+    """Return what there is to say of a run's arenas beside their births."""
+    arenas = [island for island in run.islands if island.simulated_s is not None]
+    if not arenas:
+        return ""
+    simulated_s = sum(island.simulated_s or 0.0 for island in arenas)
+    alive = sum(island.alive for island in arenas)
+    paused = sum(island.is_paused for island in arenas)
+    pace = ", paused" if paused else ""
+    if run.simulated_per_s:
+        pace = f"{pace}, {run.simulated_per_s:.1f} x real time"
+    return f", {simulated_s:.0f} s simulated, {alive} alive{pace}"

@@ -1,0 +1,1 @@
+"""Pure machines that assign jobs and arena shards to agents."""

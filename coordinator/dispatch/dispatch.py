@@ -1,0 +1,286 @@
+"""Who gets which job: a pure machine between those who ask and those who do.
+
+Each requested job is delivered exactly once, unless it is withdrawn, whatever joins,
+leaves, dies, errs or answers late. An agent holds ``slots + 1`` jobs, so that the next
+one is always at hand, and some more while many short ones wait, so that nobody need be
+asked for each of them. Lower numbers go first, and so what was lost goes first again;
+the agent with the least to do gets it, ties break on its name.
+
+An agent that erred or lost a job without leaving rests before it is given more,
+longer each time in a row, so that a broken one cannot eat the queue.
+
+A job that is late gets a second copy where somebody is idle; who answers first is
+heard. A job that ended several processes by its own doing is given to nobody more.
+"""
+
+from collections.abc import Callable, Iterator
+from heapq import heappop, heappush
+from itertools import count
+
+from coordinator.dispatch.events import (
+    AgentKind,
+    Assign,
+    Cancel,
+    Deliver,
+    Died,
+    DispatchCommand,
+    DispatchEvent,
+    JobKind,
+    Joined,
+    Left,
+    Requested,
+    Returned,
+    Ticked,
+    Withdrawn,
+)
+from coordinator.dispatch.pool import AgentState, Pending, Pool, Rests, Twins
+from coordinator.dispatch.stragglers import Stragglers
+from schema.errors import UnexpectedEvent
+
+AGENT_OF: dict[JobKind, AgentKind] = {"vet": "analyzer", "evaluate": "worker"}
+MAX_ERRORS = 3
+MAX_DEATHS = 3
+VETS_AT_HAND = 16
+"""Vettings that an analyzer has beside the one it is at: some milliseconds' work."""
+
+
+class Dispatch:
+    """The machine; ``handle`` is its only door."""
+
+    def __init__(self) -> None:
+        self._jobs: dict[int, Pending] = {}
+        self._pools: dict[AgentKind, Pool] = {
+            "worker": Pool(),
+            "analyzer": Pool(VETS_AT_HAND),
+        }
+        self._kind_of: dict[str, AgentKind] = {}
+        self._rests = Rests()
+        self._stamps = count(1)
+        self._stragglers = Stragglers()
+        self._twins = Twins()
+        self._highest = -1
+        self._now_s: float | None = None
+        self._doors: dict[type, Callable[..., Iterator[DispatchCommand]]] = {
+            Joined: self._joined,
+            Left: self._left,
+            Requested: self._requested,
+            Withdrawn: self._withdrawn,
+            Returned: self._returned,
+            Died: self._died,
+            Ticked: self._ticked,
+        }
+
+    @property
+    def pending(self) -> int:
+        """How many jobs are asked for and not delivered."""
+        return len(self._jobs)
+
+    def agents(self, kind: AgentKind) -> int:
+        """Return how many agents of a kind are there."""
+        return len(self._pools[kind].agents)
+
+    def names(self, kind: AgentKind) -> list[str]:
+        """Return who of a kind is there, ascending."""
+        return sorted(self._pools[kind].agents)
+
+    def waiting(self, kind: AgentKind) -> int:
+        """Return how many jobs no agent of their kind has taken yet."""
+        return len(self._pools[kind].waiting)
+
+    def platform(self, agent: str) -> str:
+        """Return what an agent's machine is; empty once it has left."""
+        kind = self._kind_of.get(agent)
+        return self._pools[kind].agents[agent].joined.platform if kind else ""
+
+    @property
+    def leisure_s(self) -> float:
+        """How long no worker will want for a job whatever comes meanwhile [s]."""
+        return self._pools["worker"].leisure_s
+
+    @property
+    def wake_s(self) -> float | None:
+        """When the next ``Ticked`` can change something [s]; None: no need."""
+        return self._rests.wake_s
+
+    def handle(self, event: DispatchEvent) -> list[DispatchCommand]:
+        """Take an event and return what is to be done, in this order.
+
+        Late answers, second answers and whoever joins or leaves twice change
+        nothing.
+
+        Raises:
+            UnexpectedEvent: a job number that does not ascend or that names
+                another job, an agent with less than one slot or that joins as
+                another than it is, a clock that runs backwards.
+        """
+        return list(self._doors[type(event)](event))
+
+    def _joined(self, event: Joined) -> Iterator[DispatchCommand]:
+        if event.slots < 1:
+            raise UnexpectedEvent(f"{event.agent}: slots must be >= 1: {event.slots}")
+        if kind := self._kind_of.get(event.agent):
+            known = self._pools[kind].agents[event.agent].joined
+            if known != event:
+                raise UnexpectedEvent(f"joins as {event}, is there as {known}")
+            return
+        pool = self._pools[event.kind]
+        self._kind_of[event.agent] = event.kind
+        pool.agents[event.agent] = AgentState(event)
+        pool.offer(event.agent, next(self._stamps))
+        yield from self._assign(pool)
+
+    def _left(self, event: Left) -> Iterator[DispatchCommand]:
+        kind = self._kind_of.pop(event.agent, None)
+        if kind is None:
+            return
+        pool = self._pools[kind]
+        for number in pool.agents.pop(event.agent).held:
+            if pending := self._jobs.get(number):
+                self._put_back(pending, event.agent)
+        yield from self._assign(pool)
+
+    def _put_back(self, pending: Pending, agent: str) -> None:
+        """Take a job from an agent; it waits again if that was the only one."""
+        del pending.holders[agent]
+        if not pending.holders:
+            number = pending.job.number
+            heappush(self._pools[AGENT_OF[pending.job.kind]].waiting, number)
+
+    def _requested(self, event: Requested) -> Iterator[DispatchCommand]:
+        number = event.job.number
+        if (known := self._jobs.get(number)) and known.job == event.job:
+            return
+        if number <= self._highest:
+            raise UnexpectedEvent(
+                f"job numbers must ascend: got {number} after {self._highest}"
+            )
+        pool = self._pools[AGENT_OF[event.job.kind]]
+        self._highest = number
+        self._jobs[number] = Pending(event.job)
+        heappush(pool.waiting, number)
+        yield from self._assign(pool)
+
+    def _withdrawn(self, event: Withdrawn) -> Iterator[DispatchCommand]:
+        pending = self._jobs.get(event.number)
+        if pending is None:
+            return
+        if not pending.holders:
+            self._pools[AGENT_OF[pending.job.kind]].drop(event.number)
+        yield from self._close(pending)
+
+    def _returned(self, event: Returned) -> Iterator[DispatchCommand]:
+        kind = self._kind_of.get(event.agent)
+        if kind is None:
+            return
+        pool = self._pools[kind]
+        agent = pool.agents[event.agent]
+        if event.number not in agent.held:
+            return
+        del agent.held[event.number]
+        # A copy that came too late says nothing of the agent but that it is free.
+        if pending := self._jobs.get(event.number):
+            yield from self._outcome(pending, event)
+            if event.outcome == "ok":
+                agent.failures = 0
+            else:
+                self._rests.begin(agent, self._now_s or 0.0)
+        pool.offer(event.agent, next(self._stamps))
+        yield from self._assign(pool)
+
+    def _outcome(self, pending: Pending, event: Returned) -> Iterator[DispatchCommand]:
+        """Deliver a job, or see to it that another agent gets it."""
+        pending.errors += event.outcome == "error"
+        if event.outcome == "ok" or pending.errors == MAX_ERRORS:
+            since_s, place = pending.holders.pop(event.agent)
+            if event.outcome == "ok" and self._now_s is not None:
+                elapsed_s = self._now_s - since_s
+                self._stragglers.learn(pending.job.kind, elapsed_s)
+                pool = self._pools[AGENT_OF[pending.job.kind]]
+                pool.agents[event.agent].learn(elapsed_s / place)
+            yield Deliver(pending.job, event.agent, event.answer, event.reason)
+            yield from self._close(pending)
+            return
+        if event.agent not in pending.avoid:
+            pending.avoid = (*pending.avoid, event.agent)
+        self._put_back(pending, event.agent)
+
+    def _close(self, pending: Pending) -> Iterator[DispatchCommand]:
+        """Forget a job that is done with; whoever is still at it may stop."""
+        job = pending.job
+        del self._jobs[job.number]
+        if job.twin not in self._jobs:
+            self._twins.forget(job)
+        for agent in pending.holders:
+            yield Cancel(job, agent)
+
+    def _died(self, event: Died) -> Iterator[DispatchCommand]:
+        pending = self._jobs.get(event.number)
+        if pending is None:
+            return
+        pending.killed[event.agent] = event.cause
+        if len(pending.killed) < MAX_DEATHS:
+            return
+        pool = self._pools[AGENT_OF[pending.job.kind]]
+        if not pending.holders:
+            pool.drop(event.number)
+        causes = ", ".join(sorted(set(pending.killed.values())))
+        reason = f"ended its own process {MAX_DEATHS} times, by {causes}"
+        yield Deliver(pending.job, event.agent, b"", reason, is_deadly=True)
+        yield from self._close(pending)
+
+    def _ticked(self, event: Ticked) -> Iterator[DispatchCommand]:
+        if self._now_s is not None and event.now_s < self._now_s:
+            raise UnexpectedEvent(f"{event.now_s} s comes after {self._now_s} s")
+        self._now_s = event.now_s
+        for name in self._rests.over(event.now_s):
+            if kind := self._kind_of.get(name):
+                pool = self._pools[kind]
+                pool.agents[name].rests = False
+                pool.offer(name, next(self._stamps))
+                yield from self._assign(pool)
+        if self._stragglers.is_time(event.now_s):
+            for pool in self._pools.values():
+                yield from self._copy(pool, event.now_s)
+
+    def _copy(self, pool: Pool, now_s: float) -> Iterator[DispatchCommand]:
+        """Give who is idle a second copy of what is late, the oldest first."""
+        idle = pool.idle()
+        if not idle:
+            return
+        for pending in list(self._jobs.values()):
+            kind = pending.job.kind
+            if len(pending.holders) != 1:
+                continue
+            if not self._stragglers.is_late(kind, now_s - pending.since_s):
+                continue
+            if self._pools[AGENT_OF[kind]] is not pool:
+                continue
+            avoid = {*self._twins.avoided(pending), *pending.holders}
+            name = next((each for each in idle if each not in avoid), "")
+            if name:
+                idle.remove(name)
+                yield self._give(pending, pool, name)
+
+    def _give(self, pending: Pending, pool: Pool, name: str) -> Assign:
+        """Have an agent do a job."""
+        job = pending.job
+        self._twins.note(job, name)
+        agent = pool.agents[name]
+        agent.held[job.number] = None
+        place = max(1.0, len(agent.held) / agent.joined.slots)
+        pending.holders[name] = (self._now_s or 0.0, place)
+        pool.offer(name, next(self._stamps))
+        return Assign(job, name)
+
+    def _assign(self, pool: Pool) -> Iterator[DispatchCommand]:
+        """Give out what can be given out."""
+        passed: list[str] = []
+        while pool.waiting and (name := pool.best()):
+            pending = pool.take(name, self._jobs, self._twins.avoided)
+            if pending is None:
+                passed.append(name)
+                heappop(pool.free)
+                continue
+            yield self._give(pending, pool, name)
+        for name in passed:
+            pool.offer(name, next(self._stamps))

@@ -1,0 +1,1 @@
+"""Pure operators: generation, selection, crossover, mutation, random streams."""

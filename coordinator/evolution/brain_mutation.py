@@ -1,0 +1,166 @@
+"""The steps of mutation that change the brain; `variation` orders them.
+
+Each changes a tree in place and keeps every restriction. Source: Hupkes 2016,
+section 4.4.6; facts of the original, section 4.5. Its trap is avoided: deleting a
+hidden neuron re-wires nothing.
+"""
+
+from collections.abc import Sequence
+from decimal import Decimal
+
+from msgspec.structs import replace
+
+from coordinator.evolution.draws import Draws
+from coordinator.evolution.growth import connect, endings, random_neuron
+from coordinator.evolution.tree import Branch, follow
+from schema.experiment.document import Experiment
+from schema.robot.brain import NEURON_TYPES
+from schema.robot.genome import ConnectionGene, NeuronGene
+
+_HALF = Decimal("0.5")
+
+
+def delete_hidden_neurons(
+    draws: Draws, branches: Sequence[Branch], probability: float
+) -> None:
+    """Delete each hidden neuron with a probability, and what led to or from it.
+
+    Connections to and from the neurons that stay lead where they led before.
+    """
+    moved: dict[Branch, list[int | None]] = {}
+    for branch in branches:
+        if not branch.hidden:
+            continue
+        stays = [not draws.chance(probability) for _ in branch.hidden]
+        if not all(stays):
+            offsets = iter(range(len(stays)))
+            moved[branch] = [next(offsets) if stay else None for stay in stays]
+    if not moved:
+        return
+    for branch in branches:
+        if branch.connections:
+            renamed = [_renamed(gene, branch, moved) for gene in branch.connections]
+            branch.connections = tuple([gene for gene in renamed if gene is not None])
+    for branch, offsets_after in moved.items():
+        branch.hidden = tuple(
+            neuron
+            for neuron, after in zip(branch.hidden, offsets_after, strict=True)
+            if after is not None
+        )
+
+
+def _renamed(
+    gene: ConnectionGene, owner: Branch, moved: dict[Branch, list[int | None]]
+) -> ConnectionGene | None:
+    """Return a connection under its neurons' new offsets; None if one is gone."""
+    if "hidden" not in (gene.source[0], gene.target[0]):
+        return gene
+    offsets = {"source": gene.source[1], "target": gene.target[1]}
+    end = follow(owner, gene.path)
+    for name, branch, layer in (
+        ("source", owner, gene.source[0]),
+        ("target", end, gene.target[0]),
+    ):
+        after = moved.get(branch) if branch is not None else None
+        if after is None or layer != "hidden":
+            continue
+        before = offsets[name]
+        # A connection to a neuron that never was keeps leading to none.
+        renamed = after[before] if before < len(after) else before - after.count(None)
+        if renamed is None:
+            return None
+        offsets[name] = renamed
+    if offsets == {"source": gene.source[1], "target": gene.target[1]}:
+        return gene
+    return replace(
+        gene,
+        source=(gene.source[0], offsets["source"]),
+        target=(gene.target[0], offsets["target"]),
+    )
+
+
+def delete_connections(
+    draws: Draws, branches: Sequence[Branch], probability: float
+) -> None:
+    """Delete each connection with a probability."""
+    for branch in branches:
+        if branch.connections:
+            branch.connections = tuple(
+                [gene for gene in branch.connections if draws.number() >= probability]
+            )
+
+
+def vary_neurons(draws: Draws, branches: Sequence[Branch], epsilon: float) -> None:
+    """Move every neuron's parameters towards random values."""
+    for branch in branches:
+        if branch.outputs:
+            branch.outputs = _varied(draws, branch.outputs, epsilon)
+        if branch.hidden:
+            branch.hidden = _varied(draws, branch.hidden, epsilon)
+
+
+def _varied(
+    draws: Draws, neurons: tuple[NeuronGene, ...], epsilon: float
+) -> tuple[NeuronGene, ...]:
+    return tuple(
+        [
+            NeuronGene(
+                neuron.kind,
+                draws.nearby(NEURON_TYPES[neuron.kind], neuron.parameters, epsilon),
+            )
+            for neuron in neurons
+        ]
+    )
+
+
+def add_hidden_neurons(
+    draws: Draws, branches: Sequence[Branch], before: int, experiment: Experiment
+) -> None:
+    """Add as many hidden neurons as deletion takes on average.
+
+    Args:
+        draws: where they come from.
+        branches: the tree, depth first.
+        before: hidden neurons that it had before any was deleted.
+        experiment: probability, limit and way of rounding.
+    """
+    variation = experiment.variation
+    if variation.hidden_rounding == "half-up":
+        wanted = _share(before, variation.p_delete_hidden_neuron)
+    else:
+        wanted = draws.rounded(before * variation.p_delete_hidden_neuron)
+    room = experiment.space.max_hidden - sum(len(b.hidden) for b in branches)
+    for _ in range(min(wanted, room)):
+        draws.pick(branches).hidden += (random_neuron(draws),)
+
+
+def add_connections(
+    draws: Draws, branches: Sequence[Branch], before: int, experiment: Experiment
+) -> None:
+    """Add as many connections as deletion takes on average, rounded half up.
+
+    Args:
+        draws: where they come from.
+        branches: the tree, depth first.
+        before: connections that it had before any was deleted.
+        experiment: probability of deletion.
+    """
+    probability = experiment.variation.p_remove_brain_connection
+    count = _share(before, probability)
+    if not count:
+        return
+    sources = endings(branches, "input", "output", "hidden")
+    targets = [ending for ending in sources if ending[1][0] != "input"]
+    if not (sources and targets):
+        return
+    for _ in range(count):
+        source, target = draws.pick(sources), draws.pick(targets)
+        source[0].connections += (connect(draws, source, target),)
+
+
+def _share(count: int, probability: float) -> int:
+    """Return a share of a count, rounded half up.
+
+    The probability is the decimal number that a document wrote: halves are exact.
+    """
+    return int(count * Decimal(repr(probability)) + _HALF)

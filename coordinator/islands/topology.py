@@ -1,0 +1,71 @@
+"""Which islands of an archipelago are neighbours.
+
+Source: networkx makes the graphs; the small world is that of Watts and Strogatz
+1998, drawn until it is connected.
+"""
+
+from collections.abc import Callable
+from math import isqrt
+from typing import Any
+
+from coordinator.evolution.seeding import Purpose, stream
+from schema.errors import ExperimentError
+from schema.experiment.migration import Migration
+from schema.robot.names import BirthId
+
+Edge = tuple[int, int]
+"""From which island to which."""
+
+
+def connections(
+    migration: Migration, islands: int, seed: int, run: int
+) -> tuple[Edge, ...]:
+    """Return who sends migrants to whom, in order.
+
+    Args:
+        migration: names the topology.
+        islands: how many there are.
+        seed: of the experiment's execution; only random topologies depend on it.
+        run: number of the repeat, from 0.
+
+    Raises:
+        ExperimentError: no small world of that degree is connected.
+    """
+    if migration.topology == "unconnected":
+        return ()
+    if migration.topology == "edges":
+        return tuple(sorted(migration.edges))
+    rng = stream(seed, run, BirthId(0, 0), 0, Purpose.TOPOLOGY)
+    edges = _graph(migration, islands, int(rng.integers(2**32)))
+    return tuple(sorted([*edges, *((to, source) for source, to in edges)]))
+
+
+def _graph(migration: Migration, islands: int, seed: int) -> list[Edge]:
+    """Return the edges of an undirected graph, each once."""
+    # A large package, which only an archipelago needs.
+    import networkx as nx  # noqa: PLC0415
+
+    rows = _rows(islands)
+    degree, p_rewire = migration.degree, migration.p_rewire
+    make: dict[str, Callable[[], Any]] = {
+        "ring": lambda: nx.cycle_graph(islands),
+        "fully-connected": lambda: nx.complete_graph(islands),
+        "star": lambda: nx.star_graph(islands - 1),
+        "grid": lambda: nx.convert_node_labels_to_integers(
+            nx.grid_2d_graph(rows, islands // rows), ordering="sorted"
+        ),
+        "random-regular": lambda: nx.random_regular_graph(degree, islands, seed),
+        "small-world": lambda: nx.connected_watts_strogatz_graph(
+            islands, degree, p_rewire, seed=seed
+        ),
+    }
+    try:
+        graph = make[migration.topology]()
+    except nx.NetworkXError as error:
+        raise ExperimentError(f"migration.topology: {error}") from None
+    return [(int(one), int(other)) for one, other in graph.edges]
+
+
+def _rows(islands: int) -> int:
+    """Return how many rows the most square grid of so many islands has."""
+    return max(rows for rows in range(1, isqrt(islands) + 1) if islands % rows == 0)

@@ -1,0 +1,1 @@
+"""Zenoh connection to agents, operators and viewers; an in-process substitute."""

@@ -1,0 +1,338 @@
+"""The coordinator on the network: who is there, jobs out, answers in.
+
+The network's threads only enqueue; whoever owns ``Network`` calls ``send`` and
+``receive`` from one thread and sees events in the order in which they came.
+"""
+
+import json
+import logging
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+from typing import Self
+
+import zenoh
+
+from coordinator.dispatch.events import AgentKind, DispatchEvent, Left, Returned
+from coordinator.network.roster import Roster
+from schema.agent.network import (
+    ASK_TIMEOUT_S,
+    DEFAULT_FLEET,
+    FENCED,
+    JOB_TIMEOUT_S,
+    THIS_MACHINE,
+    UNFIT,
+    Tls,
+    client_config,
+    hub_config,
+    parse_address,
+)
+from schema.agent.platform_tag import wire_version
+from schema.agent.service import Outlet
+from schema.agent.topics import Member, agents_alive, check_name
+from schema.errors import MalformedMessage, NetworkError
+
+_LOG = logging.getLogger(__name__)
+_KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
+_NOW = zenoh.ConsolidationMode.NONE
+_LONGEST_REASON = 1000
+_MOST_AT_ONCE = 1000
+_ASK_AGAIN_S = 1.0
+# What the engine itself replies when nobody did in time.
+_TIMEOUT = b"Timeout"
+
+
+@dataclass(slots=True)
+class _Asked:
+    """One question to one agent; ``number`` is the job's, -1 for "what are you?"."""
+
+    agent: str
+    number: int
+    inbox: "SimpleQueue[_News]"
+    reply: zenoh.Reply | None = None
+
+    def take(self, reply: zenoh.Reply) -> None:
+        self.reply = reply
+
+    def end(self) -> None:
+        """Comes exactly once, with a reply or without."""
+        self.inbox.put(self)
+
+
+_News = _Asked | zenoh.Sample | zenoh.Query
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What somebody asked, and where the reply goes; ``reply`` it once."""
+
+    data: bytes
+    query: zenoh.Query
+    key: str
+
+    def reply(self, data: bytes) -> None:
+        """Answer whoever asked, whether it still waits or not."""
+        with self.query as query:
+            query.reply(self.key, data)
+
+
+class Network:
+    """A coordinator's end of the network; use it in a ``with``.
+
+    Attributes:
+        address: where agents connect to.
+        malformed: messages about peers that did not decode; they were dropped. Answers
+            are for whoever asked to decode.
+    """
+
+    def __init__(
+        self,
+        *,
+        name: str,
+        fleet: str = DEFAULT_FLEET,
+        listen: tuple[str, ...] = (THIS_MACHINE,),
+        connect: str = "",
+        tls: Tls | None = None,
+    ) -> None:
+        """Prepare, open nothing.
+
+        Args:
+            name: of this process, never used again by another.
+            fleet: whose agents to use.
+            listen: addresses of the hub within this process.
+            connect: a hub elsewhere; then nothing listens here.
+            tls: files for ``tls/`` addresses.
+
+        Raises:
+            NetworkError: names or addresses that are none, or that would let
+                strangers in.
+        """
+        self.address = connect or listen[0]
+        self.malformed = 0
+        self._me = Member(
+            check_name(fleet, "fleet"), "coordinator", check_name(name, "name")
+        )
+        self._config = (
+            client_config(connect, tls) if connect else hub_config(listen, tls)
+        )
+        self._is_hub = not connect
+        self._inbox: SimpleQueue[_News] = SimpleQueue()
+        self._roster = Roster(wire_version())
+        self._ask_again: list[tuple[float, str]] = []
+        self._orders: list[Order] = []
+        self._onlookers: list[Order] = []
+        self._outlet = Outlet()
+
+    @property
+    def refused(self) -> Mapping[str, str]:
+        """Agents that may not take part, and why."""
+        return self._roster.refused
+
+    def __enter__(self) -> Self:
+        """Open the session and begin to look for agents.
+
+        Raises:
+            NetworkError: an address in use, a hub that is not there.
+        """
+        zenoh.init_log_from_env_or("error")
+        with ExitStack() as opened:
+            try:
+                config = zenoh.Config.from_json5(self._config)
+                self._session = opened.enter_context(zenoh.open(config))
+            except zenoh.ZError as error:
+                raise NetworkError(self._why_not(str(error))) from None
+            self._declare()
+            self._opened = opened.pop_all()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._opened.close()
+
+    def _why_not(self, error: str) -> str:
+        """Return the engine's complaint as one short line."""
+        if not self._is_hub:
+            return f"no hub at {self.address}"
+        if "in use" in error:
+            return f"cannot listen on {self.address}: it is in use"
+        return f"cannot listen on {self.address}: {error.partition(' at /')[0].strip()}"
+
+    def _declare(self) -> None:
+        if self._is_hub and parse_address(self.address)[2] == 0:
+            self.address = self._free_address()
+        put = zenoh.handlers.Callback(self._inbox.put, indirect=False)
+        self._watches = [
+            self._session.liveliness().declare_subscriber(
+                agents_alive(self._me.fleet, kind), put, history=True
+            )
+            for kind in _KINDS
+        ]
+        self._operators = self._session.declare_queryable(
+            self._me.command, put, complete=True
+        )
+        self._viewers = self._session.declare_queryable(
+            self._me.state, put, complete=True
+        )
+        self._outlet.lead_to(self._session)
+        self._token = self._session.liveliness().declare_token(self._me.alive)
+
+    def _free_address(self) -> str:
+        """Return where the hub really listens."""
+        key = f"@/{self._session.zid()}/router"
+        for reply in self._session.get(key, consolidation=_NOW):
+            if reply.ok is not None:
+                return str(json.loads(reply.ok.payload.to_bytes())["locators"][0])
+        raise NetworkError(f"the hub does not tell which port of {self.address} it has")
+
+    def send(self, number: int, agent: str, payload: bytes) -> None:
+        """Give a job to an agent; exactly one ``Returned`` will tell of it.
+
+        Args:
+            number: of the job.
+            agent: that joined; one that left since loses the job.
+            payload: an encoded request.
+        """
+        asked = _Asked(agent, number, self._inbox)
+        if member := self._roster.find(agent):
+            self._ask(asked, member.jobs, payload, JOB_TIMEOUT_S)
+        else:
+            asked.end()
+
+    def cancel(self, agent: str, payload: bytes) -> None:
+        """Tell an agent that nobody waits for a job; it may have begun it.
+
+        Args:
+            agent: that was given the job, and may have left.
+            payload: an encoded request that need name only the job.
+        """
+        if member := self._roster.find(agent):
+            self._session.put(member.cancelled, payload)
+
+    def _ask(
+        self, asked: _Asked, key: str, payload: bytes | None, timeout_s: float
+    ) -> None:
+        self._session.get(
+            key,
+            zenoh.handlers.Callback(asked.take, asked.end, indirect=False),
+            payload=payload,
+            # Agents share their time among those who send.
+            attachment=self._me.name,
+            timeout=timeout_s,
+            consolidation=_NOW,
+        )
+
+    def receive(self, timeout_s: float, pause_s: float = 0.0, /) -> list[DispatchEvent]:
+        """Return what happened, in order; empty if nothing did in time.
+
+        Args:
+            timeout_s: how long to wait for the first event, after the pause [s].
+            pause_s: how long to let events come before looking at them [s].
+
+        Raises:
+            NetworkError: another coordinator has taken this one's run over.
+        """
+        now_s = time.monotonic()
+        while self._ask_again and self._ask_again[0][0] <= now_s:
+            self._ask_info(self._ask_again.pop(0)[1])
+        events: list[DispatchEvent] = []
+        time.sleep(pause_s)
+        try:
+            news = self._inbox.get(timeout=timeout_s)
+            while True:
+                events += self._understand(news)
+                if len(events) >= _MOST_AT_ONCE:
+                    return events
+                news = self._inbox.get_nowait()
+        except Empty:
+            return events
+
+    def orders(self) -> list[Order]:
+        """Return what operators sent since the last call; ``receive`` waits for it."""
+        orders, self._orders = self._orders, []
+        return orders
+
+    def onlookers(self) -> list[Order]:
+        """Return who asked, since the last call, to be told all of a run."""
+        onlookers, self._onlookers = self._onlookers, []
+        return onlookers
+
+    @property
+    def has_audience(self) -> bool:
+        """Somebody listens to the news."""
+        return self._outlet.has_listeners(self._me.events)
+
+    def tell(self, data: bytes) -> None:
+        """Publish news, best effort."""
+        self._outlet.put(self._me.events, data)
+
+    def _understand(self, news: _News) -> Sequence[DispatchEvent]:
+        """Return what news means for who gives out jobs, if anything."""
+        if isinstance(news, zenoh.Query):
+            data = b"" if news.payload is None else news.payload.to_bytes()
+            is_onlooker = str(news.key_expr) == self._me.state
+            asked = self._onlookers if is_onlooker else self._orders
+            key = self._me.state if is_onlooker else self._me.command
+            asked.append(Order(data, news, key))
+            return []
+        try:
+            if isinstance(news, zenoh.Sample):
+                return self._token_changed(news)
+            if news.number < 0:
+                return self._introduced(news)
+            return [self._returned(news)]
+        except MalformedMessage as error:
+            self.malformed += 1
+            _LOG.warning("dropped a malformed message: %s", error)
+            return []
+
+    def _token_changed(self, sample: zenoh.Sample) -> list[DispatchEvent]:
+        key = str(sample.key_expr)
+        if sample.kind != zenoh.SampleKind.PUT:
+            left = self._roster.vanish(key)
+            return [left] if left else []
+        if member := self._roster.appear(key):
+            self._ask_info(member.name)
+        return []
+
+    def _ask_info(self, agent: str) -> None:
+        if member := self._roster.find(agent):
+            asked = _Asked(agent, -1, self._inbox)
+            self._ask(asked, member.info, None, ASK_TIMEOUT_S)
+
+    def _introduced(self, asked: _Asked) -> Sequence[DispatchEvent]:
+        """Let an agent take part that says what it is and is of our version."""
+        agent, reply = asked.agent, asked.reply
+        if not self._roster.is_stranger(agent):
+            return []
+        if reply is None or reply.ok is None:
+            # It lives but does not answer (yet).
+            self._ask_again.append((time.monotonic() + _ASK_AGAIN_S, agent))
+            return []
+        events = self._roster.introduce(agent, reply.ok.payload.to_bytes())
+        if agent in self.refused:
+            self._say_refused(agent)
+        return events
+
+    def _say_refused(self, agent: str) -> None:
+        _LOG.warning("refused: %s: %s", agent, self.refused[agent])
+
+    def _returned(self, asked: _Asked) -> Returned | Left:
+        number, agent, reply = asked.number, asked.agent, asked.reply
+        if reply is None:
+            return Returned(number, agent, "lost")
+        if reply.ok is not None:
+            return Returned(number, agent, "ok", reply.ok.payload.to_bytes())
+        assert reply.err is not None
+        told = reply.err.payload.to_bytes()
+        if told == _TIMEOUT:
+            return Returned(number, agent, "lost")
+        reason = told.decode("utf-8", "replace")[:_LONGEST_REASON]
+        if reason.startswith(FENCED):
+            raise NetworkError(f"this coordinator stops: {reason[len(FENCED) :]}")
+        if reason.startswith(UNFIT):
+            if left := self._roster.refuse(agent, reason[len(UNFIT) :]):
+                self._say_refused(agent)
+                return left
+            return Returned(number, agent, "lost")
+        return Returned(number, agent, "error", reason=reason or "no reason given")

@@ -1,0 +1,1 @@
+"""Drives one run or many: events in, journal first, commands out."""

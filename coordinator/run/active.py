@@ -1,0 +1,229 @@
+"""A run that this process has in hand, from opening its folder to its last row."""
+
+import json
+from contextlib import ExitStack
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+
+from coordinator.arena.arena import Arena
+from coordinator.dispatch.fleet import Fleet
+from coordinator.islands.events import Record
+from coordinator.islands.island import Island
+from coordinator.run.archipelago import archipelago
+from coordinator.run.audits import CARELESS, Caution
+from coordinator.run.feed import Feed, Overheard
+from coordinator.run.loop import Loop
+from coordinator.run.pacing import Pace
+from coordinator.run.questions import Question
+from coordinator.run.rate import Tempo
+from coordinator.storage.folder import DETAILS, STATE, RunFolder
+from coordinator.storage.journal import NAME as JOURNAL
+from coordinator.storage.journal import Journal, is_begun
+from coordinator.storage.recorder import Recorder
+from coordinator.storage.snapshots import Snapshots
+from schema.agent.platform_tag import cpu_flags, our_version, platform_tag
+from schema.agent.service import tell_user
+from schema.errors import RunFolderError
+from schema.experiment.document import Experiment, island_experiment
+from schema.experiment.file import experiment_from_text
+from schema.tables.columns import TABLES
+from schema.tables.files import has_rows
+from schema.wire.status import IslandStatus, RunStatus
+
+_LIBRARIES = ("mujoco-core", "eclipse-zenoh", "numpy", "pyarrow", "protobuf")
+
+
+class ActiveRun:
+    """One run on its way.
+
+    Attributes:
+        held: its folder, which this process holds.
+        experiment: what is run.
+        loop: its machines, and what connects them to the world.
+        feed: hears of its rows for those who watch; None if nobody can.
+    """
+
+    def __init__(
+        self,
+        held: RunFolder,
+        fleet: Fleet,
+        *,
+        fsync: bool = False,
+        speed: float | None = None,
+        is_watched: bool = False,
+        caution: Caution = CARELESS,
+    ) -> None:
+        """Open all of a run; nothing happens before ``start``.
+
+        Args:
+            held: the folder; closed with the run, or at once if this fails.
+            fleet: who does the work.
+            fsync: survive power loss, too.
+            speed: simulated seconds per second at most, of arenas; None: no limit.
+            is_watched: have a feed.
+            caution: what to look out for.
+
+        Raises:
+            RunFolderError: a damaged journal, or a disk that fails.
+        """
+        self.held = held
+        details = held.details
+        with ExitStack() as stack:
+            stack.callback(held.close)
+            _check_journal(held.path)
+            self._journal = stack.enter_context(
+                Journal.open(held.path, epoch=held.epoch, fsync=fsync)
+            )
+            if self._journal.dropped:
+                tell_user(
+                    f"{held.path}: journal: dropped a cut record of "
+                    f"{self._journal.dropped} bytes at its end"
+                )
+            self._recorder = Recorder(held.path, details, fsync=fsync)
+            stack.callback(self._recorder.close)
+            self.experiment = experiment_from_text(details.document)
+            self.feed = Feed(held.name, held.epoch, details) if is_watched else None
+            rows = Overheard(self._recorder, self.feed) if self.feed else self._recorder
+            self.loop = Loop(
+                archipelago(self.experiment, details.seed, details.run),
+                question=Question.of(
+                    held.name, held.epoch, self.experiment, details.origin
+                ),
+                fleet=fleet,
+                log=self._journal,
+                rows=rows,
+                vault=Snapshots(held.path),
+                pace=_pace(self.experiment, speed),
+                caution=caution,
+                confirm=held.confirm,
+            )
+            self._births, self._simulated = Tempo(), Tempo()
+            self._owns = {
+                number: island_experiment(self.experiment, number)
+                for number in self.loop.islands
+            }
+            self._opened = stack.pop_all()
+
+    def start(self) -> None:
+        """Begin, or go on where the journal ends.
+
+        Raises:
+            RevolveError: the run cannot go on; see ``Loop.start``.
+        """
+        self.loop.start(self._journal.replay())
+        self.held.set_state("running")
+
+    def do_chores(self) -> None:
+        """Find out whether the folder is still ours; bring rows to disk.
+
+        Raises:
+            RunFolderError: it is not, or the disk is full or failed.
+        """
+        self.held.confirm()
+        self._recorder.flush()
+
+    def finish(self) -> None:
+        """Write the last row, and turn all tables into their final form.
+
+        Raises:
+            RunFolderError: the folder is not ours, or the disk is full or failed.
+        """
+        self.held.confirm()
+        self._recorder.write(_runs_row(self.held))
+        self._recorder.finish()
+        self.held.set_state("finished")
+
+    def stop(self) -> None:
+        """Leave all as it is, to go on another day.
+
+        Raises:
+            RunFolderError: the folder is not ours, or the disk is full or failed.
+        """
+        self.held.confirm()
+        self._recorder.flush()
+        self.held.set_state("stopped")
+
+    def close(self) -> None:
+        """Wait for no answer; let go of the folder and all files."""
+        self.loop.leave()
+        self._opened.close()
+
+    def status(self, now_s: float) -> RunStatus:
+        """Return how far it is.
+
+        Args:
+            now_s: the time, of any clock that only goes forward [s].
+        """
+        islands = tuple(
+            _island_status(island, self._owns[number])
+            for number, island in sorted(self.loop.islands.items())
+        )
+        self._births.note(now_s, sum(island.births for island in islands))
+        simulated_s = sum(island.simulated_s or 0.0 for island in islands)
+        self._simulated.note(now_s, simulated_s)
+        details = self.held.details
+        return RunStatus(
+            folder=str(self.held.path.resolve()),
+            name=details.name,
+            run=details.run,
+            state="finished" if self.loop.is_finished else "running",
+            births_per_s=self._births.per_s,
+            islands=islands,
+            simulated_per_s=self._simulated.per_s,
+        )
+
+
+def _check_journal(folder: Path) -> None:
+    """Raise if a run has lost its journal; nothing is touched before.
+
+    Raises:
+        RunFolderError: it has none, and had.
+    """
+    is_old = (folder / STATE).exists() or any(has_rows(folder, name) for name in TABLES)
+    if is_old and not is_begun(folder):
+        raise RunFolderError(
+            f"{folder / JOURNAL}: is lost: put a sound copy of it in its place, or "
+            "begin anew in another folder"
+        )
+
+
+def _pace(experiment: Experiment, speed: float | None) -> Pace | None:
+    """Return what holds arenas back, None if nothing shall."""
+    return None if speed is None else Pace(speed, experiment.simulation.timestep_s)
+
+
+def _island_status(island: Island | Arena, own: Experiment) -> IslandStatus:
+    best = max((one.fitness for one in island.judged), default=None)
+    alive = len(island.population)
+    if not isinstance(island, Arena):
+        return IslandStatus(island.births, own.births, best, alive)
+    return IslandStatus(
+        births=island.births,
+        wanted=island.births if island.is_finished else own.births,
+        best=best,
+        alive=alive,
+        simulated_s=island.step * own.simulation.timestep_s,
+        is_paused=island.is_paused,
+    )
+
+
+def _runs_row(held: RunFolder) -> Record:
+    """Return the one row of the runs table."""
+    details = held.details
+    began = (held.path / DETAILS).stat().st_mtime
+    versions = {name: metadata.version(name) for name in _LIBRARIES}
+    versions["revolve-islands"] = our_version()
+    row = {
+        "name": details.name,
+        "run": details.run,
+        "seed": details.seed,
+        "document": details.document,
+        "state": "finished",
+        "versions": json.dumps(versions),
+        "platform": platform_tag(),
+        "cpu_flags": " ".join(sorted(cpu_flags(Path("/proc/cpuinfo")))),
+        "start": datetime.fromtimestamp(began, UTC),
+        "end": datetime.now(UTC),
+    }
+    return Record("runs", row)

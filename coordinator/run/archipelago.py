@@ -1,0 +1,68 @@
+"""All islands of an experiment, each with its settings and its neighbours."""
+
+from coordinator.arena.arena import Arena
+from coordinator.islands.island import Island
+from coordinator.islands.migration import Exchange, Waters
+from coordinator.islands.topology import connections
+from schema.experiment.document import Experiment, island_count, island_experiment
+from schema.experiment.settings import evaluation_settings
+
+
+def archipelago(
+    experiment: Experiment, seed: int, run: int
+) -> dict[int, Island | Arena]:
+    """Return the islands by their numbers; nothing has happened to them.
+
+    Args:
+        experiment: what is evolved, and how.
+        seed: of the experiment's execution.
+        run: number of the repeat, from 0.
+
+    Raises:
+        ExperimentError: no graph is as the topology asks.
+    """
+    count = island_count(experiment)
+    owns = [island_experiment(experiment, number) for number in range(count)]
+    waters = _waters(experiment, owns, seed, run)
+    islands: dict[int, Island | Arena] = {}
+    for number, own in enumerate(owns):
+        exchange = None
+        if own.migration is not None and waters[number].neighbours:
+            exchange = Exchange(
+                own.migration,
+                number,
+                waters[number],
+                tournament_size=own.selection.tournament_size,
+                seed=seed,
+                run=run,
+            )
+        machine = Island if own.arena is None else Arena
+        islands[number] = machine(own, seed, run, number, exchange=exchange)
+    return islands
+
+
+def _waters(
+    experiment: Experiment, owns: list[Experiment], seed: int, run: int
+) -> list[Waters]:
+    """Return where each island lies."""
+    edges: tuple[tuple[int, int], ...] = ()
+    if experiment.migration is not None:
+        edges = connections(experiment.migration, len(owns), seed, run)
+    waters = []
+    for number, own in enumerate(owns):
+        sources = tuple(source for source, to in edges if to == number)
+        waters.append(
+            Waters(
+                targets=tuple(to for source, to in edges if source == number),
+                sources=sources,
+                strange=tuple(each for each in sources if _differs(own, owns[each])),
+            )
+        )
+    return waters
+
+
+def _differs(own: Experiment, other: Experiment) -> bool:
+    """Return whether another island judges robots in another way than this one."""
+    if (own.arena is None) != (other.arena is None):
+        return True
+    return evaluation_settings(own) != evaluation_settings(other)

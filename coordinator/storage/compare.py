@@ -1,0 +1,123 @@
+"""Are two runs the same, in every column that must repeat?"""
+
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute
+
+from coordinator.storage.folder import read_details
+from schema.errors import ExperimentError
+from schema.experiment.file import experiment_from_text, experiment_text
+from schema.tables.columns import TABLES, repeatable
+from schema.tables.files import read_table
+
+LONGEST = 60
+"""Characters of a value that a message shows."""
+
+
+def compare(first: Path, second: Path) -> list[str]:
+    """Return how two runs differ in their repeatable columns.
+
+    Args:
+        first: a run folder, finished or not.
+        second: the other.
+
+    Returns:
+        One line for each run without births, for each table whose number of rows
+        differs, and for the first row and column of each table that does; nothing
+        if the runs are equal. If they are not and ran on different platforms, a
+        last line says so, for equality is only promised on one.
+
+    Raises:
+        RunFolderError: a folder without a run, or a table that cannot be read.
+    """
+    for folder in (first, second):
+        read_details(folder)
+    lines: list[str] = []
+    platforms: list[set[str]] = [set(), set()]
+    for name, schema in TABLES.items():
+        if not repeatable(schema):
+            continue
+        tables = [_read(folder, name) for folder in (first, second)]
+        lines += _differences(name, tables, repeatable(schema))
+        if name == "births":
+            lines += [
+                f"{folder}: nobody has been born yet, so there is nothing to compare"
+                for folder, table in zip((first, second), tables, strict=True)
+                if not table.num_rows
+            ]
+        if "platform" in schema.names:
+            for found, table in zip(platforms, tables, strict=True):
+                found.update(pa.compute.unique(table["platform"]).to_pylist())
+    if lines and platforms[0] != platforms[1]:
+        ours, theirs = (", ".join(sorted(each)) or "none" for each in platforms)
+        lines.append(
+            f"platforms differ: {ours} against {theirs}; equality is only promised "
+            "on equal ones"
+        )
+    return lines
+
+
+def _read(folder: Path, name: str) -> pa.Table:
+    """Return a table; documents of older versions say all that they left unsaid.
+
+    Raises:
+        RunFolderError: it cannot be read.
+    """
+    table = read_table(folder, name)
+    if name != "runs":
+        return table
+    index = table.schema.get_field_index("document")
+    whole = [_whole(text) for text in table["document"].to_pylist()]
+    return table.set_column(
+        index, table.schema.field(index), pa.array(whole, pa.string())
+    )
+
+
+def _whole(document: str) -> str:
+    """Return a document with the defaults of keys that it is older than."""
+    try:
+        return experiment_text(experiment_from_text(document))
+    except ExperimentError:
+        return document
+
+
+def _differences(name: str, tables: list[pa.Table], columns: list[str]) -> list[str]:
+    """Return what is different between two tables of one name."""
+    lines = []
+    rows = [table.num_rows for table in tables]
+    if rows[0] != rows[1]:
+        lines.append(f"{name}: {rows[0]} rows against {rows[1]}")
+    common = min(rows)
+    found: tuple[int, str, Any, Any] | None = None
+    for column in columns:
+        ours, theirs = (table[column][:common] for table in tables)
+        if ours.equals(theirs):
+            continue
+        row, one, other = _first_difference(ours.to_pylist(), theirs.to_pylist())
+        if row >= 0 and (found is None or row < found[0]):
+            found = (row, column, one, other)
+    if found is not None:
+        row, column, one, other = found
+        lines.append(
+            f"{name}: first at record {row}, column {column}: "
+            f"{_short(one)} against {_short(other)}"
+        )
+    return lines
+
+
+def _first_difference(ours: list[Any], theirs: list[Any]) -> tuple[int, Any, Any]:
+    """Return row and values of the first difference; row -1 if there is none.
+
+    Values are told apart by how they are written: a NaN equals itself.
+    """
+    for row, (one, other) in enumerate(zip(ours, theirs, strict=True)):
+        if repr(one) != repr(other):
+            return row, one, other
+    return -1, None, None
+
+
+def _short(value: Any) -> str:  # noqa: ANN401 - any value of any column
+    text = repr(value)
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."

@@ -1,0 +1,1 @@
+"""Runtime that worker and analyzer processes share: connection, processes, serving."""

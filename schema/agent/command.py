@@ -1,0 +1,169 @@
+"""``revolve worker`` and ``revolve analyzer``: the same flags, the same life.
+
+One process does one job at a time; the command starts as many as it is told,
+starts those again that end, and ends all on Ctrl-C. It gives up when none is left and
+all ended by themselves.
+"""
+
+import argparse
+import re
+import socket
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from schema.agent.crew import Crew, stop_on_signals, stop_with_input
+from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config
+from schema.agent.supervision import CPU_LIMIT_S, Death, Post
+from schema.agent.topics import Role, check_name
+from schema.errors import NetworkError, RevolveError
+from schema.flags import Flags, positive_number, whole_number
+
+_POLL_S = 0.5
+
+
+def add_network_flags(flags: argparse.ArgumentParser) -> None:
+    """Add what everybody on a network needs: its fleet and its certificates."""
+    flags.add_argument(
+        "--fleet", default=DEFAULT_FLEET, help=f"its name (default: {DEFAULT_FLEET})"
+    )
+    flags.add_argument(
+        "--tls-ca", metavar="FILE", help="certificate authority of the fleet (PEM)"
+    )
+    flags.add_argument("--tls-certificate", metavar="FILE", help="own one (PEM)")
+    flags.add_argument("--tls-key", metavar="FILE", help="own key (PEM, PKCS#8)")
+
+
+def add_cpu_limit(flags: argparse.ArgumentParser) -> None:
+    """Add how much CPU time a job may take before its process is ended."""
+    flags.add_argument(
+        "--cpu-limit",
+        type=positive_number,
+        default=CPU_LIMIT_S,
+        metavar="S",
+        help="CPU seconds after which a job counts as one that never ends "
+        f"(default: {CPU_LIMIT_S:.0f})",
+    )
+
+
+def tls_of(options: argparse.Namespace) -> Tls | None:
+    """Return the files that flags name; None if they name none.
+
+    Raises:
+        NetworkError: one is not named, or not there.
+    """
+    files = {
+        "--tls-ca": options.tls_ca,
+        "--tls-certificate": options.tls_certificate,
+        "--tls-key": options.tls_key,
+    }
+    if not any(files.values()):
+        return None
+    for flag, file in files.items():
+        if not file:
+            raise NetworkError(f"{flag} is missing: {', '.join(files)} go together")
+        if not Path(file).is_file():
+            raise NetworkError(f"{flag}: no such file: {file}")
+    return Tls(options.tls_ca, options.tls_certificate, options.tls_key)
+
+
+def host_name() -> str:
+    """Return this machine's name as it may stand in a key."""
+    return re.sub(r"[^A-Za-z0-9-]", "-", socket.gethostname()).strip("-")[:40] or "host"
+
+
+def run_crew(
+    role: Role,
+    body: Callable[[Agent, Post], None],
+    arguments: list[str],
+    processes: int,
+) -> int:
+    """Run a command that serves jobs until Ctrl-C, and return its exit status.
+
+    Args:
+        role: "worker" or "analyzer".
+        body: what each process does with its agent and its place.
+        arguments: of the user, after the command's name.
+        processes: how many unless the user says so.
+    """
+    flags = _flags(role, processes)
+    options = flags.parse_args(arguments)
+    try:
+        agent = Agent(
+            role,
+            check_name(options.name, "--name"),
+            options.connect,
+            check_name(options.fleet, "--fleet"),
+            tls=tls_of(options),
+            threads=options.threads,
+            cpu_limit_s=options.cpu_limit,
+        )
+        client_config(agent.connect, agent.tls)
+    except RevolveError as error:
+        flags.error(str(error))
+    stop = stop_on_signals()
+    if options.until_closed:
+        stop_with_input(stop)
+    restarts = deaths = 0
+    try:
+        with Crew(body, (agent,), size=options.processes) as crew:
+            while not stop.is_set():
+                crew.look_after()
+                crew.wait(_POLL_S)
+                for death in crew.deaths[deaths:]:
+                    sys.stderr.write(f"{tell_death(death)}\n")
+                if crew.restarts > restarts:
+                    sys.stderr.write(f"a {role} is gone; another takes its place\n")
+                restarts, deaths = crew.restarts, len(crew.deaths)
+                if len(crew.exit_codes) == options.processes:
+                    return max(crew.exit_codes)
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+def tell_death(death: Death) -> str:
+    """Return, in a line, what a process died of."""
+    task = death.task
+    return f"{task.agent} died of job {task.number} of {task.run}: {death.cause}"
+
+
+def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
+    flags = Flags(
+        prog=f"revolve {role}",
+        description=f"Serve a coordinator as {role} until Ctrl-C, or wait for one.",
+        epilog=f"example: revolve {role} --connect tcp/127.0.0.1:7447 --processes 2",
+        allow_abbrev=False,
+    )
+    flags.add_argument(
+        "--connect",
+        required=True,
+        metavar="ADDRESS",
+        help="the coordinator's address, tcp/HOST:PORT or tls/HOST:PORT",
+    )
+    flags.add_argument(
+        "--processes",
+        type=whole_number(),
+        default=processes,
+        metavar="N",
+        help=f"how many at a time (default: {processes})",
+    )
+    flags.add_argument(
+        "--name", default=host_name(), help="of this machine (default: its host name)"
+    )
+    flags.add_argument(
+        "--until-closed",
+        action="store_true",
+        help="end when standard input is closed, too",
+    )
+    add_cpu_limit(flags)
+    flags.set_defaults(threads=1)
+    if role == "worker":
+        flags.add_argument(
+            "--threads",
+            type=whole_number(),
+            metavar="N",
+            help="of each process, to advance one arena together (default: 1)",
+        )
+    add_network_flags(flags)
+    return flags

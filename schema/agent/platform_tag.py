@@ -1,0 +1,86 @@
+"""What decides the last bit of a number: CPU class, system, libraries.
+
+Two machines with equal tags give equal results; with other tags they may.
+"""
+
+import platform
+from collections.abc import Collection
+from hashlib import sha256
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as installed
+from pathlib import Path
+
+from schema.wire.revolve_pb2 import DESCRIPTOR
+
+MEANING = 1
+"""Counts the times that messages came to mean something else and looked the same.
+
+1: what is to be vetted is a body, without the brain of its robot.
+"""
+# What compilers and libraries choose their code by (x86-64 psABI levels); each
+# level includes those before it.
+_LEVELS = {
+    "v2": {"cx16", "lahf_lm", "popcnt", "pni", "sse4_1", "sse4_2", "ssse3"},
+    "v3": {"abm", "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe", "xsave"},
+    "v4": {"avx512bw", "avx512cd", "avx512dq", "avx512f", "avx512vl"},
+}
+
+
+def platform_tag() -> str:
+    """Return this process's tag, such as ``linux-x86_64_v3-glibc2.36-mujoco...``."""
+    system = platform.system().lower()
+    machine = cpu_class(platform.machine().lower(), cpu_flags(Path("/proc/cpuinfo")))
+    library, number = platform.libc_ver()
+    numpy = _version("numpy")
+    mujoco = _version("mujoco-core")
+    # Without a C library's name the system's release stands for it.
+    library = f"{library}{number}" if library else platform.release()
+    return f"{system}-{machine}-{library}-mujoco{mujoco}-numpy{numpy}"
+
+
+def our_version() -> str:
+    """Return the version of Revolve Islands, 0 if it is run without installing."""
+    return _version("revolve-islands")
+
+
+def wire_version() -> str:
+    """Return our version and, after a ``+``, which messages it speaks, and how."""
+    messages = sha256(DESCRIPTOR.serialized_pb).hexdigest()
+    return f"{our_version()}+{messages[:8]}.{MEANING}"
+
+
+def cpu_class(machine: str, flags: Collection[str]) -> str:
+    """Return the architecture and its level.
+
+    Args:
+        machine: name of the architecture.
+        flags: what the CPU can do, in Linux's words.
+    """
+    reached = machine
+    if machine in {"x86_64", "amd64"}:
+        reached = "x86_64_v1"
+        for level, needed in _LEVELS.items():
+            if not needed <= set(flags):
+                break
+            reached = f"x86_64_{level}"
+    return reached
+
+
+def cpu_flags(cpuinfo: Path) -> frozenset[str]:
+    """Return what the first CPU of Linux's list can do; empty if there is no list."""
+    try:
+        lines = cpuinfo.read_text("utf-8", errors="replace").splitlines()
+    except OSError:
+        return frozenset()
+    for line in lines:
+        key, _, value = line.partition(":")
+        if key.strip().lower() in {"flags", "features"}:
+            return frozenset(value.split())
+    return frozenset()
+
+
+def _version(distribution: str) -> str:
+    try:
+        return installed(distribution)
+    except PackageNotFoundError:
+        return "0"

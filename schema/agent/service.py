@@ -1,0 +1,260 @@
+"""Jobs from the network: the serving loop that workers and analyzers share.
+
+An agent takes one job after the other from its own key; the next one already
+waits within the process. The callbacks of the network only enqueue. Whatever a
+peer sends, the loop goes on: bad requests are refused with a reason and counted.
+"""
+
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from queue import Empty, SimpleQueue
+from typing import Any
+
+import zenoh
+
+from schema.agent.crew import stop_on_signals, stop_with_parent
+from schema.agent.network import Agent, client_config
+from schema.agent.platform_tag import platform_tag, wire_version
+from schema.agent.serving import Server, Tally
+from schema.agent.supervision import Post
+from schema.agent.topics import Member, check_name, unique_name
+from schema.agent.turns import Turns
+
+_POLL_S = 0.2
+_RETRY_S = 0.3
+_SAY_S = 5.0
+
+NOBODYS = Post()
+"""The place of a process that nobody looks after."""
+
+
+def tell_user(line: str) -> None:
+    """Write a line to standard error."""
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
+
+
+class Outlet:
+    """Where an agent publishes for those who watch: best effort, nothing waits."""
+
+    def __init__(self) -> None:
+        """Lead nowhere until there is a session."""
+        self._session: zenoh.Session | None = None
+        self._publishers: dict[str, zenoh.Publisher] = {}
+
+    def lead_to(self, session: zenoh.Session | None) -> None:
+        """Publish by a session from now on, or no more."""
+        self._session = session
+        self._publishers = {}
+
+    def has_listeners(self, key: str) -> bool:
+        """Return whether somebody would get what is put: if not, spare the work."""
+        publisher = self._publisher(key)
+        # Zenoh's stubs call it a bool; it is an object that is always true.
+        status: Any = publisher and publisher.matching_status
+        return publisher is not None and bool(status.matching)
+
+    def put(self, key: str, data: bytes) -> None:
+        """Publish bytes; lost if nobody listens or the line is full."""
+        publisher = self._publisher(key)
+        if publisher is not None:
+            publisher.put(data)
+
+    def _publisher(self, key: str) -> zenoh.Publisher | None:
+        """Return what publishes on a key; None while there is no session."""
+        if self._session is None:
+            return None
+        if key not in self._publishers:
+            self._publishers[key] = self._session.declare_publisher(
+                key,
+                congestion_control=zenoh.CongestionControl.DROP,
+                priority=zenoh.Priority.DATA_LOW,
+            )
+        return self._publishers[key]
+
+
+def serve(
+    answer: Callable[[bytes], bytes],
+    agent: Agent,
+    stop: threading.Event,
+    say: Callable[[str], None] = tell_user,
+    *,
+    outlet: Outlet | None = None,
+    post: Post = NOBODYS,
+) -> Tally:
+    """Answer jobs until told to stop; wait for the hub as long as it takes.
+
+    The job at hand is finished, the one behind it dropped: whoever asked gives it
+    to somebody else.
+
+    Args:
+        answer: bytes of a ``Request`` to bytes of an ``Answer``; it raises if the
+            request is bad.
+        agent: who this is and where its hub is.
+        stop: ends it; looked at between jobs.
+        say: told, in one line, when there is no hub and when there is one again.
+        outlet: publishes by this agent's session while there is one.
+        post: this process's place in a crew, if it has one.
+
+    Raises:
+        NetworkError: a name or an address that is none.
+    """
+    check_name(agent.name, "name")
+    check_name(agent.fleet, "fleet")
+    config = client_config(agent.connect, agent.tls)
+    server = Server(answer, agent, post)
+    hub = _Hub(agent.connect, say)
+    zenoh.init_log_from_env_or("error")
+    session = _open(config, hub, stop)
+    if session is not None:
+        with session:
+            if outlet is not None:
+                outlet.lead_to(session)
+            _serve_session(session, server, hub, stop)
+            if outlet is not None:
+                outlet.lead_to(None)
+    return server.tally
+
+
+def own_agent(agent: Agent, index: int) -> Agent:
+    """Return what one process of a crew calls itself and says of itself.
+
+    Args:
+        agent: of the whole crew.
+        index: of the process.
+    """
+    return replace(
+        agent,
+        name=unique_name(f"{agent.name}-{index}"),
+        platform=platform_tag(),
+        version=wire_version(),
+    )
+
+
+def serve_as_process(
+    answer: Callable[[bytes], bytes],
+    agent: Agent,
+    post: Post,
+    outlet: Outlet | None = None,
+) -> None:
+    """Be one process of a crew: serve until asked to end, or left alone.
+
+    Args:
+        answer: as for ``serve``.
+        agent: of this process, or of the whole crew if it has no version yet.
+        post: of the process; the first one speaks for all.
+        outlet: as for ``serve``.
+    """
+    stop = stop_on_signals()
+    stop_with_parent(stop)
+    own = agent if agent.version else own_agent(agent, post.index)
+    say = tell_user if post.index == 0 else _keep_quiet
+    tally = serve(answer, own, stop, say, outlet=outlet, post=post)
+    if tally.refused:
+        tell_user(
+            f"{own.name} refused {tally.refused} requests, "
+            f"{tally.malformed} of them malformed"
+        )
+
+
+def _keep_quiet(_line: str) -> None:
+    """Let the first of the crew speak."""
+
+
+def _open(config: str, hub: "_Hub", stop: threading.Event) -> zenoh.Session | None:
+    """Return a session as soon as there is a hub; None if told to stop first."""
+    while not stop.is_set():
+        try:
+            return zenoh.open(zenoh.Config.from_json5(config))
+        except zenoh.ZError:
+            hub.seen(is_there=False)
+        stop.wait(_RETRY_S)
+    return None
+
+
+def _serve_session(
+    session: zenoh.Session, server: Server, hub: "_Hub", stop: threading.Event
+) -> None:
+    me = Member(server.agent.fleet, server.agent.role, server.agent.name)
+    inbox: SimpleQueue[zenoh.Query] = SimpleQueue()
+    take = zenoh.handlers.Callback(inbox.put, indirect=False)
+
+    def tell_info(query: zenoh.Query) -> None:
+        with query:
+            query.reply(me.info, server.info)
+
+    def cancel(sample: zenoh.Sample) -> None:
+        server.cancel(sample.payload.to_bytes())
+
+    # The keys first, the token last: whoever sees it may ask at once.
+    with (
+        session.declare_queryable(me.jobs, take, complete=True),
+        session.declare_queryable(
+            me.info, zenoh.handlers.Callback(tell_info), complete=True
+        ),
+        session.declare_subscriber(
+            me.cancelled, zenoh.handlers.Callback(cancel, indirect=False)
+        ),
+        session.liveliness().declare_token(me.alive),
+    ):
+        hub.seen(is_there=True)
+        turns: Turns[zenoh.Query] = Turns()
+        while not stop.is_set():
+            if not _let_in(inbox, turns):
+                hub.seen(is_there=bool(session.info.routers_zid()))
+                continue
+            # A job that came after all was quiet: the hub is back.
+            hub.seen(is_there=True)
+            began_s = time.monotonic()
+            with turns.take() as query:
+                _answer(query, server, me)
+            turns.spent(time.monotonic() - began_s)
+    _let_in(inbox, turns)
+    while turns:
+        with turns.take():
+            pass  # its end without a reply is the asker's news
+
+
+def _let_in(inbox: SimpleQueue[zenoh.Query], turns: Turns[zenoh.Query]) -> bool:
+    """Have all that came wait its turn; return whether anything waits now."""
+    try:
+        while True:
+            # Only who has nothing to do waits for more to come.
+            query = inbox.get_nowait() if turns else inbox.get(timeout=_POLL_S)
+            sender = query.attachment
+            turns.put(sender.to_bytes() if sender else b"", query)
+    except Empty:
+        return bool(turns)
+
+
+def _answer(query: zenoh.Query, server: Server, me: Member) -> None:
+    """Reply with an answer, or with the reason why there is none."""
+    payload = query.payload
+    reply = server.reply(b"" if payload is None else payload.to_bytes())
+    if reply.reason:
+        query.reply_err(reply.reason)
+    else:
+        query.reply(me.jobs, reply.answer)
+
+
+@dataclass(slots=True)
+class _Hub:
+    """What the user knows of the hub."""
+
+    address: str
+    say: Callable[[str], None]
+    is_there: bool = True
+    said_s: float = 0.0
+
+    def seen(self, *, is_there: bool) -> None:
+        """Say what is new, and every few seconds that the hub is still missing."""
+        now_s = time.monotonic()
+        if is_there and not self.is_there:
+            self.say(f"connected to {self.address}")
+        if not is_there and (self.is_there or now_s - self.said_s >= _SAY_S):
+            self.say(f"no coordinator at {self.address}; trying on, Ctrl-C ends")
+            self.said_s = now_s
+        self.is_there = is_there

@@ -1,0 +1,152 @@
+"""One request in, one reply out: what an agent does with a request but compute.
+
+It refuses who was replaced, what it has not the plug-ins for and what nobody waits
+for any more, and counts. Whatever a peer sends or a plug-in raises becomes a reply.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from google.protobuf.message import DecodeError
+
+from schema.agent.network import FENCED, UNFIT, Agent
+from schema.agent.supervision import Post, Task
+from schema.errors import MalformedMessage, PluginDiffers, RevolveError, UnknownPlugin
+from schema.experiment.plugin_source import check_plugins
+from schema.wire import revolve_pb2 as pb
+
+_MOST_CANCELLED = 1000
+
+
+@dataclass(slots=True)
+class Tally:
+    """What an agent did.
+
+    Attributes:
+        answered: jobs with an answer.
+        refused: jobs with a reason why not, the malformed among them.
+        malformed: requests that do not decode.
+        skipped: jobs that nobody waited for any more.
+    """
+
+    answered: int = 0
+    refused: int = 0
+    malformed: int = 0
+    skipped: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """An answer, or the reason why there is none."""
+
+    answer: bytes = b""
+    reason: str = ""
+
+
+@dataclass(slots=True)
+class Server:
+    """Answers single requests; knows the newest coordinator of each run.
+
+    Attributes:
+        compute: bytes of a ``Request`` to bytes of an ``Answer``; it raises if the
+            request is bad.
+        agent: who this is.
+        post: its place in a crew.
+        tally: what it did.
+    """
+
+    compute: Callable[[bytes], bytes]
+    agent: Agent
+    post: Post = field(default_factory=Post)
+    tally: Tally = field(default_factory=Tally)
+    _epochs: dict[str, int] = field(default_factory=dict)
+    _cancelled: dict[Task, None] = field(default_factory=dict)
+
+    @property
+    def info(self) -> bytes:
+        """Bytes of the ``AgentInfo`` that says what this agent is."""
+        agent = self.agent
+        info = pb.AgentInfo(
+            agent=agent.name,
+            kind=agent.role,
+            slots=agent.slots,
+            platform=agent.platform,
+            version=agent.version,
+        )
+        for death in self.post.deaths:
+            task = death.task
+            info.deaths.add(
+                agent=task.agent,
+                run=task.run,
+                epoch=task.epoch,
+                number=task.number,
+                cause=death.cause,
+            )
+        return info.SerializeToString()
+
+    def cancel(self, data: bytes) -> None:
+        """Note that nobody waits for a job any more; may come from any thread.
+
+        Args:
+            data: bytes of a ``Request`` that need name only the job.
+        """
+        try:
+            task = self._task(pb.Request.FromString(data))
+        except DecodeError:
+            self.tally.malformed += 1
+            return
+        self._cancelled[task] = None
+        if len(self._cancelled) > _MOST_CANCELLED:
+            del self._cancelled[next(iter(self._cancelled))]
+
+    def reply(self, data: bytes) -> Reply:
+        """Return the reply to a request; whatever it is, one comes."""
+        try:
+            request = self._checked(data)
+            task = self._task(request)
+            if task in self._cancelled:
+                del self._cancelled[task]
+                self.tally.skipped += 1
+                return Reply(reason="nobody waits for this job any more")
+            answer = self.post.do(
+                lambda: self.compute(data), task, self.agent.cpu_limit_s
+            )
+        except (UnknownPlugin, PluginDiffers) as error:
+            self.tally.refused += 1
+            return Reply(reason=f"{UNFIT}{error}")
+        except RevolveError as error:
+            self.tally.refused += 1
+            self.tally.malformed += isinstance(error, MalformedMessage)
+            return Reply(reason=str(error))
+        except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
+            self.tally.refused += 1
+            return Reply(reason=f"{type(error).__name__}: {error}")
+        self.tally.answered += 1
+        return Reply(answer)
+
+    def _task(self, request: pb.Request) -> Task:
+        return Task(self.agent.name, request.run, request.epoch, request.number)
+
+    def _checked(self, data: bytes) -> pb.Request:
+        """Return what every kind of request begins with.
+
+        Raises:
+            MalformedMessage: not a request's bytes, or one that names no run.
+            PluginDiffers: a plug-in that is not here, or another one.
+            RevolveError: an older epoch than the newest seen of its run.
+        """
+        try:
+            request = pb.Request.FromString(data)
+        except DecodeError as error:
+            raise MalformedMessage(f"not the bytes of a Request: {error}") from None
+        if not request.run:
+            raise MalformedMessage("Request: names no run")
+        newest = self._epochs.get(request.run, 0)
+        if request.epoch < newest:
+            raise RevolveError(
+                f"{FENCED}epoch {request.epoch} of run {request.run} is over: "
+                f"epoch {newest} has begun"
+            )
+        self._epochs[request.run] = request.epoch
+        check_plugins(request.plugins)
+        return request

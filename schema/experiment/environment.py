@@ -1,0 +1,106 @@
+"""The section ``[environment]``: how the ground lies, and what stands on it."""
+
+from functools import lru_cache
+from math import cos, isclose, radians, sin
+from typing import Annotated
+
+import numpy as np
+from msgspec import Meta
+
+from schema.experiment.section import Count, NotNegative, Positive, Section
+from schema.parts import Vector
+from schema.robot.results import Floats
+
+MOST_PATCHES = 400
+"""Patches of rough ground side by side: every robot's model has all of them."""
+TAPER = 0.2
+"""Share of the extent over which rough ground comes down to the plane."""
+
+
+class Environment(Section, frozen=True):
+    """What robots are put into, off-line and in arenas.
+
+    ``slope_deg`` [degrees] is how steeply the ground rises along x. World frames lie
+    in the ground, so it is gravity that leans: heights, walls and places of birth
+    are as on level ground, and so are pictures.
+
+    Above 0, ``roughness_m`` [m] makes a height field: nodes ``patch_m`` apart, drawn
+    by ``ground_seed``, the highest that high, within ``extent_m`` of the origin along
+    x and y. It comes down to the plane at its rim, and beyond there is the plane.
+
+    ``scenery`` is MJCF of what stands there and never moves; a document may name a
+    file instead, relative to itself.
+    """
+
+    slope_deg: Annotated[float, Meta(ge=0, lt=45)] = 0.0
+    roughness_m: NotNegative = 0.0
+    patch_m: Positive = 0.1
+    extent_m: Positive = 5.0
+    ground_seed: Count = 1
+    scenery: str = ""
+
+    @property
+    def is_even(self) -> bool:
+        """Whether there is nothing but a plane."""
+        return not (self.roughness_m or self.scenery)
+
+    @property
+    def patches(self) -> int:
+        """Patches of rough ground from the origin to the rim."""
+        return round(self.extent_m / self.patch_m)
+
+    def gravity_vector(self, gravity: float) -> Vector:
+        """Return gravity of some strength in the ground's frame, x uphill [m/s2]."""
+        slope = radians(self.slope_deg)
+        # From 0, so that a plane has no negative zero: it would change readings.
+        return 0.0 - gravity * sin(slope), 0.0, -gravity * cos(slope)
+
+
+FLAT = Environment()
+"""The thesis's: an endless plane."""
+
+
+def is_mjcf(scenery: str) -> bool:
+    """Return whether scenery is MJCF itself and not the path of a file."""
+    return scenery.lstrip().startswith("<")
+
+
+def ground_problem(environment: Environment) -> str:
+    """Return why rough ground cannot be laid out; nothing if it can."""
+    if not environment.roughness_m:
+        return ""
+    extent_m, patch_m = environment.extent_m, environment.patch_m
+    whole = environment.patches
+    if not whole or not isclose(whole * patch_m, extent_m, rel_tol=1e-9):
+        return (
+            "environment.extent_m: must be a whole multiple of environment.patch_m = "
+            f"{patch_m:g}, got {extent_m:g}"
+        )
+    if 2 * whole > MOST_PATCHES:
+        return (
+            "environment.patch_m: must be >= 2 environment.extent_m / "
+            f"{MOST_PATCHES} = {2 * extent_m / MOST_PATCHES:g}, got {patch_m:g}"
+        )
+    return ""
+
+
+@lru_cache(maxsize=8)
+def relief(environment: Environment) -> Floats:
+    """Return the heights of rough ground as shares of the greatest, in [0, 1].
+
+    Args:
+        environment: with roughness.
+
+    Returns:
+        (N, N) exact in single precision, rows along y, columns along x, both
+        ascending; 0 at the rim, 1 at the highest node.
+    """
+    half = environment.patches
+    rng = np.random.default_rng(environment.ground_seed)
+    bumps = rng.random((2 * half + 1, 2 * half + 1))
+    away = np.abs(np.arange(-half, half + 1))
+    from_rim = half - np.maximum(away[:, None], away)
+    bumps *= np.minimum(1.0, from_rim / max(1.0, TAPER * half))
+    shares: Floats = (bumps / bumps.max()).astype(np.float32).astype(np.float64)
+    shares.setflags(write=False)
+    return shares

@@ -1,0 +1,208 @@
+"""Reads and writes experiment documents: TOML by people, JSON in a run's tables."""
+
+import tomllib
+from collections.abc import Collection
+from importlib import resources
+from math import isfinite
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+import msgspec
+from msgspec import Struct
+
+from schema.errors import ExperimentError, nearest
+from schema.experiment.check import check_experiment
+from schema.experiment.document import Experiment
+from schema.experiment.environment import is_mjcf
+
+
+def read_experiment(source: str) -> Experiment:
+    """Return a shipped experiment by its name, or one from a TOML file.
+
+    Args:
+        source: ``scenario1``, or a path that ends in ``.toml``.
+
+    Raises:
+        ExperimentError: no such experiment or file, or a document that is not one.
+    """
+    if source.endswith(".toml"):
+        try:
+            text = Path(source).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ExperimentError(f"{source}: cannot be read: {error}") from None
+        return parse_experiment(text, source)
+    check_source(source, shipped_experiments())
+    folder = resources.files("coordinator") / "experiments"
+    text = (folder / f"{source}.toml").read_text(encoding="utf-8")
+    return parse_experiment(text, f"{source}.toml")
+
+
+def check_source(source: str, shipped: Collection[str]) -> None:
+    """Raise unless a word is a path of a TOML file or one of the shipped names.
+
+    Raises:
+        ExperimentError: it is neither; the nearest is named.
+    """
+    if not source.endswith(".toml") and source not in shipped:
+        raise ExperimentError(
+            f"{source}: no such experiment{nearest(source, shipped)}; "
+            f"shipped are {', '.join(shipped)}, or give a path to a .toml file"
+        )
+
+
+def shipped_experiments() -> list[str]:
+    """Return the names of the experiments that come with the package."""
+    folder = resources.files("coordinator") / "experiments"
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in folder.iterdir()
+        if entry.name.endswith(".toml")
+    )
+
+
+def parse_experiment(text: str, where: str) -> Experiment:
+    """Return the experiment of a TOML text.
+
+    Args:
+        text: the document.
+        where: its path, for messages and for scenery that is named beside it.
+
+    Raises:
+        ExperimentError: bad TOML, an unknown key (the nearest is named), a wrong
+            type or a value outside its range, or values that exclude each other.
+    """
+    try:
+        document = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ExperimentError(f"{where}: not TOML: {error}") from None
+    _refuse_unknown(document, Experiment, where, "")
+    _read_scenery(document, where)
+    document = _completed(document)
+    try:
+        experiment = msgspec.convert(document, type=Experiment)
+    except msgspec.ValidationError as error:
+        raise ExperimentError(f"{where}: {_explain(error, document)}") from None
+    check_experiment(experiment, where)
+    return experiment
+
+
+def _read_scenery(document: dict[str, Any], where: str) -> None:
+    """Put the text of scenery where its path stands, so that it goes along."""
+    for table in (document, *document.get("islands", ())):
+        environment = table.get("environment", {})
+        named = environment.get("scenery", "")
+        if not isinstance(named, str) or not named or is_mjcf(named):
+            continue
+        path = Path(where).parent / named
+        try:
+            text = path.read_text(encoding="utf-8-sig")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ExperimentError(
+                f"{where}: environment.scenery: {named}: cannot be read: {error}"
+            ) from None
+        if not text.strip():
+            # Or it would be taken for no scenery at all.
+            raise ExperimentError(f"{where}: environment.scenery: {named}: is empty")
+        environment["scenery"] = text
+
+
+def _completed(document: dict[str, Any]) -> dict[str, Any]:
+    """Return a document whose ``islands`` have their sections whole."""
+    if "islands" not in document:
+        return document
+    islands = [
+        {key: _completed_table(document.get(key), value) for key, value in each.items()}
+        for each in document["islands"]
+    ]
+    return {**document, "islands": islands}
+
+
+def _completed_table(kept: Any, changed: Any) -> Any:  # noqa: ANN401 - any TOML value
+    """Return a section in which what islands change stands among what they keep."""
+    return {**(kept or {}), **changed} if isinstance(changed, dict) else changed
+
+
+def experiment_text(experiment: Experiment) -> str:
+    """Return an experiment as one line of JSON, every default written out."""
+    return msgspec.json.encode(experiment).decode()
+
+
+def experiment_from_text(text: str) -> Experiment:
+    """Return the experiment that ``experiment_text`` wrote.
+
+    Raises:
+        ExperimentError: not such a text.
+    """
+    try:
+        return msgspec.json.decode(text.encode(), type=Experiment)
+    except msgspec.MsgspecError as error:
+        raise ExperimentError(f"experiment of a run: {error}") from None
+
+
+def _refuse_unknown(
+    document: dict[str, Any], kind: type[Struct], where: str, prefix: str
+) -> None:
+    """Raise for a key that a section does not have, or a number that is none."""
+    fields = {field.name: field for field in msgspec.structs.fields(kind)}
+    for key, value in document.items():
+        if key not in fields:
+            raise ExperimentError(
+                f"{where}: {prefix}{key}: no such key{nearest(key, fields)}; "
+                f"allowed: {', '.join(fields)}"
+            )
+        for number in value if isinstance(value, list) else (value,):
+            if isinstance(number, float) and not isfinite(number):
+                raise ExperimentError(
+                    f"{where}: {prefix}{key}: must be finite, got {number}"
+                )
+        inner = _section(fields[key].type)
+        if inner is None:
+            continue
+        if key == "islands" and isinstance(value, dict):
+            raise ExperimentError(
+                f"{where}: islands: must be [[islands]], got [islands]"
+            )
+        if key == "islands" and isinstance(value, list):
+            tables = {f"{prefix}{key}[{at}]": each for at, each in enumerate(value)}
+        else:
+            tables = {f"{prefix}{key}": value}
+        for name, table in tables.items():
+            if not isinstance(table, dict):
+                raise ExperimentError(f"{where}: {name}: must be a table")
+            _refuse_unknown(table, inner, where, f"{name}.")
+
+
+def _section(kind: Any) -> type[Struct] | None:  # noqa: ANN401 - any annotation
+    """Return the section that a key holds, be it optional; None if a plain value."""
+    for each in (kind, *get_args(kind)):
+        if isinstance(each, type) and issubclass(each, Struct):
+            return each
+    return None
+
+
+def _explain(error: msgspec.ValidationError, document: dict[str, Any]) -> str:
+    """Return msgspec's message as ``key: expected, got value``."""
+    message, _, path = str(error).partition(" - at `$.")
+    key = path.rstrip("`")
+    value: Any = document
+    kind: Any = Experiment
+    for name in key.split(".") if key else ():
+        word, *places = name.replace("]", "").split("[")
+        value = value.get(word) if isinstance(value, dict) else None
+        kind = _type_of(kind, word)
+        for place in places:
+            value = value[int(place)] if isinstance(value, list) else None
+    if not key:
+        return message
+    choices = get_args(kind) if get_origin(kind) is Literal else ()
+    if not choices:
+        return f"{key}: {message}, got {value!r}"
+    allowed = ", ".join(map(repr, choices))
+    return f"{key}: must be one of {allowed}, got {value!r}{nearest(value, choices)}"
+
+
+def _type_of(kind: Any, key: str) -> Any:  # noqa: ANN401 - any annotation
+    """Return the annotation of a key of the section that an annotation names."""
+    section = _section(kind)
+    fields = msgspec.structs.fields(section) if section else ()
+    return next((field.type for field in fields if field.name == key), None)

@@ -1,0 +1,1 @@
+"""Robot files: YAML, RoboGen, MJCF and URDF."""

@@ -1,0 +1,130 @@
+"""MJCF files that hold a whole robot: body, brain and the world it is judged in.
+
+The body is plain MJCF, for MuJoCo's own viewer and other tools. What MJCF has no
+words for rides along as custom text: the robot in its Protobuf form, and the
+settings of an evaluation. MJCF rounds its numbers, so what is read back is that
+text, bit for bit; a body that was edited by hand no longer fits it, and is refused.
+"""
+
+import base64
+import binascii
+from pathlib import Path
+
+import msgspec
+import mujoco
+import numpy as np
+
+from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
+from schema.experiment.document import body_space
+from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
+from schema.mjcf.model import solo_model, solo_spec
+from schema.robot.robot import Robot, check_robot
+from schema.wire.codec import decode_robot, encode_robot
+
+ROBOT = "revolve_robot"
+SETTINGS = "revolve_settings"
+"""Names of the two custom texts."""
+
+_DIGITS = 1e-4
+"""Relative difference that MJCF's rounding cannot make."""
+_LENGTH_M = 1e-6
+_COMPARED = ("body_mass", "geom_size", "geom_pos", "geom_quat", "jnt_range")
+
+
+def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
+    """Return the text of a robot alone on its ground, brain and settings inside.
+
+    Args:
+        robot: the robot.
+        settings: the world that it is to be judged in, and how.
+
+    Raises:
+        InvalidRobot: the robot is not well formed in the settings' body space.
+    """
+    space = body_space(settings.space)
+    check_robot(robot, space)
+    spec = solo_spec(robot, space, settings.simulation, settings.environment)
+    spec.modelname = "robot"
+    for name, data in (
+        (ROBOT, encode_robot(robot)),
+        (SETTINGS, msgspec.json.encode(settings)),
+    ):
+        text = spec.add_text()
+        text.name, text.data = name, base64.b64encode(data).decode("ascii")
+    spec.compile()
+    return str(spec.to_xml())
+
+
+def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
+    """Return the robot and the settings that a text holds.
+
+    Args:
+        text: of an MJCF file.
+        where: its name, for messages.
+
+    Raises:
+        InvalidRobot: no MJCF, or none that holds a robot and its settings; or its
+            body is another than the robot's.
+    """
+    try:
+        spec = mujoco.MjSpec.from_string(text)
+        model = spec.compile()
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        raise InvalidRobot(f"{where}: no MJCF: {reason}") from None
+    held = {one.name: one.data for one in spec.texts}
+    try:
+        robot = decode_robot(_bytes(held, ROBOT))
+        settings = read_evaluation_settings(_bytes(held, SETTINGS))
+        space = body_space(settings.space)
+        check_robot(robot, space)
+    except (MalformedMessage, ExperimentError, InvalidRobot) as error:
+        raise InvalidRobot(f"{where}: {error}") from None
+    built = solo_model(robot, space, settings.simulation, settings.environment)
+    _check_body(model, built, where)
+    return robot, settings
+
+
+def read_mjcf(path: Path) -> tuple[Robot, EvaluationSettings]:
+    """Return the robot and the settings of a file.
+
+    Raises:
+        InvalidRobot: as ``robot_from_mjcf``, or the file cannot be read.
+    """
+    try:
+        return robot_from_mjcf(path.read_text(encoding="utf-8"), str(path))
+    except OSError as error:
+        raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise InvalidRobot(f"{path}: no MJCF: byte {error.start} is no text") from None
+
+
+def _bytes(held: dict[str, str], name: str) -> bytes:
+    if name not in held:
+        raise InvalidRobot(
+            f"holds no text {name!r}: only MJCF that `revolve robot convert` wrote "
+            "has a brain inside"
+        )
+    try:
+        return base64.b64decode(held[name], validate=True)
+    except binascii.Error as error:
+        raise InvalidRobot(f"text {name!r}: {error}") from None
+
+
+def _check_body(found: mujoco.MjModel, built: mujoco.MjModel, where: str) -> None:
+    """Raise if a file's body is not, but for rounding, the robot's."""
+    counts = ("nbody", "ngeom", "njnt", "nu")
+    differing = [n for n in counts if getattr(found, n) != getattr(built, n)]
+    if not differing:
+        differing = [
+            name
+            for name in _COMPARED
+            if not np.allclose(
+                getattr(found, name), getattr(built, name), rtol=_DIGITS, atol=_LENGTH_M
+            )
+        ]
+    if differing:
+        raise InvalidRobot(
+            f"{where}: its body is not that of the robot it holds "
+            f"({', '.join(differing)}): edit the robot's YAML and convert it again"
+        )

@@ -1,0 +1,65 @@
+"""How RoboGen's slots and quarter turns become ours.
+
+Source: RoboGen's published sources of 2018.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from schema.parts import BUILT_IN, Slot, Vector
+from schema.robot.frames import attach
+from schema.robot.robot import ORIENTATIONS
+
+SQUARE = ("Core", "FixedBrick")
+"""Parts whose slots RoboGen counts left, right, front, back."""
+
+_OUR_SLOTS = (3, 2, 0, 1)
+_X: Vector = (1.0, 0.0, 0.0)
+_Y: Vector = (0.0, 1.0, 0.0)
+_Z: Vector = (0.0, 0.0, 1.0)
+
+
+def our_slot(kind: str, slot: int) -> int:
+    """Return our number of a slot that RoboGen numbers."""
+    return _OUR_SLOTS[slot] if kind in SQUARE else slot
+
+
+@lru_cache(maxsize=256)
+def our_orientation(parent: str, slot: int, child: str, quarter: int) -> int:
+    """Return the orientation [degrees] that turns a part as RoboGen does.
+
+    Args:
+        parent: our type of the parent.
+        slot: RoboGen's slot of it.
+        child: our type of the child, which sits by its first slot.
+        quarter: RoboGen's quarter turns.
+    """
+    # It turns the child about its own normal, ours turns the tangent: opposite.
+    turn = (-90 * quarter) % 360
+    wanted, _ = attach(_their_slot(parent, slot), _their_slot(child, 0), turn)
+    parent_slot = _OUR_SLOTS[slot] if parent in SQUARE else slot
+    ours = (
+        _our_slot(parent, parent_slot),
+        _our_slot(child, _OUR_SLOTS[0] if child in SQUARE else 0),
+    )
+    for orientation in ORIENTATIONS:
+        rotation, _ = attach(*ours, orientation)
+        if np.allclose(rotation, wanted, atol=1e-9):
+            return orientation
+    raise AssertionError("quarter turns about one normal reach each other")
+
+
+def _their_slot(kind: str, slot: int) -> Slot:
+    """Return RoboGen's normal and tangent of a slot, untilted, at the origin."""
+    if kind in SQUARE:
+        normal = ((-1.0, 0.0, 0.0), _X, (0.0, -1.0, 0.0), _Y)[slot]
+        return Slot((0.0, 0.0, 0.0), normal, (_Y, _Y, _Z, _Z)[slot])
+    return Slot((0.0, 0.0, 0.0), _X if slot else (-1.0, 0.0, 0.0), _Y)
+
+
+def _our_slot(kind: str, slot: int) -> Slot:
+    """Return our normal and tangent of a slot, untilted."""
+    part_type = BUILT_IN[kind]
+    values = tuple(parameter.default for parameter in part_type.parameters)
+    return part_type.shape(values).slots[slot]

@@ -1,0 +1,169 @@
+"""RoboGen's JSON, as its evolution writes robots.
+
+Source: RoboGen's published sources of 2018.
+"""
+
+import json
+from typing import Any, NoReturn, TypeVar
+
+from schema.errors import InvalidRobot
+from schema.formats.robogen import (
+    Ending,
+    RobogenPart,
+    RobogenRobot,
+    checked_part,
+    neuron_kind,
+    our_robot,
+)
+from schema.parts import BodySpace
+from schema.robot.brain import LAYERS
+from schema.robot.robot import Robot
+
+T = TypeVar("T", str, int, float)
+
+_KEYS: dict[str, tuple[tuple[str, float], ...]] = {
+    "Simple": (("bias", 0.0), ("gain", 1.0)),
+    "Sigmoid": (("bias", 0.0), ("gain", 1.0)),
+    "Oscillator": (("period", 0.0), ("phaseOffset", 0.0), ("gain", 1.0)),
+}
+"""Keys of our parameters, and what a missing one stands for."""
+
+
+def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
+    """Return the robot of RoboGen's JSON form.
+
+    Args:
+        text: of the file.
+        where: its name, for messages.
+        space: part types that the robot may use.
+
+    Raises:
+        InvalidRobot: no such JSON; with file and line, or path in the document.
+    """
+    try:
+        document = json.loads(text, parse_constant=_refuse)
+    except json.JSONDecodeError as error:
+        raise InvalidRobot(f"{where}:{error.lineno}: no JSON: {error.msg}") from None
+    except (ValueError, RecursionError) as error:
+        raise InvalidRobot(f"{where}: no JSON: {error}") from None
+    theirs = RobogenRobot(_body(document, where))
+    ends: dict[str, Ending] = {}
+    for at, neuron in _items(document, ("brain", "neuron"), where):
+        end = (_get(neuron, "bodyPartId", str, at), _get(neuron, "ioId", int, at))
+        ends[_get(neuron, "id", str, at)] = end
+        layer = _get(neuron, "layer", str, at)
+        if layer not in LAYERS:
+            allowed = ", ".join(LAYERS)
+            raise InvalidRobot(f"{at}.layer: must be one of {allowed}, got {layer!r}")
+        if layer == "hidden":
+            theirs.hidden.append(end)
+        if layer != "input":
+            kind = neuron_kind(_get(neuron, "type", str, at), f"{at}.type")
+            values = [
+                _get(neuron, key, float, at) if key in neuron else usual
+                for key, usual in _KEYS[kind]
+            ]
+            theirs.kinds[end] = (kind, tuple(values))
+    for at, edge in _items(document, ("brain", "connection"), where):
+        source, target = (
+            _known(ends, _get(edge, key, str, at), f"{at}.{key}")
+            for key in ("src", "dest")
+        )
+        theirs.weights.append((source, target, _get(edge, "weight", float, at)))
+    return our_robot(theirs, space, where)
+
+
+def _body(document: object, where: str) -> RobogenPart:
+    """Return a document's tree of parts."""
+    parts: dict[str, RobogenPart] = {}
+    roots: list[RobogenPart] = []
+    for at, entry in _items(document, ("body", "part"), where):
+        name = _get(entry, "id", str, at)
+        if name in parts:
+            raise InvalidRobot(f"{at}.id: a second part {name!r}")
+        values = tuple(
+            _get(value, "paramValue", float, inner)
+            for inner, value in _items(entry, ("evolvableParam",), at)
+        )
+        kind, turns = _get(entry, "type", str, at), _get(entry, "orientation", int, at)
+        parts[name] = checked_part(name, kind, turns, values, at)
+        if entry.get("root") is True:
+            roots.append(parts[name])
+    if len(roots) != 1:
+        raise InvalidRobot(
+            f"{where}: body.part: exactly one must be the root, got {len(roots)}"
+        )
+    carried = {roots[0].name}
+    for at, entry in _items(document, ("body", "connection"), where):
+        child = _known(parts, _get(entry, "dest", str, at), f"{at}.dest")
+        parent = _known(parts, _get(entry, "src", str, at), f"{at}.src")
+        slot = _get(entry, "srcSlot", int, at)
+        if _get(entry, "destSlot", int, at) != 0:
+            raise InvalidRobot(f"{at}.destSlot: parts sit by their slot 0")
+        if child.name in carried:
+            raise InvalidRobot(f"{at}.dest: {child.name!r} sits on a part already")
+        if slot in parent.children or (slot == 0 and parent is not roots[0]):
+            raise InvalidRobot(f"{at}.srcSlot: slot {slot} is taken")
+        carried.add(child.name)
+        parent.children[slot] = child
+    if loose := [name for name in parts if name not in carried]:
+        raise InvalidRobot(f"{where}: body.part: {loose[0]!r} sits nowhere")
+    _check_connected(roots[0], len(parts), where)
+    return roots[0]
+
+
+def _check_connected(root: RobogenPart, count: int, where: str) -> None:
+    """Raise if some parts carry each other in a ring, apart from the core."""
+    waiting, reached = [root], 0
+    while waiting:
+        reached += 1
+        waiting += waiting.pop().children.values()
+    if reached != count:
+        raise InvalidRobot(
+            f"{where}: body.connection: {count - reached} parts do not hang on the core"
+        )
+
+
+def _items(
+    document: object, path: tuple[str, ...], where: str
+) -> list[tuple[str, dict[str, Any]]]:
+    """Return (where, entry) of a list in a document; a missing one is empty."""
+    value = document
+    for key in path:
+        if not isinstance(value, dict):
+            raise InvalidRobot(f"{where}: must be an object with {key!r}")
+        value = value.get(key, {} if key != path[-1] else [])
+    name = ".".join(path)
+    if not isinstance(value, list):
+        raise InvalidRobot(f"{where}: {name} must be a list")
+    entries: list[tuple[str, dict[str, Any]]] = []
+    for number, entry in enumerate(value):
+        if not isinstance(entry, dict):
+            raise InvalidRobot(f"{where}: {name}[{number}] must be an object")
+        entries.append((f"{where}: {name}[{number}]", entry))
+    return entries
+
+
+def _get(entry: dict[str, Any], key: str, kind: type[T], at: str) -> T:
+    """Return an entry's value of a type; whole numbers pass for floats."""
+    value = entry.get(key)
+    if kind is float and isinstance(value, int):
+        value = float(value)
+    if not isinstance(value, kind) or isinstance(value, bool):
+        raise InvalidRobot(
+            f"{at}.{key}: must be of type {kind.__name__}, got {value!r}"
+        )
+    return value
+
+
+Known = TypeVar("Known")
+
+
+def _known(things: dict[str, Known], name: str, at: str) -> Known:
+    if name not in things:
+        raise InvalidRobot(f"{at}: nothing is called {name!r}")
+    return things[name]
+
+
+def _refuse(name: str) -> NoReturn:
+    raise ValueError(f"{name} is no number")

@@ -1,0 +1,181 @@
+"""RoboGen's indented text.
+
+It has four sections, each ended by an empty line: parts, one a line, indented
+by tabs below what carries them; hidden neurons; weights; neuron parameters. All but
+the first may be missing.
+Source: RoboGen's published sources of 2018.
+"""
+
+import math
+import re
+from collections.abc import Iterator
+
+from schema.errors import InvalidRobot
+from schema.formats.robogen import (
+    RobogenPart,
+    RobogenRobot,
+    checked_part,
+    neuron_kind,
+    our_robot,
+)
+from schema.parts import BUILT_IN, BodySpace
+from schema.robot.robot import Robot
+
+_LETTERS = {
+    "E": "CoreComponent",
+    "N": "CoreComponentNoIMU",
+    "F": "FixedBrick",
+    "I": "ActiveHinge",
+    "H": "PassiveHinge",
+    "B": "ParametricJoint",
+    "T": "TouchSensor",
+    "L": "LightSensor",
+}
+_PART = re.compile(r"(\t*)(\d) (\S+) (\S+) (\d)((?: \S+)*)\s*")
+
+
+def robot_from_robogen_text(text: str, where: str, space: BodySpace) -> Robot:
+    """Return the robot of RoboGen's text form.
+
+    Args:
+        text: of the file.
+        where: its name, for messages.
+        space: part types that the robot may use.
+
+    Raises:
+        InvalidRobot: no such text; with file, line and what is allowed.
+    """
+    sections = _sections(text, where)
+    root = _body(next(sections), where)
+    numbers = _counts(root)
+    theirs = RobogenRobot(root)
+    for line, words in next(sections, []):
+        part, kind = _exactly(words, ("PART", "TYPE"), line)
+        if part not in numbers:
+            raise InvalidRobot(f"{line}: no part {part!r}")
+        theirs.hidden.append((part, numbers[part]))
+        # Said again below if it has parameters of its own.
+        theirs.kinds[theirs.hidden[-1]] = (neuron_kind(kind, line), (0.0, 1.0))
+        numbers[part] += 1
+    for line, words in next(sections, []):
+        names = ("PART", "NUMBER", "PART", "NUMBER", "WEIGHT")
+        source, one, target, two, weight = _exactly(words, names, line)
+        ends = (source, _count(one, line)), (target, _count(two, line))
+        theirs.weights.append((*ends, _number(weight, line)))
+    for line, words in next(sections, []):
+        _read_parameters(theirs, words, line)
+    if rest := next(sections, []):
+        raise InvalidRobot(f"{rest[0][0]}: a fifth section: four are allowed")
+    return our_robot(theirs, space, where)
+
+
+def _sections(text: str, where: str) -> Iterator[list[tuple[str, list[str]]]]:
+    """Yield (file and line, words) of all lines, section by section, the first raw."""
+    section: list[tuple[str, list[str]]] = []
+    is_body = True
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.strip():
+            section.append((f"{where}:{number}", [line] if is_body else line.split()))
+        else:
+            yield section
+            section, is_body = [], False
+    yield section
+
+
+def _body(lines: list[tuple[str, list[str]]], where: str) -> RobogenPart:
+    """Return the tree of a text's first section."""
+    if not lines:
+        raise InvalidRobot(f"{where}:1: must hold the core, got an empty line")
+    path: list[RobogenPart] = []
+    names: set[str] = set()
+    for line, (written,) in lines:
+        match = _PART.fullmatch(written)
+        if match is None:
+            raise InvalidRobot(
+                f"{line}: must be TABS SLOT TYPE NAME ORIENTATION PARAMETERS, "
+                f"got {written!r}"
+            )
+        tabs, slot, kind, name, turns, rest = match.groups()
+        kind = _LETTERS.get(kind, kind)
+        values = tuple(_number(word, line) for word in rest.split())
+        part = checked_part(name, kind, int(turns), values, line)
+        depth = len(tabs)
+        if name in names:
+            raise InvalidRobot(f"{line}: a second part {name!r}")
+        names.add(name)
+        if (depth == 0) != (not path) or depth > len(path):
+            allowed = f"1..{len(path)}" if path else "0"
+            raise InvalidRobot(f"{line}: tabs must be {allowed}, got {depth}")
+        del path[depth:]
+        if path:
+            _graft(path[-1], int(slot), part)
+        path.append(part)
+    return path[0]
+
+
+def _graft(parent: RobogenPart, slot: int, child: RobogenPart) -> None:
+    """Put a part on another, by the slot number of a text."""
+    # Slot 0 of all but the core is where they sit themselves: not counted.
+    own = slot + (parent.kind != "Core")
+    if own in parent.children:
+        raise InvalidRobot(f"{child.where}: slot {slot} of {parent.name!r} is taken")
+    count = BUILT_IN[parent.kind].arity
+    if own >= count:
+        free = count - (parent.kind != "Core")
+        raise InvalidRobot(
+            f"{child.where}: {parent.name!r} has {free} slots to put parts on, "
+            f"got slot {slot}"
+        )
+    parent.children[own] = child
+
+
+def _counts(root: RobogenPart) -> dict[str, int]:
+    """Return how many neurons each part has from its sensors and motors."""
+    counts: dict[str, int] = {}
+    waiting = [root]
+    while waiting:
+        part = waiting.pop()
+        kind = BUILT_IN[part.kind]
+        counts[part.name] = kind.inputs + kind.outputs
+        waiting += part.children.values()
+    return counts
+
+
+def _read_parameters(theirs: RobogenRobot, words: list[str], line: str) -> None:
+    """Read a line of the last section: a bias, or a type and its parameters."""
+    if len(words) <= len(("PART", "NUMBER", "BIAS")):
+        words = _exactly(words, ("PART", "NUMBER", "BIAS"), line)
+        words.insert(2, "sigmoid")
+    part, number, name, *rest = words
+    kind = neuron_kind(name, line)
+    values = tuple(_number(word, line) for word in rest)
+    wanted = 3 if kind == "Oscillator" else 1
+    if len(values) != wanted:
+        raise InvalidRobot(f"{line}: {name} takes {wanted} numbers, got {len(values)}")
+    # Their text has no gain but an oscillator's.
+    gain = () if kind == "Oscillator" else (1.0,)
+    theirs.kinds[part, _count(number, line)] = (kind, (*values, *gain))
+
+
+def _exactly(words: list[str], names: tuple[str, ...], line: str) -> list[str]:
+    if len(words) != len(names):
+        raise InvalidRobot(
+            f"{line}: must be {' '.join(names)}, got {' '.join(words)!r}"
+        )
+    return words
+
+
+def _count(word: str, line: str) -> int:
+    if not word.isdecimal():
+        raise InvalidRobot(f"{line}: must be a neuron's number, got {word!r}")
+    return int(word)
+
+
+def _number(word: str, line: str) -> float:
+    try:
+        value = float(word)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise InvalidRobot(f"{line}: must be a number, got {word!r}")
+    return value

@@ -1,0 +1,107 @@
+"""A robot's body as URDF, for other tools.
+
+Links are the robot's rigid segments, named as its bodies in MuJoCo are; joints are
+revolute. URDF has no words for brains and servos: they stay behind.
+"""
+
+import math
+from xml.etree import ElementTree as ET
+
+import mujoco
+import numpy as np
+
+from schema.experiment.document import Simulation
+from schema.mjcf.model import robot_spec
+from schema.parts import BodySpace
+from schema.robot.results import Floats
+from schema.robot.robot import Robot, check_robot
+
+_FREE = (0.0, 1e6)
+"""Effort [N m] and velocity [rad/s] of a hinge without a motor: URDF wants both."""
+
+
+def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str:
+    """Return the text of a robot's body; lengths in m, masses in kg, angles in rad.
+
+    Args:
+        robot: the robot.
+        space: its part types.
+        simulation: damping of the joints.
+
+    Raises:
+        InvalidRobot: the robot is not well formed in this body space.
+    """
+    check_robot(robot, space)
+    model = robot_spec(robot, space, simulation).spec.compile()
+    root = ET.Element("robot", name="robot")
+    for body in range(1, model.nbody):
+        root.append(_link(model, body))
+    for joint in range(1, model.njnt):
+        part = int(model.joint(joint).name.removeprefix("joint"))
+        motor = space[robot.parts[part].kind].motor
+        drive = (motor.max_torque, motor.max_velocity) if motor else _FREE
+        root.append(_joint(model, joint, *drive))
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _link(model: mujoco.MjModel, body: int) -> ET.Element:
+    """Return a body's mass and boxes."""
+    link = ET.Element("link", name=model.body(body).name)
+    inertial = ET.SubElement(link, "inertial")
+    inertial.append(_origin(model.body_ipos[body], model.body_iquat[body]))
+    ET.SubElement(inertial, "mass", value=repr(float(model.body_mass[body])))
+    ixx, iyy, izz = map(float, model.body_inertia[body])
+    own = {"ixx": ixx, "iyy": iyy, "izz": izz, "ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
+    ET.SubElement(inertial, "inertia", {name: repr(own[name]) for name in sorted(own)})
+    first = int(model.body_geomadr[body])
+    for geom in range(first, first + int(model.body_geomnum[body])):
+        name = model.geom(geom).name
+        for role in ("visual", "collision"):
+            shown = ET.SubElement(link, role, name=name)
+            shown.append(_origin(model.geom_pos[geom], model.geom_quat[geom]))
+            box = ET.SubElement(shown, "geometry")
+            ET.SubElement(box, "box", size=_numbers(2.0 * model.geom_size[geom]))
+            if role == "visual":
+                material = ET.SubElement(shown, "material", name=name)
+                ET.SubElement(material, "color", rgba=_numbers(model.geom_rgba[geom]))
+    return link
+
+
+def _joint(
+    model: mujoco.MjModel, joint: int, effort: float, velocity: float
+) -> ET.Element:
+    """Return a hinge between a body and its parent."""
+    body = int(model.jnt_bodyid[joint])
+    parent = model.body(int(model.body_parentid[body])).name
+    made = ET.Element("joint", name=model.joint(joint).name, type="revolute")
+    made.append(_origin(model.body_pos[body], model.body_quat[body]))
+    ET.SubElement(made, "parent", link=parent)
+    ET.SubElement(made, "child", link=model.body(body).name)
+    ET.SubElement(made, "axis", xyz=_numbers(model.jnt_axis[joint]))
+    low, high = map(float, model.jnt_range[joint])
+    limits = {"lower": low, "upper": high, "effort": effort, "velocity": velocity}
+    ET.SubElement(made, "limit", {name: repr(value) for name, value in limits.items()})
+    damping = float(model.dof_damping[model.jnt_dofadr[joint]])
+    ET.SubElement(made, "dynamics", damping=repr(damping))
+    return made
+
+
+def _origin(position: Floats, quaternion: Floats) -> ET.Element:
+    """Return a frame: position [m], and roll, pitch, yaw about fixed axes [rad]."""
+    matrix = np.empty(9)
+    mujoco.mju_quat2Mat(matrix, quaternion)
+    m = matrix.reshape(3, 3)
+    pitch = math.asin(max(-1.0, min(1.0, -m[2, 0])))
+    if abs(m[2, 0]) < 1.0 - 1e-12:
+        roll, yaw = math.atan2(m[2, 1], m[2, 2]), math.atan2(m[1, 0], m[0, 0])
+    else:
+        # Upright: roll and yaw turn about the same axis, one of them is enough.
+        roll, yaw = 0.0, math.atan2(-m[0, 1], m[1, 1])
+    angles = np.array((roll, pitch, yaw))
+    return ET.Element("origin", xyz=_numbers(position), rpy=_numbers(angles))
+
+
+def _numbers(values: Floats) -> str:
+    """Return numbers as they are read back bit for bit."""
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,114 @@
+"""Robots in the YAML form of Revolve itself, read.
+
+It differs from ours in what goes without saying: a part sits on its parent with slot
+0, every output has a neuron, of type Simple unless ``params`` says otherwise, and
+hidden neurons are a mapping by their names. Edges go from ``src`` to ``dst``.
+
+Source: the conversion of the published code (revolve/convert), and its examples.
+"""
+
+from schema.formats.yaml_node import Table
+from schema.formats.yaml_reader import Reader
+from schema.robot.brain import NEURON_TYPES, Brain, Layer, Neuron
+
+_KINDS = {"CoreComponent": "Core"}
+_OTHER_NAMES = {"phase_offset": ("phaseOffset",), "amplitude": ("gain",)}
+"""Older names of an oscillator's parameters, as published robots have them."""
+_ABOUT = ("id", "layer", "type", "part_id")
+
+
+def is_of_revolve(document: Table) -> bool:
+    """Return whether a document has what only Revolve's own form has."""
+    if document.has("revolve_robot"):
+        return False
+    has_brain = not document.is_empty("brain")
+    return document.has("id") or (has_brain and document.table("brain").has("params"))
+
+
+class RevolveReader(Reader):
+    """One reading of one document in Revolve's form; labels and numbers are left."""
+
+    top_keys = ("id", "body", "brain")
+    edge_keys = ("src", "dst")
+    part_keys = ("id", "type", "orientation", "label", "params", "children")
+
+    def kind(self, table: Table) -> str:
+        """Return the type of a part, by the name that it has here."""
+        return table.word("type", self.space, _KINDS)
+
+    def own_slot(self, table: Table) -> int:
+        """Return the slot with which a part sits on its parent; 0 unless written."""
+        return table.integer("slot", 0)
+
+    def orientation(self, table: Table) -> int:
+        """Return how far a part is turned; Revolve itself writes 90.0."""
+        degrees = table.number("orientation", 0.0)
+        if not degrees.is_integer():
+            table.refuse("orientation", f"must be a whole number, got {degrees}")
+        return int(degrees)
+
+    def weight(self, table: Table) -> float:
+        """Return the weight of a connection; 0 unless written."""
+        return table.number("weight", 0.0)
+
+    def brain(self, table: Table | None) -> Brain:
+        """Return the brain: all outputs, and the hidden neurons that are written."""
+        neurons = self.inputs()
+        outputs = {
+            f"{name}-out-{offset}": index
+            for name, index in self.part_index.items()
+            for offset in range(self.space[self.parts[index].kind].outputs)
+        }
+        if table is None:
+            made = (_neuron("output", part, None) for part in outputs.values())
+            return Brain((*neurons.values(), *made))
+        table.refuse_others("neurons", "params", "connections")
+        written, params = _tables(table, "neurons"), _tables(table, "params")
+        for name in params:
+            if name not in {**neurons, **outputs, **written}:
+                table.table("params").refuse(name, "no such neuron")
+        for name, part in outputs.items():
+            said = params.get(name) or written.get(name)
+            neurons[name] = _neuron("output", part, said)
+        hidden = [name for name in written if name not in neurons]
+        owner = {name: self._owner(written[name]) for name in hidden}
+        for name in sorted(hidden, key=owner.__getitem__):
+            said = params.get(name) or written[name]
+            neurons[name] = _neuron("hidden", owner[name], said)
+        edges = [] if table.is_empty("connections") else table.tables("connections")
+        return Brain(tuple(neurons.values()), self.connections(edges, list(neurons)))
+
+    def _owner(self, table: Table) -> int:
+        """Return the part of a hidden neuron: the core unless written."""
+        if table.has("layer"):
+            table.word("layer", ("hidden",))
+        if table.is_empty("part_id"):
+            return 0
+        return self.part_index[table.word("part_id", self.part_index)]
+
+
+def _tables(table: Table, key: str) -> dict[str, Table]:
+    """Return what stands at the keys of a mapping that may be missing or empty."""
+    if table.is_empty(key):
+        return {}
+    inner = table.table(key)
+    return {name: inner.table(name) for name in inner.keys}
+
+
+def _neuron(layer: Layer, part: int, table: Table | None) -> Neuron:
+    """Return a neuron of what is said of it, of type Simple unless that says so."""
+    if table is None:
+        defaults = (parameter.default for parameter in NEURON_TYPES["Simple"])
+        return Neuron(layer, "Simple", part, tuple(defaults))
+    kind = table.word("type", NEURON_TYPES) if table.has("type") else "Simple"
+    values = []
+    allowed = [*_ABOUT]
+    for parameter in NEURON_TYPES[kind]:
+        names = [parameter.name]
+        if kind == "Oscillator":
+            names += _OTHER_NAMES.get(parameter.name, ())
+        allowed += names
+        name = next((name for name in names if table.has(name)), parameter.name)
+        values.append(table.number(name, parameter.default))
+    table.refuse_others(*allowed)
+    return Neuron(layer, kind, part, tuple(values))

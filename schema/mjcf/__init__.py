@@ -1,0 +1,1 @@
+"""The one translation of a robot into MuJoCo."""

@@ -1,0 +1,266 @@
+"""The one translation of a robot into MuJoCo.
+
+One body per rigid segment, so a robot with k joints has k + 1 bodies. At neutral
+pose all body frames are parallel to the core's; the root body's origin is the
+centre of the core, every other origin is its joint's anchor. The free joint's
+position is therefore the position that the thesis tracks, and its velocity that of
+the core's centre.
+
+A robot's spec has no ground and can be attached to any number of worlds, each time
+with a prefix of its own. Its elements are found by name, p being the index of the
+part: bodies ``root`` and ``body{p}``, joints and actuators ``joint{p}``, the free
+joint ``free``, geoms ``{p}/{box}``, imu sites ``{p}/imu``. What MuJoCo needs beyond
+the original's numbers stands, with its measured effect, in docs/physics.md.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from schema.experiment.document import Simulation
+from schema.experiment.environment import Environment
+from schema.mjcf.footing import footprint, standing_height
+from schema.mjcf.world import add_ground, set_options
+from schema.parts import IDENTITY, BodySpace, Joint, PartType
+from schema.robot.frames import place_parts, shapes_of
+from schema.robot.results import Floats
+from schema.robot.robot import Robot
+
+MEMORY_BYTES = 1 << 20
+"""Arena of a single robot's data.
+
+A pile of 30 parts needs about 120 KB, on rough ground of 5 mm patches 270 KB.
+"""
+
+_Segment = tuple[mujoco.MjsBody, list[float]]
+"""A body and its origin in the core's frame [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSpec:
+    """A robot as MuJoCo's own description.
+
+    Attributes:
+        spec: root body with a free joint, no ground; attachable.
+        height: of the core's centre when the lowest point touches z = 0 [m].
+    """
+
+    spec: mujoco.MjSpec
+    height: float
+
+
+def robot_spec(robot: Robot, space: BodySpace, simulation: Simulation) -> RobotSpec:
+    """Return a robot's description, its core's centre at the origin.
+
+    Args:
+        robot: a checked robot.
+        space: its part types.
+        simulation: numbers of contacts, joints and servos.
+    """
+    builder = _Builder(robot, space, simulation)
+    for index in range(len(robot.parts)):
+        builder.add_part(index)
+    return RobotSpec(builder.spec, -builder.lowest)
+
+
+Furnish = Callable[[mujoco.MjSpec], None]
+"""Adds what stands in a world, beside what its environment has."""
+
+
+def solo_spec(
+    robot: Robot,
+    space: BodySpace,
+    simulation: Simulation,
+    environment: Environment,
+    *,
+    furnish: Furnish | None = None,
+) -> mujoco.MjSpec:
+    """Return the description of one robot alone, at the origin.
+
+    Its lowest point is on the ground, or the robot stands on what rises below it.
+
+    Args:
+        robot: a checked robot.
+        space: its part types.
+        simulation: the world's numbers; ``drop_m`` lifts the robot.
+        environment: what it stands in.
+        furnish: adds what else stands there.
+
+    Raises:
+        ExperimentError: an environment with scenery that is none.
+    """
+    built = robot_spec(robot, space, simulation)
+    spec, height = built.spec, built.height
+    if not environment.is_even:
+        boxes = footprint(spec.compile())
+        height = standing_height(boxes, simulation, environment, (0.0, 0.0), 0.0)
+    set_options(spec, simulation, environment, is_single=True)
+    add_ground(spec, simulation, environment)
+    if furnish is not None:
+        furnish(spec)
+    spec.memory = MEMORY_BYTES
+    spec.body("root").pos = (0.0, 0.0, height + simulation.drop_m)
+    return spec
+
+
+def solo_model(
+    robot: Robot,
+    space: BodySpace,
+    simulation: Simulation,
+    environment: Environment,
+    *,
+    furnish: Furnish | None = None,
+) -> mujoco.MjModel:
+    """Return the compiled ``solo_spec``."""
+    spec = solo_spec(robot, space, simulation, environment, furnish=furnish)
+    return spec.compile()
+
+
+def shared_model(
+    robots: Sequence[tuple[str, mujoco.MjSpec]],
+    simulation: Simulation,
+    environment: Environment,
+    *,
+    furnish: Furnish | None = None,
+) -> mujoco.MjModel:
+    """Return the model of several robots on one ground.
+
+    Args:
+        robots: prefix of the names, and ``robot_spec``'s spec, of each; the specs
+            stay as they are and may be used again.
+        simulation: the world's numbers.
+        environment: what they stand in.
+        furnish: adds what else stands there.
+    """
+    spec = mujoco.MjSpec()
+    set_options(spec, simulation, environment, is_single=False)
+    add_ground(spec, simulation, environment)
+    if furnish is not None:
+        furnish(spec)
+    # Contacts grow with neighbours: a pile needs more than its robots alone.
+    spec.memory = 2 * MEMORY_BYTES * len(robots)
+    for prefix, child in robots:
+        spec.attach(child, frame=spec.worldbody.add_frame(), prefix=prefix)
+    return spec.compile()
+
+
+class _Builder:
+    """Builds one robot, part by part in the robot's own order."""
+
+    def __init__(self, robot: Robot, space: BodySpace, simulation: Simulation) -> None:
+        self.robot = robot
+        self.simulation = simulation
+        self.types: list[PartType] = [space[part.kind] for part in robot.parts]
+        self.shapes = shapes_of(robot, space)
+        self.rotations, self.positions = place_parts(robot, self.shapes)
+        self.lowest = np.inf
+        self.spec = mujoco.MjSpec()
+        self._set_defaults()
+        root = self.spec.worldbody.add_body(name="root")
+        # Never aligned: the joint's position must stay the core's centre.
+        root.add_freejoint(name="free", align=0)
+        # Of each part: (body, its origin in the core's frame) of both segments.
+        self.segments: list[list[_Segment]] = []
+        self.root: _Segment = (root, [0.0, 0.0, 0.0])
+
+    def _set_defaults(self) -> None:
+        spec, simulation = self.spec, self.simulation
+        spec.compiler.degree = False
+        geom = spec.default.geom
+        geom.type = mujoco.mjtGeom.mjGEOM_BOX
+        geom.condim = 3
+        geom.friction = (simulation.friction, 0.0, 0.0)
+        geom.solref = (simulation.contact_time_s, 1.0)
+        joint = spec.default.joint
+        joint.type = mujoco.mjtJoint.mjJNT_HINGE
+        joint.limited = 1
+        joint.armature = simulation.armature
+        joint.damping[0] = simulation.damping
+
+    def add_part(self, index: int) -> None:
+        """Add a part's boxes, and its joint if it has one."""
+        part, shape = self.robot.parts[index], self.shapes[index]
+        near = self.root
+        own = 0
+        if index:
+            slot = self.shapes[part.parent].slots[part.parent_slot]
+            near = self.segments[part.parent][slot.segment]
+            own = shape.slots[part.slot].segment
+        pair = [near, near]
+        if shape.joint is not None:
+            pair[1 - own] = self._add_joint(index, shape.joint, near, own)
+        self.segments.append(pair)
+        self._add_boxes(index, pair)
+
+    def _add_joint(
+        self, index: int, joint: Joint, near: _Segment, own: int
+    ) -> _Segment:
+        """Return the segment beyond a joint; ``own`` is the one on the near side."""
+        rotation = self.rotations[index]
+        anchor = self.positions[index] + rotation @ joint.anchor
+        # Here and below set one by one: half of the time that keywords take.
+        body = near[0].add_body()
+        body.name, body.pos = f"body{index}", anchor - near[1]
+        # The angle is that of segment 1 against segment 0, also where segment 1
+        # is the one that carries segment 0.
+        axis = rotation @ joint.axis
+        made = body.add_joint()
+        made.name, made.axis = f"joint{index}", axis if own == 0 else -axis
+        made.range = (-joint.limit, joint.limit)
+        motor = self.types[index].motor
+        if motor is not None:
+            made.armature = self.simulation.servo_armature
+            actuator = self.spec.add_actuator()
+            actuator.name = actuator.target = f"joint{index}"
+            actuator.trntype = mujoco.mjtTrn.mjTRN_JOINT
+            actuator.forcelimited = 1
+            actuator.forcerange = (-motor.max_torque, motor.max_torque)
+            actuator.set_to_velocity(kv=self.simulation.servo_stiffness)
+        return body, anchor.tolist()
+
+    def _add_boxes(self, index: int, pair: list[_Segment]) -> None:
+        """Add a part's boxes to its segments, and its imus to their boxes."""
+        boxes, rotation = self.shapes[index].boxes, self.rotations[index]
+        imus = {s.box for s in self.types[index].sensors if s.kind == "imu"}
+        # Arrays where more than one box takes them: half of a tuple's time; and
+        # colours as the engine keeps them.
+        colour = np.array((*self.robot.parts[index].parameters[-3:], 1.0), np.float32)
+        upright = _quaternion(rotation)
+        ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = rotation.tolist()
+        px, py, pz = self.positions[index].tolist()
+        # Plain floats: at a few boxes a part they are faster than arrays.
+        for box in boxes:
+            x, y, z = box.position
+            centre = (
+                px + ax * x + ay * y + az * z,
+                py + bx * x + by * y + bz * z,
+                pz + cx * x + cy * y + cz * z,
+            )
+            half = (0.5 * box.size[0], 0.5 * box.size[1], 0.5 * box.size[2])
+            reach = abs(cx) * half[0] + abs(cy) * half[1] + abs(cz) * half[2]
+            quaternion, below = upright, reach
+            if box.rotation is not IDENTITY:
+                turned = rotation @ np.asarray(box.rotation)
+                quaternion, below = _quaternion(turned), float(abs(turned[2]) @ half)
+            body, origin = pair[box.segment]
+            place = (
+                centre[0] - origin[0],
+                centre[1] - origin[1],
+                centre[2] - origin[2],
+            )
+            geom = body.add_geom()
+            geom.name = f"{index}/{box.name}"
+            geom.size, geom.pos, geom.quat = half, place, quaternion
+            geom.mass, geom.rgba = box.mass, colour
+            if box.name in imus:
+                body.add_site(name=f"{index}/imu", pos=place, quat=quaternion)
+            self.lowest = min(self.lowest, centre[2] - below)
+
+
+def _quaternion(rotation: Floats) -> Floats:
+    """Return the quaternion (w, x, y, z) of a rotation matrix."""
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, rotation.ravel())
+    return quaternion

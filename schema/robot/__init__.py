@@ -1,0 +1,1 @@
+"""A robot and its genome as data."""

@@ -1,0 +1,82 @@
+"""A genome for a robot that has none: the inverse of development."""
+
+from schema.robot.brain import Brain, Connection, Layer
+from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node
+from schema.robot.robot import Part, Robot
+
+
+def genome_of(robot: Robot) -> Genome:
+    """Return a genome that develops into a robot.
+
+    Args:
+        robot: well formed in its body space.
+
+    Returns:
+        The genome. Its robot has the same parts and neurons; connections stand in
+        the order of the parts that they leave.
+    """
+    neurons, places = _shares(robot.brain)
+    connections: dict[int, list[ConnectionGene]] = {}
+    for edge in robot.brain.connections:
+        owner, gene = _connection(edge, places, robot.parts)
+        connections.setdefault(owner, []).append(gene)
+    # Children stand behind their parents: the last part has none.
+    children: dict[int, list[tuple[int, Node]]] = {}
+    for index in reversed(range(len(robot.parts))):
+        part = robot.parts[index]
+        node = Node(
+            part.kind,
+            part.slot,
+            part.orientation,
+            part.parameters,
+            part.gene,
+            tuple(neurons.get((index, "output"), ())),
+            tuple(neurons.get((index, "hidden"), ())),
+            tuple(connections.get(index, ())),
+            tuple(reversed(children.get(index, []))),
+        )
+        children.setdefault(part.parent, []).append((part.parent_slot, node))
+    return children[-1][0][1]
+
+
+Place = tuple[int, Layer, int]
+"""Where a neuron is: part, layer, offset among those of this part and layer."""
+
+
+def _shares(
+    brain: Brain,
+) -> tuple[dict[tuple[int, Layer], list[NeuronGene]], list[Place]]:
+    """Return each part's neurons, and where each neuron is."""
+    shares: dict[tuple[int, Layer], list[NeuronGene]] = {}
+    places: list[Place] = []
+    for neuron in brain.neurons:
+        share = shares.setdefault((neuron.part, neuron.layer), [])
+        places.append((neuron.part, neuron.layer, len(share)))
+        share.append(NeuronGene(neuron.kind, neuron.parameters))
+    return shares, places
+
+
+def _connection(
+    edge: Connection, places: list[Place], parts: tuple[Part, ...]
+) -> tuple[int, ConnectionGene]:
+    """Return the part that a connection leaves, and its gene."""
+    part, layer, offset = places[edge.source]
+    end, end_layer, end_offset = places[edge.target]
+    path = _path(part, end, parts)
+    gene = ConnectionGene((layer, offset), path, (end_layer, end_offset), edge.weight)
+    return part, gene
+
+
+def _path(start: int, end: int, parts: tuple[Part, ...]) -> tuple[int, ...]:
+    """Return the slots to follow from one part to another."""
+    up: list[int] = []
+    down: list[int] = []
+    # The greater index is never an ancestor of the smaller.
+    while start != end:
+        if start > end:
+            up.append(parts[start].slot)
+            start = parts[start].parent
+        else:
+            down.append(parts[end].parent_slot)
+            end = parts[end].parent
+    return (*up, *reversed(down))

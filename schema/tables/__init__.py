@@ -1,0 +1,1 @@
+"""Arrow tables of a run: their columns, and where their files lie."""

@@ -1,0 +1,1 @@
+"""Protobuf messages that two processes exchange, and their codecs."""

@@ -1,0 +1,175 @@
+"""Changes and advances of arenas as Protobuf messages, and back.
+
+``schema.wire.arena_codec`` makes bytes of them.
+"""
+
+from schema.errors import MalformedMessage
+from schema.robot.names import BirthId
+from schema.wire import revolve_pb2 as pb
+from schema.wire.arena import (
+    Advance,
+    BrainChange,
+    Casualty,
+    Changes,
+    Insertion,
+    Judgement,
+    Touch,
+)
+from schema.wire.codec import vector_from_message, vector_to_message
+from schema.wire.messages import (
+    finite,
+    read_brain,
+    robot_from_message,
+    robot_to_message,
+    write_brain,
+)
+
+DIGEST_BYTES = 32
+
+
+def changes_to_message(changes: Changes) -> pb.Changes:
+    """Return changes as a message."""
+    message = pb.Changes(removals=map(birth_to_message, changes.removals))
+    for each in changes.insertions:
+        message.insertions.add(
+            birth=birth_to_message(each.birth),
+            robot=robot_to_message(each.robot),
+            x=each.place[0],
+            y=each.place[1],
+            heading=each.heading,
+        )
+    for change in changes.brains:
+        write_brain_change(change, message.brains.add())
+    return message
+
+
+def changes_from_message(message: pb.Changes) -> Changes:
+    """Return the changes of a message.
+
+    Raises:
+        InvalidRobot: a robot or a brain that breaks its rules.
+        MalformedMessage: an unknown layer, a number that is not finite.
+    """
+    return Changes(
+        removals=tuple(map(birth_from_message, message.removals)),
+        insertions=tuple(map(_insertion, message.insertions)),
+        brains=tuple(map(read_brain_change, message.brains)),
+    )
+
+
+def write_brain_change(change: BrainChange, message: pb.BrainChange) -> None:
+    """Put a change of a brain into a message."""
+    message.birth.CopyFrom(birth_to_message(change.birth))
+    write_brain(change.brain, message)
+
+
+def read_brain_change(message: pb.BrainChange) -> BrainChange:
+    """Return the change of a brain of a message.
+
+    Whether the brain fits its robot is for whoever has the robot.
+
+    Raises:
+        InvalidRobot: a brain that breaks its rules.
+        MalformedMessage: an unknown layer.
+    """
+    parts = 1 + max((neuron.part for neuron in message.neurons), default=0)
+    return BrainChange(birth_from_message(message.birth), read_brain(message, parts))
+
+
+def advance_to_message(advance: Advance) -> pb.Advance:
+    """Return an advance as a message, poses included."""
+    message = pb.Advance(step=advance.step, digest=advance.digest, poses=advance.poses)
+    for one in advance.judgements:
+        message.judgements.add(
+            birth=birth_to_message(one.birth),
+            age_s=one.age_s,
+            path_velocity=one.path_velocity,
+            straight_velocity=one.straight_velocity,
+            fitness=one.fitness,
+            is_mature=one.is_mature,
+            place=vector_to_message(one.place),
+        )
+    for fallen in advance.casualties:
+        message.casualties.add(
+            birth=birth_to_message(fallen.birth),
+            step=fallen.step,
+            reason=fallen.reason,
+            place=vector_to_message(fallen.place),
+        )
+    for touch in advance.touches:
+        message.touches.add(
+            first=birth_to_message(touch.first),
+            second=birth_to_message(touch.second),
+            duration_s=touch.duration_s,
+        )
+    return message
+
+
+def advance_from_message(message: pb.Advance) -> Advance:
+    """Return the advance of a message.
+
+    Raises:
+        MalformedMessage: a digest that is none, a number that is not finite.
+    """
+    if len(message.digest) != DIGEST_BYTES:
+        raise MalformedMessage(
+            f"advance.digest: must be {DIGEST_BYTES} bytes, got {len(message.digest)}"
+        )
+    return Advance(
+        step=message.step,
+        digest=message.digest,
+        judgements=tuple(map(_judgement, message.judgements)),
+        casualties=tuple(map(_casualty, message.casualties)),
+        touches=tuple(map(_touch, message.touches)),
+        poses=message.poses,
+    )
+
+
+def birth_to_message(birth: BirthId) -> pb.BirthName:
+    """Return an individual's name as a message."""
+    return pb.BirthName(island=birth.island, number=birth.number)
+
+
+def birth_from_message(message: pb.BirthName) -> BirthId:
+    """Return the name of a message."""
+    return BirthId(message.island, message.number)
+
+
+def _insertion(message: pb.Insertion) -> Insertion:
+    return Insertion(
+        birth_from_message(message.birth),
+        robot_from_message(message.robot),
+        (finite(message.x, "insertion.x"), finite(message.y, "insertion.y")),
+        finite(message.heading, "insertion.heading"),
+    )
+
+
+def _judgement(message: pb.Judgement) -> Judgement:
+    return Judgement(
+        birth=birth_from_message(message.birth),
+        age_s=finite(message.age_s, "judgement.age_s"),
+        path_velocity=finite(message.path_velocity, "judgement.path_velocity"),
+        straight_velocity=finite(
+            message.straight_velocity, "judgement.straight_velocity"
+        ),
+        fitness=finite(message.fitness, "judgement.fitness"),
+        is_mature=message.is_mature,
+        place=vector_from_message(message.place, "judgement.place"),
+    )
+
+
+def _casualty(message: pb.Casualty) -> Casualty:
+    return Casualty(
+        birth_from_message(message.birth),
+        message.step,
+        message.reason,
+        vector_from_message(message.place, "casualty.place"),
+    )
+
+
+def _touch(message: pb.Touch) -> Touch:
+    return Touch(
+        birth_from_message(message.first),
+        birth_from_message(message.second),
+        finite(message.duration_s, "touch.duration_s"),
+    )

@@ -1,0 +1,321 @@
+"""Bytes of robots, genomes, requests and answers: what travels and what is stored.
+
+Encoding is deterministic: equal values give equal bytes. Decoding trusts nobody:
+bytes are such a message and keep its rules, or ``MalformedMessage`` is raised.
+What needs the part types is ``schema.robot.robot.check_robot``'s business.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from google.protobuf.message import DecodeError, Message
+
+from schema.errors import InvalidRobot, MalformedMessage
+from schema.experiment.identity import NOBODY, Identity
+from schema.parts import Vector
+from schema.robot.genome import Genome
+from schema.robot.results import Evaluation, Report
+from schema.robot.robot import Robot
+from schema.wire import revolve_pb2 as pb
+from schema.wire.messages import (
+    body_from_message,
+    body_to_message,
+    finite,
+    genome_from_message,
+    genome_to_message,
+    identity_from_message,
+    identity_to_message,
+    robot_from_message,
+    write_brain,
+)
+
+M = TypeVar("M", bound=Message)
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A request to an analyzer or a worker; its answer depends on nothing else.
+
+    Attributes:
+        run: name of the run that it belongs to.
+        epoch: incarnation of the run's coordinator.
+        number: of the job, unique within the epoch.
+        settings: JSON of ``VettingSettings`` or ``EvaluationSettings``.
+        robot: the robot in question; an analyzer is asked about its body alone.
+        steps: of physics to simulate; 0: as the settings say.
+        identity: which evaluation it is; nobody's for an analyzer.
+    """
+
+    run: str
+    epoch: int
+    number: int
+    settings: bytes
+    robot: Robot
+    steps: int = 0
+    identity: Identity = NOBODY
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The answer to a request.
+
+    Attributes:
+        epoch, number: of the request.
+        wall_s: how long it took [s]; never decides anything.
+        result: what came out; a text says why the simulation came to nothing.
+    """
+
+    epoch: int
+    number: int
+    wall_s: float
+    result: Report | Evaluation | str
+
+
+def encode_robot(robot: Robot) -> bytes:
+    """Return the bytes of a robot: those of its body, then those of its brain.
+
+    Messages add up as their bytes do, so either part may be had on its own.
+    """
+    return encode_body(robot) + encode_brain(robot)
+
+
+def encode_body(robot: Robot) -> bytes:
+    """Return the bytes of a robot without its brain."""
+    message = body_to_message(robot.parts)
+    return message.SerializeToString(deterministic=True)
+
+
+def encode_brain(robot: Robot) -> bytes:
+    """Return what is left of a robot's bytes after those of its body."""
+    message = pb.Robot()
+    write_brain(robot.brain, message)
+    return message.SerializeToString(deterministic=True)
+
+
+def decode_robot(data: bytes) -> Robot:
+    """Return the robot of some bytes.
+
+    Raises:
+        MalformedMessage: not a robot's bytes, no tree of parts, or a brain that
+            breaks its rules.
+    """
+    return decoded(data, pb.Robot(), robot_from_message)
+
+
+def decode_body(data: bytes) -> Robot:
+    """Return the robot of some bytes without its brain, should it have one.
+
+    Raises:
+        MalformedMessage: not a robot's bytes, or no tree of parts.
+    """
+    return decoded(data, pb.Robot(), _bare_robot_from_message)
+
+
+def encode_genome(genome: Genome) -> bytes:
+    """Return the bytes of a genome."""
+    message = genome_to_message(genome)
+    return message.SerializeToString(deterministic=True)
+
+
+def decode_genome(data: bytes) -> Genome:
+    """Return the genome of some bytes.
+
+    Raises:
+        MalformedMessage: not a genome's bytes, no tree of nodes, an unknown neuron
+            type or layer, a number that is not finite.
+    """
+    return decoded(data, pb.Genome(), genome_from_message)
+
+
+def encode_request(
+    *,
+    run: str,
+    epoch: int,
+    number: int,
+    settings: bytes,
+    robot: bytes,
+    steps: int = 0,
+    identity: Identity = NOBODY,
+    plugins: str = "",
+) -> bytes:
+    """Return the bytes of a request; ``robot`` is already encoded, or its body is.
+
+    ``plugins`` is what ``plugin_source.plugins_of`` says of the settings.
+    """
+    message = pb.Request(
+        run=run,
+        epoch=epoch,
+        number=number,
+        settings=settings,
+        robot=robot,
+        steps=steps,
+        plugins=plugins,
+    )
+    if identity is not NOBODY:
+        message.identity.CopyFrom(identity_to_message(identity))
+    return message.SerializeToString(deterministic=True)
+
+
+def decode_request(
+    data: bytes, read: Callable[[bytes], Robot] = decode_robot
+) -> Request:
+    """Return the request of some bytes.
+
+    Args:
+        data: the bytes.
+        read: gives its robot; ``decode_body`` where brains do not matter.
+
+    Raises:
+        MalformedMessage: not a request's bytes, or its robot is malformed.
+    """
+    return decoded(data, pb.Request(), lambda message: _request(message, read))
+
+
+def encode_answer(answer: Answer) -> bytes:
+    """Return the bytes of an answer."""
+    message = pb.Answer(epoch=answer.epoch, number=answer.number, wall_s=answer.wall_s)
+    if isinstance(answer.result, Report):
+        write_report(answer.result, message.report)
+    elif isinstance(answer.result, Evaluation):
+        message.evaluation.CopyFrom(evaluation_to_message(answer.result))
+    else:
+        message.failure = answer.result
+    return message.SerializeToString(deterministic=True)
+
+
+def decode_answer(data: bytes) -> Answer:
+    """Return the answer of some bytes.
+
+    Raises:
+        MalformedMessage: not an answer's bytes, no result in it, a number that is
+            not finite.
+    """
+    return decoded(data, pb.Answer(), _answer_from_message)
+
+
+def write_report(report: Report, message: pb.Report) -> None:
+    """Put a report into an empty message: half of the time that copying takes."""
+    message.is_viable, message.reason = report.is_viable, report.reason
+    for pair in report.intersections:
+        entry = message.intersections.add()
+        entry.first, entry.second = pair
+    lower, upper = message.lower, message.upper
+    lower.x, lower.y, lower.z = report.lower
+    upper.x, upper.y, upper.z = report.upper
+    message.mass, message.motors = report.mass, report.motors
+
+
+def report_from_message(message: pb.Report) -> Report:
+    """Return the report of a message.
+
+    Raises:
+        MalformedMessage: a viable body with a reason why not, a missing corner, a
+            number that is not finite.
+    """
+    if message.is_viable and message.reason:
+        raise MalformedMessage(f"report: viable, and yet {message.reason!r}")
+    if not (message.HasField("lower") and message.HasField("upper")):
+        raise MalformedMessage("report: must hold both corners of the body")
+    return Report(
+        is_viable=message.is_viable,
+        reason=message.reason,
+        intersections=tuple(
+            (pair.first, pair.second) for pair in message.intersections
+        ),
+        lower=vector_from_message(message.lower, "report.lower"),
+        upper=vector_from_message(message.upper, "report.upper"),
+        mass=finite(message.mass, "report.mass"),
+        motors=message.motors,
+    )
+
+
+def evaluation_to_message(evaluation: Evaluation) -> pb.Evaluation:
+    """Return an evaluation as a message."""
+    return pb.Evaluation(
+        fitness=evaluation.fitness,
+        path_velocity=evaluation.path_velocity,
+        straight_velocity=evaluation.straight_velocity,
+        simulated_s=evaluation.simulated_s,
+    )
+
+
+def evaluation_from_message(message: pb.Evaluation) -> Evaluation:
+    """Return the evaluation of a message.
+
+    Raises:
+        MalformedMessage: a number that is not finite.
+    """
+    return Evaluation(
+        fitness=finite(message.fitness, "evaluation.fitness"),
+        path_velocity=finite(message.path_velocity, "evaluation.path_velocity"),
+        straight_velocity=finite(
+            message.straight_velocity, "evaluation.straight_velocity"
+        ),
+        simulated_s=finite(message.simulated_s, "evaluation.simulated_s"),
+    )
+
+
+def decoded(data: bytes, message: M, read: Callable[[M], T]) -> T:
+    """Return what ``read`` makes of a parsed message; any fault is the sender's.
+
+    Raises:
+        MalformedMessage: not the bytes of such a message, or ``read`` refuses it.
+    """
+    name = message.DESCRIPTOR.name
+    try:
+        message.ParseFromString(data)
+    except DecodeError as error:
+        raise MalformedMessage(f"not the bytes of a {name}: {error}") from None
+    try:
+        return read(message)
+    except InvalidRobot as error:
+        raise MalformedMessage(f"{name}: {error}") from None
+
+
+def _bare_robot_from_message(message: pb.Robot) -> Robot:
+    return Robot(body_from_message(message))
+
+
+def _request(message: pb.Request, read: Callable[[bytes], Robot]) -> Request:
+    has_identity = message.HasField("identity")
+    return Request(
+        run=message.run,
+        epoch=message.epoch,
+        number=message.number,
+        settings=message.settings,
+        robot=read(message.robot),
+        steps=message.steps,
+        identity=identity_from_message(message.identity) if has_identity else NOBODY,
+    )
+
+
+def _answer_from_message(message: pb.Answer) -> Answer:
+    result: Report | Evaluation | str
+    match message.WhichOneof("result"):
+        case "report":
+            result = report_from_message(message.report)
+        case "evaluation":
+            result = evaluation_from_message(message.evaluation)
+        case "failure":
+            result = message.failure
+        case _:
+            raise MalformedMessage("answer: holds no result")
+    wall_s = finite(message.wall_s, "answer.wall_s")
+    return Answer(message.epoch, message.number, wall_s, result)
+
+
+def vector_to_message(vector: Vector) -> pb.Vector:
+    """Return a vector as a message."""
+    return pb.Vector(x=vector[0], y=vector[1], z=vector[2])
+
+
+def vector_from_message(message: pb.Vector, where: str) -> Vector:
+    """Return the vector of a message.
+
+    Raises:
+        MalformedMessage: a number that is not finite.
+    """
+    x, y, z = message.x, message.y, message.z
+    return finite(x, where), finite(y, where), finite(z, where)

@@ -1,0 +1,203 @@
+"""Experiments against each other, and findings, of runs with known numbers."""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pyarrow as pa
+import pytest
+
+from analysis.comparison.claims import CLAIMS, Claim
+from analysis.comparison.comparison import Outcomes, comparison, findings, verdict
+from analysis.comparison.outcomes import outcome
+from analysis.measures.load import Run, Settings
+from analysis.measures.outputs import OUTCOME, OUTPUTS, schema
+from analysis.measures.study import Measured
+
+Level = Mapping[str, float | None]
+ROBOT = dict.fromkeys(OUTPUTS["robots"], 0) | {"experiment": "", "folder": ""}
+
+
+def tables(
+    levels: Sequence[Level], robots: Sequence[Level] = ()
+) -> dict[str, pa.Table]:
+    """Return measured tables: rows of populations, and of robots."""
+    blank = dict.fromkeys(OUTPUTS["populations"])
+    rows = [{**blank, "island": 0, "judged": 1, **level} for level in levels]
+    named = [
+        {**ROBOT, "is_last": False, "birth": number, **robot}
+        for number, robot in enumerate(robots)
+    ]
+    return {
+        "populations": pa.Table.from_pylist(rows, schema("populations")),
+        "robots": pa.Table.from_pylist(named, schema("robots")),
+    }
+
+
+def measured(
+    name: str, number: int, made: dict[str, pa.Table], state: str = "finished"
+) -> Measured:
+    settings = (Settings(100, is_online=False, records_touches=False),)
+    folder = Path(f"{name}-{number}")
+    return Measured(Run(folder, name, number, 1, state, "", settings), made, ())
+
+
+def runs(name: str, values: list[float], *, births: int = 100) -> list[Measured]:
+    """Return finished runs that end with these fitnesses."""
+    return [
+        measured(name, number, tables([{"births": births, "fitness": value}]))
+        for number, value in enumerate(values)
+    ]
+
+
+def test_outcomes_by_hand() -> None:
+    levels = [
+        {"births": 15, "fitness": 0.1, "diversity": 10.0, "parts": 12.0, "hidden": 4.0},
+        {"births": 30, "fitness": 0.2, "diversity": 6.0, "retention": 0.5},
+        {"births": 60, "fitness": 0.4, "diversity": 4.0, "retention": 0.1},
+        {"births": 120, "fitness": 0.5, "diversity": 2.0, "parts": 20.0, "hidden": 1.0},
+        {"births": 150, "fitness": 9.0, "diversity": 9.0, "parts": 9.0},
+    ]
+    robots = [
+        {"parts": 10.0, "hidden": 3.0, "fitness": 0.1, "extremities": 2.0},
+        {"parts": 14.0, "hidden": 5.0, "fitness": 0.2, "extremities": 3.0},
+        {"parts": 99.0, "ancestors": 2.0, "fitness": 0.3, "extremities": 5.0},
+    ]
+    found = outcome(tables(levels, robots), 120)
+    assert (found["births"], found["fitness"], found["parts"]) == (120, 0.5, 20)
+    assert found["retention"] == pytest.approx(0.3)
+    # Of 0.4 gained, 0.1 came after birth 60; of 8 lost, none up to birth 12, and 4 up
+    # to birth 30.
+    assert found["late_gain"] == pytest.approx(0.25)
+    assert found["early_drop"] == 0
+    longer = [*levels[:4], {**levels[3], "births": 300}]
+    assert outcome(tables(longer), 300)["early_drop"] == pytest.approx(0.5)
+    assert found["diversity_change"] == -8
+    # Random robots have no ancestors: 12 parts and 4 hidden neurons on average.
+    assert found["parts_change"] == 8
+    assert found["hidden_change"] == -3
+    assert found["extremities_fitness"] == pytest.approx(1)
+    assert math.isnan(found["touched"])
+
+
+def test_several_islands_count_with_their_mean() -> None:
+    levels = [
+        {"island": 0, "births": 15, "fitness": 0.1},
+        {"island": 1, "births": 15, "fitness": 0.5},
+        {"island": 0, "births": 30, "fitness": 0.3},
+    ]
+    assert outcome(tables(levels), 30)["fitness"] == pytest.approx(0.4)
+
+
+def test_every_measure_of_every_pair_is_compared_once() -> None:
+    found = comparison(
+        Outcomes([*runs("b", [1, 2, 3]), *runs("a", [4, 5, 6]), *runs("c", [2, 2])])
+    ).to_pylist()
+    fitness = [row for row in found if row["measure"] == "fitness"]
+    assert [(row["a"], row["b"]) for row in fitness] == [
+        ("a", "b"),
+        ("a", "c"),
+        ("b", "c"),
+    ]
+    first = fitness[0]
+    assert (first["runs_a"], first["runs_b"], first["effect"]) == (3, 3, 1)
+    assert (first["mean_a"], first["median_b"], first["difference"]) == (5, 2, 3)
+    assert first["p"] == pytest.approx(0.1)
+    assert first["q"] >= first["p"]
+    assert first["difference_low"] < 3 < first["difference_high"]
+
+
+def test_experiments_meet_where_all_their_runs_have_been() -> None:
+    short = [
+        measured("a", 0, tables([{"births": 30, "fitness": 0.2}])),
+        measured("a", 1, tables([{"births": 60, "fitness": 0.4}])),
+    ]
+    levels = [{"births": 15, "fitness": 0.1}, {"births": 90, "fitness": 0.9}]
+    long = [measured("b", number, tables(levels)) for number in range(2)]
+    (row,) = [
+        row
+        for row in comparison(Outcomes([*short, *long])).to_pylist()
+        if row["measure"] == "fitness"
+    ]
+    # Run 1 of a has nothing recorded up to 30 births.
+    assert (row["births"], row["runs_a"], row["mean_b"]) == (30, 1, 0.1)
+
+
+def test_who_has_not_finished_is_not_compared() -> None:
+    made = tables([{"births": 30, "fitness": 0.2}])
+    outcomes = Outcomes([measured("a", 0, made, "running"), *runs("b", [1, 2])])
+    assert outcomes.experiments == ["b"]
+    assert outcomes.table()["fitness"].to_pylist() == [1, 2]
+    assert comparison(outcomes).num_rows == 0
+
+
+HIGH = [11.0, 12, 13, 14, 15, 16, 17, 18, 19, 20]
+LOW = [1.0, 2, 3, 4, 5, 6, 7, 8, 9, 10]
+
+
+def test_findings_are_reproduced_or_not_or_undecided() -> None:
+    claims = [
+        Claim("1", "reproduced", "fitness", "high", ">", "low"),
+        Claim("2", "the other way", "fitness", "high", "<", "low"),
+        Claim("3", "two alike runs do not tell", "fitness", "low", ">", "few"),
+        Claim("4", "nobody ran it", "fitness", "low", ">", "ghost"),
+        Claim("5", "far from alike", "fitness", "high", "=", "low"),
+        Claim("6", "alike", "fitness", "many", "=", "more"),
+        Claim("7", "above a reference", "fitness", "low", ">", reference=0.5),
+        Claim("8", "no effect as expected", "fitness", "many", ">", "moderate"),
+    ]
+    many = [float(value % 10) for value in range(40)]
+    outcomes = Outcomes(
+        [
+            *runs("high", HIGH),
+            *runs("low", LOW),
+            *runs("few", [5, 6]),
+            *runs("many", many),
+            *runs("more", many),
+            *runs("moderate", [value + 2 for value in many]),
+        ]
+    )
+    found = findings(outcomes, claims).to_pylist()
+    assert [(row["finding"], row["verdict"]) for row in found] == [
+        (1, "reproduced"),
+        (2, "not reproduced"),
+        (3, "undecided"),
+        (4, "undecided"),
+        (5, "not reproduced"),
+        (6, "reproduced"),
+        (7, "reproduced"),
+        (8, "not reproduced"),
+    ]
+    assert found[3]["why"] == "no finished run of ghost could be measured"
+    assert found[3]["q"] is None
+    assert (found[6]["mean_b"], found[6]["effect"]) == (0.5, 1)
+    assert found[6]["p"] == pytest.approx(2 / 1024)
+
+
+@pytest.mark.parametrize(
+    ("expected", "effect", "q", "ends", "decided"),
+    [
+        (">", 0.9, 0.01, (0.5, 1.0), "reproduced"),
+        ("<", 0.9, 0.01, (0.5, 1.0), "not reproduced"),
+        ("<", -0.9, 0.01, (-1.0, -0.5), "reproduced"),
+        (">", 0.4, 0.2, (-0.1, 0.8), "undecided"),
+        (">", -0.1, 0.6, (-0.3, 0.1), "not reproduced"),
+        ("<", 0.1, 0.6, (-0.1, 0.3), "not reproduced"),
+        ("=", 0.1, 0.6, (-0.2, 0.4), "reproduced"),
+        ("=", 0.1, 0.6, (-0.4, 0.6), "undecided"),
+        ("=", 0.3, 0.01, (0.1, 0.5), "undecided"),
+        ("=", -0.7, 0.01, (-0.9, -0.3), "not reproduced"),
+    ],
+)
+def test_the_rules_of_verdicts(
+    expected: str, effect: float, q: float, ends: tuple[float, float], decided: str
+) -> None:
+    row = {"effect": effect, "q": q, "effect_low": ends[0], "effect_high": ends[1]}
+    assert verdict(expected, row)[0] == decided
+
+
+def test_claims_are_about_what_is_measured() -> None:
+    assert {claim.measure for claim in CLAIMS} <= set(OUTCOME)
+    figures = [tuple(map(int, claim.figure.split("."))) for claim in CLAIMS]
+    assert figures == sorted(figures)
+    assert {figure for _, figure in figures} == {*range(2, 10), 12, 14, 15, 16}

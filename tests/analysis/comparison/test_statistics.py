@@ -1,0 +1,157 @@
+"""Statistics against scipy, and by hand where few runs can be counted out."""
+
+import math
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import optimize, stats
+
+from analysis.comparison.statistics import (
+    cliffs_delta,
+    delta_interval,
+    false_discovery,
+    mean_difference,
+    rank_sum_p,
+    ranks,
+    signed_rank,
+    t_quantile,
+)
+from analysis.measures.populations_table import Numbers
+
+
+def numbers(*values: float) -> Numbers:
+    return np.array(values, np.float64)
+
+
+# Few different values, so that many are tied.
+samples = st.lists(st.integers(-4, 4), min_size=2, max_size=7)
+
+
+def test_cliffs_delta_by_hand() -> None:
+    # 2 is above 1 and below 3; 4 above both; of four pairs three less one.
+    assert cliffs_delta(numbers(2, 4), numbers(1, 3)) == 0.5
+    assert cliffs_delta(numbers(1, 3), numbers(2, 4)) == -0.5
+    assert cliffs_delta(numbers(1, 1), numbers(1)) == 0
+    assert cliffs_delta(numbers(5, 6), numbers(1, 2, 3)) == 1
+
+
+def test_few_runs_cannot_be_sure() -> None:
+    # All three above all three: one of 20 ways to deal, and as many the other way.
+    assert rank_sum_p(numbers(4, 5, 6), numbers(1, 2, 3)) == pytest.approx(2 / 20)
+    assert rank_sum_p(numbers(1, 2, 3), numbers(4, 5, 6)) == pytest.approx(2 / 20)
+    assert rank_sum_p(numbers(1, 1), numbers(1, 1)) == 1
+
+
+def test_rank_sum_without_ties_equals_scipy() -> None:
+    rng = np.random.default_rng(3)
+    for size, other in ((1, 1), (5, 10), (30, 30), (30, 7)):
+        a, b = rng.normal(0.5, 1, size), rng.normal(0, 1, other)
+        expected = stats.mannwhitneyu(a, b, method="exact").pvalue
+        assert rank_sum_p(a, b) == pytest.approx(expected, rel=1e-9)
+
+
+@given(samples, samples)
+def test_rank_sum_with_ties_is_counted_out(a: list[int], b: list[int]) -> None:
+    both = numbers(*a, *b)
+    places = ranks(both)
+    found = places[: len(a)].sum()
+    mean = len(a) * (len(both) + 1) / 2
+    sums = [sum(dealt) for dealt in combinations(places.tolist(), len(a))]
+    far = [abs(each - mean) >= abs(found - mean) - 1e-9 for each in sums]
+    expected = sum(far) / len(far)
+    assert rank_sum_p(numbers(*a), numbers(*b)) == pytest.approx(expected)
+
+
+@given(samples)
+def test_ranks_equal_scipy(values: list[int]) -> None:
+    assert ranks(numbers(*values)).tolist() == stats.rankdata(values).tolist()
+
+
+def test_signed_rank_by_hand() -> None:
+    # Ranks 1, 2, 3 of which 2 and 3 are above: (5 - 1) / 6; sums 0, 1, 5, 6 of the 8
+    # possible are as far from 3 as 5 is.
+    effect, p = signed_rank(numbers(-1, 2, 3))
+    assert effect == pytest.approx(4 / 6)
+    assert p == pytest.approx(4 / 8)
+    assert signed_rank(numbers(0, 0)) == (0, 1)
+    assert signed_rank(numbers(*range(1, 11)))[1] == pytest.approx(2 / 1024)
+
+
+def test_signed_rank_equals_scipy() -> None:
+    values = np.random.default_rng(4).normal(0.3, 1, 25)
+    expected = stats.wilcoxon(values, method="exact").pvalue
+    assert signed_rank(values)[1] == pytest.approx(expected)
+    assert signed_rank(-values)[1] == pytest.approx(expected)
+    assert signed_rank(-values)[0] == pytest.approx(-signed_rank(values)[0])
+
+
+def test_false_discovery_equals_scipy() -> None:
+    p = np.random.default_rng(5).uniform(size=40) ** 3
+    expected = stats.false_discovery_control(p)
+    assert false_discovery(p) == pytest.approx(expected)
+    # By hand: 0.01 * 3, 0.03 * 3 / 2 above 0.04 * 3 / 3.
+    assert false_discovery(numbers(0.04, 0.01, 0.03)) == pytest.approx(
+        [0.04, 0.03, 0.04]
+    )
+    assert false_discovery(numbers()).tolist() == []
+
+
+@pytest.mark.parametrize("freedom", [1.0, 1.7, 4.0, 29.0, 300.0])
+def test_students_t_equals_scipy(freedom: float) -> None:
+    assert t_quantile(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), rel=1e-5)
+
+
+def test_difference_of_means_equals_scipy() -> None:
+    rng = np.random.default_rng(6)
+    a, b = rng.normal(1, 1, 10), rng.normal(0, 3, 5)
+    expected = stats.ttest_ind(a, b, equal_var=False).confidence_interval()
+    assert mean_difference(a, b) == pytest.approx(
+        (a.mean() - b.mean(), expected.low, expected.high), rel=1e-5
+    )
+    # Against a reference: the interval of one mean.
+    alone = stats.ttest_1samp(a, 0.5).confidence_interval()
+    _, low, high = mean_difference(a, numbers(0.5))
+    assert (low + 0.5, high + 0.5) == pytest.approx((alone.low, alone.high), rel=1e-5)
+
+
+def test_no_spread_can_be_told_from_one_run() -> None:
+    difference, low, high = mean_difference(numbers(3), numbers(1, 2))
+    assert difference == 1.5
+    assert math.isnan(low)
+    assert math.isnan(high)
+
+
+@pytest.mark.parametrize("delta", [-1.0, -0.6, 0.0, 0.3, 1.0])
+def test_the_interval_of_delta_ends_where_the_score_does(delta: float) -> None:
+    first, second = 10, 5
+    theta = (delta + 1) / 2
+
+    def score(at: float) -> float:
+        bracket = (1 - at) / (2 - at) + at / (1 + at)
+        variance = at * (1 - at) * (1 + 6.5 * bracket) / (first * second)
+        return float((at - theta) ** 2 - stats.norm.ppf(0.975) ** 2 * variance)
+
+    low, high = delta_interval(delta, first, second)
+    if delta > -1:
+        root = optimize.brentq(score, 1e-9, theta - 1e-9)
+        assert low == pytest.approx(2 * root - 1, abs=1e-6)
+    if delta < 1:
+        root = optimize.brentq(score, theta + 1e-9, 1 - 1e-9)
+        assert high == pytest.approx(2 * root - 1, abs=1e-6)
+    assert low <= delta <= high
+
+
+@pytest.mark.slow
+def test_the_interval_holds_what_it_promises() -> None:
+    # Normal runs, one experiment half a deviation above: delta is known.
+    rng = np.random.default_rng(7)
+    truth = 2 * stats.norm.cdf(0.5 / math.sqrt(2)) - 1
+    inside = 0
+    for _ in range(600):
+        a, b = rng.normal(0.5, 1, 10), rng.normal(0, 1, 10)
+        low, high = delta_interval(cliffs_delta(a, b), 10, 10)
+        inside += low <= truth <= high
+    assert 0.93 <= inside / 600 <= 0.98

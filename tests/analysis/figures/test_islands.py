@@ -1,0 +1,112 @@
+"""Figures of islands, of extremities and of speed, by hand."""
+
+import pyarrow as pa
+import pytest
+from matplotlib.text import Text
+
+from analysis.figures.bench import arena_speed
+from analysis.figures.forms import NothingToDraw
+from analysis.figures.islands import between, fitness_by_island, migration_graph
+from analysis.figures.robots import extremities_and_fitness
+from tests.analysis.drawn import layers, table
+
+
+def test_arrows_go_from_island_to_island_as_often_as_migrants_went() -> None:
+    went = [(0, 1, 2), (0, 1, 0), (1, 0, 0), (2, 0, 1)]
+    rows = [
+        {"experiment": "ring", "island": island, "to": to, "living": living}
+        for island, to, living in went
+    ]
+    figure = migration_graph({"migrants": table("migrants", rows)})
+    arrows = figure.data.sort_values(["island", "to"])
+    assert arrows["line_count"].tolist() == [2, 1, 1]
+    assert arrows["line_mean"].tolist() == [0.5, 0.0, 1.0]
+    # Island 0 is on top, 1 at the lower right, 2 at the lower left.
+    assert (arrows["yend"] - arrows["y"] > 0).tolist() == [False, True, True]
+    assert (arrows["xend"] - arrows["x"] > 0).tolist() == [True, False, True]
+    figure.draw()
+
+
+def test_islands_have_their_lines() -> None:
+    rows = [
+        {"experiment": "ring", "folder": "f", "island": island, "births": births,
+         "fitness": 0.1 * island + births}
+        for island in range(2)
+        for births in (15, 30)
+    ]  # fmt: skip
+    runs = [{"folder": "f", "islands": 2}]
+    figure = fitness_by_island(
+        {"runs": table("runs", runs), "populations": table("populations", rows)}
+    )
+    assert figure.data["island"].tolist() == ["0", "0", "1", "1"]
+    assert figure.data["fitness"].tolist() == pytest.approx([15, 30, 15.1, 30.1])
+    figure.draw()
+    alone = {"runs": table("runs", [{"folder": "f", "islands": 1}])}
+    with pytest.raises(NothingToDraw, match="several islands"):
+        fitness_by_island({**alone, "populations": table("populations", rows)})
+
+
+def test_within_and_between_islands_are_means_over_runs() -> None:
+    rows = [
+        {"experiment": "ring", "births": 15, "within": within, "between": between}
+        for within, between in ((2.0, 5.0), (4.0, 8.0))
+    ]
+    figure = between({"between": table("between", rows)})
+    shown = dict(zip(figure.data["pairs"], figure.data["distance"], strict=True))
+    assert shown == {"within islands": 3.0, "between islands": 6.5}
+
+
+def test_fitness_by_extremities_has_bars_where_three_runs_are() -> None:
+    rows = [
+        {"experiment": name, "folder": f"{name}{run}", "population": "final",
+         "by": "count", "bin": extremities, "fitness": fitness}
+        for name, extremities, values in (
+            ("a", 4.0, (0.1, 0.2, 0.3)), ("a", 5.0, (0.1, 0.2)), ("b", 4.0, (0.7,))
+        )
+        for run, fitness in enumerate(values)
+    ]  # fmt: skip
+    figure = extremities_and_fitness(
+        {"extremities": table("extremities", rows)}, "count"
+    )
+    shown = layers(figure)
+    # The mean of three runs, Student's t of two degrees of freedom, at the left of 4.
+    error = 4.302653 * 0.1 / 3**0.5
+    bars = shown["geom_linerange"]
+    known = [
+        (at, low, high)
+        for at, low, high in zip(bars["at"], bars["low"], bars["high"], strict=True)
+        if low == low and high == high  # noqa: PLR0124 - NaN is not itself
+    ]
+    assert known == [pytest.approx((3.935, max(0.2 - error, 0.0), 0.2 + error))]
+    points = dict(
+        zip(shown["geom_point"]["at"], shown["geom_point"]["fitness"], strict=True)
+    )
+    assert points == pytest.approx({3.935: 0.2, 4.935: 0.15, 4.065: 0.7})
+    figure.draw()
+
+
+def test_last_populations_stand_left_however_few_runs_there_are() -> None:
+    rows = [
+        {"experiment": "a", "folder": "f", "population": population, "by": "count",
+         "bin": extremities, "fitness": 0.1}
+        for population in ("born", "final")
+        for extremities in (4.0, 5.0)
+    ]  # fmt: skip
+    tables = {"extremities": table("extremities", rows)}
+    drawn = extremities_and_fitness(tables, "count").draw()
+    titles = [text.get_text() for text in drawn.findobj(Text)]
+    assert titles.index("last populations") < titles.index("all ever judged")
+
+
+def test_a_speed_is_drawn_beside_the_thesiss() -> None:
+    rows = [
+        {"benchmark": "arena", "population": size, "factor": factor}
+        for size, factor in ((5, 8.0), (5, 10.0), (10, 4.0))
+    ] + [{"benchmark": "spider", "population": 5, "factor": 99.0}]
+    figure = arena_speed({"benchmark": pa.Table.from_pylist(rows)})
+    means = dict(zip(figure.data["population"], figure.data["factor"], strict=True))
+    assert means == {5: 9.0, 10: 4.0}
+    fit = figure.layers[-1]._data
+    # The thesis's formula at 5 and 10 robots.
+    assert fit["factor"].iloc[[0, -1]].tolist() == pytest.approx([7.5124, 3.4221])
+    figure.draw()

@@ -1,0 +1,46 @@
+"""What is asked of whoever simulates a robot whose picture is taken."""
+
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+import pytest
+
+from analysis.figures.family import Best
+from analysis.figures.pictures import FOUNDERS
+from analysis.figures.portraits import portrait
+from coordinator.evolution.generation import generate
+from schema.errors import SimulationDiverged
+from schema.experiment.document import Experiment, Islands
+from schema.experiment.identity import NOBODY, Identity, Origin
+from schema.robot.names import BirthId
+from schema.wire.codec import encode_genome
+from tests.analysis.bodies import part
+from tests.analysis.tables import births
+
+EXPERIMENT = Experiment(name="x", islands=(Islands(count=3),))
+
+
+def test_a_robot_moves_by_the_noise_of_its_own_run_and_island() -> None:
+    asked: list[Identity] = []
+
+    def simulate(*_: object, identity: Identity = NOBODY, **__: object) -> NoReturn:
+        asked.append(identity)
+        raise SimulationDiverged("not simulated here")
+
+    genome = generate(np.random.default_rng(1), EXPERIMENT, BirthId(2, 4))
+    people = births(
+        ((2, 4), []), genome=[encode_genome(genome)], body=[[part(0, -1, -1, "Core")]]
+    )
+    with pytest.raises(SimulationDiverged):
+        portrait(
+            Best("x", Path("f"), 2, 4, 0.1),
+            people,
+            EXPERIMENT,
+            simulate,
+            FOUNDERS,
+            origin=Origin(seed=7, run=3),
+            has_family=False,
+        )
+    origin = Origin(seed=7, run=3, island=2)
+    assert asked == [Identity(origin, BirthId(2, 4), 0)]

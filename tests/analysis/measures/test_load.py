@@ -1,0 +1,338 @@
+"""Runs that are broken, unfinished, doubled or of another version."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from analysis.measures.load import Run, read_runs, read_tables
+from analysis.measures.study import Measured, measure_run, measure_runs
+from schema.errors import RunFolderError
+from schema.tables.files import parquet_path, segment_path
+from tests.analysis.tables import births, population, table
+
+A, B, C = ((0, number) for number in range(3))
+LIVING = population((0, 2, {A: 0.1, B: 0.3}), (0, 3, {B: 0.3, C: 0.5}))
+ROWS = {
+    "births": births((A, []), (B, []), (C, [A, B])),
+    "population": LIVING.drop_columns("is_online"),
+    "evaluations": table(
+        "evaluations",
+        [
+            {"birth": birth, "status": "ok", "fitness": fitness}
+            for birth, fitness in enumerate((0.1, 0.3, 0.5))
+        ],
+    ),
+}
+Maker = Callable[..., Path]
+
+
+@pytest.fixture
+def made(tmp_path: Path) -> Maker:
+    """Return what makes a run folder, finished or not."""
+
+    def make(name: str, *, seed: int = 1, state: str = "finished") -> Path:
+        folder = tmp_path / name
+        folder.mkdir()
+        document = json.dumps({"births": 3, "arena": None})
+        details = {"name": "e", "run": 0, "seed": seed, "document": document}
+        (folder / "run.json").write_text(json.dumps(details))
+        (folder / "state").write_text(state)
+        for table_name, rows in ROWS.items():
+            if state == "finished":
+                path = parquet_path(folder, "e", 0, table_name)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                pq.write_table(rows, path)
+            else:
+                path = segment_path(folder, table_name, 0)
+                path.parent.mkdir(exist_ok=True)
+                with pa.ipc.new_stream(path, rows.schema) as stream:
+                    for batch in rows.to_batches(max_chunksize=1):
+                        stream.write_batch(batch)
+        return folder
+
+    return make
+
+
+def whys(measured: Measured) -> dict[str, str]:
+    return {one.what: one.why for one in measured.left_out}
+
+
+def found_in(folder: Path) -> Run:
+    (run,), left_out = read_runs([folder])
+    assert not left_out
+    return run
+
+
+def fitness(measured: Measured) -> list[float]:
+    values: list[float] = measured.tables["populations"]["fitness"].to_pylist()
+    return values
+
+
+@pytest.mark.parametrize("state", ["finished", "running", "stopped"])
+def test_finished_and_unfinished_runs_are_measured_alike(
+    made: Maker, state: str
+) -> None:
+    measured = measure_run(found_in(made("x", state=state)), "parent")
+    assert fitness(measured) == pytest.approx([0.2, 0.4])
+    assert measured.tables["robots"].num_rows == 3
+    expected = {} if state == "finished" else {
+        "comparison": "the run is not finished: 3 of 3 births are there"
+    }  # fmt: skip
+    assert whys(measured) == expected
+
+
+def test_runs_are_found_below_in_order(made: Maker, tmp_path: Path) -> None:
+    for number, name in enumerate(("two", "one")):
+        made(name, seed=number)
+    runs, left_out = read_runs([tmp_path, tmp_path / "one"])
+    assert [(run.folder.name, run.seed) for run in runs] == [("one", 1), ("two", 0)]
+    assert not left_out
+
+
+def test_where_no_run_is_is_said(tmp_path: Path) -> None:
+    with pytest.raises(RunFolderError, match="no run is there or below"):
+        read_runs([tmp_path])
+    with pytest.raises(RunFolderError, match="nowhere: no such folder"):
+        read_runs([tmp_path / "nowhere"])
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{}", '{"name": 1}', '{"document": "{}", "name": "e"}', "\x00"]
+)
+def test_a_broken_description_is_named_and_the_others_are_read(
+    made: Maker, tmp_path: Path, text: str
+) -> None:
+    made("whole")
+    (made("broken", seed=2) / "run.json").write_text(text)
+    runs, left_out = read_runs([tmp_path])
+    assert [run.folder.name for run in runs] == ["whole"]
+    (one,) = left_out
+    assert one.folder.endswith("broken")
+    assert one.why.startswith("run.json: ")
+
+
+def test_where_no_run_can_be_read_is_said(tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text("{}")
+    with pytest.raises(RunFolderError, match=r"no run can be read: .*: run.json: "):
+        read_runs([tmp_path])
+
+
+def test_a_finished_run_tells_what_it_is_without_its_description(made: Maker) -> None:
+    folder = made("x")
+    document = json.dumps({"births": 3, "arena": None})
+    row = {"name": "e", "run": 4, "seed": 9, "document": document, "state": "finished"}
+    path = parquet_path(folder, "e", 0, "runs")
+    row |= {"start": 0, "end": 0}
+    pq.write_table(table("runs", [row]), path)
+    (folder / "run.json").unlink()
+    (folder / "state").unlink()
+    run = found_in(folder)
+    assert (run.number, run.seed, run.state) == (4, 9, "finished")
+    assert fitness(measure_run(run, "parent")) == pytest.approx([0.2, 0.4])
+
+
+def test_a_run_in_two_folders_counts_once(made: Maker, tmp_path: Path) -> None:
+    made("a", state="running")
+    made("b")
+    shutil.copytree(tmp_path / "b", tmp_path / "c")
+    runs, left_out = read_runs([tmp_path])
+    assert [run.folder.name for run in runs] == ["b"]
+    assert [Path(one.folder).name for one in left_out] == ["c", "a"]
+    assert all(one.why.endswith("b") for one in left_out)
+
+
+def test_a_finished_run_without_tables_is_named(made: Maker, tmp_path: Path) -> None:
+    made("whole")
+    shutil.rmtree(made("gone", seed=2) / "tables")
+    runs, left_out = read_runs([tmp_path])
+    assert [run.folder.name for run in runs] == ["whole"]
+    (one,) = left_out
+    assert (Path(one.folder).name, one.what) == ("gone", "run")
+    assert one.why == "is finished, but its tables are gone: none is there"
+
+
+@pytest.mark.parametrize("name", ["births", "population", "evaluations"])
+def test_a_table_that_a_finished_run_must_have_is_missed(
+    made: Maker, name: str
+) -> None:
+    folder = made("x")
+    parquet_path(folder, "e", 0, name).unlink()
+    measured = measure_run(found_in(folder), "parent")
+    why = "is not there, though the run is finished"
+    assert whys(measured)[f"table {name}"] == why
+    assert whys(measured)["measure robots"] == f"needs table {name}"
+
+
+def test_an_arena_s_tables_are_missed_too(made: Maker) -> None:
+    folder = made("x")
+    document = {"births": 3, "arena": {"record_touches": True}}
+    details = {"name": "e", "run": 0, "seed": 1, "document": json.dumps(document)}
+    (folder / "run.json").write_text(json.dumps(details))
+    missing = {one.what for one in read_tables(found_in(folder))[1]}
+    assert missing == {"table fitness", "table deaths", "table touches"}
+
+
+def test_a_copy_whose_tables_are_gone_does_not_count(
+    made: Maker, tmp_path: Path
+) -> None:
+    for name in ("a", "b", "c"):
+        made(name)
+    shutil.rmtree(tmp_path / "a" / "tables")
+    parquet_path(tmp_path / "b", "e", 0, "births").unlink()
+    runs, _ = read_runs([tmp_path])
+    assert [run.folder.name for run in runs] == ["c"]
+
+
+def test_of_a_run_in_two_folders_the_one_that_can_be_read_counts(
+    made: Maker, tmp_path: Path
+) -> None:
+    for name in ("a", "b", "c"):
+        made(name)
+    for name, damaged in (("a", "population"), ("c", "births")):
+        parquet_path(tmp_path / name, "e", 0, damaged).write_bytes(b"")
+    runs, left_out = read_runs([tmp_path])
+    assert [run.folder.name for run in runs] == ["b"]
+    same = f"the same run as {tmp_path / 'b'}, and not all of it can be read"
+    assert [(Path(one.folder).name, one.why) for one in left_out] == [
+        ("a", same),
+        ("c", same),
+    ]
+
+
+def test_of_an_unfinished_run_in_two_folders_the_longer_counts(
+    made: Maker, tmp_path: Path
+) -> None:
+    for name in ("a", "b"):
+        made(name, state="stopped")
+    path = segment_path(tmp_path / "a", "births", 0)
+    path.write_bytes(path.read_bytes()[:-100])
+    runs, _ = read_runs([tmp_path])
+    assert [run.folder.name for run in runs] == ["b"]
+
+
+def test_a_damaged_table_is_named_and_the_others_are_measured(made: Maker) -> None:
+    folder = made("x")
+    path = parquet_path(folder, "e", 0, "evaluations")
+    path.write_bytes(path.read_bytes()[:-20])
+    measured = measure_run(found_in(folder), "parent")
+    assert fitness(measured) == pytest.approx([0.2, 0.4])
+    assert "Parquet" in whys(measured)["table evaluations"]
+    # Nothing is told of robots that may not be all.
+    assert whys(measured)["measure robots"] == "needs table evaluations"
+    assert "robots" not in measured.tables
+
+
+def test_another_version_s_table_is_named_not_guessed_at(made: Maker) -> None:
+    folder = made("x")
+    path = parquet_path(folder, "e", 0, "population")
+    old = ROWS["population"].replace_schema_metadata({"revolve.schema_version": "1"})
+    pq.write_table(old, path)
+    measured = measure_run(found_in(folder), "parent")
+    assert measured.tables["populations"].num_rows == 0
+    assert (
+        "is of version 1, and this program reads 2"
+        in whys(measured)["table population"]
+    )
+    assert whys(measured)["measures"] == "no population is recorded"
+
+
+def test_another_version_s_segment_is_named(made: Maker) -> None:
+    folder = made("x", state="running")
+    path = segment_path(folder, "births", 0)
+    rows = ROWS["births"].rename_columns(
+        ["rank_" if name == "rank" else name for name in ROWS["births"].column_names]
+    )
+    with pa.ipc.new_stream(path, rows.schema) as stream:
+        stream.write_table(rows)
+    measured = measure_run(found_in(folder), "parent")
+    assert "another version" in whys(measured)["table births"]
+    assert (
+        "2 name somebody whose birth is not recorded" in whys(measured)["populations"]
+    )
+
+
+def test_columns_that_an_older_run_lacks_are_filled(made: Maker) -> None:
+    folder = made("x")
+    for name, column in (("population", "birth_island"), ("evaluations", "trial")):
+        path = parquet_path(folder, "e", 0, name)
+        pq.write_table(ROWS[name].drop_columns(column), path)
+    measured = measure_run(found_in(folder), "parent")
+    assert fitness(measured) == pytest.approx([0.2, 0.4])
+    assert not measured.left_out
+
+
+@pytest.mark.parametrize("kept", np.linspace(0.3, 0.99, 6).tolist())
+def test_what_a_kill_cut_off_is_missing_and_nothing_else(
+    made: Maker, kept: float
+) -> None:
+    folder = made("x", state="running")
+    path = segment_path(folder, "births", 0)
+    data = path.read_bytes()
+    path.write_bytes(data[: int(len(data) * kept)])
+    tables, left_out = read_tables(found_in(folder))
+    assert not left_out
+    known = tables["births"].num_rows
+    assert known < 3
+    measured = measure_run(found_in(folder), "parent")
+    # The founders' population needs two births, the next one three.
+    assert fitness(measured) == pytest.approx([0.2] if known == 2 else [])
+    why = whys(measured)["populations"]
+    assert why.startswith("1 name" if known == 2 else "2 name")
+
+
+def test_an_empty_run_is_named(made: Maker) -> None:
+    folder = made("x", state="running")
+    shutil.rmtree(folder / "segments")
+    measured = measure_run(found_in(folder), "parent")
+    assert whys(measured) == {
+        "measures": "no population is recorded",
+        "comparison": "the run is not finished: 0 of 3 births are there",
+    }
+
+
+def test_islands_have_their_own_settings(made: Maker) -> None:
+    folder = made("x")
+    arena = {"record_touches": True}
+    islands = [{"count": 2, "births": 5}, {"count": 1, "arena": arena}]
+    document = {"births": 3, "arena": None, "islands": islands}
+    details = {"name": "e", "run": 0, "seed": 1, "document": json.dumps(document)}
+    (folder / "run.json").write_text(json.dumps(details))
+    settings = found_in(folder).islands
+    assert [one.births for one in settings] == [5, 5, 3]
+    assert [one.is_online for one in settings] == [False, False, True]
+    assert [one.records_touches for one in settings] == [False, False, True]
+    for name in ("fitness", "deaths", "touches", "migrations"):
+        pq.write_table(table(name, []), parquet_path(folder, "e", 0, name))
+    measured = measure_run(found_in(folder), "parent")
+    assert {"between", "migrants", "variability"} <= set(measured.tables)
+
+
+def test_immigrants_keep_the_name_they_were_born_with(made: Maker) -> None:
+    folder = made("x")
+    rows: list[dict[str, object]] = [
+        {"island": 1, "births": 3, "birth_island": 0, "birth": 2, "fitness": 1.0},
+        {"island": 0, "births": 3, "birth_island": None, "birth": 1, "fitness": 0.5},
+    ]
+    pq.write_table(
+        table("population", rows), parquet_path(folder, "e", 0, "population")
+    )
+    tables, _ = read_tables(found_in(folder))
+    assert tables["population"]["birth_island"].to_pylist() == [0, 0]
+
+
+@pytest.mark.slow
+def test_processes_measure_as_one_does(made: Maker, tmp_path: Path) -> None:
+    for number in range(4):
+        made(f"run-{number}", seed=number)
+    runs, _ = read_runs([tmp_path])
+    done: list[int] = []
+    alone = measure_runs(runs, tell=lambda: done.append(1))
+    together = measure_runs(runs, processes=2, tell=lambda: done.append(1))
+    assert len(done) == 8
+    assert together == alone

@@ -1,0 +1,434 @@
+"""Every measure of hand-worked tables with a known answer."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from analysis.comparison.progression import progression
+from analysis.measures.ancestry import ancestors, parents_of
+from analysis.measures.bodies import body_sizes, extremity_bins
+from analysis.measures.diversity import diversity, mean_distances
+from analysis.measures.material import Material
+from analysis.measures.measures import measure
+from analysis.measures.migrants import migrants
+from analysis.measures.outputs import OUTPUTS
+from analysis.measures.populations import populations
+from analysis.measures.populations_table import census
+from analysis.measures.retention import retention
+from analysis.measures.robots import robots
+from analysis.measures.trees import encode
+from analysis.measures.variability import variability
+from schema.errors import RunFolderError
+from tests.analysis.bodies import Body, part
+from tests.analysis.tables import CORE, births, population, run, table
+
+A, B, C, D, E = ((0, number) for number in range(5))
+FAMILY = births((A, []), (B, []), (C, [A, B]), (D, [C, A]), (E, [D, C]))
+"""A and B are founders, C their child, D that one's and A's, E a child of both."""
+
+
+def column(tables: dict[str, pa.Table], name: str) -> list[Any]:
+    found, refusals = populations(Material(tables))
+    assert not refusals
+    values: list[Any] = found[name].to_pylist()
+    return values
+
+
+def test_fitness_is_that_of_the_judged_off_line() -> None:
+    tables = run(
+        births=FAMILY,
+        population=population(
+            (0, 2, {A: 0.1, B: 0.3}),
+            # A failed evaluation is a fitness of 0, as it is in selection.
+            (0, 4, {A: 0.5, C: None, D: 0.4}),
+        ),
+    )
+    assert column(tables, "births") == [2, 4]
+    assert column(tables, "size") == [2, 3]
+    assert column(tables, "judged") == [2, 3]
+    assert column(tables, "fitness") == pytest.approx([0.2, 0.3])
+    assert column(tables, "fitness_best") == [0.3, 0.5]
+
+
+def test_in_an_arena_who_is_not_mature_does_not_count() -> None:
+    living = population(
+        (0, 1, {A: None}), (0, 4, {A: 0.2, B: None, D: 0.4}), is_online=True
+    )
+    ranks = births((A, []), (B, []), (D, [A, B]), rank=[1, 1, 2])
+    tables = run(births=ranks, population=living)
+    assert column(tables, "size") == [1, 3]
+    assert column(tables, "judged") == [0, 2]
+    assert column(tables, "fitness") == [None, pytest.approx(0.3)]
+    assert column(tables, "fitness_best") == [None, 0.4]
+    assert column(tables, "rank") == [None, 1.5]
+
+
+def test_unique_ancestors_are_counted_once_each() -> None:
+    assert ancestors(parents_of(FAMILY)) == [0, 0, 0b11, 0b111, 0b1111]
+    tables = run(
+        births=FAMILY,
+        population=population(
+            (0, 2, {A: 0.1, B: 0.3}),
+            (0, 3, {B: 0.3, C: 0.3}),
+            # D descends from A, B, C; E from D besides: 4 of 2 robots.
+            (0, 5, {D: 0.3, E: 0.3}),
+        ),
+    )
+    assert column(tables, "ancestors") == [0, 2, 4]
+    assert column(tables, "ancestors_per_robot") == [0, 1, 2]
+
+
+def test_a_parent_on_another_island_may_stand_behind_its_child() -> None:
+    # Island 0 is recorded first; its G descends from F and H of island 1.
+    f, g, h = (1, 0), (0, 0), (1, 1)
+    born = births((g, [h]), (f, []), (h, [f]))
+    assert ancestors(parents_of(born)) == [0b110, 0, 0b010]
+    living = population((0, 1, {g: 1}), (1, 2, {f: 1, h: 1}))
+    tables = run(births=born, population=living)
+    assert column(tables, "ancestors") == [2, 1]
+    assert column(tables, "foreign") == [1, 0]
+
+
+def test_nobody_descends_from_itself() -> None:
+    with pytest.raises(RunFolderError, match="row 0 descends from itself"):
+        ancestors(parents_of(births((A, [B]), (B, [A]))))
+
+
+def test_ancestors_of_the_immature_do_not_count() -> None:
+    tables = run(
+        births=FAMILY, population=population((0, 5, {C: 0.1, E: None}), is_online=True)
+    )
+    assert column(tables, "ancestors") == [2]
+    assert column(tables, "ancestors_per_robot") == [2]
+
+
+def test_a_parent_that_is_not_there_is_told_and_the_rest_is_measured() -> None:
+    tables = run(
+        births=births((A, []), (C, [A, B])), population=population((0, 2, {A: 1, C: 2}))
+    )
+    with pytest.raises(RunFolderError, match="row 1 has a parent whose birth is not"):
+        parents_of(tables["births"])
+    found, refusals = measure(Material(tables), frozenset())
+    assert found["populations"]["fitness"].to_pylist() == [1.5]
+    assert found["populations"]["ancestors"].to_pylist() == [None]
+    assert {"ancestors", "foreign", "robots"} <= set(refusals)
+
+
+BRICK: Body = [*CORE, part(1, 0, 0, "FixedBrick")]
+HINGE: Body = [*CORE, part(1, 0, 0, "ActiveHinge")]
+FAR: Body = [*CORE, part(1, 0, 2, "Hinge"), part(2, 1, 1, "Hinge")]
+
+
+def test_diversity_is_the_mean_over_pairs() -> None:
+    # Core to brick 1, core to hinge 1, brick to hinge 1, core to far 2, brick to far
+    # 1 + 2 (type and slot differ, one more part), hinge to far the same.
+    bodies = births((A, []), (B, []), (C, []), (D, []), body=[CORE, BRICK, HINGE, FAR])
+    who = census(
+        population(
+            (0, 2, {A: 0.1}),
+            (0, 3, {A: 0.1, B: None, C: 0.1}),
+            (0, 4, {A: 0.1, B: 0.1, C: 0.1, D: None}),
+            is_online=True,
+        ),
+        bodies,
+    )
+    found = diversity(who, encode(bodies["body"]))
+    assert math.isnan(found[0])
+    assert found[1:].tolist() == pytest.approx([1.0, (1 + 1 + 1 + 2 + 3 + 3) / 6])
+
+
+def test_retention_is_the_share_that_still_lives() -> None:
+    born = births(*((name, []) for name in (A, B, C, D, E)))
+    who = census(
+        population(
+            (0, 10, {A: 1, B: 1, C: 1, D: 1}),
+            # Nothing was recorded at 130 + 5: skipped, and so are the last.
+            (0, 15, {A: 1, E: 1}),
+            (0, 130, {B: 1, D: 1, E: None}),
+            (0, 250, {B: 1}),
+            # Another island's do not count, though they bear the same names.
+            (1, 130, {A: 1}),
+        ),
+        born,
+    )
+    found = retention(who)
+    assert found.tolist() == pytest.approx(
+        [0.5, math.nan, 1 / 3, math.nan, math.nan], nan_ok=True
+    )
+    assert retention(who, step=5)[0] == 0.25
+
+
+def test_variability_by_hand() -> None:
+    rows = [
+        # (robot, second, fitness, mature): C is never compared with anybody.
+        (0, 5, 0.9, False),
+        (0, 10, 0.1, True),
+        (1, 10, 0.2, True),
+        (0, 15, 0.4, True),
+        (1, 15, 0.6, True),
+        (0, 20, 0.2, True),
+        (1, 20, 0.1, True),
+        (1, 25, 1.1, True),
+        (2, 25, 0.3, True),
+    ]
+    samples = [
+        {"birth": birth, "sim_time_s": time, "fitness": fitness, "is_mature": mature}
+        for birth, time, fitness, mature in rows
+    ]
+    found = variability(table("fitness", samples)).to_pylist()
+    assert [(row["birth"], row["samples"]) for row in found] == [(0, 3), (1, 4)]
+    # While 0 lived, fitness ran from 0.1 to 0.6; while 1 did, from 0.1 to 1.1.
+    assert [row["fitness_range"] for row in found] == pytest.approx([0.3, 1.0])
+    assert [row["population_range"] for row in found] == pytest.approx([0.5, 1.0])
+    assert [row["variability"] for row in found] == pytest.approx([0.6, 1.0])
+
+
+def test_sizes_by_hand() -> None:
+    body = [
+        *CORE,
+        part(1, 0, 0, "ActiveHinge"),
+        part(2, 1, 1, "TouchSensor"),
+        part(3, 0, 1, "Hinge"),
+        part(4, 3, 1, "TouchSensor"),
+    ]
+    born = births(
+        (A, []), (B, []), body=[body, CORE], parts=[5, 1], joints=[2, 0],
+        motors=[1, 0], extremities=[2, 1], hidden=[3, 0], connections=[10, 1],
+    )  # fmt: skip
+    found = {name: values.tolist() for name, values in body_sizes(born).items()}
+    assert found == {
+        "parts": [5, 1],
+        "active_joints": [1, 0],
+        "passive_joints": [1, 0],
+        "joints": [2, 0],
+        "extremities": [2, 1],
+        "touch_sensors": [2, 0],
+        "hidden": [3, 0],
+        "connections": [10, 1],
+        "active_joints_per_part": [0.2, 0],
+        "passive_joints_per_part": [0.2, 0],
+        "joints_per_part": [0.4, 0],
+        "extremities_per_part": [0.4, 1],
+        "hidden_per_part": [0.6, 0],
+        "connections_per_part": [2, 1],
+    }
+    tables = run(births=born, population=population((0, 2, {A: 0.1, B: 0.3})))
+    assert column(tables, "parts") == [3]
+    assert column(tables, "extremities_per_part") == [pytest.approx(0.7)]
+    assert column(tables, "touch_sensors") == [1]
+    assert column(tables, "without_touch") == [0.5]
+
+
+def test_robots_have_the_fitness_that_they_were_last_judged_by() -> None:
+    evaluations = [
+        {"birth": 0, "trial": 0, "status": "ok", "fitness": 0.1},
+        {"birth": 1, "trial": 0, "status": "failed", "fitness": None},
+        {"birth": 2, "trial": 0, "status": "ok", "fitness": 0.3},
+        {"birth": 0, "trial": 1, "status": "ok", "fitness": 0.2},
+    ]
+    tables = run(
+        births=FAMILY,
+        population=population((0, 3, {A: 0.1, B: None}), (0, 5, {A: 0.2, C: 0.3})),
+        evaluations=table("evaluations", evaluations),
+    )
+    found = robots(Material(tables))
+    assert found["birth"].to_pylist() == [0, 1, 2]
+    assert found["fitness"].to_pylist() == [0.2, 0.0, 0.3]
+    assert found["is_last"].to_pylist() == [True, False, True]
+    assert found["ancestors"].to_pylist() == [0, 0, 2]
+
+
+def test_robots_of_an_arena_count_once_they_were_mature() -> None:
+    samples = [
+        {"birth": 0, "sim_time_s": 20.0, "fitness": 0.2, "is_mature": True},
+        {"birth": 0, "sim_time_s": 15.0, "fitness": 0.1, "is_mature": True},
+        {"birth": 1, "sim_time_s": 20.0, "fitness": 0.9, "is_mature": False},
+    ]
+    living = population((0, 2, {A: 0.15, B: None}), is_online=True)
+    tables = run(births=FAMILY, population=living, fitness=table("fitness", samples))
+    (row,) = robots(Material(tables)).to_pylist()
+    # Alive at the last birth: as it was judged then.
+    assert (row["birth"], row["fitness"], row["is_last"]) == (0, 0.15, True)
+
+
+def test_extremities_against_fitness() -> None:
+    made = pa.table(
+        {
+            "is_last": [True, True, False, False],
+            "parts": [10, 10, 20, 3],
+            "extremities": [3, 3, 6, 1],
+            "fitness": [0.1, 0.3, 0.5, 0.7],
+        }
+    )
+    found = [tuple(row.values()) for row in extremity_bins(made).to_pylist()]
+    assert found == [
+        ("final", "count", 3, 2, pytest.approx(0.2)),
+        ("final", "per_part", 0.3, 2, pytest.approx(0.2)),
+        ("born", "count", 1, 1, 0.7),
+        ("born", "count", 3, 2, pytest.approx(0.2)),
+        ("born", "count", 6, 1, 0.5),
+        ("born", "per_part", 0.3, 4, pytest.approx(0.4)),
+    ]
+
+
+def test_interactions_by_hand() -> None:
+    born = births(
+        (A, []), (B, []), (C, []), (D, []), sim_time_s=[0.0, 10.0, 20.0, None]
+    )
+    deaths = table("deaths", [{"birth": 0, "sim_time_s": 40.0}])
+    touch = {"other_island": 0, "over_s": 1.0}
+    touches = table(
+        "touches",
+        [
+            {
+                "birth": 0,
+                "other_birth": 1,
+                "sim_time_s": 30.0,
+                "duration_s": 0.5,
+                **touch,
+            },
+            {
+                "birth": 0,
+                "other_birth": 1,
+                "sim_time_s": 31.0,
+                "duration_s": 1.0,
+                **touch,
+            },
+        ],
+    )
+    samples = table("fitness", [{"birth": 1, "sim_time_s": 60.0}])
+    tables = run(births=born, population=population((0, 3, {B: None}), is_online=True))
+    tables |= {"deaths": deaths, "touches": touches, "fitness": samples}
+    found, _ = measure(Material(tables), frozenset({"interactions"}))
+    (row,) = found["interactions"].to_pylist()
+    # A lived 40 s, B 50 s and C 40 s, to the last sample; D off-line.
+    assert row == {
+        "island": 0,
+        "robots": 3,
+        "lived_s": 130.0,
+        "pairs": 1,
+        "touched": pytest.approx(2 / 3),
+        "touching": pytest.approx(3.0 / 130.0),
+    }
+
+
+F, G, H = (1, 0), (1, 1), (1, 2)
+ISLANDS = births((A, []), (B, []), (F, []), (C, [A, B]), (G, [F, A]), (H, [G]))
+"""On island 1, G has a parent on island 0; H is its child."""
+
+
+def test_migrants_and_their_descendants() -> None:
+    living = population(
+        (0, 2, {A: 1, B: 1}),
+        (0, 3, {B: 1, C: 1}),
+        (1, 1, {F: 1}),
+        (1, 2, {F: 1, A: 1, G: 1}),
+        (1, 3, {F: 1, G: 1, H: 1}),
+    )
+    tables = run(births=ISLANDS, population=living)
+    assert column(tables, "foreign") == pytest.approx([0, 0, 0, 2 / 3, 2 / 3])
+    moved = table(
+        "migrations",
+        [
+            {"island": 0, "to": 1, "epoch": 1, "birth": 0, "fitness": 0.5},
+            {"island": 1, "to": 0, "epoch": 1, "birth": 0, "fitness": None},
+        ],
+    )
+    lines = ancestors(parents_of(ISLANDS))
+    found = migrants(moved, ISLANDS, census(living, ISLANDS), lines).to_pylist()
+    # A has G and H on island 1, where both live, and C at home.
+    assert [row["descendants"] for row in found] == [2, 0]
+    assert [row["living"] for row in found] == [2, 0]
+    assert [row["reached"] for row in found] == [2, 1]
+    assert [row["birth_island"] for row in found] == [0, 1]
+
+
+def test_one_island_has_no_foreigners() -> None:
+    tables = run(births=FAMILY, population=population((0, 2, {A: 1, B: 1})))
+    assert column(tables, "foreign") == [None]
+
+
+def test_distances_between_islands() -> None:
+    bodies = [CORE, BRICK, FAR, HINGE, CORE, CORE]
+    born = births((A, []), (B, []), (F, []), (C, []), (G, []), (H, []), body=bodies)
+    who = census(
+        population(
+            (0, 2, {A: 1, B: 1}),
+            (1, 1, {F: 1}),
+            (0, 4, {B: 1, C: 1}),
+            (1, 3, {F: 1, G: 1}),
+        ),
+        born,
+    )
+    found = mean_distances(who, encode(born["body"]), step=2).to_pylist()
+    # At 2: core and brick here, far there: (2 + 3) / 2; within only here: 1.
+    assert found[0] == {"births": 2, "islands": 2, "within": 1.0, "between": 2.5}
+    # At 4: brick and hinge; far and core: 3, 1, 3, 1; within: 1 and 2.
+    assert found[1] == {"births": 4, "islands": 2, "within": 1.5, "between": 2.0}
+
+
+def test_progression_of_two_runs_and_of_another_experiment() -> None:
+    rows = [
+        ("a", "x", 15, 0.2),
+        ("a", "y", 15, 0.4),
+        ("a", "x", 30, 0.4),
+        ("b", "z", 15, 0.25),
+    ]
+    names = ["experiment", "folder", "births", "fitness"]
+    made = pa.table(dict(zip(names, map(list, zip(*rows, strict=True)), strict=True)))
+    for name in OUTPUTS["populations"]:
+        if name not in made.column_names:
+            made = made.append_column(name, pa.nulls(4, pa.float64()))
+    found = progression(made).to_pylist()
+    assert {row["measure"] for row in found} == {"fitness"}
+    assert [(row["experiment"], row["births"], row["runs"]) for row in found] == [
+        ("a", 15, 2),
+        ("a", 30, 1),
+        ("b", 15, 1),
+    ]
+    assert [row["mean"] for row in found] == pytest.approx([0.3, 0.4, 0.25])
+    assert (found[0]["least"], found[0]["greatest"]) == (0.2, 0.4)
+    # Standard error 0.1, and Student's t of one degree of freedom is 12.706.
+    assert found[0]["low"] == pytest.approx(0.3 - 1.2706, abs=1e-4)
+    assert found[0]["high"] == pytest.approx(0.3 + 1.2706, abs=1e-4)
+    assert found[1]["low"] is None
+
+
+def test_progression_of_islands_is_where_all_of_them_are_recorded() -> None:
+    rows = [(0, 15, 0.2), (1, 15, 0.4), (1, 16, 0.9), (0, 30, 0.4), (1, 30, 0.8)]
+    names = ["island", "births", "fitness"]
+    made = pa.table(dict(zip(names, map(list, zip(*rows, strict=True)), strict=True)))
+    for name in ("experiment", "folder"):
+        made = made.append_column(name, pa.array(["a"] * len(rows)))
+    for name in OUTPUTS["populations"]:
+        if name not in made.column_names:
+            made = made.append_column(name, pa.nulls(len(rows), pa.float64()))
+    found = progression(made).to_pylist()
+    assert [row["births"] for row in found] == [15, 30]
+    assert [row["mean"] for row in found] == pytest.approx([0.3, 0.6])
+
+
+def test_a_population_with_somebody_unknown_is_left_out() -> None:
+    born = births((A, []), (B, []))
+    who = census(population((0, 1, {A: 1}), (0, 3, {B: 1, C: 2})), born)
+    assert who.births.tolist() == [1]
+    assert who.lacking == 1
+
+
+def test_nothing_born_is_nothing_measured() -> None:
+    tables = run(births=births(), population=population())
+    found, refusals = measure(
+        Material(tables),
+        frozenset({"variability", "interactions", "between", "migrants"}),
+    )
+    assert not refusals
+    assert {name: rows.num_rows for name, rows in found.items()} == dict.fromkeys(
+        found, 0
+    )
+    assert (
+        np.isnan(census(tables["population"], tables["births"]).mean(np.zeros(0))).size
+        == 0
+    )

@@ -1,0 +1,153 @@
+"""Pictures: what is drawn where, and files that open again."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from analysis.render.command import main
+from analysis.render.picture import (
+    NoPictures,
+    Studio,
+    choose_engine,
+    gait_strip,
+    save_film,
+    save_picture,
+)
+from schema.experiment.document import Simulation
+from schema.experiment.environment import FLAT
+from schema.formats.files import write_robot
+from schema.parts import BUILT_IN
+from schema.robot.brain import INPUT, Brain, Neuron
+from schema.robot.robot import Part, Robot
+
+RED, BLUE = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+ROBOT = Robot(
+    (
+        Part("Core", -1, -1, -1, 0, RED),
+        Part("FixedBrick", 0, 2, 0, 0, BLUE),
+        Part("FixedBrick", 1, 1, 0, 0, BLUE),
+    ),
+    Brain(tuple(Neuron("input", INPUT, 0) for _ in range(6))),
+)
+
+
+@pytest.fixture(scope="module")
+def studio() -> Iterator[Studio]:
+    try:
+        choose_engine()
+        made = Studio(ROBOT, BUILT_IN, Simulation(), FLAT, size=(160, 120))
+    except NoPictures as error:
+        pytest.skip(str(error))
+    with made:
+        yield made
+
+
+def mostly(picture: np.ndarray, channel: int) -> np.ndarray:
+    """Return the pixels (row, column) in which one channel is twice any other."""
+    others = np.delete(picture.astype(int), channel, axis=2).max(axis=2)
+    return np.argwhere(picture[..., channel].astype(int) > 2 * others + 20)
+
+
+def test_parts_show_their_colours_where_they_are(studio: Studio) -> None:
+    picture = studio.picture()
+    assert picture.shape == (120, 160, 3)
+    red, blue = mostly(picture, 0), mostly(picture, 2)
+    assert len(red) > 100
+    assert len(blue) > 40
+    # Bricks at +x; the camera looks along (-0.64, 0.77), so +x is to its right, and
+    # nearer to it, which is lower.
+    assert blue.mean(axis=0)[1] > red.mean(axis=0)[1]
+    # The robot is in the middle: floor all around.
+    seen = np.vstack([red, blue])
+    assert seen.min(axis=0).min() > 2
+    assert (seen.max(axis=0) < (117, 157)).all()
+
+
+def test_a_pose_moves_the_robot_in_a_picture_that_stands_still(studio: Studio) -> None:
+    pose = np.array([0.0, 0.0, 0.0225, 1.0, 0.0, 0.0, 0.0])
+    there = pose.copy()
+    there[0] += 0.05
+    middle = np.array([0.05, 0.0, 0.02])
+    one = mostly(studio.picture(pose, look_at=middle), 0).mean(axis=0)
+    other = mostly(studio.picture(there, look_at=middle), 0).mean(axis=0)
+    assert other[1] > one[1] + 5
+    follows = [mostly(studio.picture(at), 0).mean(axis=0) for at in (pose, there)]
+    assert follows[0] == pytest.approx(follows[1], abs=1.5)
+
+
+def test_a_strip_fills_rows_of_five() -> None:
+    pictures = [np.full((2, 3, 3), 10 * number, np.uint8) for number in range(7)]
+    strip = gait_strip(pictures)
+    assert strip.shape == (4, 15, 3)
+    assert strip[0, ::3, 0].tolist() == [0, 10, 20, 30, 40]
+    assert strip[2, ::3, 0].tolist() == [50, 60, 255, 255, 255]
+
+
+def test_files_open_again(tmp_path: Path) -> None:
+    pictures = [np.full((4, 6, 3), 120 * number, np.uint8) for number in range(3)]
+    save_picture(pictures[1], tmp_path / "one.png")
+    assert np.array_equal(np.array(Image.open(tmp_path / "one.png")), pictures[1])
+    save_film(pictures, tmp_path / "film.gif", 0.12)
+    with Image.open(tmp_path / "film.gif") as film:
+        assert getattr(film, "n_frames", 0) == 3
+        assert film.info["duration"] == 120
+    with pytest.raises(NoPictures, match="cannot be written"):
+        save_picture(pictures[0], tmp_path / "no" / "one.png")
+
+
+def simulate(*_: object, **__: object) -> NoReturn:
+    """Fail: what is wrong with the words is told before anything is done."""
+    raise AssertionError("words come first")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--gait", "0"), "--gait: must be a whole number >= 1, got '0'"),
+        (("--width", "-5"), "--width: must be a whole number >= 16, got '-5'"),
+    ],
+)
+def test_words_that_cannot_be_are_refused(
+    words: tuple[str, str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["robot render", "a.yaml", "a.png", *words], simulate)
+    assert end.value.code == 2
+    assert said in capsys.readouterr().err
+
+
+@pytest.fixture
+def robot_file(tmp_path: Path) -> Path:
+    path = tmp_path / "robot.yaml"
+    write_robot(ROBOT, path, BUILT_IN)
+    return path
+
+
+@pytest.mark.usefixtures("studio")  # where nothing can draw, that is told
+def test_a_strip_longer_than_there_are_ticks_is_refused(robot_file: Path) -> None:
+    words = ["robot render", str(robot_file), str(robot_file.with_suffix(".png"))]
+    said = r"--gait 49: must be <= 48, the ticks of the second half of its life"
+    with pytest.raises(NoPictures, match=said):
+        main([*words, "--gait", "49"], simulate)
+    # One less is what there is, and goes on to the simulation.
+    with pytest.raises(AssertionError, match="words come first"):
+        main([*words, "--gait", "48"], simulate)
+
+
+@pytest.mark.usefixtures("studio")
+def test_a_log_is_told_at_the_beginning_what_is_drawn(
+    robot_file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = robot_file.with_suffix(".gif")
+    with pytest.raises(AssertionError, match="words come first"):
+        main(["robot render", str(robot_file), str(out)], simulate)
+    assert capsys.readouterr().err == f"simulating and drawing: {out}\n"
+
+
+def test_a_film_is_no_strip() -> None:
+    with pytest.raises(NoPictures, match=r"--gait is for a \.png"):
+        main(["robot render", "a.yaml", "a.gif", "--gait", "5"], simulate)

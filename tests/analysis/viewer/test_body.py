@@ -1,0 +1,125 @@
+"""Boxes are where the engine has them, in every pose."""
+
+import itertools
+
+import mujoco
+import numpy as np
+import pytest
+
+from analysis.viewer.body import figure, place, standing
+from schema.experiment.document import Simulation
+from schema.mjcf.model import robot_spec
+from schema.parts import BUILT_IN
+from schema.robot.brain import Brain
+from schema.robot.results import Floats
+from schema.robot.robot import Part, Robot
+
+GREY = (0.2, 0.4, 0.6)
+ROBOT = Robot(
+    (
+        Part("Core", -1, -1, -1, 0, GREY),
+        Part("ActiveHinge", 0, 0, 0, 90, GREY),
+        Part("FixedBrick", 1, 1, 0, 90, GREY),
+        Part("Hinge", 2, 1, 1, 0, GREY),
+        Part("ParametricBarJoint", 0, 2, 0, 0, (60.0, 0.7, 0.0, 1.0, 0.0, 0.5)),
+        Part("ActiveHinge", 4, 1, 1, 270, GREY),
+        Part("TouchSensor", 5, 0, 0, 180, GREY),
+    ),
+    Brain(),
+)
+
+
+def _oracle(root: Floats, angles: Floats) -> list[tuple[Floats, Floats]]:
+    """Return corners' centre and the corner set of each geom, by the engine."""
+    model = robot_spec(ROBOT, BUILT_IN, Simulation()).spec.compile()
+    data = mujoco.MjData(model)
+    data.qpos[:7], data.qpos[7:] = root, angles
+    mujoco.mj_kinematics(model, data)
+    return [
+        (data.geom_xpos[geom], _corners(data, model, geom))
+        for geom in range(model.ngeom)
+    ]
+
+
+def _corners(data: mujoco.MjData, model: mujoco.MjModel, geom: int) -> Floats:
+    signs = np.array(list(itertools.product((-1, 1), repeat=3)))
+    turned = data.geom_xmat[geom].reshape(3, 3)
+    return np.asarray(data.geom_xpos[geom] + (signs * model.geom_size[geom]) @ turned.T)
+
+
+def _own_corners(centre: Floats, attitude: Floats, half: Floats) -> Floats:
+    signs = np.array(list(itertools.product((-1, 1), repeat=3)))
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, attitude[[3, 0, 1, 2]].astype(np.float64))
+    return np.asarray(centre + (signs * half) @ matrix.reshape(3, 3).T)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_boxes_are_where_the_engine_has_them(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=7)
+    root[3:] /= np.linalg.norm(root[3:])
+    angles = rng.uniform(-0.7, 0.7, 3)
+    drawn = figure(ROBOT, BUILT_IN, is_plain=False)
+    centres, attitudes = place(drawn, root[None], angles[None])
+    found = [
+        _own_corners(centre, attitude, half)
+        for centre, attitude, half in zip(
+            centres[0], attitudes[0], drawn.half_sizes, strict=True
+        )
+    ]
+    expected = [corners for _, corners in _oracle(root, angles)]
+    assert len(found) == len(expected)
+    for corners in expected:
+        nearest = min(found, key=lambda own: _apart(own, corners))
+        assert _apart(nearest, corners) < 1e-5
+
+
+def _apart(first: Floats, second: Floats) -> float:
+    """Return how far each corner of a box is from the nearest of another, at most."""
+    distances = np.linalg.norm(first[:, None] - second[None], axis=-1)
+    return float(distances.min(axis=1).max())
+
+
+def test_a_plain_figure_has_a_box_for_each_part_and_segment() -> None:
+    drawn = figure(ROBOT, BUILT_IN, is_plain=True)
+    assert len(drawn.half_sizes) == len(ROBOT.parts) + 3
+    assert len(drawn.parents) == 4
+
+
+def test_a_plain_figure_fills_the_room_of_the_whole_one() -> None:
+    root, angles = np.array([[0.0, 0, 0, 1, 0, 0, 0]]), np.zeros((1, 3))
+    plain = figure(ROBOT, BUILT_IN, is_plain=True)
+    whole = figure(ROBOT, BUILT_IN, is_plain=False)
+    near, far = place(plain, root, angles)[0], place(whole, root, angles)[0]
+    for centre in near[0]:
+        assert np.linalg.norm(far[0] - centre, axis=1).min() < 0.02
+
+
+def test_few_attitudes_serve_all_boxes() -> None:
+    drawn = figure(ROBOT, BUILT_IN, is_plain=False)
+    # Four segments, and the tilts beyond the bar.
+    assert len(np.unique(drawn.attitude_of)) <= 6
+
+
+def test_colours_are_the_parts() -> None:
+    drawn = figure(ROBOT, BUILT_IN, is_plain=True)
+    assert {tuple(colour) for colour in drawn.colours.tolist()} == {
+        (51, 102, 153),
+        (255, 0, 128),
+    }
+
+
+def test_a_standing_robot_touches_the_ground() -> None:
+    built = robot_spec(ROBOT, BUILT_IN, Simulation())
+    drawn = figure(ROBOT, BUILT_IN, is_plain=False)
+    centres, attitudes = standing(drawn, (2.0, -1.0))
+    corners = np.concatenate(
+        [
+            _own_corners(*each)
+            for each in zip(centres[0], attitudes[0], drawn.half_sizes, strict=True)
+        ]
+    )
+    assert corners[:, 2].min() == pytest.approx(0.0, abs=1e-6)
+    core = int(np.argmax(drawn.half_sizes.prod(axis=1)))
+    assert centres[0, core] == pytest.approx((2.0, -1.0, built.height), abs=1e-6)

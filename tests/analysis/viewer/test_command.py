@@ -1,0 +1,200 @@
+"""What a viewer makes of what it is told, without network and screen."""
+
+import os
+import threading
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from analysis.viewer.blueprint import layout
+from analysis.viewer.entries import Moves, When
+from analysis.viewer.gallery import Gallery, spot_place
+from analysis.viewer.lineage import Lineage
+from analysis.viewer.live import Sequel
+from analysis.viewer.looks import Figures
+from analysis.viewer.output import Output, Window, linger
+from analysis.viewer.recording import ViewerError
+from analysis.viewer.show import Show
+from analysis.viewer.stage import stage
+from schema.experiment.document import Arena, Experiment, Simulation
+from schema.experiment.file import read_experiment
+from schema.mjcf.world import add_ring_wall
+from schema.parts import BUILT_IN
+from schema.robot.names import BirthId
+from schema.robot.robot import Part, Robot
+from schema.tables.columns import TABLES
+from schema.wire.news import Departed, Level, Newborn, News
+
+CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
+WHOLE = News("run", 1, 4, is_whole=True, experiment="e")
+
+
+class Recorded:
+    """Takes down what a recording is told."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[object, ...]] = []
+
+    def __getattr__(self, name: str) -> object:
+        return lambda *words: self.told.append((name, *words))
+
+
+def _news(sequence: int, run: str = "run", epoch: int = 1) -> News:
+    return News(run, epoch, sequence, is_whole=False, experiment="e")
+
+
+def test_news_that_follow_are_shown_and_nothing_is_asked() -> None:
+    sequel = Sequel()
+    assert sequel.is_behind
+    assert sequel.take(WHOLE)
+    assert sequel.take(_news(5))
+    assert sequel.take(_news(6))
+    assert not sequel.is_behind
+
+
+@pytest.mark.parametrize("late", [_news(6), _news(1, epoch=2)])
+def test_a_gap_has_all_asked_anew_until_it_comes(late: News) -> None:
+    sequel = Sequel()
+    sequel.take(WHOLE)
+    assert sequel.take(late)
+    assert sequel.is_behind
+    sequel.take(_news(late.sequence + 1, epoch=late.epoch))
+    assert sequel.is_behind
+    sequel.take(replace(WHOLE, epoch=late.epoch, sequence=late.sequence + 1))
+    assert not sequel.is_behind
+
+
+def test_another_run_is_not_shown() -> None:
+    sequel = Sequel()
+    sequel.take(WHOLE)
+    assert not sequel.take(_news(5, run="other"))
+    assert not sequel.take(replace(WHOLE, run="other"))
+    assert not sequel.is_behind
+
+
+def test_news_that_come_twice_are_no_gap() -> None:
+    sequel = Sequel()
+    sequel.take(WHOLE)
+    sequel.take(_news(3))
+    assert not sequel.is_behind
+
+
+def test_a_ring_wall_stands_where_the_engine_has_it() -> None:
+    arena = Arena(wall_diameter_m=3.0, wall_segments=5)
+    spec = mujoco.MjSpec()
+    add_ring_wall(spec, arena, Simulation())
+    model = spec.compile()
+    (walls,) = stage(Experiment(name="e", arena=arena)).walls
+    assert len(walls) == model.ngeom == 5
+    for geom, (place, half) in enumerate(walls):
+        assert place[:3] == pytest.approx(model.geom_pos[geom], abs=1e-6)
+        assert place[[6, 3, 4, 5]] == pytest.approx(model.geom_quat[geom], abs=1e-6)
+        assert half == pytest.approx(model.geom_size[geom], abs=1e-6)
+
+
+def test_who_lives_keeps_a_spot_and_who_dies_frees_it() -> None:
+    recorded, figures = Recorded(), Figures(BUILT_IN)
+    gallery = Gallery(recorded)  # type: ignore[arg-type]
+    names = [BirthId(0, number) for number in range(4)]
+    for name in names:
+        figures.add(name, CORE)
+    gallery.hang(Level(0, 3, 3, 3, 0.0, 0.0, tuple(names[:3])), figures)
+    gallery.hang(Level(0, 4, 3, 3, 0.0, 0.0, (names[0], names[2], names[3])), figures)
+    kinds = [told[0] for told in recorded.told]
+    assert kinds == ["born", "stands"] * 3 + ["died", "born", "stands"]
+    assert recorded.told[6][1] == "islands/0/robots/0-1"
+    centres = recorded.told[8][2]
+    assert isinstance(centres, np.ndarray)
+    assert centres[0, 0, :2] == pytest.approx(spot_place(1))
+
+
+def test_the_lineage_is_drawn_every_ten_births_and_knows_the_living() -> None:
+    recorded = Recorded()
+    lineage = Lineage(recorded)  # type: ignore[arg-type]
+    for number in range(12):
+        one = Newborn(BirthId(0, number), (), 1, number + 1, None, None)
+        assert lineage.add(one)
+        assert not lineage.add(one)
+    assert len(recorded.told) == 1
+    lineage.keep(Level(0, 11, 2, 2, 0.0, 0.0, (BirthId(0, 3), BirthId(0, 10))))
+    lineage.draw()
+    _, kin, _ = recorded.told[1]
+    assert isinstance(kin, list)
+    # The last one was born since.
+    assert [each.birth.number for each in kin if each.is_alive] == [3, 10, 11]
+
+
+def test_who_dies_vanishes_with_as_many_births_as_its_last_pose_has() -> None:
+    recorded: Any = Recorded()
+    show = Show(recorded, BUILT_IN)
+    first, second = (Newborn(BirthId(0, n), (), 1, n + 1, 10.0 * n, CORE)
+                     for n in range(2))  # fmt: skip
+    # At 10 s the second is born and the first dies: one birth, says the table.
+    death = Departed(0, first.birth, 1, 10.0, "cull")
+    show.tell(replace(WHOLE, births=(first, second), deaths=(death,)))
+    rows = [
+        {"record": n, "island": 0, "birth": 0, "sim_time_s": 9.0 + n, "angles": [],
+         "x": 0.0, "y": 0.0, "z": 0.0, "qw": 1.0, "qx": 0.0, "qy": 0.0, "qz": 0.0}
+        for n in range(2)
+    ]  # fmt: skip
+    show.move(0, pa.Table.from_pylist(rows, TABLES["poses"]))
+    (moves,) = [told[2] for told in recorded.told if told[0] == "moved"]
+    assert isinstance(moves, Moves)
+    assert moves.births is not None
+    assert moves.births.tolist() == [1, 2]
+    (gone,) = [told[2] for told in recorded.told if told[0] == "died"]
+    assert gone == When(10.0, 2)
+
+
+def test_islands_of_a_mixed_archipelago_are_called_what_they_are() -> None:
+    scene = stage(read_experiment("archipelago-mixed"))
+    assert scene.islands == (0, 1, 2, 3, 4, 5)
+    assert scene.arenas == {4, 5}
+    blueprint: Any = layout(scene.islands, extent_m=2.0, arenas=scene.arenas)
+    scenes, _ = blueprint.root_container.contents
+    names = [view.name for view in scenes.contents]
+    assert names == [*(f"Population of island {n}" for n in range(4)),
+                     "Arena 4", "Arena 5"]  # fmt: skip
+
+
+def test_an_output_is_a_window_unless_told_otherwise(tmp_path: Path) -> None:
+    file = tmp_path / "a.rrd"
+    assert Output.of(None, None).has_window
+    assert Output.of(file, None) == Output(file, None, has_window=False)
+    assert Output.of(None, "127.0.0.1:0").url == "rerun+http://127.0.0.1:0/proxy"
+
+
+def test_a_file_that_no_viewer_would_open_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ViewerError, match=r"must end in \.rrd"):
+        Output.of(tmp_path / "a.txt", None)
+    with pytest.raises(ViewerError, match="there is no folder"):
+        Output.of(tmp_path / "no" / "a.rrd", None)
+
+
+def test_a_window_that_fails_late_is_told_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / "python"
+    program.write_text(f"#!/bin/sh\nread -r _ < {tmp_path}/go\nexit 1\n")
+    program.chmod(0o755)
+    os.mkfifo(tmp_path / "go")
+    monkeypatch.setattr("sys.executable", str(program))
+    monkeypatch.setattr("analysis.viewer.output._WINDOW_S", 0.1)
+    output = Output(None, ("127.0.0.1", 1), has_window=True)
+    window = Window(output)
+    assert not window.was_closed
+    (tmp_path / "go").write_text("now\n")
+    recorded: Any = Recorded()
+    with pytest.raises(ViewerError, match="cannot open a window"):
+        linger(output, window, recorded, threading.Event())
+
+
+@pytest.mark.parametrize("text", ["9876", "127.0.0.1:", "127.0.0.1:99999", ":x"])
+def test_an_address_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(ViewerError, match="must be HOST:PORT"):
+        Output.of(None, text)

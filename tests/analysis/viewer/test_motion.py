@@ -1,0 +1,49 @@
+"""Who the best is that a viewer is asked for."""
+
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from analysis.viewer.motion import best_ever, chosen
+from analysis.viewer.recording import ViewerError
+from schema.robot.names import BirthId
+from schema.tables.files import parquet_path
+from tests.analysis.tables import births, table
+
+
+def write(folder: Path, **rows: list[dict[str, Any]]) -> None:
+    for name in ("evaluations", "fitness"):
+        path = parquet_path(folder, "e", 0, name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        pq.write_table(table(name, rows.get(name, [])), path)
+
+
+def test_the_best_is_the_first_of_the_fittest_ever_judged(tmp_path: Path) -> None:
+    fitness = (0.1, 0.5, None, 0.5, 0.3)
+    judged = [{"birth": n, "fitness": value} for n, value in enumerate(fitness)]
+    young = {"birth": 7, "fitness": 0.9, "is_mature": False}
+    write(tmp_path, evaluations=judged, fitness=[young])
+    assert best_ever(tmp_path) == (BirthId(0, 1), 0.5)
+    grown = {"birth": 8, "island": 1, "fitness": 0.8, "is_mature": True}
+    write(tmp_path, evaluations=judged, fitness=[young, grown])
+    assert best_ever(tmp_path) == (BirthId(1, 8), 0.8)
+
+
+def test_where_nobody_was_judged_there_is_no_best(tmp_path: Path) -> None:
+    write(tmp_path)
+    with pytest.raises(ViewerError, match="nobody has been judged yet"):
+        best_ever(tmp_path)
+
+
+def test_ancestry_goes_back_by_first_parents_each_once(tmp_path: Path) -> None:
+    path = parquet_path(tmp_path, "e", 0, "births")
+    path.parent.mkdir(parents=True)
+    a, b, c, d = ((0, number) for number in range(4))
+    pq.write_table(births((a, []), (b, []), (c, [b, a]), (d, [c, a])), path)
+    names = [BirthId(*each) for each in (d, c, a)]
+    found = chosen(tmp_path, names, has_ancestry=True)
+    assert found == [BirthId(*each) for each in (d, c, b, a)]
+    with pytest.raises(ViewerError, match="0:9: nobody of that name"):
+        chosen(tmp_path, [BirthId(0, 9)], has_ancestry=False)

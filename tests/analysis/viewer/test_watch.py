@@ -1,0 +1,99 @@
+"""Watching a run: how far it is, and where the recording went."""
+
+import threading
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from analysis.viewer.live import Ended, Told
+from analysis.viewer.output import Output
+from analysis.viewer.watch import Spectator, watch
+from schema.errors import NetworkError
+from schema.experiment.file import experiment_text, read_experiment
+from schema.robot.names import BirthId
+from schema.wire.news import Newborn, News
+
+
+def news(sequence: int, *births: tuple[int, int]) -> News:
+    """Return news of births, by island and number."""
+    born = tuple(
+        Newborn(BirthId(island, number), (), 1, number + 1, None, None)
+        for island, number in births
+    )
+    return News("a/run", 1, sequence, is_whole=False, experiment="e", births=born)
+
+
+WHOLE = replace(
+    news(1, (0, 0), (0, 1)),
+    is_whole=True,
+    document=experiment_text(read_experiment("scenario1")),
+)
+
+
+class Source:
+    """Tells what it is given, bit by bit; then somebody stops the viewer, or not."""
+
+    def __init__(self, stop: threading.Event, *told: Told) -> None:
+        self._told = list(told)
+        self._stop = stop
+
+    def receive(self, *_: float) -> list[Told]:
+        if not self._told:
+            self._stop.set()
+        return [self._told.pop(0)] if self._told else []
+
+
+def seen(file: Path, *told: Told) -> None:
+    stop = threading.Event()
+    source: Any = Source(stop, *told)
+    watch(source, Output(file, None, has_window=False), None, stop)
+
+
+@pytest.mark.parametrize("end", [(), (Ended(),)])
+def test_how_far_it_is_and_where_the_recording_is_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], end: tuple[Ended, ...]
+) -> None:
+    file = tmp_path / "my run.rrd"
+    seen(file, WHOLE, news(2, (0, 2)), *end)
+    told = capsys.readouterr()
+    saved = f"saved {file}; to look: rerun '{file}'"
+    assert told.err.splitlines() == [
+        "watching e-run: 2 births so far",
+        *(["the run has ended"] if end else []),
+        saved,
+    ]
+    assert not told.out
+    assert file.stat().st_size > 0
+
+
+def test_that_nothing_was_saved_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "a.rrd"
+    seen(file)
+    why = f"stopped before a run was told of: no {file} is written\n"
+    assert capsys.readouterr().err == why
+    assert not file.exists()
+
+
+def test_who_waits_for_a_run_is_told_so_once(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    times = iter([0.0, 0.0, 1.0, 2.5, 3.0, 16.0])
+    clock = SimpleNamespace(monotonic=lambda: next(times))
+    monkeypatch.setattr("analysis.viewer.watch.time", clock)
+    with pytest.raises(NetworkError, match="does not tell of a run"):
+        seen(tmp_path / "a.rrd", *[news(number) for number in range(5)])
+    assert capsys.readouterr().err == "waiting to be told of a run\n"
+
+
+def test_births_count_once_on_every_island() -> None:
+    ignored: Any = type("Show", (), {"tell": lambda *_: None})()
+    spectator = Spectator(ignored, "a/run")
+    spectator.tell([WHOLE, news(2, (1, 0), (0, 2)), news(2, (1, 0), (0, 2)), news(3)])
+    assert spectator.births == 4

@@ -1,0 +1,329 @@
+"""An arena by hand: founders, births, culls, samples, ends; every rule once."""
+
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import pytest
+
+from coordinator.arena.arena import Arena
+from coordinator.islands.events import (
+    Advanced,
+    AdvanceShard,
+    ArenaEvent,
+    Finish,
+    Started,
+    Vet,
+    Vetted,
+    VettingFailed,
+)
+from schema.errors import ExperimentError, UnexpectedEvent
+from schema.experiment.document import Experiment
+from schema.experiment.file import read_experiment
+from schema.robot.names import BirthId
+from schema.tables.columns import TABLES
+from schema.wire.arena import Advance
+from tests.coordinator.arena_world import (
+    CROWDED,
+    DT,
+    SOMEBODY,
+    VIABLE,
+    Life,
+    World,
+    equal,
+    experiment,
+    golden,
+    picky,
+    viable,
+)
+
+
+def life(births: int = 3000, *, world: World | None = None) -> Life:
+    return Life(Arena(experiment(births), 1, 0), world or World())
+
+
+def numbers(rows: list[dict[str, int]]) -> list[int]:
+    return [row["birth"] for row in rows]
+
+
+def test_founders_come_one_a_second_the_last_made_first() -> None:
+    lived = life().live(14.9)
+    vets = [one for one in lived.commands if isinstance(one, Vet)]
+    assert [one.birth.number for one in vets] == list(range(15))
+    advances = lived.advances
+    inserted = [one.changes.insertions for one in advances]
+    assert [each.birth.number for (each,) in inserted] == list(range(14, -1, -1))
+    assert [one.number for one in advances] == list(range(15))
+    assert [one.until for one in advances] == [*range(200, 3000, 200), 3000]
+    times = [row["sim_time_s"] for row in lived.rows("births")]
+    assert times == [float(second) for second in range(15)]
+    assert not lived.rows("fitness")
+    assert not lived.rows("deaths")
+
+
+def test_population_rows_stand_at_every_birth() -> None:
+    lived = life().live(46)
+    alive: dict[int, list[int]] = {}
+    for row in lived.rows("population"):
+        alive.setdefault(row["births"], []).append(row["birth"])
+    assert list(alive) == list(range(1, 18))
+    assert alive[1] == [14]
+    assert alive[3] == [12, 13, 14]
+    assert alive[17] == list(range(17))
+    newborn = [row for row in lived.rows("population") if row["births"] == 17]
+    assert [row["fitness"] for row in newborn] == [*([0.1] * 16), None]
+
+
+def test_an_arena_of_equals_fills_up_and_is_culled() -> None:
+    """The sixteenth is born at 30 s, the thirtieth at 240 s; 9 of 30 stay at 270 s."""
+    lived = life().live(286)
+    times = {row["birth"]: row["sim_time_s"] for row in lived.rows("births")}
+    assert [times[number] for number in (15, 16, 29)] == [30.0, 45.0, 240.0]
+    deaths = lived.rows("deaths")
+    assert numbers(deaths) == list(range(29, 8, -1))
+    assert {(row["sim_time_s"], row["reason"]) for row in deaths} == {(270.0, "cull")}
+    # The slots of 255 s and 270 s found the arena full.
+    assert times[30] == 285.0
+    at_270 = [one for one in lived.advances if one.changes.removals]
+    assert [one.until for one in at_270] == [55000]
+    assert len(at_270[0].changes.removals) == 21
+
+
+def test_the_unfit_die_by_the_mean_of_the_mature() -> None:
+    """Of 0..14 the mean is 7, and 0..4 are below 0.7 x 7 = 4.9."""
+    lived = life(world=World(lambda birth, _: birth.number / 100.0)).live(31)
+    deaths = lived.rows("deaths")
+    assert numbers(deaths) == [0, 1, 2, 3, 4]
+    assert {(row["sim_time_s"], row["reason"]) for row in deaths} == {
+        (30.0, "selection")
+    }
+    # The child of that step came into the world that they had left.
+    (changes,) = [one.changes for one in lived.advances if one.changes.removals]
+    assert changes.removals == tuple(BirthId(0, number) for number in range(5))
+    assert [each.birth.number for each in changes.insertions] == [15]
+    alive = [row["birth"] for row in lived.rows("population") if row["births"] == 16]
+    assert alive == list(range(5, 16))
+
+
+def test_eight_always_stay_and_the_least_fit_go() -> None:
+    """14 of 15 are below the mean's share, but only 7 may go (trap B11)."""
+
+    def fit(birth: BirthId, _step: int) -> float:
+        return 1.0 if birth.number == 0 else birth.number * 7 % 15 / 1000
+
+    lived = life(world=World(fit)).live(31)
+    order = sorted(range(1, 15), key=lambda number: number * 7 % 15)
+    assert numbers(lived.rows("deaths")) == order[:7]
+
+
+def test_every_living_robot_is_sampled_every_five_seconds() -> None:
+    lived = life().live(46)
+    rows = lived.rows("fitness")
+    assert sorted({row["sim_time_s"] for row in rows}) == [
+        15.0, 20.0, 25.0, 30.0, 35.0, 40.0, 45.0,
+    ]  # fmt: skip
+    at_45 = [row for row in rows if row["sim_time_s"] == 45.0]
+    assert numbers(at_45) == list(range(16))
+    assert {row["births"] for row in at_45} == {16}
+    assert at_45[14] == {
+        "island": 0, "birth_island": None, "birth": 14,
+        "sim_time_s": 45.0, "births": 16, "age_s": 45.0,
+        "path_velocity": 0.0, "straight_velocity": 0.02, "fitness": 0.1,
+        "is_mature": True,
+    }  # fmt: skip
+    assert (at_45[15]["age_s"], at_45[15]["is_mature"]) == (15.0, True)
+
+
+def test_no_slot_before_five_are_mature() -> None:
+    lived = life().live(15)
+    before = len(lived.commands)
+    lived.live(29.9)
+    assert not [one for one in lived.commands[before:] if isinstance(one, Vet)]
+    lived.live(30)
+    assert isinstance(lived.commands[-1], Vet | AdvanceShard)
+    assert numbers(lived.rows("births"))[15:] == [15]
+
+
+def test_only_the_mature_have_children() -> None:
+    lived = life(60, world=World(golden)).live()
+    times = {row["birth"]: row["sim_time_s"] for row in lived.rows("births")}
+    ranks = {row["birth"]: row["rank"] for row in lived.rows("births")}
+    for row in lived.rows("births")[15:]:
+        parents = [parent["birth"] for parent in row["parents"]]
+        assert len(set(parents)) == 2
+        assert all(row["sim_time_s"] - times[one] >= 15.0 for one in parents)
+        assert row["rank"] == 1 + max(ranks[one] for one in parents)
+        assert row["generation"] is None
+    for row in lived.rows("deaths"):
+        assert row["sim_time_s"] - times[row["birth"]] >= 15.0
+
+
+def test_a_couple_gives_up_after_five_attempts_and_its_slot_is_lost() -> None:
+    def stubborn(vet: Vet) -> Vetted:
+        is_child = vet.birth.number >= 15
+        refused = is_child and vet.attempt < 7
+        return Vetted(vet.birth, vet.attempt, CROWDED if refused else VIABLE)
+
+    lived = Life(Arena(experiment(), 1, 0), verdict=stubborn).live(46)
+    vets = [one for one in lived.commands if isinstance(one, Vet)][15:]
+    assert [one.birth.number for one in vets] == [15] * len(vets)
+    attempts = [one.attempt for one in vets]
+    assert attempts == sorted(set(attempts))
+    (born,) = lived.rows("births")[15:]
+    assert (born["birth"], born["sim_time_s"]) == (15, 45.0)
+    assert born["attempts"] == attempts[-1] + 1 >= 8
+    assert [one.attempt for one in vets if one.attempt < 5]
+
+
+def test_the_end_is_the_slot_that_finds_all_births_done() -> None:
+    lived = life(16).live()
+    assert lived.arena.births == 16
+    assert lived.arena.step == 9000
+    assert lived.commands[-1] == Finish(0)
+    assert lived.is_done
+    assert not lived.arena.is_extinct
+    assert lived.advances[-1].until == 9000
+    assert max(row["sim_time_s"] for row in lived.rows("fitness")) == 45.0
+
+
+def test_snapshots_are_wanted_every_hundred_seconds() -> None:
+    lived = life().live(310)
+    wanted = [one.until for one in lived.advances if one.wants_snapshot]
+    assert wanted == [20000, 40000, 60000]
+
+
+def test_a_fallen_robot_is_a_death_with_its_reason() -> None:
+    def falls(birth: BirthId, step: int) -> bool:
+        return birth.number == 3 and step == 4000
+
+    lived = life(world=World(falls=falls)).live(31)
+    (death,) = lived.rows("deaths")
+    x, y = lived.world.places[BirthId(0, 3)]
+    assert death == {
+        "island": 0, "birth_island": None, "birth": 3,
+        "sim_time_s": pytest.approx(19.995), "births": 15,
+        "reason": "diverged", "detail": "diverged: qacc", "x": x, "y": y, "z": 0.5,
+    }  # fmt: skip
+    assert 3 not in [one.birth.number for one in lived.arena.population]
+    assert not any(one.changes.removals for one in lived.advances)
+    at_20 = [row for row in lived.rows("fitness") if row["sim_time_s"] == 20.0]
+    assert len(at_20) == 14
+
+
+def test_an_arena_in_which_too_few_are_left_to_mate_is_done() -> None:
+    def falls(birth: BirthId, step: int) -> bool:
+        return birth.number >= 4 and step == 4000
+
+    lived = life(world=World(falls=falls)).live()
+    assert lived.arena.is_extinct
+    assert lived.is_done
+    assert lived.arena.step == 6000
+    assert len(lived.arena.population) == 4
+
+
+def test_touches_and_poses_go_through() -> None:
+    lived = life().live(15)
+    assert {append.table for append in lived.bulk} == {"poses"}
+    assert [append.rows for append in lived.bulk] == [*range(1, 16)]
+    row = lived.rows("touches")[0]
+    assert row == {
+        "island": 0, "birth_island": None, "birth": 13,
+        "other_island": 0, "other_birth": 14,
+        "sim_time_s": 2.0, "over_s": 1.0, "duration_s": 0.25,
+    }  # fmt: skip
+
+
+def test_rows_have_the_columns_of_their_tables() -> None:
+    lived = life(40, world=World(golden)).live()
+    for name in ("births", "population", "fitness", "deaths", "touches"):
+        rows = lived.rows(name)
+        assert rows
+        for row in rows:
+            assert [*sorted(["record", *row])] == sorted(TABLES[name].names)
+
+
+def advanced(step: int, number: int) -> Advanced:
+    return Advanced(0, number, Advance(step, bytes(32), (), (), (), b""), 0, SOMEBODY)
+
+
+def test_an_old_advance_is_ignored() -> None:
+    lived = life().live(20)
+    told = [one for one in lived.events if isinstance(one, Advanced)]
+    for event in told:
+        assert lived.arena.handle(event) == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"number": 99},
+        {"island": 1},
+        {"number": -1},
+        {"step": 3999},
+        {"judgements": ()},
+        {"fitness": float("nan")},
+    ],
+)
+def test_a_wrong_advance_raises_and_changes_nothing(change: dict[str, Any]) -> None:
+    lived, undisturbed = life(20).live(20), life(20).live()
+    right = lived.world.advance(lived.waiting[0])  # type: ignore[arg-type]
+    advance = right.advance
+    if "fitness" in change:
+        judged = tuple(replace(one, **change) for one in advance.judgements)
+        wrong = replace(right, advance=replace(advance, judgements=judged))
+    elif "step" in change or "judgements" in change:
+        wrong = replace(right, advance=replace(advance, **change))
+    else:
+        wrong = replace(right, **change)
+    with pytest.raises(UnexpectedEvent, match=r"arena 0 at step .* born"):
+        lived.arena.handle(wrong)
+    lived.waiting.clear()
+    lived.tell(right)
+    assert lived.live().commands == undisturbed.commands
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        Started(),
+        Vetted(BirthId(0, 15), 0, VIABLE),
+        Vetted(BirthId(1, 3), 0, VIABLE),
+        VettingFailed(BirthId(0, 2**40), 0, "x"),
+        advanced(200, 0),
+    ],
+)
+def test_what_was_never_asked_raises(event: ArenaEvent) -> None:
+    lived = life()
+    lived.tell(Started())
+    with pytest.raises(UnexpectedEvent):
+        lived.arena.handle(event)
+
+
+def test_nothing_comes_before_the_start() -> None:
+    with pytest.raises(UnexpectedEvent, match="has not started"):
+        life().arena.handle(viable(Vet(BirthId(0, 0), 0, None)))  # type: ignore[arg-type]
+
+
+def test_verdicts_that_come_twice_are_ignored() -> None:
+    lived = Life(Arena(experiment(20), 1, 0), verdict=picky).live()
+    verdicts = [one for one in lived.events if isinstance(one, Vetted | VettingFailed)]
+    assert len(verdicts) > 20
+    assert all(lived.arena.handle(one) == [] for one in verdicts)
+
+
+def test_an_off_line_experiment_has_no_arena() -> None:
+    with pytest.raises(ExperimentError, match=r"has no \[arena\]"):
+        Arena(read_experiment("scenario1"), 1, 0)
+
+
+def without_reproduction() -> Experiment:
+    base = experiment(20)
+    selection = msgspec.structs.replace(base.selection, parents="none")
+    return msgspec.structs.replace(base, selection=selection)
+
+
+def test_children_may_be_random_robots() -> None:
+    lived = Life(Arena(without_reproduction(), 1, 0), World(equal)).live()
+    assert all(row["parents"] == [] for row in lived.rows("births"))
+    # Nobody needs to be mature for it: the first comes at 15 s.
+    assert lived.rows("births")[15]["sim_time_s"] == 15.0 == 3000 * DT

@@ -1,0 +1,129 @@
+"""What holds of every arena, whatever its world does."""
+
+import random
+from collections.abc import Iterator
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coordinator.arena.arena import Arena
+from coordinator.islands.events import (
+    Advanced,
+    AdvanceShard,
+    Append,
+    ArenaCommand,
+    Commanded,
+    Pause,
+    Record,
+    Remove,
+    Resume,
+    Started,
+    Vetted,
+    VettingFailed,
+)
+from coordinator.storage.entries import decode_entry, encode_entry
+from schema.robot.names import BirthId
+from tests.coordinator.arena_world import DT, Life, World, experiment, golden, picky
+
+fixed = settings(max_examples=12, derandomize=True, database=None, deadline=None)
+
+
+def shuffled(seed: int) -> Iterator[int]:
+    rng = random.Random(seed)  # noqa: S311 - the order of a test, not a secret
+    while True:
+        yield rng.randrange(10)
+
+
+def said(commands: list[ArenaCommand]) -> list[ArenaCommand]:
+    """Return what was decided; questions about bodies may come in any order."""
+    return [one for one in commands if isinstance(one, AdvanceShard | Record | Append)]
+
+
+@given(seed=st.integers(0, 2**32))
+@fixed
+def test_the_order_of_verdicts_does_not_matter(seed: int) -> None:
+    one = Life(Arena(experiment(40), 7, 0), World(golden), picky).live()
+    other = Life(
+        Arena(experiment(40), 7, 0), World(golden), picky, order=shuffled(seed)
+    ).live()
+    assert said(one.commands) == said(other.commands)
+
+
+@given(
+    luck=st.integers(0, 2**32),
+    limit=st.integers(15, 30),
+    floor=st.integers(5, 15),
+    share=st.floats(0.0, 1.5),
+)
+@fixed
+def test_floor_and_limit_hold_in_every_world(
+    luck: int, limit: int, floor: int, share: float
+) -> None:
+    def fit(birth: BirthId, step: int) -> float:
+        return random.Random(f"{luck} {birth} {step}").random()  # noqa: S311
+
+    def falls(birth: BirthId, step: int) -> bool:
+        return random.Random(f"{birth} {step} {luck}").random() < 0.002  # noqa: S311
+
+    rules = {
+        "population_limit": limit,
+        "population_floor": floor,
+        "survive_share_of_mean": share,
+    }
+    lived = Life(Arena(experiment(45, **rules), 3, 0), World(fit, falls), picky)
+    while not lived.commands or lived.waiting:
+        before = lived.arena.step
+        found = lived.turn() if lived.commands else lived.tell(Started())
+        assert len(lived.arena.population) <= limit
+        culled = [
+            one
+            for one in found
+            if isinstance(one, Record)
+            and one.table == "deaths"
+            and one.row["reason"] in ("selection", "cull")
+        ]
+        if culled:
+            assert lived.arena.step > before
+            since = {
+                one: lived.world.step - then for one, then in lived.world.born.items()
+            }
+            mature = [one for one, age in since.items() if age * DT >= 15.0]
+            assert len(mature) - len(culled) >= floor
+    assert lived.arena.births <= 45
+
+
+def test_a_replayed_journal_gives_the_same_commands_and_rows() -> None:
+    lived = Life(Arena(experiment(40), 7, 0), World(golden), picky).live(50)
+    for wanted in (Pause(), Remove(BirthId(0, 2)), Resume()):
+        identity = type(wanted).__name__
+        lived.tell(Commanded(0, identity, lived.arena.next_step, wanted))
+        if lived.waiting:
+            lived.turn()
+    lived.live()
+    kept = Advanced | Commanded | Vetted | VettingFailed
+    journal = [encode_entry(one) for one in lived.events if isinstance(one, kept)]
+    again = Arena(experiment(40), 7, 0)
+    commands = again.handle(Started())
+    for entry in journal:
+        event = decode_entry(entry)
+        assert isinstance(event, kept)
+        commands += again.handle(event)
+    assert len(commands) == len(lived.commands)
+    for one, other in zip(commands, lived.commands, strict=True):
+        if isinstance(other, Append):
+            assert one == Append(other.table, other.rows, b"")
+        else:
+            assert one == other
+
+
+def test_other_seeds_and_runs_give_other_places() -> None:
+    places = [
+        [
+            (row["x"], row["y"])
+            for row in Life(Arena(experiment(15), seed, run), World())
+            .live()
+            .rows("births")
+        ]
+        for seed, run in ((1, 0), (2, 0), (1, 1))
+    ]
+    assert len({tuple(each) for each in places}) == 3

@@ -1,0 +1,31 @@
+"""``revolve robot random``: founders on paper."""
+
+from pathlib import Path
+
+import pytest
+
+from coordinator.cli.robot import main
+from schema.formats.files import read_robot
+
+
+def test_files_hold_different_robots_and_the_same_ones_again(tmp_path: Path) -> None:
+    words = ["robot random", str(tmp_path / "r.yaml"), "--seed", "7", "--count", "2"]
+    assert main(words) == 0
+    robots = [read_robot(tmp_path / f"r-{number}.yaml") for number in range(2)]
+    assert robots[0] != robots[1]
+    assert all(len(robot.parts) >= 3 for robot in robots)
+    assert main(["robot random", str(tmp_path / "one.pb"), "--seed", "7"]) == 0
+    assert read_robot(tmp_path / "one.pb") == robots[0]
+
+
+@pytest.mark.parametrize(("flag", "value"), [("--seed", "-1"), ("--count", "1.5")])
+def test_numbers_that_cannot_be_are_refused(
+    flag: str, value: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["robot random", str(tmp_path / "r.yaml"), flag, value])
+    assert end.value.code == 2
+    assert (
+        f"{flag}: must be a whole number >= 0, got '{value}'" in capsys.readouterr().err
+    )
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,589 @@
+"""Who gets which job: every job once, whatever happens to whoever does it."""
+
+from itertools import count
+from random import Random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coordinator.dispatch.dispatch import MAX_DEATHS, MAX_ERRORS, VETS_AT_HAND, Dispatch
+from coordinator.dispatch.events import (
+    AgentKind,
+    Assign,
+    Cancel,
+    Deliver,
+    Died,
+    DispatchCommand,
+    DispatchEvent,
+    Job,
+    JobKind,
+    Joined,
+    Left,
+    Requested,
+    Returned,
+    Ticked,
+    Withdrawn,
+)
+from coordinator.dispatch.pool import LONGEST_REST_S, MOST_AHEAD, PAUSE_S, REST_S
+from coordinator.dispatch.stragglers import LEAST_S, PATIENCE
+from schema.errors import UnexpectedEvent
+from schema.robot.names import BirthId
+
+
+def job(number: int, kind: JobKind = "evaluate") -> Job:
+    return Job(number, kind, BirthId(0, number), 0, b"%d" % number)
+
+
+def worker(name: str, slots: int = 1) -> Joined:
+    return Joined(name, "worker", slots, "p")
+
+
+def ok(number: int, agent: str) -> Returned:
+    return Returned(number, agent, "ok", b"a%d" % number)
+
+
+def error(number: int, agent: str) -> Returned:
+    return Returned(number, agent, "error", reason=f"{agent} cannot")
+
+
+def lost(number: int, agent: str) -> Returned:
+    return Returned(number, agent, "lost")
+
+
+def died(number: int, agent: str, cause: str = "SIGSEGV") -> Died:
+    return Died("run", 1, number, agent, cause)
+
+
+def told(*events: DispatchEvent) -> Dispatch:
+    dispatch = Dispatch()
+    for event in events:
+        dispatch.handle(event)
+    return dispatch
+
+
+def given_out(commands: list[DispatchCommand]) -> list[tuple[int, str]]:
+    return [(c.job.number, c.agent) for c in commands if isinstance(c, Assign)]
+
+
+def requests(*numbers: int) -> list[Requested]:
+    return [Requested(job(number)) for number in numbers]
+
+
+def test_an_agent_holds_one_job_more_than_it_has_slots() -> None:
+    dispatch = told(*requests(0, 1, 2, 3, 4))
+    assert given_out(dispatch.handle(worker("w", slots=2))) == [
+        (0, "w"),
+        (1, "w"),
+        (2, "w"),
+    ]
+    assert dispatch.waiting("worker") == 2
+    assert given_out(dispatch.handle(ok(1, "w"))) == [(3, "w")]
+
+
+def busy_pair(
+    *job_s: float,
+) -> tuple[Dispatch, list[tuple[int, str]], list[tuple[int, str]]]:
+    """Return two workers who did a job each of 30, and what either answer set off.
+
+    Args:
+        job_s: how long the first worker and the second one were at it, ascending.
+    """
+    dispatch = told(Ticked(0.0), worker("a"), worker("b"), *requests(*range(30)))
+    assert dispatch.waiting("worker") == 26  # how long they take is not known yet
+    assert dispatch.leisure_s == 0.0
+    given = []
+    for number, (name, duration_s) in enumerate(zip("ab", job_s, strict=True)):
+        dispatch.handle(Ticked(duration_s))
+        given.append(given_out(dispatch.handle(ok(number, name))))
+    return dispatch, given[0], given[1]
+
+
+def test_short_jobs_are_given_ahead_while_many_wait() -> None:
+    dispatch, first, second = busy_pair(0.04, 0.04)
+    # One for the one that is done; then 25 wait, and a quarter of what still waits
+    # may be ahead at each: 5 of 20.
+    assert first == [(number, "a") for number in range(4, 10)]
+    # The same: 4 of 16.
+    assert second == [(number, "b") for number in range(10, 15)]
+    # Half of what the second has to spare takes 80 ms.
+    assert dispatch.leisure_s == pytest.approx(0.08)
+    dispatch.handle(Left("a"))
+    # The other had 7, and half of what waits may be ahead at the only one: 9 of 18.
+    held = dispatch._pools["worker"].agents["b"].held
+    assert (len(held), dispatch.waiting("worker")) == (2 + 9, 17)
+    assert dispatch.leisure_s == pytest.approx(0.18)
+    for event in requests(*range(30, 60)):
+        dispatch.handle(event)
+    assert len(held) == 2 + MOST_AHEAD
+    assert dispatch.leisure_s == PAUSE_S
+
+
+def test_a_slow_worker_is_given_no_more_ahead_than_it_can_do_soon() -> None:
+    dispatch, first, second = busy_pair(0.04, 0.5)
+    assert len(first) == 6
+    # One in the place of the one that is done, and what takes less than 0.8 s.
+    assert second == [(10, "b"), (11, "b")]
+    # The quick one, too, is done with 5 x 40 ms, and the slow one with 500 ms.
+    assert dispatch.leisure_s == pytest.approx(0.1)
+    # What the slow one has keeps nothing from the quick one.
+    for event in requests(*range(30, 90)):
+        dispatch.handle(event)
+    agents = dispatch._pools["worker"].agents
+    assert {name: len(agent.held) for name, agent in agents.items()} == {
+        "a": 2 + MOST_AHEAD,
+        "b": 2 + 1,
+    }
+
+
+def test_a_newcomer_is_given_nothing_ahead_before_it_did_a_job() -> None:
+    dispatch, *_ = busy_pair(0.04, 0.04)
+    dispatch.handle(worker("c"))
+    for event in requests(*range(30, 190)):
+        dispatch.handle(event)
+    agents = dispatch._pools["worker"].agents
+    assert [len(agents[name].held) for name in "abc"] == [18, 18, 2]
+    assert dispatch.leisure_s == 0.0
+
+
+def test_nothing_is_given_ahead_near_the_end() -> None:
+    dispatch, *_ = busy_pair(0.04, 0.04)
+    agents = dispatch._pools["worker"].agents
+    while dispatch.waiting("worker"):
+        name = max(agents, key=lambda each: len(agents[each].held))
+        dispatch.handle(ok(next(iter(agents[name].held)), name))
+    assert [len(agent.held) for agent in agents.values()] == [2, 2]
+    assert dispatch.leisure_s == 0.0
+
+
+def test_long_jobs_are_not_given_ahead() -> None:
+    dispatch, first, second = busy_pair(1.0, 1.0)
+    assert (first, second) == ([(4, "a")], [(5, "b")])
+    assert dispatch.leisure_s == 0.0
+
+
+def test_the_agent_with_the_least_to_do_comes_first_then_the_name() -> None:
+    dispatch = told(worker("b"), worker("a"), worker("c", slots=4))
+    out = [given_out(dispatch.handle(event)) for event in requests(*range(8))]
+    # c has four slots: one job there weighs a quarter.
+    assert [agent for ((_, agent),) in out] == ["a", "b", "c", "c", "c", "c", "a", "b"]
+
+
+def test_kinds_do_not_mix() -> None:
+    dispatch = told(Joined("an", "analyzer", 1, "p"))
+    assert given_out(dispatch.handle(Requested(job(0)))) == []
+    assert given_out(dispatch.handle(Requested(job(1, "vet")))) == [(1, "an")]
+    assert (dispatch.agents("worker"), dispatch.waiting("worker")) == (0, 1)
+
+
+def test_what_an_agent_held_goes_first_to_others() -> None:
+    dispatch = told(worker("a"), *requests(0, 1, 2, 3))
+    dispatch.handle(worker("b"))  # takes 2 and 3
+    assert given_out(dispatch.handle(Left("a"))) == []
+    assert given_out(dispatch.handle(ok(3, "b"))) == [(0, "b")]
+    assert given_out(dispatch.handle(ok(2, "b"))) == [(1, "b")]
+
+
+def test_lost_after_left_is_no_news() -> None:
+    dispatch = told(worker("a"), *requests(0), worker("b"))
+    assert given_out(dispatch.handle(Left("a"))) == [(0, "b")]
+    assert dispatch.handle(lost(0, "a")) == []
+    assert dispatch.handle(Left("a")) == []
+    assert dispatch.handle(ok(0, "b")) == [Deliver(job(0), "b", b"a0")]
+
+
+def test_an_agent_that_lost_a_job_rests_before_it_gets_it_back() -> None:
+    dispatch = told(Ticked(10.0), worker("a"), *requests(0))
+    assert dispatch.wake_s is None
+    assert dispatch.handle(lost(0, "a")) == []
+    assert dispatch.wake_s == pytest.approx(10.0 + REST_S)
+    assert dispatch.handle(Ticked(10.0 + 0.9 * REST_S)) == []
+    assert given_out(dispatch.handle(Ticked(10.0 + 1.1 * REST_S))) == [(0, "a")]
+
+
+def test_rests_grow_until_an_answer_comes() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
+    rests = []
+    for _ in range(9):
+        begin = dispatch._now_s
+        dispatch.handle(lost(0, "a"))
+        assert begin is not None
+        assert dispatch.wake_s is not None
+        rests.append(dispatch.wake_s - begin)
+        dispatch.handle(Ticked(dispatch.wake_s))
+    doubled = [min(REST_S * 2**k, LONGEST_REST_S) for k in range(9)]
+    assert rests == pytest.approx(doubled)
+    dispatch.handle(ok(0, "a"))
+    dispatch.handle(Requested(job(1)))
+    now_s = dispatch._now_s or 0.0
+    dispatch.handle(lost(1, "a"))
+    assert dispatch.wake_s == pytest.approx(now_s + REST_S)
+
+
+def test_a_job_that_fails_goes_to_another_agent_though_that_one_waits() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), worker("b"), *requests(0, 1, 2, 3))
+    # a holds 0 and 2, b holds 1 and 3 and has no credit.
+    assert dispatch.handle(error(0, "a")) == []
+    assert dispatch.handle(Ticked(9.0)) == []  # a is free again, but 0 avoids it
+    assert given_out(dispatch.handle(Requested(job(4)))) == [(4, "a")]
+    assert given_out(dispatch.handle(ok(1, "b"))) == [(0, "b")]
+
+
+def test_three_errors_are_delivered_with_the_last_reason() -> None:
+    dispatch = told(worker("a"), worker("b"), worker("c"), *requests(0))
+    assert given_out(dispatch.handle(error(0, "a"))) == [(0, "b")]
+    assert given_out(dispatch.handle(error(0, "b"))) == [(0, "c")]
+    assert dispatch.handle(error(0, "c")) == [Deliver(job(0), "c", b"", "c cannot")]
+    assert dispatch.pending == 0
+
+
+def test_a_lonely_agent_is_asked_again() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
+    delivered: list[DispatchCommand] = []
+    for tries in range(1, MAX_ERRORS + 1):
+        delivered = dispatch.handle(error(0, "a"))
+        assert given_out(dispatch.handle(Ticked(10.0 * tries))) == (
+            [(0, "a")] if tries < MAX_ERRORS else []
+        )
+    assert delivered == [Deliver(job(0), "a", b"", "a cannot")]
+
+
+def test_losses_never_end_a_job() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
+    for tries in range(1, 20):
+        assert dispatch.handle(lost(0, "a")) == []
+        assert given_out(dispatch.handle(Ticked(10.0 * tries))) == [(0, "a")]
+
+
+def test_answers_that_nobody_waits_for_change_nothing() -> None:
+    dispatch = told(worker("a"), *requests(0))
+    assert dispatch.handle(ok(7, "a")) == []
+    assert dispatch.handle(ok(0, "b")) == []
+    assert len(dispatch.handle(ok(0, "a"))) == 1
+    assert dispatch.handle(ok(0, "a")) == []
+
+
+def test_twice_the_same_is_once() -> None:
+    dispatch = told(worker("a"), *requests(0))
+    assert dispatch.handle(worker("a")) == []
+    assert dispatch.handle(Requested(job(0))) == []
+    assert dispatch.handle(Left("nobody")) == []
+    assert (dispatch.pending, dispatch.agents("worker")) == (1, 1)
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        Requested(job(4)),
+        Requested(job(5, "vet")),
+        worker("b", slots=0),
+        worker("a", slots=3),
+        Joined("a", "analyzer", 1, "p"),
+        Ticked(0.5),
+    ],
+)
+def test_what_cannot_be_changes_nothing(event: DispatchEvent) -> None:
+    dispatch = told(Ticked(1.0), worker("a"), Requested(job(5)))
+    with pytest.raises(UnexpectedEvent):
+        dispatch.handle(event)
+    assert dispatch.handle(ok(5, "a")) == [Deliver(job(5), "a", b"a5")]
+    assert dispatch.pending == 0
+
+
+def late(typical_s: float = 0.5) -> Dispatch:
+    """Return a machine whose worker a is late with 1, while b has nothing to do."""
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0), Ticked(typical_s))
+    dispatch.handle(ok(0, "a"))
+    for request in requests(1, 2):
+        dispatch.handle(request)
+    dispatch.handle(worker("b"))
+    return dispatch
+
+
+@pytest.mark.parametrize(("typical_s", "patience_s"), [(0.01, LEAST_S), (0.5, 2.0)])
+def test_a_late_job_gets_a_second_copy_where_somebody_is_idle(
+    typical_s: float, patience_s: float
+) -> None:
+    assert PATIENCE == 4.0
+    dispatch = late(typical_s)
+    almost_s = typical_s + patience_s
+    assert given_out(dispatch.handle(Ticked(almost_s))) == []
+    # The oldest first; nobody is idle for the second.
+    assert given_out(dispatch.handle(Ticked(almost_s + 0.3))) == [(1, "b")]
+    assert given_out(dispatch.handle(Ticked(almost_s + 9.0))) == []
+
+
+def test_who_answers_first_is_heard_and_the_other_may_stop() -> None:
+    dispatch = late()
+    dispatch.handle(Ticked(9.0))
+    first = dispatch.handle(ok(1, "b"))
+    assert first == [Deliver(job(1), "b", b"a1"), Cancel(job(1), "a")]
+    assert given_out(dispatch.handle(Ticked(19.0))) == [(2, "b")]
+    # The loser keeps its credit busy until it has answered, too; then it is free.
+    assert given_out(dispatch.handle(Requested(job(3)))) == [(3, "b")]
+    assert dispatch.handle(Requested(job(4))) == []
+    assert given_out(dispatch.handle(error(1, "a"))) == [(4, "a")]
+    assert dispatch.wake_s is None
+
+
+@pytest.mark.parametrize(
+    ("who", "job_s"),
+    # The first did a job in 0.5 s before and has had this one for 9.5 s; the second
+    # has had its copy for 1 s.
+    [("a", 0.9 * 0.5 + 0.1 * 9.5), ("b", 1.0)],
+)
+def test_of_two_at_a_job_each_tells_of_its_own_time(who: str, job_s: float) -> None:
+    dispatch = late()
+    dispatch.handle(Ticked(9.0))
+    dispatch.handle(Ticked(10.0))
+    dispatch.handle(ok(1, who))
+    learned = dispatch._pools["worker"].agents[who].job_s
+    assert learned == pytest.approx(job_s)
+
+
+def test_a_copy_survives_the_loss_of_the_other() -> None:
+    for gone in ("a", "b"):
+        dispatch = late()
+        dispatch.handle(Ticked(9.0))
+        dispatch.handle(Left(gone))
+        (other,) = {"a", "b"} - {gone}
+        assert dispatch.handle(ok(1, other))[0] == Deliver(job(1), other, b"a1")
+
+
+def test_nobody_is_given_a_copy_of_what_it_has_or_failed_at() -> None:
+    dispatch = late()
+    dispatch.handle(Ticked(9.0))
+    assert given_out(dispatch.handle(lost(1, "b"))) == []
+    assert given_out(dispatch.handle(Ticked(99.0))) == [(2, "b")]
+    assert dispatch.handle(ok(2, "b"))[0] == Deliver(job(2), "b", b"a2")
+    assert given_out(dispatch.handle(Ticked(199.0))) == []
+
+
+def test_a_job_that_ends_three_processes_is_given_to_nobody_more() -> None:
+    dispatch = told(worker("a"), worker("b"), *requests(0))
+    for number, name in enumerate(("a", "b")):
+        assert given_out(dispatch.handle(Left(name))) == [(0, "b")][number:]
+        assert dispatch.handle(died(0, name)) == []
+    assert dispatch.handle(died(0, "a")) == []  # told twice
+    assert given_out(dispatch.handle(worker("c"))) == [(0, "c")]
+    dispatch.handle(Left("c"))
+    reason = "ended its own process 3 times, by SIGPROF, SIGSEGV"
+    assert dispatch.handle(died(0, "c", "SIGPROF")) == [
+        Deliver(job(0), "c", b"", reason, is_deadly=True)
+    ]
+    assert dispatch.pending == dispatch.waiting("worker") == 0
+    assert dispatch.handle(died(0, "d")) == []
+
+
+def test_who_is_at_a_deadly_job_may_stop() -> None:
+    dispatch = told(worker("z"), *requests(0))
+    commands = [dispatch.handle(died(0, name)) for name in ("a", "b", "c")]
+    assert commands[2][1:] == [Cancel(job(0), "z")]
+
+
+def test_twins_go_to_two_workers_if_there_are_two() -> None:
+    first = Job(1, "evaluate", BirthId(0, 1), 0, b"1", twin=2)
+    second = Job(2, "evaluate", BirthId(0, 1), 0, b"2", twin=1)
+    dispatch = told(worker("a"))
+    assert given_out(dispatch.handle(Requested(first))) == [(1, "a")]
+    assert given_out(dispatch.handle(Requested(second))) == [(2, "a")]
+    dispatch = told(worker("a"), worker("b", 3), Requested(first))
+    assert given_out(dispatch.handle(Requested(second))) == [(2, "b")]
+    assert given_out(dispatch.handle(Left("a"))) == [(1, "b")]
+    dispatch.handle(worker("c"))
+    dispatch.handle(ok(1, "b"))
+    # c did neither of them yet.
+    assert given_out(dispatch.handle(lost(2, "b"))) == [(2, "c")]
+    dispatch.handle(ok(2, "c"))
+    assert len(dispatch._twins) == 0
+
+
+class World:
+    """All that can happen to jobs, and what must hold after each step."""
+
+    def __init__(self, seed: int) -> None:
+        self.dispatch = Dispatch()
+        self.random = Random(seed)  # noqa: S311 - a story, no secret
+        self.names = count()
+        self.numbers = count()
+        self.now_s = 0.0
+        self.jobs: dict[int, Job] = {}
+        self.delivered: dict[int, Deliver] = {}
+        self.withdrawn: set[int] = set()
+        self.errors: dict[int, int] = {}
+        self.killed: dict[int, list[str]] = {}
+        self.agents: dict[str, Joined] = {}
+        self.held: dict[str, list[int]] = {}
+        self.past: list[DispatchEvent] = []
+
+    def tell(self, event: DispatchEvent) -> None:
+        for command in self.dispatch.handle(event):
+            number, agent = command.job.number, command.agent
+            if isinstance(command, Deliver):
+                assert number not in {*self.delivered, *self.withdrawn}
+                self.delivered[number] = command
+                continue
+            if isinstance(command, Cancel):
+                assert number in {*self.delivered, *self.withdrawn}
+                assert number in self.held[agent]
+                continue
+            assert number not in {*self.delivered, *self.withdrawn}
+            assert sum(number in held for held in self.held.values()) < 2
+            assert number not in self.held[agent]
+            kind: AgentKind = "analyzer" if command.job.kind == "vet" else "worker"
+            assert self.agents[agent].kind == kind
+            self.held[agent].append(number)
+            at_hand = VETS_AT_HAND if kind == "analyzer" else 1
+            most = self.agents[agent].slots + at_hand + MOST_AHEAD
+            assert len(self.held[agent]) <= most
+        self.past.append(event)
+        self.check()
+
+    def check(self) -> None:
+        """Hold the machine's books against the world's."""
+        inside = self.dispatch
+        ended = len(self.delivered) + len(self.withdrawn)
+        assert inside.pending == len(self.jobs) - ended
+        for kind, pool in inside._pools.items():
+            names = [n for n, joined in self.agents.items() if joined.kind == kind]
+            assert sorted(pool.agents) == sorted(names)
+            for name in names:
+                assert sorted(pool.agents[name].held) == sorted(self.held[name])
+            held = [number for name in names for number in self.held[name]]
+            assert len(set(pool.waiting)) == len(pool.waiting)
+            assert not set(pool.waiting) & set(held)
+            assert len(pool.free) <= 4 * len(pool.agents) + 65
+            if pool.waiting and (name := pool.best()):
+                # Credit and work: only a job that avoids all with credit waits.
+                assert all(inside._jobs[n].avoid for n in pool.waiting)
+
+    def request(self) -> None:
+        number = next(self.numbers)
+        self.jobs[number] = job(number, self.random.choice(("vet", "evaluate")))
+        self.tell(Requested(self.jobs[number]))
+
+    def withdraw(self) -> None:
+        """Nobody wants a job more that may be waiting, out, or long done."""
+        if self.jobs:
+            number = self.random.choice(sorted(self.jobs))
+            if number not in self.delivered:
+                self.withdrawn.add(number)
+            self.tell(Withdrawn(number))
+
+    def join(self) -> None:
+        kind: AgentKind = self.random.choice(("worker", "analyzer"))
+        name = f"{kind}-{next(self.names)}"
+        self.enter(Joined(name, kind, self.random.randint(1, 3), "p"))
+
+    def enter(self, joined: Joined) -> None:
+        self.agents[joined.agent] = joined
+        self.held[joined.agent] = []
+        self.tell(joined)
+
+    def leave(self) -> None:
+        if self.agents:
+            name = self.random.choice(sorted(self.agents))
+            joined = self.agents.pop(name)
+            held = self.held.pop(name)
+            self.tell(Left(name))
+            for number in held:  # the news of each comes after that of the whole
+                self.tell(lost(number, name))
+            if self.random.random() < 0.3:  # a thawed one comes back
+                self.enter(joined)
+
+    def answer(self) -> None:
+        self.give_back("ok")
+
+    def give_back(self, outcome: str) -> None:
+        busy = sorted(name for name, held in self.held.items() if held)
+        if not busy:
+            return
+        name = self.random.choice(busy)
+        held = self.held[name]
+        number = held.pop(self.random.randrange(len(held)))
+        if outcome == "error" and number not in self.delivered:
+            self.errors[number] = self.errors.get(number, 0) + 1
+        made = {"ok": ok, "error": error, "lost": lost}[outcome]
+        self.tell(made(number, name))
+
+    def fail(self) -> None:
+        self.give_back("error")
+
+    def lose(self) -> None:
+        self.give_back("lost")
+
+    def die(self) -> None:
+        """Somebody died of a job that may be long done."""
+        if self.jobs:
+            number = self.random.choice(sorted(self.jobs))
+            self.killed.setdefault(number, []).append(f"dead-{next(self.names)}")
+            self.tell(died(number, self.killed[number][-1]))
+
+    def tick(self) -> None:
+        self.now_s += self.random.choice((0.1, 0.3, 3.0))
+        self.tell(Ticked(self.now_s))
+
+    def repeat(self) -> None:
+        """A message of the past once more, if its sender is not asked just now."""
+        event = self.random.choice(self.past) if self.past else Left("nobody")
+        if isinstance(event, Returned) and event.number not in self.held.get(
+            event.agent, ()
+        ):
+            self.tell(event)
+
+    def finish(self) -> None:
+        """Let one good agent of each kind join, and time pass."""
+        self.enter(Joined("z1", "worker", 1, "p"))
+        self.enter(Joined("z2", "analyzer", 1, "p"))
+        while self.dispatch.pending:
+            self.now_s += LONGEST_REST_S
+            self.tell(Ticked(self.now_s))
+            self.answer()
+
+
+ACTIONS = ["request"] * 3 + [
+    "withdraw",
+    "join",
+    "leave",
+    "answer",
+    "fail",
+    "lose",
+    "die",
+    "tick",
+    "tick",
+    "repeat",
+]
+
+
+@settings(derandomize=True, max_examples=150, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    actions=st.lists(st.sampled_from(ACTIONS), max_size=120),
+)
+def test_each_job_is_delivered_once_whatever_happens(
+    seed: int, actions: list[str]
+) -> None:
+    world = World(seed)
+    for action in actions:
+        getattr(world, action)()
+    world.finish()
+    assert sorted([*world.delivered, *world.withdrawn]) == sorted(world.jobs)
+    for number, delivered in world.delivered.items():
+        failed = world.errors.get(number, 0) == MAX_ERRORS
+        assert delivered.job == world.jobs[number]
+        if delivered.is_deadly:
+            assert len(world.killed[number]) >= MAX_DEATHS
+            assert not failed
+            continue
+        assert bool(delivered.reason) == failed
+        assert delivered.answer == (b"" if failed else b"a%d" % number)
+
+
+def test_same_story_same_commands() -> None:
+    stories = []
+    for _ in range(2):
+        world = World(7)
+        for _ in range(300):
+            getattr(world, world.random.choice(ACTIONS))()
+        stories.append((world.past, world.held, list(world.delivered)))
+    assert stories[0] == stories[1]

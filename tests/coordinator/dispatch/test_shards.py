@@ -1,0 +1,217 @@
+"""Who gets which shard, event by event."""
+
+from itertools import count
+
+import pytest
+
+from coordinator.dispatch.events import (
+    Accept,
+    Came,
+    GiveUp,
+    Hand,
+    Joined,
+    Killed,
+    Left,
+    Placed,
+    Ticked,
+    Wanted,
+)
+from coordinator.dispatch.shards import DRIFT_S, MAX_ERRORS, ShardDispatch
+from schema.errors import UnexpectedEvent
+
+
+def joined(name: str, platform: str = "p", kind: str = "worker") -> Joined:
+    return Joined(name, kind, 1, platform)  # type: ignore[arg-type]
+
+
+def fleet(*names: str) -> ShardDispatch:
+    dispatch = ShardDispatch(count(1))
+    for name in names:
+        assert dispatch.handle(joined(name)) == []
+    return dispatch
+
+
+def test_first_advance_is_whole_and_the_next_goes_on() -> None:
+    dispatch = fleet("b", "a")
+    assert dispatch.handle(Wanted(0)) == [Hand(1, 0, "a", is_whole=True)]
+    assert dispatch.handle(Came(1, "done")) == [Accept(0, "a")]
+    assert dispatch.handle(Wanted(0)) == [Hand(2, 0, "a", is_whole=False)]
+
+
+def test_waits_for_a_worker() -> None:
+    dispatch = fleet()
+    assert dispatch.handle(Wanted(0)) == []
+    assert dispatch.waiting == {0: ""}
+    assert dispatch.handle(joined("x", kind="analyzer")) == []
+    assert dispatch.handle(joined("a")) == [Hand(1, 0, "a", is_whole=True)]
+    assert dispatch.waiting == {}
+
+
+def test_shards_spread_over_workers() -> None:
+    dispatch = fleet("a", "b")
+    agents = [dispatch.handle(Wanted(number))[0] for number in range(4)]
+    assert [hand.agent for hand in agents if isinstance(hand, Hand)] == list("abab")
+    assert dispatch.holder(2) == "a"
+
+
+def test_dead_holder_is_replaced_at_once_with_the_whole_state() -> None:
+    dispatch = fleet("a", "b")
+    dispatch.handle(Wanted(0))
+    assert dispatch.handle(Left("a")) == [Hand(2, 0, "b", is_whole=True)]
+    # Its own end as a job comes late and says nothing new.
+    assert dispatch.handle(Came(1, "lost")) == []
+    assert dispatch.handle(Came(1, "done")) == []
+    assert dispatch.handle(Came(2, "done")) == [Accept(0, "b")]
+
+
+def test_holder_that_dies_between_advances() -> None:
+    dispatch = fleet("a", "b")
+    dispatch.handle(Wanted(0))
+    dispatch.handle(Came(1, "done"))
+    assert dispatch.handle(Left("a")) == []
+    assert dispatch.handle(Wanted(0)) == [Hand(2, 0, "b", is_whole=True)]
+
+
+def test_one_that_has_not_the_state_is_given_it() -> None:
+    dispatch = fleet("a", "b")
+    dispatch.handle(Wanted(0))
+    dispatch.handle(Came(1, "done"))
+    dispatch.handle(Wanted(0))
+    assert dispatch.handle(Came(2, "stateless")) == [Hand(3, 0, "a", is_whole=True)]
+    # Asking again is an error.
+    assert dispatch.handle(Came(3, "stateless")) == []
+    assert dispatch.wake_s is not None
+    hands = dispatch.handle(Ticked(dispatch.wake_s))
+    assert hands == [Hand(4, 0, "b", is_whole=True)]
+
+
+@pytest.mark.parametrize("outcome", ["error", "lost"])
+def test_after_a_failure_another_one_has_its_turn(outcome: str) -> None:
+    dispatch = fleet("a", "b")
+    dispatch.handle(Ticked(10.0))
+    dispatch.handle(Wanted(0))
+    assert dispatch.handle(Came(1, outcome, "why")) == []  # type: ignore[arg-type]
+    assert dispatch.handle(Ticked(10.01)) == []
+    assert dispatch.handle(Ticked(10.05)) == [Hand(2, 0, "b", is_whole=True)]
+
+
+def test_an_advance_that_kills_three_is_given_up() -> None:
+    dispatch = fleet("a", "b", "c")
+    dispatch.handle(Wanted(0))
+    for number, name, following in ((1, "a", "b"), (2, "b", "c")):
+        hand = Hand(number + 1, 0, following, is_whole=True)
+        assert dispatch.handle(Left(name)) == [hand]
+        assert dispatch.shard_that_lost(number) == 0
+        assert dispatch.handle(Killed(number, name, "SIGSEGV")) == []
+    assert dispatch.handle(Left("c")) == []
+    reason = f"ended its own process {MAX_ERRORS} times, by SIGSEGV"
+    ended = dispatch.handle(Killed(3, "c", "SIGSEGV"))
+    assert ended == [GiveUp(0, "c", reason)]
+    assert dispatch.handle(joined("d")) == []
+
+
+def test_deaths_of_an_advance_that_is_done_are_forgotten() -> None:
+    dispatch = fleet("a", "b")
+    dispatch.handle(Wanted(0))
+    dispatch.handle(Left("a"))
+    assert dispatch.handle(Came(2, "done")) == [Accept(0, "b")]
+    assert dispatch.shard_that_lost(1) is None
+    assert dispatch.handle(Killed(1, "a", "SIGSEGV")) == []
+
+
+def test_errors_of_several_end_it_and_losses_never_do() -> None:
+    dispatch = fleet("a", "b")
+    dispatch.handle(Wanted(0))
+    now_s, number = 0.0, 1
+    for _ in range(10):
+        assert dispatch.handle(Came(number, "lost")) == []
+        now_s += 10.0
+        assert len(dispatch.handle(Ticked(now_s))) == 1
+        number += 1
+    for _ in range(MAX_ERRORS - 1):
+        assert dispatch.handle(Came(number, "error", "no")) == []
+        now_s += 10.0
+        (hand,) = dispatch.handle(Ticked(now_s))
+        number += 1
+    assert isinstance(hand, Hand)
+    given_up = dispatch.handle(Came(number, "error", "no"))
+    assert given_up == [GiveUp(0, hand.agent, "no")]
+
+
+def test_only_an_equal_platform_may_go_on() -> None:
+    dispatch = ShardDispatch(count(1))
+    dispatch.handle(joined("a", "arm"))
+    dispatch.handle(joined("b", "x86"))
+    dispatch.handle(Placed(0, "x86"))
+    assert dispatch.handle(Wanted(0)) == [Hand(1, 0, "b", is_whole=True)]
+    assert dispatch.handle(Left("b")) == []
+    assert dispatch.waiting == {0: "x86"}
+    assert dispatch.handle(joined("c", "x86")) == [Hand(2, 0, "c", is_whole=True)]
+
+
+def test_whoever_made_the_first_advance_settles_the_platform() -> None:
+    dispatch = ShardDispatch(count(1))
+    dispatch.handle(joined("a", "arm"))
+    dispatch.handle(Wanted(0))
+    dispatch.handle(Came(1, "done"))
+    dispatch.handle(Left("a"))
+    dispatch.handle(joined("b", "x86"))
+    assert dispatch.handle(Wanted(0)) == []
+    assert dispatch.waiting == {0: "arm"}
+
+
+def test_wanted_twice_is_our_own_fault() -> None:
+    dispatch = fleet("a")
+    dispatch.handle(Wanted(0))
+    with pytest.raises(UnexpectedEvent, match="wanted already"):
+        dispatch.handle(Wanted(0))
+
+
+def drifting(*, allows_drift: bool) -> ShardDispatch:
+    """Return one whose shard was advanced on a platform that is gone."""
+    dispatch = ShardDispatch(count(1), allows_drift=allows_drift)
+    dispatch.handle(Placed(0, "theirs"))
+    dispatch.handle(joined("b", "ours"))
+    dispatch.handle(joined("a", "ours"))
+    assert dispatch.handle(Wanted(0)) == []
+    assert dispatch.handle(Ticked(100.0)) == []
+    assert dispatch.waiting == {0: "theirs"}
+    return dispatch
+
+
+def test_another_platform_gets_a_shard_after_a_while_if_that_is_allowed() -> None:
+    dispatch = drifting(allows_drift=True)
+    assert dispatch.wake_s == 100.0 + DRIFT_S
+    assert dispatch.handle(Ticked(99.9 + DRIFT_S)) == []
+    whole = Hand(1, 0, "a", is_whole=True)
+    assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == [whole]
+    dispatch.handle(Came(1, "done"))
+    # It is at home there now.
+    dispatch.handle(joined("c", "theirs"))
+    assert dispatch.handle(Wanted(0)) == [Hand(2, 0, "a", is_whole=False)]
+
+
+def test_one_that_may_drift_waits_for_whoever_comes_and_not_for_a_time() -> None:
+    dispatch = ShardDispatch(count(1), allows_drift=True)
+    dispatch.handle(Placed(0, "theirs"))
+    dispatch.handle(Wanted(0))
+    dispatch.handle(Ticked(100.0))
+    assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == []
+    assert dispatch.wake_s is None
+    assert dispatch.handle(joined("a", "ours")) == [Hand(1, 0, "a", is_whole=True)]
+
+
+def test_its_own_platform_comes_back_in_time() -> None:
+    dispatch = drifting(allows_drift=True)
+    assert dispatch.handle(joined("z", "theirs")) == [Hand(1, 0, "z", is_whole=True)]
+    dispatch.handle(Left("z"))
+    # The while begins anew.
+    dispatch.handle(Ticked(110.0))
+    assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == []
+    assert len(dispatch.handle(Ticked(110.0 + DRIFT_S))) == 1
+
+
+def test_nothing_drifts_that_is_not_allowed_to() -> None:
+    dispatch = drifting(allows_drift=False)
+    assert dispatch.wake_s is None
+    assert dispatch.handle(Ticked(1e9)) == []

@@ -1,0 +1,104 @@
+"""How a birth's candidates come about, attempt by attempt."""
+
+from typing import Any
+
+import pytest
+
+from coordinator.evolution.breeding import Breeder
+from coordinator.evolution.selection import Individual
+from schema.errors import ExperimentError
+from schema.experiment.document import Experiment, Selection, Space
+from schema.robot.genome import Genome, NeuronGene, Node
+from schema.robot.names import BirthId
+
+GREY = (0.5, 0.5, 0.5)
+CHILD = BirthId(0, 40)
+
+
+def breeder(space: Space | None = None, **selection: Any) -> Breeder:  # noqa: ANN401 - any setting
+    experiment = Experiment(
+        name="test", space=space or Space(), selection=Selection(**selection)
+    )
+    return Breeder(experiment, 1, 0)
+
+
+def individuals(genomes: list[Genome]) -> list[Individual]:
+    return [
+        Individual(BirthId(0, number), genome, number / 10, rank=1, generation=0)
+        for number, genome in enumerate(genomes)
+    ]
+
+
+def founders(count: int = 10) -> list[Individual]:
+    genomes = [breeder().conceive(BirthId(0, n), 0, (), None)[1] for n in range(count)]
+    return individuals([genome for genome in genomes if genome])
+
+
+def test_founders_have_no_parents_and_every_attempt_is_another_robot() -> None:
+    attempts = [breeder().conceive(CHILD, attempt, (), None) for attempt in range(9)]
+    assert all(couple is None and genome for couple, genome in attempts)
+    assert len({genome for _, genome in attempts}) == 9
+    assert attempts == [breeder().conceive(CHILD, k, (), None) for k in range(9)]
+
+
+def test_without_reproduction_children_are_random_as_well() -> None:
+    made = breeder(parents="none").conceive(CHILD, 3, founders(), None)
+    assert made == breeder().conceive(CHILD, 3, (), None)
+
+
+def test_a_couple_stays_for_its_attempts_and_then_makes_room_for_another() -> None:
+    population = founders()
+    couple = None
+    seen = []
+    for attempt in range(15):
+        couple, _ = breeder(parents="random").conceive(
+            CHILD, attempt, population, couple
+        )
+        assert couple is not None
+        seen.append((couple[0].birth.number, couple[1].birth.number))
+    blocks = [set(seen[start : start + 5]) for start in (0, 5, 10)]
+    assert all(len(block) == 1 for block in blocks)
+    assert len(set.union(*blocks)) == 3
+
+
+def test_every_attempt_of_a_couple_draws_anew() -> None:
+    population = founders()
+    couple = None
+    children = []
+    for attempt in range(5):
+        couple, child = breeder().conceive(CHILD, attempt, population, couple)
+        children.append(child)
+    assert len(set(children)) == 5
+
+
+def test_parents_that_cannot_mate_give_no_genome() -> None:
+    motor = Node("ActiveHinge", 0, 0, GREY, outputs=(NeuronGene("Simple", (0.0, 0.5)),))
+    pair = Node("Core", -1, 0, GREY, children=((0, motor),))
+    # Two parts each: every child has two as well, one too few.
+    couple, genome = breeder(Space(min_parts=3)).conceive(
+        CHILD, 0, individuals([pair] * 5), None
+    )
+    assert couple is not None
+    assert genome is None
+
+
+@pytest.mark.parametrize(
+    ("parents", "is_founder", "limit", "what"),
+    [
+        ("tournament", False, 500, "100 x selection.max_mating_attempts"),
+        ("none", False, 100, "generation.max_tries"),
+        ("tournament", True, 100, "generation.max_tries"),
+    ],
+)
+def test_patience_ends_in_one_clear_error(
+    *, parents: str, is_founder: bool, limit: int, what: str
+) -> None:
+    population = [] if is_founder else founders(5)
+    patient = breeder(parents=parents)
+    patient.check_patience(CHILD, limit - 1, population, "too crowded")
+    with pytest.raises(ExperimentError) as caught:
+        patient.check_patience(CHILD, limit, population, "too crowded")
+    message = str(caught.value)
+    assert "\n" not in message
+    for word in ("birth 40 of island 0", f"{what} = {limit}", "too crowded"):
+        assert word in message

@@ -1,0 +1,170 @@
+"""The tree that variation works on."""
+
+from itertools import islice
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from coordinator.evolution.generation import generate
+from coordinator.evolution.limits import tallies
+from coordinator.evolution.tree import (
+    copied,
+    follow,
+    free_places,
+    freeze,
+    gene_ids,
+    level,
+    path_between,
+    preorder,
+    thaw,
+)
+from schema.experiment.document import Experiment, Space, body_space
+from schema.parts import BUILT_IN
+from schema.robot.frames import place_parts, shapes_of
+from schema.robot.genome import Genome, NeuronGene, Node, develop, walk
+from schema.robot.names import BirthId
+
+EXPERIMENT = Experiment(name="test")
+TYPES = body_space(EXPERIMENT.space)
+GREY = (0.5, 0.5, 0.5)
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def node(
+    kind: str,
+    *children: tuple[int, Node],
+    slot: int = 0,
+    orientation: int = 0,
+    hidden: int = 0,
+) -> Node:
+    own = tuple(parameter.default for parameter in BUILT_IN[kind].own_parameters)
+    neuron = NeuronGene("Simple", (0.0, 0.5))
+    return Node(
+        kind,
+        -1 if kind == "Core" else slot,
+        orientation,
+        own + GREY,
+        outputs=(neuron,) * BUILT_IN[kind].outputs,
+        hidden=(neuron,) * hidden,
+        children=children,
+    )
+
+
+def random_genome(seed: int, experiment: Experiment = EXPERIMENT) -> Genome:
+    return generate(np.random.default_rng(seed), experiment)
+
+
+TREE = node(
+    "Core",
+    (1, node("ActiveHinge", (0, node("TouchSensor")), slot=1, hidden=2)),
+    (3, node("FixedBrick", (0, node("Hinge")), (2, node("TouchSensor")), slot=3)),
+)
+"""Core - (1) motor - sensor; core - (3) brick - (0) hinge, (2) sensor."""
+
+
+@given(SEEDS)
+def test_thawing_and_freezing_gives_the_genome_back(seed: int) -> None:
+    genome = random_genome(seed)
+    root = thaw(genome, TYPES)
+    assert freeze(preorder(root)) == genome
+    assert freeze(preorder(copied(root))) == genome
+
+
+@given(SEEDS)
+def test_branches_stand_in_the_order_of_the_genome(seed: int) -> None:
+    genome = random_genome(seed)
+    found = [(b.kind.name, b.parent_slot) for b in preorder(thaw(genome, TYPES))]
+    assert found == [(one.kind, slot) for one, _, slot in walk(genome)]
+
+
+@given(SEEDS)
+def test_a_path_leads_where_it_was_made_for(seed: int) -> None:
+    branches = preorder(thaw(random_genome(seed), TYPES))
+    for source in branches:
+        for target in branches:
+            path = path_between(source, target)
+            assert follow(source, path) is target
+            assert len(path) < len(branches)
+
+
+def test_a_path_goes_up_by_own_slots_and_down_by_the_parents() -> None:
+    _, hinge, sensor, brick, _, pads = preorder(thaw(TREE, TYPES))
+    assert path_between(hinge, hinge) == ()
+    assert path_between(sensor, hinge) == (0,)
+    assert path_between(sensor, pads) == (0, 1, 3, 2)
+    assert path_between(brick, sensor) == (3, 1, 0)
+    assert follow(pads, (0, 3, 2)) is None, "nothing sits on the core's slot 2"
+    assert follow(pads, (0, 3, 2, 0)) is None
+
+
+def test_tallies_count_every_subtree() -> None:
+    found = [tuple(size) for size in tallies(preorder(thaw(TREE, TYPES))).values()]
+    assert found == [
+        (6, 10, 1, 2),
+        (2, 2, 1, 2),
+        (1, 2, 0, 0),
+        (3, 2, 0, 0),
+        (1, 0, 0, 0),
+        (1, 2, 0, 0),
+    ]
+
+
+def test_free_places_are_those_that_nothing_sits_on() -> None:
+    found = [
+        (b.kind.name, slot) for b, slot in free_places(preorder(thaw(TREE, TYPES)))
+    ]
+    core = [("Core", 0), ("Core", 2)]
+    assert found == [*core, ("FixedBrick", 1), ("Hinge", 1)]
+
+
+def test_a_cut_branch_hangs_nowhere_and_leaves_its_slot_free() -> None:
+    root = thaw(TREE, TYPES)
+    brick = preorder(root)[3]
+    brick.cut()
+    assert (brick.parent, brick.parent_slot) == (None, -1)
+    assert [b.kind.name for b in preorder(root)] == [
+        "Core",
+        "ActiveHinge",
+        "TouchSensor",
+    ]
+
+
+def test_levelling_undoes_all_turns_before_a_brick() -> None:
+    bar = node("ParametricBarJoint", slot=1, orientation=180)
+    brick = node("FixedBrick", (1, node("Hinge", (1, bar), orientation=270)))
+    inner = node("Hinge", (1, brick), orientation=180)
+    genome = node("Core", (0, node("ActiveHinge", (1, inner), orientation=270)))
+    root = thaw(genome, TYPES)
+    level(preorder(root))
+    # 270 + 180 = 90 before the brick, so it turns by 270; 270 before the bar.
+    assert [b.orientation for b in preorder(root)] == [0, 270, 180, 270, 270, 90]
+
+
+@given(SEEDS)
+def test_every_slot_of_a_levelled_robot_looks_sideways(seed: int) -> None:
+    robot = develop(random_genome(seed), TYPES)
+    rotations, _ = place_parts(robot, shapes_of(robot, TYPES))
+    for part, rotation in zip(robot.parts, rotations, strict=True):
+        for slot in TYPES[part.kind].shape(part.parameters).slots:
+            assert (rotation @ np.asarray(slot.normal))[2] == pytest.approx(0.0)
+
+
+def test_without_planarity_some_robots_leave_the_plane() -> None:
+    free = Experiment(name="free", space=Space(planar=False))
+    types = body_space(free.space)
+    turned = 0
+    for seed in range(50):
+        robot = develop(random_genome(seed, free), types)
+        rotations, _ = place_parts(robot, shapes_of(robot, types))
+        turned += bool(np.abs(rotations[:, 2, 0]).max() > 0.5)
+    assert turned > 25
+
+
+def test_gene_identities_of_different_births_never_meet() -> None:
+    births = [BirthId(i, n) for i in (0, 1, 300) for n in (0, 1, 2999, 2**32 - 1)]
+    genes = [g for birth in births for g in islice(gene_ids(birth), 100)]
+    assert len(set(genes)) == len(genes)
+    assert min(genes) > 0
+    assert max(genes) < 2**64

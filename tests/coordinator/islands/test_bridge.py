@@ -1,0 +1,228 @@
+"""Islands between off-line and on-line: whole lives, events in, commands out."""
+
+from collections import Counter, deque
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from coordinator.islands.events import (
+    Answered,
+    Evaluate,
+    Evaluated,
+    EvaluationFailed,
+    Finish,
+    IslandCommand,
+    Record,
+    Started,
+    Vet,
+    Vetted,
+)
+from coordinator.islands.island import Island
+from schema.errors import UnexpectedEvent
+from schema.experiment.document import (
+    Culling,
+    Experiment,
+    Reevaluation,
+    Selection,
+    Simulation,
+)
+from schema.experiment.file import read_experiment
+from schema.robot.results import Evaluation, Provenance, Report
+
+ORIGIN = (0.0, 0.0, 0.0)
+VIABLE = Report(
+    is_viable=True, reason="", intersections=(), lower=ORIGIN, upper=ORIGIN,
+    mass=0.1, motors=1,
+)  # fmt: skip
+BRIDGE = Experiment(
+    name="test",
+    births=40,
+    selection=Selection(
+        population=6,
+        children=2,
+        reevaluation=Reevaluation(interval=4, share=0.5),
+        culling=Culling(population_limit=12, population_floor=5),
+    ),
+    simulation=Simulation(evaluation_s=(12.0, 30.0)),
+)
+
+
+def answer(command: Vet | Evaluate) -> Answered:
+    """Judge by birth, trial and duration; every eleventh trial fails."""
+    birth = command.birth
+    if isinstance(command, Vet):
+        return Vetted(birth, command.attempt, VIABLE)
+    if (birth.number + 3 * command.trial) % 11 == 10:
+        return EvaluationFailed(birth, "diverged", Provenance(), command.trial)
+    fitness = (birth.number * 0.618 + command.trial * 0.37 + command.steps / 1e4) % 1.0
+    evaluation = Evaluation(fitness, 0.1, 0.1, command.steps * 0.005)
+    return Evaluated(birth, evaluation, Provenance(), command.trial)
+
+
+def live(
+    experiment: Experiment, order: Iterator[int] | None = None, *, twice: bool = False
+) -> list[IslandCommand]:
+    """Run an island to its end, answering in some order, each question once or twice.
+
+    Nobody is asked about before all that went before is known.
+    """
+    island = Island(experiment, 7, 0)
+    commands = island.handle(Started())
+    waiting = deque(one for one in commands if isinstance(one, Vet | Evaluate))
+    while waiting:
+        assert not island.is_finished
+        waiting.rotate(-next(order) if order else 0)
+        told = answer(waiting.popleft())
+        found = island.handle(told)
+        if twice:
+            assert island.handle(told) == []
+        commands += found
+        waiting.extend(one for one in found if isinstance(one, Vet | Evaluate))
+    assert island.is_finished
+    return commands
+
+
+def rows(commands: list[IslandCommand], table: str) -> list[Any]:
+    return [
+        one.row for one in commands if isinstance(one, Record) and one.table == table
+    ]
+
+
+def test_the_tables_of_a_life_are_complete() -> None:
+    commands = live(BRIDGE)
+    assert commands[-1] == Finish(0)
+    assert [row["birth"] for row in rows(commands, "births")] == list(range(40))
+    trials = [(row["birth"], row["trial"]) for row in rows(commands, "evaluations")]
+    firsts = [birth for birth, trial in trials if trial == 0]
+    assert firsts == list(range(40))
+    counts = Counter(birth for birth, _ in trials)
+    assert max(counts.values()) > 2
+    for birth, count in counts.items():
+        assert [trial for one, trial in trials if one == birth] == list(range(count))
+
+
+def test_everybody_lives_as_long_as_was_asked_and_no_two_alike() -> None:
+    asked = [one for one in live(BRIDGE) if isinstance(one, Evaluate)]
+    steps = [one.steps for one in asked]
+    assert all(2400 <= each <= 6000 for each in steps)
+    assert len(set(steps)) > 0.9 * len(steps)
+
+
+@pytest.mark.parametrize(("share", "sizes"), [(0.7, 3), (0.1, 5)])
+def test_the_population_rows_are_those_who_passed_the_rule(
+    share: float, sizes: int
+) -> None:
+    """An oracle of its own: the rule worked out from the tables alone."""
+    culling = Culling(
+        population_limit=12, population_floor=5, survive_share_of_mean=share
+    )
+    selection = replace(BRIDGE.selection, culling=culling)
+    commands = live(replace(BRIDGE, selection=selection))
+    fitness: dict[int, float] = {}
+    alive: set[int] = set()
+    stands: dict[int, set[int]] = {}
+    expected: dict[int, set[int]] = {}
+    for one in commands:
+        match one:
+            case Record(table="births", row=row):
+                alive.add(row["birth"])
+            case Record(table="evaluations", row=row):
+                fitness[row["birth"]] = row["fitness"] or 0.0
+            case Record(table="population", row=row):
+                births = row["births"]
+                if births not in stands:
+                    alive = survivors(alive, fitness, share, births)
+                    expected[births] = set(alive)
+                stands.setdefault(births, set()).add(row["birth"])
+                assert (row["fitness"] or 0.0) == fitness[row["birth"]]
+    assert stands == expected
+    assert len({len(found) for found in stands.values()}) >= sizes
+
+
+def survivors(
+    alive: set[int], fitness: dict[int, float], share: float, births: int
+) -> set[int]:
+    """Return who lives on at a number of births: 6 founders, then a cull a brood."""
+    if births == 6:
+        return alive
+    limit = share * sum(fitness[one] for one in alive) / len(alive)
+    ranked = sorted(alive, key=lambda one: (-fitness[one], one))
+    weak = [one for one in ranked if fitness[one] < limit]
+    gone = len(weak) or (8 if len(alive) == 12 else 0)
+    return set(ranked[: max(min(5, len(alive)), len(alive) - gone)])
+
+
+def test_the_clocks_of_births_are_kept() -> None:
+    commands = live(replace(BRIDGE, births=38))
+    born, when = 0, []
+    for one in commands:
+        if isinstance(one, Record) and one.table == "births":
+            born += 1
+        if isinstance(one, Evaluate) and one.trial:
+            when.append(born)
+    # Every 4 births after 6 founders, at the end of a brood; at the end, too.
+    assert sorted(set(when)) == list(range(10, 39, 4))
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.data())
+def test_whatever_order_answers_come_in_the_records_are_the_same(
+    data: st.DataObject,
+) -> None:
+    numbers = data.draw(st.lists(st.integers(0, 12), min_size=60, max_size=60))
+    shuffled = live(BRIDGE, iter(numbers * 20), twice=True)
+    undisturbed = live(BRIDGE)
+    assert [one for one in shuffled if isinstance(one, Record)] == [
+        one for one in undisturbed if isinstance(one, Record)
+    ]
+
+
+def test_judging_anew_waits_for_everybody() -> None:
+    selection = replace(BRIDGE.selection, culling=None, children=1)
+    island = Island(replace(BRIDGE, selection=selection), 7, 0)
+    waiting = deque(island.handle(Started()))
+    late: list[Evaluate] = []
+    while waiting:
+        command = waiting.popleft()
+        if isinstance(command, Evaluate) and command.trial:
+            late.append(command)
+        elif isinstance(command, Vet | Evaluate):
+            waiting.extend(island.handle(answer(command)))
+    assert island.births == 10
+    assert [one.trial for one in late] == [1, 1, 1]
+    first, second, third = late
+    with pytest.raises(UnexpectedEvent):
+        island.handle(Evaluated(first.birth, Evaluation(0, 0, 0, 12), Provenance(), 2))
+    assert island.handle(answer(third)) == []
+    assert island.handle(answer(first)) == []
+    found = island.handle(answer(second))
+    tables = [one.table for one in found if isinstance(one, Record)]
+    assert tables == ["evaluations"] * 3 + ["population"] * 6
+    assert isinstance(found[-1], Vet)
+
+
+def test_nothing_is_judged_anew_unless_it_is_wanted() -> None:
+    selection = replace(BRIDGE.selection, reevaluation=None)
+    plain = replace(BRIDGE, selection=selection, simulation=Simulation())
+    asked = [one for one in live(plain) if isinstance(one, Evaluate)]
+    assert [(one.trial, one.steps) for one in asked] == [(0, 0)] * 40
+
+
+def test_the_shipped_bridge_has_all_three() -> None:
+    bridge = read_experiment("bridge")
+    assert bridge.name == "bridge"
+    assert (bridge.births, bridge.arena) == (3000, None)
+    selection = bridge.selection
+    assert (selection.population, selection.children, bridge.window) == (15, 1, 1)
+    assert selection.culling == Culling()
+    assert selection.reevaluation == Reevaluation()
+    assert bridge.simulation == Simulation(evaluation_s=(12.0, 30.0))
+    commands = live(replace(bridge, births=200))
+    sizes = Counter(row["births"] for row in rows(commands, "population"))
+    assert set(sizes) == set(range(15, 201))
+    assert 8 <= min(sizes.values()) <= 10
+    assert 15 < max(sizes.values()) <= 30

@@ -1,0 +1,218 @@
+"""Migration between off-line islands: cases worked out by hand."""
+
+from typing import Any
+
+import msgspec
+import pytest
+
+from coordinator.islands.events import (
+    Emigrate,
+    Evaluate,
+    Finish,
+    Immigrated,
+    NeighbourClosed,
+    Record,
+)
+from coordinator.islands.island import Island
+from schema.errors import UnexpectedEvent
+from schema.experiment.check import check_experiment
+from schema.experiment.document import Experiment, Islands, Selection, Simulation
+from schema.experiment.environment import Environment
+from schema.experiment.migration import Migration
+from schema.robot.names import BirthId
+from tests.coordinator.sea import Sea
+
+Names = list[tuple[int, int]]
+
+
+def sea(*births: int, selection: Selection | None = None, **migration: Any) -> Sea:  # noqa: ANN401
+    """Return islands of four with broods of two; fitness rises with the name.
+
+    Birth n of island i has fitness (4 i + n) / 100 everywhere.
+    """
+    document = Experiment(
+        name="test",
+        selection=selection or Selection(population=4, children=2, parents="random"),
+        islands=tuple(Islands(births=each) for each in births),
+        migration=Migration(**{"topology": "ring", "epoch": 4, **migration}),
+    )
+    check_experiment(document, "test")
+    return Sea(document, fit=rising)
+
+
+def rising(birth: BirthId, island: int) -> float:
+    del island
+    return (4 * birth.island + birth.number) / 100
+
+
+def living(sea: Sea, island: int, births: int) -> Names:
+    """Return the names in the population rows of an island."""
+    return [
+        (row["island"] if row["birth_island"] is None else row["birth_island"],
+         row["birth"])
+        for row in sea.rows("population")
+        if (row["island"], row["births"]) == (island, births)
+    ]  # fmt: skip
+
+
+def sent(sea: Sea) -> list[tuple[int, int, int, int, int]]:
+    columns = ("island", "to", "epoch", "birth_island", "birth")
+    return [tuple(row[name] for name in columns) for row in sea.rows("migrations")]
+
+
+def test_the_best_is_copied_and_takes_the_place_of_the_worst() -> None:
+    lived = sea(6, 6).live()
+    assert sent(lived) == [(0, 1, 0, 0, 3), (1, 0, 0, 1, 3)]
+    assert living(lived, 0, 4) == [(0, 1), (0, 2), (0, 3), (1, 3)]
+    assert living(lived, 1, 4) == [(0, 3), (1, 1), (1, 2), (1, 3)]
+    (row, _) = lived.rows("migrations")
+    assert row == {
+        "island": 0, "to": 1, "epoch": 0, "births": 4, "sim_time_s": None,
+        "birth_island": 0, "birth": 3, "fitness": 0.03,
+    }  # fmt: skip
+
+
+def test_an_evicted_migrant_is_gone_and_its_place_is_taken_first() -> None:
+    lived = sea(6, 6, handling="evict").live()
+    assert living(lived, 0, 4) == [(0, 0), (0, 1), (0, 2), (1, 3)]
+    assert living(lived, 1, 4) == [(0, 3), (1, 0), (1, 1), (1, 2)]
+
+
+def test_the_evicted_are_dealt_out_and_enough_stay_to_mate() -> None:
+    # Two of four must stay: of the three that three neighbours want two go.
+    lived = sea(6, 6, 6, 6, topology="star", handling="evict").live()
+    assert [each for each in sent(lived) if each[0] == 0] == [
+        (0, 1, 0, 0, 3),
+        (0, 2, 0, 0, 2),
+    ]
+    assert living(lived, 3, 4) == [(3, 0), (3, 1), (3, 2)]
+    assert living(lived, 0, 4) == [(0, 1), (1, 3), (2, 3), (3, 3)]
+
+
+def test_a_share_of_a_population_is_rounded() -> None:
+    lived = sea(6, 6, migrants=0.4).live()
+    assert sent(lived)[:2] == [(0, 1, 0, 0, 3), (0, 1, 0, 0, 2)]
+
+
+def test_edges_go_one_way() -> None:
+    lived = sea(6, 6, topology="edges", edges=((1, 0),)).live()
+    assert sent(lived) == [(1, 0, 0, 1, 3)]
+    assert living(lived, 1, 4) == [(1, 0), (1, 1), (1, 2), (1, 3)]
+
+
+def test_migrants_have_no_births_and_change_no_rank() -> None:
+    lived = sea(6, 6).live()
+    names = [(row["island"], row["birth"]) for row in lived.rows("births")]
+    assert names == [(island, birth) for island in (0, 1) for birth in range(6)]
+    assert {row["rank"] for row in lived.rows("births")} == {1, 2}
+    assert all(island.births == 6 for island in lived.islands.values())
+
+
+def test_whoever_lives_there_already_is_turned_away() -> None:
+    # Broods are no better than immigrants: 1:3 stays the best of both islands.
+    worst = Selection(population=4, children=2, parents="random")
+    lived = sea(8, 8, epoch=2, selection=worst)
+    lived.fit = lambda birth, _: 0.9 if birth == (1, 3) else 0.5 - birth.number / 99
+    lived.live()
+    assert (1, 0, 1, 1, 3) in sent(lived)
+    assert living(lived, 0, 6).count((1, 3)) == 1
+    assert len(living(lived, 0, 6)) == 4
+
+
+def test_an_immigrant_is_judged_anew_where_the_island_says_so() -> None:
+    lived = sea(6, 6, judge_anew=True)
+    lived.fit = lambda birth, island: 0.5 + 0.1 * (birth.island == island)
+    lived.live()
+    asked = [one for one in lived.commands[0] if isinstance(one, Evaluate)]
+    (again,) = [one for one in asked if one.asker is not None]
+    assert (again.birth, again.asker, again.trial) == (BirthId(1, 0), 0, 1)
+    (row,) = [row for row in lived.rows("evaluations") if row["birth_island"] == 1]
+    assert (row["island"], row["birth"], row["trial"]) == (0, 0, 1)
+    (fitness,) = [
+        row["fitness"]
+        for row in lived.rows("population")
+        if (row["island"], row["births"], row["birth_island"]) == (0, 4, 1)
+    ]
+    assert fitness == 0.5
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"simulation": Simulation(window_steps=400)},
+        {"environment": Environment(slope_deg=5.0)},
+    ],
+)
+def test_islands_that_judge_otherwise_judge_anew(changes: dict[str, object]) -> None:
+    document = sea(6, 6).experiment
+    first, second = document.islands
+    other = msgspec.structs.replace(second, **changes)
+    document = msgspec.structs.replace(document, islands=(first, other))
+    lived = Sea(document, fit=rising).live()
+    anew = [row for row in lived.rows("evaluations") if row["trial"]]
+    assert [(row["island"], row["birth_island"]) for row in anew] == [(0, 1), (1, 0)]
+
+
+def test_nobody_waits_for_an_island_that_has_finished() -> None:
+    # What island 1 sends at the end of epoch 1 it sends before it waits.
+    lived = sea(6, 20).live()
+    assert [each[:3] for each in sent(lived)] == [(0, 1, 0), (1, 0, 0), (1, 0, 1)]
+    assert all(island.is_finished for island in lived.islands.values())
+    assert lived.islands[1].births == 20
+
+
+@pytest.mark.parametrize("lazy", [(0,), (1,), (0, 2)])
+def test_the_slow_decide_nothing_but_when(lazy: tuple[int, ...]) -> None:
+    story = sea(12, 8, 10).live().story
+    slow = sea(12, 8, 10)
+    slow.lazy = lazy
+    assert slow.live().story == story
+
+
+def test_a_fast_island_waits_for_its_neighbour_s_epoch() -> None:
+    lived = sea(12, 12)
+    lived.lazy = (1,)
+    lived.start()
+    while any(number == 0 for number, _ in lived.waiting):
+        lived.turn()
+    assert (lived.islands[0].births, lived.islands[1].births) == (4, 0)
+
+
+def test_the_last_command_tells_the_neighbours() -> None:
+    lived = sea(6, 6, 6).live()
+    assert lived.commands[1][-1] == Finish(1, (0, 2))
+
+
+def test_news_that_cannot_be_is_refused() -> None:
+    lived = sea(6, 6).live(3)
+    island = lived.islands[0]
+    for event in (
+        Immigrated(0, 2, 0, ()),
+        Immigrated(0, 1, 1, ()),
+        Immigrated(1, 0, 0, ()),
+        NeighbourClosed(0, 3),
+    ):
+        with pytest.raises(UnexpectedEvent):
+            island.handle(event)
+    island.handle(NeighbourClosed(0, 1))
+    with pytest.raises(UnexpectedEvent):
+        island.handle(NeighbourClosed(0, 1))
+    alone = Island(Experiment(name="alone"), 1, 0)
+    with pytest.raises(UnexpectedEvent, match="no neighbours"):
+        alone.handle(NeighbourClosed(0, 1))
+
+
+def test_an_epoch_ends_with_the_brood_in_which_it_is_over() -> None:
+    # Broods end with births 4, 6, 8, 10; multiples of 3 are reached at 4, 6, 10.
+    lived = sea(12, 12, epoch=3).live()
+    assert [row["births"] for row in lived.rows("migrations") if not row["island"]] == [
+        4, 6, 10,
+    ]  # fmt: skip
+
+
+def test_what_leaves_is_sent_before_it_is_waited_for() -> None:
+    lived = sea(6, 6).live()
+    kinds = [type(one) for one in lived.commands[0]]
+    emigrated = kinds.index(Emigrate)
+    assert kinds[emigrated - 1] is Record
+    assert lived.commands[0][emigrated - 1].table == "migrations"  # type: ignore[union-attr]

@@ -1,0 +1,191 @@
+"""Migration between arenas, and between arenas and off-line islands."""
+
+from math import dist
+from typing import Any
+
+from coordinator.arena.arena import Arena
+from coordinator.islands.events import Evaluate
+from schema.experiment.check import check_experiment
+from schema.experiment.document import Arena as Rules
+from schema.experiment.document import Experiment, Islands, Selection, Simulation
+from schema.experiment.migration import Migration
+from schema.robot.names import BirthId
+from tests.coordinator.arena_world import World
+from tests.coordinator.sea import Sea
+
+FEW = Selection(population=5, tournament_size=2)
+CALM = Simulation(warmup_steps=600)
+"""Robots mature 15 s after they were dropped."""
+
+
+def arenas(*births: int, rules: dict[str, Any] | None = None, **migration: Any) -> Sea:  # noqa: ANN401
+    """Return arenas with five founders, dropped in the first 4 s; a birth each 15 s."""
+    wanted = {"population_limit": 12, "population_floor": 4, **(rules or {})}
+    document = Experiment(
+        name="test",
+        selection=FEW,
+        simulation=CALM,
+        arena=Rules(**wanted),
+        islands=tuple(Islands(births=each) for each in births),
+        migration=Migration(**{"topology": "ring", "epoch": 7, **migration}),
+    )
+    check_experiment(document, "test")
+    return Sea(document)
+
+
+def inserted(sea: Sea, island: int) -> dict[BirthId, tuple[float, float]]:
+    """Return who was put into an arena, and where."""
+    return dict(sea.worlds[island].places)
+
+
+def test_a_moved_robot_dies_here_and_lives_there() -> None:
+    lived = arenas(9, 9, handling="evict", replaced="none").live()
+    first = lived.rows("migrations")[0]
+    name = BirthId(first["birth_island"], first["birth"])
+    assert (first["island"], first["to"], first["epoch"], name.island) == (0, 1, 0, 0)
+    (death,) = [
+        row
+        for row in lived.rows("deaths")
+        if (row["island"], row["reason"], row["birth"]) == (0, "migrated", name.number)
+    ]
+    assert death["sim_time_s"] == first["sim_time_s"]
+    assert name in inserted(lived, 1)
+    assert all(row["birth_island"] is None for row in lived.rows("deaths")[:1])
+    rows = [row for row in lived.rows("fitness") if row["birth_island"] == 0]
+    assert {(row["island"], row["birth"]) for row in rows} >= {(1, name.number)}
+
+
+def test_an_immigrant_is_no_birth_and_must_mature_again() -> None:
+    lived = arenas(9, 9, handling="evict", replaced="none").live()
+    for number in (0, 1):
+        births = [row for row in lived.rows("births") if row["island"] == number]
+        assert sorted(row["birth"] for row in births) == list(range(9))
+    at_first = next(row for row in lived.rows("fitness") if row["birth_island"] == 0)
+    assert not at_first["is_mature"]
+    assert at_first["age_s"] <= 5.0
+
+
+def test_copies_live_on_both_arenas_and_the_worst_makes_room() -> None:
+    lived = arenas(9, 9).live()
+    first = lived.rows("migrations")[0]
+    name = BirthId(0, first["birth"])
+    assert name in inserted(lived, 0)
+    assert name in inserted(lived, 1)
+    replaced = [row for row in lived.rows("deaths") if row["reason"] == "replaced"]
+    assert {row["island"] for row in replaced} == {0, 1}
+    samples = [
+        row
+        for row in lived.rows("fitness")
+        if (row["island"], row["sim_time_s"]) == (1, replaced[-1]["sim_time_s"])
+        and row["is_mature"]
+    ]
+    worst = min(samples, key=lambda row: row["fitness"])
+    assert replaced[-1]["birth"] == worst["birth"]
+
+
+def test_immigrants_are_dropped_at_places_of_chance_away_from_others() -> None:
+    lived = arenas(9, 9).live()
+    name = BirthId(0, lived.rows("migrations")[0]["birth"])
+    there, here = inserted(lived, 1)[name], inserted(lived, 0)[name]
+    assert there != here
+    assert dist(there, (0.0, 0.0)) <= 2.0
+
+
+def test_seconds_may_end_an_epoch_before_births_do() -> None:
+    lived = arenas(12, 12, epoch=11, epoch_s=30.0).live()
+    times = [row["sim_time_s"] for row in lived.rows("migrations") if not row["island"]]
+    assert times[:3] == [30.0, 60.0, 90.0]
+
+
+def test_a_full_arena_lets_immigrants_wait_for_room() -> None:
+    full = {"population_limit": 5, "population_floor": 3, "full_cull_share": 0.4}
+    lived = arenas(8, 8, rules=full, epoch=6, replaced="none").live()
+    arena = lived.islands[1]
+    assert isinstance(arena, Arena)
+    most = max(
+        len({row["birth"] for row in lived.rows("fitness") if row["sim_time_s"] == at})
+        for at in {row["sim_time_s"] for row in lived.rows("fitness")}
+    )
+    assert most <= 10
+    came = [one for one in inserted(lived, 1) if one.island == 0]
+    sent = [row for row in lived.rows("migrations") if row["to"] == 1]
+    assert len(came) <= len(sent)
+    assert all(island.is_finished for island in lived.islands.values())
+    for number, world in lived.worlds.items():
+        assert len(world.born) <= 5, number
+
+
+def falling(lived: Sea, island: int, step: int) -> None:
+    """Have all but one of an arena's robots break at a step."""
+    world = World(
+        fit=lived.worlds[island].fit,
+        falls=lambda birth, at: at == step and birth != BirthId(island, 0),
+    )
+    lived.worlds[island] = world
+
+
+def test_an_arena_of_too_few_is_saved_by_its_neighbours() -> None:
+    lived = arenas(20, 20, migrants=3, replaced="none")
+    falling(lived, 0, 4000)
+    lived.live()
+    arena = lived.islands[0]
+    assert isinstance(arena, Arena)
+    assert not arena.is_extinct
+    assert arena.births == 20
+    assert len([one for one in inserted(lived, 0) if one.island == 1]) >= 3
+
+
+def test_where_nobody_comes_too_few_are_the_end() -> None:
+    lived = arenas(20, 20, replaced="none")
+    falling(lived, 0, 4000)
+    falling(lived, 1, 4000)
+    lived.live()
+    for island in lived.islands.values():
+        assert isinstance(island, Arena)
+        assert island.is_extinct
+        assert island.is_finished
+
+
+def mixed(**migration: Any) -> Sea:  # noqa: ANN401 - any setting
+    """Return an off-line island and an arena."""
+    document = Experiment(
+        name="test",
+        selection=FEW,
+        islands=(
+            Islands(births=35),
+            Islands(
+                births=12,
+                simulation=CALM,
+                arena=Rules(population_limit=12, population_floor=4),
+            ),
+        ),
+        migration=Migration(**{"topology": "ring", "epoch": 7, **migration}),
+    )
+    check_experiment(document, "test")
+    return Sea(document)
+
+
+def test_between_off_line_and_on_line_all_are_judged_anew() -> None:
+    lived = mixed().live()
+    anew = [
+        one
+        for one in lived.commands[0]
+        if isinstance(one, Evaluate) and one.asker is not None
+    ]
+    assert anew
+    assert {one.birth.island for one in anew} == {1}
+    rows = [row for row in lived.rows("evaluations") if row["birth_island"] == 1]
+    assert len(rows) == len(anew)
+    first = next(row for row in lived.rows("fitness") if row["birth_island"] == 0)
+    assert (first["island"], first["is_mature"]) == (1, False)
+
+
+def test_a_casualty_abroad_is_a_death_there() -> None:
+    lived = arenas(12, 12)
+    lived.worlds[1] = World(
+        fit=lived.worlds[1].fit, falls=lambda birth, _: birth.island == 0
+    )
+    lived.live()
+    fallen = [row for row in lived.rows("deaths") if row["reason"] == "diverged"]
+    assert fallen
+    assert {(row["island"], row["birth_island"]) for row in fallen} == {(1, 0)}

@@ -1,0 +1,124 @@
+"""What holds of every archipelago, in whatever order its questions are answered."""
+
+import random
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coordinator.arena.arena import Arena
+from coordinator.islands.events import Evaluated, EvaluationFailed, asker_of
+from coordinator.storage.entries import decode_entry, encode_entry
+from schema.errors import ExperimentError
+from schema.experiment.check import check_experiment
+from schema.experiment.document import Arena as Rules
+from schema.experiment.document import Experiment, Islands, Selection, Simulation
+from schema.experiment.migration import Migration
+from schema.robot.names import BirthId
+from schema.robot.results import Evaluation, Provenance
+from tests.coordinator.sea import Sea
+
+fixed = settings(max_examples=20, derandomize=True, database=None, deadline=None)
+
+OFF_LINE = Islands(count=2, births=14)
+ON_LINE = Islands(
+    births=9,
+    simulation=Simulation(warmup_steps=600),
+    arena=Rules(population_limit=9, population_floor=4),
+)
+SELECTION = Selection(population=5, children=3, tournament_size=2)
+
+
+def document(*islands: Islands, **migration: Any) -> Experiment:  # noqa: ANN401
+    wanted = {"topology": "fully-connected", "epoch": 6, **migration}
+    return Experiment(
+        name="test",
+        selection=SELECTION,
+        islands=islands,
+        migration=Migration(**wanted),
+    )
+
+
+def shuffled(seed: int) -> Iterator[int]:
+    rng = random.Random(seed)  # noqa: S311 - an order, no secret
+    while True:
+        yield rng.randrange(1000)
+
+
+@pytest.mark.parametrize(
+    "islands", [(OFF_LINE, OFF_LINE), (ON_LINE, ON_LINE), (OFF_LINE, ON_LINE)]
+)
+@pytest.mark.parametrize("handling", ["preserve", "evict"])
+def test_the_order_of_answers_decides_nothing(
+    islands: tuple[Islands, ...], handling: str
+) -> None:
+    wanted = document(*islands, handling=handling, emigrants="tournament", migrants=2)
+    story = Sea(wanted).live().story
+    for seed in range(4):
+        assert Sea(wanted, order=shuffled(seed)).live().story == story
+
+
+@fixed
+@given(
+    order=st.integers(0, 2**32),
+    topology=st.sampled_from(["ring", "fully-connected", "star", "grid"]),
+    emigrants=st.sampled_from(["best", "tournament", "random"]),
+    handling=st.sampled_from(["preserve", "evict"]),
+    replaced=st.sampled_from(["worst", "random"]),
+    epochs=st.tuples(st.integers(1, 8), st.integers(1, 8), st.integers(1, 8)),
+    migrants=st.one_of(st.integers(1, 4), st.sampled_from([0.2, 0.6, 1.0])),
+    judge_anew=st.booleans(),
+    kinds=st.tuples(st.booleans(), st.booleans(), st.booleans()),
+)
+def test_every_archipelago_ends_and_repeats(
+    order: int,
+    epochs: tuple[int, ...],
+    kinds: tuple[bool, ...],
+    **migration: Any,  # noqa: ANN401 - any setting
+) -> None:
+    islands = tuple(
+        Islands(
+            births=births,
+            simulation=ON_LINE.simulation if is_arena else None,
+            arena=ON_LINE.arena if is_arena else None,
+            migration=Migration(**{**migration, "epoch": epoch}),
+        )
+        for births, epoch, is_arena in zip((9, 12, 15), epochs, kinds, strict=True)
+    )
+    wanted = document(*islands, **migration)
+    try:
+        check_experiment(wanted, "test")
+    except ExperimentError:
+        return
+    straight = Sea(wanted).live()
+    assert all(island.is_finished for island in straight.islands.values())
+    assert Sea(wanted, order=shuffled(order)).live().story == straight.story
+    for number, island in straight.islands.items():
+        names = Counter(one.birth for one in island.population)
+        assert all(count == 1 for count in names.values()), number
+        births = [row for row in straight.rows("births") if row["island"] == number]
+        assert len(births) == island.births
+        if isinstance(island, Arena):
+            continue
+        # Who is moved away leaves a gap until somebody comes or is born.
+        least = 3 if migration["handling"] == "evict" else SELECTION.population
+        assert least <= len(island.population) <= SELECTION.population
+
+
+def test_the_seed_says_who_is_drawn() -> None:
+    wanted = document(OFF_LINE, OFF_LINE, emigrants="random", replaced="random")
+    stories = [Sea(wanted, seed=seed).live().rows("migrations") for seed in (1, 1, 2)]
+    assert stories[0] == stories[1] != stories[2]
+
+
+@pytest.mark.parametrize("asker", [None, 0, 3])
+def test_a_journal_keeps_who_asked(asker: int | None) -> None:
+    signed = Provenance("worker-1", "x86", 0.5)
+    done = Evaluated(BirthId(2, 7), Evaluation(0.5, 0.1, 0.2, 12.0), signed, 4, asker)
+    failed = EvaluationFailed(BirthId(2, 7), "diverged", signed, 4, asker)
+    for event in (done, failed):
+        assert decode_entry(encode_entry(event)) == event
+        assert asker_of(event) == (2 if asker is None else asker)

@@ -1,0 +1,215 @@
+"""Evaluations of drawn duration, and who is judged anew when, and with what effect."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from coordinator.evolution.selection import Individual
+from coordinator.islands.events import Evaluate, Evaluated, EvaluationFailed
+from coordinator.islands.reevaluation import Trials
+from schema.errors import UnexpectedEvent
+from schema.experiment.document import (
+    Experiment,
+    Reevaluation,
+    Selection,
+    Simulation,
+    body_space,
+)
+from schema.robot.genome import Node, develop
+from schema.robot.names import BirthId
+from schema.robot.results import Evaluation, Provenance
+
+CORE = Node("Core", -1, 0, ())
+SPACE = body_space(Experiment(name="test").space)
+ROBOT = develop(CORE, SPACE)
+
+
+def trials(
+    simulation: Simulation | None = None,
+    seed: int = 1,
+    run: int = 0,
+    **rules: Any,  # noqa: ANN401 - any setting
+) -> Trials:
+    """Return an island's trials that comes round every 5 births after 4 founders."""
+    wanted: dict[str, Any] = {"interval": 5, "share": 0.5, **rules}
+    selection = Selection(population=4, reevaluation=Reevaluation(**wanted))
+    experiment = Experiment(
+        name="test", selection=selection, simulation=simulation or Simulation()
+    )
+    return Trials(experiment, seed, run, 0)
+
+
+def one(number: int, fitness: float = 0.5, island: int = 0) -> Individual:
+    return Individual(BirthId(island, number), CORE, fitness, 1, 0)
+
+
+def judged(number: int, trial: int, fitness: float) -> Evaluated:
+    evaluation = Evaluation(fitness, 0.1, 0.1, 12.0)
+    return Evaluated(BirthId(0, number), evaluation, Provenance(), trial)
+
+
+def names(asked: list[Evaluate]) -> list[tuple[int, int]]:
+    return [(command.birth.number, command.trial) for command in asked]
+
+
+def repeat(found: Trials, births: int, numbers: list[int]) -> list[tuple[int, int]]:
+    """Judge anew whom it is time for; return who that was."""
+    population = tuple(one(number) for number in numbers)
+    asked = found.ask_anew(births, population)
+    for command in asked:
+        found.take(judged(command.birth.number, command.trial, 0.5))
+    found.conclude(population)
+    return names(asked)
+
+
+def test_without_a_range_no_request_says_how_long() -> None:
+    command = Evaluate(BirthId(0, 3), ROBOT)
+    assert trials().timed(command) is command
+
+
+def test_durations_are_uniform_in_their_range_and_hit_both_ends() -> None:
+    # 0.01 s is two steps of 0.005 s: 12.00, 12.005 and 12.01 s are three durations.
+    found = trials(Simulation(evaluation_s=(12.0, 12.01)))
+    steps = [found.timed(Evaluate(BirthId(0, n), ROBOT)).steps for n in range(3000)]
+    values, counts = np.unique(steps, return_counts=True)
+    assert values.tolist() == [2400, 2401, 2402]
+    assert counts.tolist() == pytest.approx([1000] * 3, rel=0.1)
+
+
+def test_a_duration_is_a_matter_of_seed_run_birth_and_trial_only() -> None:
+    clock = Simulation(evaluation_s=(12.0, 30.0))
+
+    def steps(birth: int, trial: int, **whose: int) -> int:
+        command = Evaluate(BirthId(0, birth), ROBOT, trial)
+        return trials(clock, **whose).timed(command).steps
+
+    assert steps(3, 1) == steps(3, 1)
+    others = [steps(3, 0), steps(4, 1), steps(3, 1, seed=2), steps(3, 1, run=1)]
+    assert len({steps(3, 1), *others}) == 5
+
+
+def test_both_ends_may_be_the_same() -> None:
+    found = trials(Simulation(evaluation_s=(20.0, 20.0)))
+    assert found.timed(Evaluate(BirthId(0, 0), ROBOT)).steps == 4000
+
+
+def test_every_five_births_after_the_founders_it_is_time() -> None:
+    found = trials(share=0.01)
+    when = [births for births in range(4, 26) if repeat(found, births, [0, 1, 2])]
+    assert when == [9, 14, 19, 24]
+
+
+def test_a_brood_that_passes_several_times_asks_once() -> None:
+    found = trials(share=0.01)
+    when = [births for births in range(4, 60, 13) if repeat(found, births, [0, 1])]
+    assert when == [17, 30, 43, 56]
+
+
+def test_who_was_judged_longest_ago_comes_first() -> None:
+    found = trials()
+    everybody = [0, 1, 2, 3]
+    assert repeat(found, 9, everybody) == [(0, 1), (1, 1)]
+    # 0 and 1 were judged when 9 had been born, 2 and 3 at their birth.
+    assert repeat(found, 14, everybody) == [(2, 1), (3, 1)]
+    # Of equals the elder; 11 was judged when 12 had been born, after 0 and 1.
+    assert repeat(found, 19, [0, 1, 3, 11]) == [(0, 2), (1, 2)]
+    assert repeat(found, 24, [0, 1, 3, 11]) == [(3, 2), (11, 1)]
+
+
+def test_a_share_is_rounded_and_somebody_always_is_judged() -> None:
+    counts = [
+        len(repeat(trials(share=share), 9, list(range(10))))
+        for share in (0.01, 0.24, 0.26, 1.0)
+    ]
+    assert counts == [1, 2, 3, 10]
+
+
+def test_immigrants_are_left_alone() -> None:
+    found = trials(share=1.0)
+    asked = found.ask_anew(9, (one(3), one(1, island=1)))
+    assert names(asked) == [(3, 1)]
+
+
+@pytest.mark.parametrize(
+    ("rule", "values"), [("replace", [0.2, 0.9]), ("mean", [0.35, 0.5333333333])]
+)
+def test_the_new_fitness_replaces_the_old_or_joins_the_mean(
+    rule: str, values: list[float]
+) -> None:
+    found = trials(fitness=rule)
+    population: tuple[Individual, ...] = (one(0, 0.5), one(5, 0.7))
+    for births, trial, fitness, value in zip(
+        (9, 19), (1, 2), (0.2, 0.9), values, strict=True
+    ):
+        assert names(found.ask_anew(births, population)) == [(0, trial)]
+        found.take(judged(0, trial, fitness))
+        assert not found.is_open
+        population, records = found.conclude(population)
+        assert [each.fitness for each in population] == pytest.approx([value, 0.7])
+        (record,) = records
+        assert record.table == "evaluations"
+        assert (record.row["birth"], record.row["trial"]) == (0, trial)
+        assert record.row["fitness"] == fitness
+        repeat(found, births + 5, [5])  # takes the turn between
+
+
+@pytest.mark.parametrize(
+    ("rule", "value", "has_failed"), [("replace", 0.0, True), ("mean", 0.25, False)]
+)
+def test_a_failed_trial_counts_as_nothing(
+    rule: str, value: float, *, has_failed: bool
+) -> None:
+    found = trials(fitness=rule)
+    population = (one(0, 0.5), one(5, 0.7))
+    found.ask_anew(9, population)
+    found.take(EvaluationFailed(BirthId(0, 0), "diverged", Provenance(), 1))
+    (first, second), (record,) = found.conclude(population)
+    assert (first.fitness, first.has_failed) == (value, has_failed)
+    assert second is population[1]
+    assert (record.row["status"], record.row["fitness"]) == ("failed", None)
+    assert (record.row["reason"], record.row["trial"]) == ("diverged", 1)
+
+
+def test_who_failed_at_birth_may_yet_succeed() -> None:
+    found = trials(fitness="mean")
+    population = (failed(one(0, 0.0)),)
+    found.ask_anew(9, population)
+    found.take(judged(0, 1, 0.6))
+    ((first,), _) = found.conclude(population)
+    assert (first.fitness, first.has_failed) == (0.3, False)
+
+
+def failed(individual: Individual) -> Individual:
+    return Individual(individual.birth, individual.genome, 0.0, 1, 0, has_failed=True)
+
+
+def test_answers_count_once_and_come_only_to_what_was_asked() -> None:
+    found = trials(share=1.0)
+    population = (one(0), one(1))
+    found.ask_anew(9, population)
+    assert found.ask_anew(9, population) == []
+    with pytest.raises(UnexpectedEvent, match="got Evaluated"):
+        found.take(judged(2, 1, 0.1))
+    with pytest.raises(UnexpectedEvent, match="got Evaluated"):
+        found.take(judged(0, 2, 0.1))
+    with pytest.raises(UnexpectedEvent, match="finite"):
+        found.take(judged(0, 1, float("inf")))
+    found.take(judged(1, 1, 0.1))
+    found.take(judged(1, 1, 0.2))
+    assert found.is_open
+    found.take(judged(0, 1, 0.3))
+    judged_anew, _ = found.conclude(population)
+    assert [each.fitness for each in judged_anew] == [0.3, 0.1]
+    found.take(judged(1, 1, 0.1))
+
+
+def test_rows_come_in_birth_order_whatever_the_answers_order() -> None:
+    found = trials(share=1.0)
+    population = tuple(one(number) for number in range(4))
+    found.ask_anew(9, population)
+    for number in (2, 0, 3, 1):
+        found.take(judged(number, 1, number / 10))
+    _, records = found.conclude(population)
+    assert [record.row["birth"] for record in records] == [0, 1, 2, 3]
+    assert found.conclude(population) == (population, [])

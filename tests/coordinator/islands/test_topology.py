@@ -1,0 +1,81 @@
+"""Who neighbours whom."""
+
+from typing import Any
+
+import networkx as nx
+import pytest
+
+from coordinator.islands.topology import Edge, connections
+from schema.experiment.migration import Migration, Topology
+
+
+def both(*pairs: tuple[int, int]) -> tuple[tuple[int, int], ...]:
+    """Return edges both ways, in order."""
+    return tuple(sorted([*pairs, *((b, a) for a, b in pairs)]))
+
+
+def edges(
+    topology: Topology,
+    islands: int,
+    seed: int = 1,
+    **keys: Any,  # noqa: ANN401 - any setting
+) -> tuple[Edge, ...]:
+    migration = Migration(topology=topology, **keys)
+    return connections(migration, islands, seed, 0)
+
+
+def test_nobody_is_connected_with_nobody() -> None:
+    assert edges("unconnected", 4) == ()
+
+
+def test_a_ring() -> None:
+    assert edges("ring", 4) == both((0, 1), (1, 2), (2, 3), (3, 0))
+
+
+def test_a_ring_of_two_is_one_connection() -> None:
+    assert edges("ring", 2) == both((0, 1))
+
+
+def test_all_with_all() -> None:
+    assert edges("fully-connected", 3) == both((0, 1), (0, 2), (1, 2))
+
+
+def test_a_star_has_island_0_in_the_middle() -> None:
+    assert edges("star", 4) == both((0, 1), (0, 2), (0, 3))
+
+
+def test_a_grid_of_six_has_two_rows() -> None:
+    # 0 1 2
+    # 3 4 5
+    assert edges("grid", 6) == both(
+        (0, 1), (1, 2), (3, 4), (4, 5), (0, 3), (1, 4), (2, 5)
+    )
+
+
+def test_a_grid_of_a_prime_number_is_a_line() -> None:
+    assert edges("grid", 3) == both((0, 1), (1, 2))
+
+
+def test_the_user_s_edges_go_one_way() -> None:
+    assert edges("edges", 3, edges=((2, 0), (0, 1))) == ((0, 1), (2, 0))
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_of_a_random_regular_graph_all_have_the_same_degree(seed: int) -> None:
+    found = edges("random-regular", 10, seed, degree=3)
+    graph: nx.DiGraph[int] = nx.DiGraph(found)
+    assert {graph.out_degree(island) for island in range(10)} == {3}
+    assert {graph.in_degree(island) for island in range(10)} == {3}
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_small_world_is_connected_and_as_dense_as_its_ring(seed: int) -> None:
+    found = edges("small-world", 12, seed, degree=4, p_rewire=0.3)
+    graph: nx.Graph[int] = nx.Graph(found)
+    assert nx.is_connected(graph)
+    assert graph.number_of_edges() == 24
+
+
+def test_chance_comes_from_the_seed_alone() -> None:
+    drawn = [edges("random-regular", 10, seed, degree=3) for seed in (1, 1, 2)]
+    assert drawn[0] == drawn[1] != drawn[2]

@@ -1,0 +1,53 @@
+"""A program: an agent with a made-up answer, for tests of the network.
+
+Run with the agent's role, name and hub, and one of: ``good`` answers, ``stuck``
+says so and never answers, ``slow`` says so and answers when told to go on, ``old``
+is of another version.
+"""
+
+import sys
+import threading
+
+from schema.agent.crew import stop_on_signals
+from schema.agent.network import Agent
+from schema.agent.platform_tag import wire_version
+from schema.agent.service import serve
+from schema.agent.topics import Role
+from schema.errors import MalformedMessage
+from schema.wire import revolve_pb2 as pb
+
+
+def answer(request: bytes) -> bytes:
+    """Answer with the job's own number as fitness."""
+    asked = pb.Request.FromString(request)
+    if asked.settings == b"bad":
+        raise MalformedMessage("settings: bad")
+    if asked.settings == b"bug":
+        raise ZeroDivisionError("a plug-in's own")
+    if BEHAVIOUR in {"stuck", "slow"}:
+        sys.stdout.write("begun\n")
+        sys.stdout.flush()
+    if BEHAVIOUR == "slow":
+        sys.stdin.readline()
+    if BEHAVIOUR == "stuck":
+        threading.Event().wait()
+    evaluation = pb.Evaluation(fitness=float(asked.number))
+    return pb.Answer(
+        epoch=asked.epoch, number=asked.number, evaluation=evaluation
+    ).SerializeToString()
+
+
+def main(role: Role, name: str, address: str) -> None:
+    """Serve until SIGTERM."""
+    version = "another" if BEHAVIOUR == "old" else wire_version()
+    serve(
+        answer,
+        Agent(role, name, address, platform="p", version=version),
+        stop_on_signals(),
+    )
+
+
+if __name__ == "__main__":
+    BEHAVIOUR = sys.argv[4]
+    assert sys.argv[1] in {"worker", "analyzer"}
+    main("worker" if sys.argv[1] == "worker" else "analyzer", *sys.argv[2:4])

@@ -1,0 +1,328 @@
+"""The coordinator's end of the network, with real processes on loopback."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from coordinator.dispatch.dispatch import Dispatch
+from coordinator.dispatch.events import (
+    Assign,
+    Deliver,
+    DispatchEvent,
+    Job,
+    Joined,
+    Left,
+    Requested,
+    Returned,
+    Ticked,
+)
+from coordinator.network.service import Network
+from schema.agent.network import client_config
+from schema.agent.topics import Member
+from schema.errors import NetworkError
+from schema.robot.names import BirthId
+from schema.wire import revolve_pb2 as pb
+from schema.wire.codec import decode_answer
+
+pytestmark = pytest.mark.system
+
+ROOT = Path(__file__).parents[3]
+PROGRAM = Path(__file__).with_name("agent_process.py")
+PATIENCE_S = 30.0
+
+
+def request(number: int, *, settings: bytes = b"", epoch: int = 1) -> bytes:
+    message = pb.Request(run="r", epoch=epoch, number=number, settings=settings)
+    return message.SerializeToString()
+
+
+@pytest.fixture
+def network() -> Iterator[Network]:
+    with Network(name="c") as network:
+        yield network
+
+
+@contextmanager
+def agent(
+    network: Network, name: str, behaviour: str = "good", role: str = "worker"
+) -> Iterator[subprocess.Popen[str]]:
+    """Run an agent; what it is told stays open, so that it waits where it should."""
+    command = [sys.executable, str(PROGRAM), role, name, network.address, behaviour]
+    with subprocess.Popen(
+        command,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def until(
+    network: Network, is_enough: Callable[[list[DispatchEvent]], bool]
+) -> list[DispatchEvent]:
+    """Return all that happens until it is enough."""
+    events: list[DispatchEvent] = []
+    end_s = time.monotonic() + PATIENCE_S
+    while not is_enough(events):
+        assert time.monotonic() < end_s, events
+        events += network.receive(0.2)
+    return events
+
+
+def has(count: int) -> Callable[[list[DispatchEvent]], bool]:
+    return lambda events: len(events) >= count
+
+
+def line_of(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    return process.stdout.readline()
+
+
+class Driver:
+    """Dispatch and network together, without anything else of a coordinator."""
+
+    def __init__(self, network: Network) -> None:
+        self.network = network
+        self.dispatch = Dispatch()
+        self.delivered: dict[int, str] = {}
+
+    def tell(self, event: DispatchEvent) -> None:
+        for command in self.dispatch.handle(event):
+            job = command.job
+            if isinstance(command, Assign):
+                self.network.send(job.number, command.agent, job.payload)
+            elif isinstance(command, Deliver):
+                assert job.number not in self.delivered
+                assert decode_answer(command.answer).number == job.number
+                self.delivered[job.number] = command.agent
+
+    def ask(self, *numbers: int) -> None:
+        for number in numbers:
+            payload = request(number)
+            job = Job(number, "evaluate", BirthId(0, number), 0, payload)
+            self.tell(Requested(job))
+
+    def run(self, is_enough: Callable[[], bool]) -> None:
+        end_s = time.monotonic() + PATIENCE_S
+        while not is_enough():
+            now_s = time.monotonic()
+            assert now_s < end_s, self.delivered
+            self.tell(Ticked(now_s))
+            for event in self.network.receive(0.05):
+                self.tell(event)
+
+
+def test_an_agent_comes_with_all_that_it_is_and_goes(network: Network) -> None:
+    with agent(network, "an", role="analyzer") as process:
+        assert until(network, has(1)) == [Joined("an", "analyzer", 1, "p")]
+        process.terminate()
+        assert until(network, has(1)) == [Left("an")]
+        assert process.wait(PATIENCE_S) == 0
+
+
+def test_each_job_is_delivered_once_by_two_workers(network: Network) -> None:
+    driver = Driver(network)
+    with agent(network, "a"), agent(network, "b"):
+        driver.run(lambda: driver.dispatch.agents("worker") == 2)
+        driver.ask(*range(500))
+        driver.run(lambda: not driver.dispatch.pending)
+    assert sorted(driver.delivered) == list(range(500))
+    assert set(driver.delivered.values()) == {"a", "b"}
+
+
+def test_jobs_of_a_killed_worker_are_done_by_another(network: Network) -> None:
+    driver = Driver(network)
+    driver.ask(0, 1, 2)
+    with agent(network, "a", "stuck") as process:
+        driver.run(lambda: driver.dispatch.waiting("worker") == 1)
+        assert line_of(process) == "begun\n"
+        process.send_signal(signal.SIGKILL)
+        with agent(network, "b"):
+            driver.run(lambda: not driver.dispatch.pending)
+    assert driver.delivered == {0: "b", 1: "b", 2: "b"}
+
+
+def test_a_worker_told_to_end_finishes_its_job_and_drops_the_next(
+    network: Network,
+) -> None:
+    with agent(network, "w", "slow") as process:
+        until(network, has(1))
+        network.send(0, "w", request(0))
+        network.send(1, "w", request(1))
+        assert line_of(process) == "begun\n"
+        process.terminate()
+        assert process.stdin is not None
+        process.stdin.write("on\n")
+        process.stdin.flush()
+        events = until(network, has(3))
+        assert process.wait(PATIENCE_S) == 0
+    outcomes = {e.number: e.outcome for e in events if isinstance(e, Returned)}
+    assert outcomes == {0: "ok", 1: "lost"}
+    assert Left("w") in events
+
+
+@pytest.mark.slow
+def test_a_frozen_worker_is_gone_and_a_thawed_one_is_back(network: Network) -> None:
+    with agent(network, "w") as process:
+        joined = until(network, has(1))
+        process.send_signal(signal.SIGSTOP)
+        network.send(0, "w", request(0))
+        gone = until(network, has(2))
+        assert Left("w") in gone
+        assert Returned(0, "w", "lost") in gone
+        process.send_signal(signal.SIGCONT)
+        assert until(network, has(1)) == joined
+
+
+def test_a_job_that_is_called_off_before_it_is_begun_is_not_done(
+    network: Network,
+) -> None:
+    with agent(network, "w", "slow") as process:
+        until(network, has(1))
+        network.send(0, "w", request(0))
+        # What is sent in this order arrives in it.
+        network.cancel("w", request(1))
+        network.send(1, "w", request(1))
+        network.cancel("nobody", request(1))
+        assert line_of(process) == "begun\n"
+        assert process.stdin is not None
+        process.stdin.write("on\n")
+        process.stdin.flush()
+        events = until(network, has(2))
+    told = {e.number: (e.outcome, e.reason) for e in events if isinstance(e, Returned)}
+    assert told == {0: ("ok", ""), 1: ("error", "nobody waits for this job any more")}
+
+
+def test_who_lacks_a_plug_in_is_refused_and_leaves(network: Network) -> None:
+    with agent(network, "w"):
+        until(network, has(1))
+        message = pb.Request(run="r", epoch=1, number=4, plugins="not_here=abc")
+        network.send(4, "w", message.SerializeToString())
+        assert until(network, has(1)) == [Left("w")]
+        assert network.refused == {"w": "has no plug-in 'not_here'"}
+
+
+def test_workers_come_back_to_a_new_coordinator() -> None:
+    with Network(name="c1") as first, agent(first, "w"):
+        until(first, has(1))
+        first.__exit__(None, None, None)
+        with Network(name="c2", listen=(first.address,)) as second:
+            assert until(second, has(1)) == [Joined("w", "worker", 1, "p")]
+
+
+@pytest.mark.parametrize(
+    ("payload", "reason"),
+    [
+        (b"\xff\xff", "not the bytes of a Request"),
+        (b"", "names no run"),
+        (request(0, settings=b"bad"), "settings: bad"),
+        (request(0, settings=b"bug"), "ZeroDivisionError: a plug-in's own"),
+    ],
+)
+def test_a_bad_request_is_refused_and_the_next_one_served(
+    network: Network, payload: bytes, reason: str
+) -> None:
+    with agent(network, "w"):
+        until(network, has(1))
+        network.send(0, "w", payload)
+        (refusal,) = until(network, has(1))
+        network.send(1, "w", request(1))
+        (answer,) = until(network, has(1))
+    assert isinstance(refusal, Returned)
+    assert refusal.outcome == "error"
+    assert reason in refusal.reason
+    assert isinstance(answer, Returned)
+    assert decode_answer(answer.answer).number == 1
+
+
+def test_a_coordinator_whose_run_was_taken_over_stops(network: Network) -> None:
+    with agent(network, "w"):
+        until(network, has(1))
+        network.send(0, "w", request(0, epoch=2))
+        until(network, has(1))
+        network.send(1, "w", request(1, epoch=1))
+        with pytest.raises(NetworkError, match=r"epoch 1 of run r is over: epoch 2"):
+            until(network, has(1))
+
+
+def test_a_job_for_who_is_gone_is_lost(network: Network) -> None:
+    network.send(7, "nobody", request(7))
+    assert until(network, has(1)) == [Returned(7, "nobody", "lost")]
+
+
+def test_an_agent_of_another_version_is_refused(network: Network) -> None:
+    with agent(network, "a", "old"):
+        until(network, lambda _: bool(network.refused))
+    assert "'another'" in network.refused["a"]
+
+
+@pytest.mark.parametrize(
+    "info",
+    [
+        b"\xff\xff",
+        b"",
+        pb.AgentInfo(agent="x", kind="worker", slots=0).SerializeToString(),
+        pb.AgentInfo(agent="y", kind="worker", slots=1).SerializeToString(),
+    ],
+)
+def test_a_malformed_message_is_counted_and_dropped(
+    network: Network, info: bytes
+) -> None:
+    peer = Member("default", "worker", "x")
+
+    def tell(query: zenoh.Query) -> None:
+        with query:
+            query.reply(peer.info, info)
+
+    config = zenoh.Config.from_json5(client_config(network.address))
+    with zenoh.open(config) as session:
+        told = zenoh.handlers.Callback(tell)
+        with (
+            session.declare_queryable(peer.info, told, complete=True),
+            session.liveliness().declare_token(peer.alive),
+        ):
+            assert until(network, lambda _: network.malformed > 0) == []
+            assert network.malformed == 1
+            with agent(network, "w"):
+                assert until(network, has(1)) == [Joined("w", "worker", 1, "p")]
+
+
+def test_a_port_in_use_is_one_line(network: Network) -> None:
+    with (
+        pytest.raises(NetworkError, match=r"^cannot listen on .*: it is in use$"),
+        Network(name="d", listen=(network.address,)),
+    ):
+        pass
+
+
+def test_a_hub_that_is_not_there_is_one_line() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    with (
+        pytest.raises(NetworkError, match=rf"^no hub at tcp/127.0.0.1:{port}$"),
+        Network(name="c", connect=f"tcp/127.0.0.1:{port}"),
+    ):
+        pass
+
+
+def test_two_coordinators_share_a_hub_and_its_workers(network: Network) -> None:
+    with agent(network, "w"), Network(name="d", connect=network.address) as other:
+        for coordinator in (network, other):
+            assert until(coordinator, has(1)) == [Joined("w", "worker", 1, "p")]
+            coordinator.send(3, "w", request(3))
+            (returned,) = until(coordinator, has(1))
+            assert isinstance(returned, Returned)
+            assert returned.outcome == "ok"

@@ -1,0 +1,382 @@
+"""An arena whose coordinator dies at any point of its work, and comes back.
+
+Everything is real but the physics: arena, loop, shards, analyzer, journal, tables
+and snapshots.
+"""
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import analyzer.jobs
+from coordinator.arena.arena import Arena
+from coordinator.dispatch.events import DispatchEvent, Returned
+from coordinator.dispatch.fleet import Fleet
+from coordinator.network.local import LocalAgents
+from coordinator.run.loop import Loop
+from coordinator.run.operators import Desk
+from coordinator.run.pacing import Pace
+from coordinator.run.questions import Question
+from coordinator.storage.compare import compare
+from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.journal import NAME, Journal
+from coordinator.storage.recorder import Recorder
+from coordinator.storage.snapshots import Snapshots
+from schema.errors import JobRefused, RunFolderError
+from schema.experiment.file import experiment_text
+from schema.parts import BUILT_IN
+from schema.robot.genome import develop
+from schema.robot.names import BirthId
+from schema.robot.robot import Part, Robot
+from schema.tables.files import read_table
+from schema.wire.operator import (
+    InsertWish,
+    ListWish,
+    OperatorRequest,
+    PauseWish,
+    RemoveWish,
+    ResumeWish,
+    SnapshotWish,
+    Wish,
+    decode_operator_reply,
+    encode_operator_request,
+)
+from tests.coordinator.arena_world import experiment
+from tests.worker.fake_world import FakeWorld, OddWorld
+from worker.serve.shards import Shards
+
+EXPERIMENT = experiment(30, snapshot_interval_s=20.0)
+DETAILS = RunDetails("resume", 0, 3, experiment_text(EXPERIMENT))
+
+Point = Callable[[str], None]
+"""Called with the name of what is about to be done, and of what was."""
+
+
+class Killed(BaseException):
+    """The coordinator dies here."""
+
+
+class Fuse:
+    """Kills at the n-th point of one name, or of any."""
+
+    def __init__(self, after: int, name: str = "") -> None:
+        self.left = after
+        self.name = name
+
+    def __call__(self, name: str) -> None:
+        if self.name in ("", name):
+            self.left -= 1
+            if self.left < 0:
+                raise Killed
+
+
+class Frail:
+    """Whatever it wraps dies before or after each call of some methods."""
+
+    def __init__(self, inner: object, point: Point, *names: str) -> None:
+        self._inner, self._point, self._names = inner, point, names
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any attribute
+        found = getattr(self._inner, name)
+        if name not in self._names:
+            return found
+
+        def call(*arguments: object) -> object:
+            self._point(f"before {name}")
+            result = found(*arguments)
+            self._point(f"after {name}")
+            return result
+
+        return call
+
+
+class Run:
+    """One incarnation of a run's coordinator, and a worker that may outlive it."""
+
+    def __init__(
+        self,
+        path: Path,
+        stack: ExitStack,
+        point: Point,
+        **other: Any,  # noqa: ANN401 - the loop's
+    ) -> None:
+        details = None if (path / NAME).exists() else DETAILS
+        folder = stack.enter_context(RunFolder(path, details))
+        journal = stack.enter_context(Journal.open(path))
+        self.rows = Recorder(path, DETAILS)
+        stack.callback(self.rows.close)
+        shards = other.pop("shards", None) or Shards(FakeWorld)
+        agents = {"analyzer": analyzer.jobs.answer, "worker": shards.answer}
+        self.arena = Arena(EXPERIMENT, DETAILS.seed, DETAILS.run)
+        platform = other.pop("platform", "any")
+        self.fleet = Fleet(
+            other.pop("agents", LocalAgents)(agents, platform),
+            allows_drift=other.pop("allows_drift", False),
+        )
+        self.loop = Loop(
+            {0: self.arena},
+            question=Question.of("resume", folder.epoch, EXPERIMENT, DETAILS.origin),
+            fleet=self.fleet,
+            log=Frail(journal, point, "append"),
+            rows=Frail(self.rows, point, "store"),
+            vault=Frail(Snapshots(path), point, "write", "drop_before"),
+            **other,
+        )
+        self.loop.start(journal.replay())
+        self.desk = Desk(self.loop, EXPERIMENT)
+
+    def ask(self, wish: Wish, name: str = "x") -> str:
+        request = encode_operator_request(OperatorRequest(name, 0, wish))
+        reply = decode_operator_reply(self.desk.answer(request))
+        return f"refused: {reply.text}" if reply.is_refused else reply.text
+
+
+def run(path: Path, point: Point = lambda _: None, **other: Any) -> bool:  # noqa: ANN401 - the loop's
+    """Run, or go on, until the end or until killed; return whether it ended."""
+    with ExitStack() as stack:
+        try:
+            one = Run(path, stack, point, **other)
+            turns = 0
+            while not one.loop.is_finished:
+                one.fleet.listen(0.0, float(turns))
+                one.loop.act(float(turns))
+                turns += 1
+                if turns % 7 == 0:
+                    one.rows.flush()
+        except Killed:
+            return False
+        one.rows.finish()
+        return True
+
+
+@pytest.fixture(scope="module")
+def calm(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a run that nothing happened to."""
+    path = tmp_path_factory.mktemp("calm") / "run"
+    assert run(path)
+    return path
+
+
+def test_a_run_leaves_all_its_tables(calm: Path) -> None:
+    sizes = {
+        name: read_table(calm, name).num_rows
+        for name in ("births", "fitness", "poses", "population", "deaths")
+    }
+    assert min(sizes.values()) > 0, sizes
+    assert sizes["births"] == EXPERIMENT.births
+    kept = sorted(path.name for path in (calm / "snapshots").iterdir())
+    assert len(kept) == 1
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "before store", "after store", "before append", "after append",
+        "before write", "after write", "after drop_before",
+    ],
+)  # fmt: skip
+def test_killed_between_any_two_steps(tmp_path: Path, calm: Path, name: str) -> None:
+    path = tmp_path / "run"
+    assert not run(path, Fuse(3, name))
+    while not run(path, Fuse(2, name)):
+        pass
+    assert compare(calm, path) == []
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_killed_again_and_again(tmp_path: Path, calm: Path, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    path = tmp_path / "run"
+    shards = Shards(FakeWorld)
+    kills = 0
+    # A worker that outlives its coordinators, or a new one each time.
+    while not run(
+        path, Fuse(int(rng.integers(20, 120))), shards=shards if seed % 2 else None
+    ):
+        kills += 1
+    assert kills >= 3
+    assert compare(calm, path) == []
+
+
+class Mortal(LocalAgents):
+    """Workers that die now and then with all they hold; another one is there."""
+
+    left = 5
+
+    def receive(self, timeout_s: float, pause_s: float = 0.0, /) -> list[DispatchEvent]:
+        """Let every fifth job of a worker be its last."""
+        news: list[DispatchEvent] = []
+        for event in super().receive(timeout_s, pause_s):
+            if isinstance(event, Returned) and event.agent == "local-worker":
+                self.left -= 1
+                if self.left == 0:
+                    self.left = 5
+                    self._answers["local-worker"] = Shards(FakeWorld).answer
+                    news.append(Returned(event.number, event.agent, "lost"))
+                    continue
+            news.append(event)
+        return news
+
+
+def test_a_worker_that_forgets_everything_now_and_then(
+    tmp_path: Path, calm: Path
+) -> None:
+    path = tmp_path / "run"
+    assert run(path, agents=Mortal)
+    assert compare(calm, path) == []
+
+
+def test_a_worker_that_computes_otherwise_stops_the_run(
+    tmp_path: Path, calm: Path
+) -> None:
+    path = tmp_path / "run"
+    assert not run(path, Fuse(150))
+    with pytest.raises(JobRefused, match="computes otherwise"):
+        run(path, shards=Shards(OddWorld))
+    assert run(path)
+    assert compare(calm, path) == []
+
+
+def test_lost_snapshots_are_done_without(tmp_path: Path, calm: Path) -> None:
+    path = tmp_path / "run"
+    assert not run(path, Fuse(200))
+    for file in (path / "snapshots").iterdir():
+        file.unlink()
+    assert run(path)
+    assert compare(calm, path) == []
+
+
+def test_pace_changes_nothing(tmp_path: Path, calm: Path) -> None:
+    path = tmp_path / "run"
+    assert run(path, pace=Pace(2.0, EXPERIMENT.simulation.timestep_s))
+    assert compare(calm, path) == []
+
+
+def ordered(path: Path, point: Point) -> list[str]:
+    """Run with orders of an operator until the end or until killed."""
+    said: list[str] = []
+    with ExitStack() as stack:
+        try:
+            one = Run(path, stack, point)
+            turns = 0
+            while not one.loop.is_finished:
+                # By what the arena has come to, so that all runs order alike.
+                living = [each.birth for each in one.arena.population]
+                if one.arena.step == 12000 and not one.arena.is_paused:
+                    guest = develop(one.arena.population[1].genome, BUILT_IN)
+                    said.append(one.ask(RemoveWish(living[0]), "remove"))
+                    said.append(one.ask(InsertWish(guest, (0.5, 1.5)), "insert"))
+                    said.append(one.ask(PauseWish(), "pause"))
+                    said.append(one.ask(SnapshotWish()))
+                elif one.arena.is_paused:
+                    said.append(one.ask(ListWish()).partition("\n")[0])
+                    said.append(one.ask(ResumeWish(), "resume"))
+                one.fleet.listen(0.0, float(turns))
+                one.loop.act(float(turns))
+                turns += 1
+        except Killed:
+            return said
+        one.rows.finish()
+    return said
+
+
+def test_orders_are_obeyed_again_in_a_replay(tmp_path: Path, calm: Path) -> None:
+    undisturbed = tmp_path / "undisturbed"
+    said = ordered(undisturbed, lambda _: None)
+    assert said[:3] == ["takes effect at 60 s"] * 3
+    assert said[4].startswith("paused at 60 s")
+    assert (undisturbed / "tables").is_dir()
+    assert compare(calm, undisturbed) != []
+    deaths = read_table(undisturbed, "deaths")
+    assert "removed" in deaths["reason"].to_pylist()
+    births = read_table(undisturbed, "births")
+    assert (0.5, 1.5) in zip(
+        births["x"].to_pylist(), births["y"].to_pylist(), strict=True
+    )
+    killed = tmp_path / "killed"
+    while not (killed / "tables").is_dir():
+        ordered(killed, Fuse(60))
+    assert compare(undisturbed, killed) == []
+
+
+@pytest.mark.parametrize(
+    ("wish", "why"),
+    [
+        (RemoveWish(BirthId(0, 999)), "birth 999: does not live"),
+        (InsertWish(Robot((Part("Barrow", -1, -1, -1, 0, ()),))), "Barrow"),
+    ],
+)
+def test_what_cannot_be_is_refused_and_not_journalled(
+    tmp_path: Path, wish: Wish, why: str
+) -> None:
+    with ExitStack() as stack:
+        one = Run(tmp_path / "run", stack, lambda _: None)
+        before = (tmp_path / "run" / NAME).stat().st_size
+        assert why in one.ask(wish)
+        assert one.ask(wish).startswith("refused")
+        assert (tmp_path / "run" / NAME).stat().st_size == before
+
+
+def test_other_islands_and_other_bytes_are_refused(tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        desk = Run(tmp_path / "run", stack, lambda _: None).desk
+        other = encode_operator_request(OperatorRequest("x", 7, PauseWish()))
+        for data in (other, b"", b"\xff"):
+            assert decode_operator_reply(desk.answer(data)).is_refused
+
+
+def test_snapshot_that_went_missing_is_named(tmp_path: Path) -> None:
+    snapshots = Snapshots(tmp_path)
+    snapshots.write(0, 5, b"five")
+    snapshots.write(0, 9, b"nine")
+    snapshots.write(1, 2, b"two")
+    snapshots.drop_before(0, 9)
+    again = Snapshots(tmp_path)
+    kept = [(0, 5, b"five"), (0, 9, b"nine"), (1, 2, b"two"), (1, 2, b"other")]
+    found = [
+        again.has(shard, step, sha256(data).digest()) for shard, step, data in kept
+    ]
+    assert found == [False, True, True, False]
+    assert again.read(0, 9) == b"nine"
+    with pytest.raises(RunFolderError, match=r"island-0-5\.bin"):
+        again.read(0, 5)
+
+
+def test_another_platform_goes_on_where_that_is_allowed(
+    tmp_path: Path, calm: Path
+) -> None:
+    """Recorded once, whatever comes then; nobody's end is forgotten."""
+    path = tmp_path / "run"
+    assert not run(path, Fuse(60))
+    other: dict[str, Any] = {"platform": "other", "allows_drift": True}
+    lives = 0
+    while not run(path, Fuse(100), shards=Shards(OddWorld), **other):
+        lives += 1
+    assert lives > 1
+    (drift,) = read_table(path, "drifts").drop_columns("record").to_pylist()
+    assert drift.pop("step") > 0
+    words = {"before": "any", "after": "other", "worker": "local-worker"}
+    assert drift == {"island": 0, **words}
+    births = read_table(path, "births")["birth"].to_pylist()
+    assert sorted(births) == list(range(EXPERIMENT.births))
+    assert "births" in {line.partition(":")[0] for line in compare(calm, path)}
+
+
+def test_a_drift_that_the_journal_does_not_have_leaves_no_state(
+    tmp_path: Path, calm: Path
+) -> None:
+    """Its snapshot is there, and the old platform comes to that step after all."""
+    path = tmp_path / "run"
+    assert not run(path, Fuse(60))
+    other: dict[str, Any] = {"platform": "other", "allows_drift": True}
+    assert not run(path, Fuse(0, "after write"), shards=Shards(OddWorld), **other)
+    assert len(list((path / "snapshots").iterdir())) == 1
+    # Each life has to rebuild the state.
+    while not run(path, Fuse(5, "after append")):
+        pass
+    assert compare(calm, path) == []

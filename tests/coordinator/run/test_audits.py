@@ -1,0 +1,95 @@
+"""Which evaluations are done twice, and what becomes of a pair."""
+
+from dataclasses import replace
+
+import pytest
+
+from coordinator.islands.events import (
+    Audited,
+    Evaluate,
+    Evaluated,
+    EvaluationFailed,
+    VettingFailed,
+)
+from coordinator.run.audits import Audits, audit_records, describe
+from coordinator.storage.entries import decode_entry, encode_entry
+from schema.robot.names import BirthId
+from schema.robot.results import Evaluation, Provenance
+from schema.robot.robot import Part, Robot
+from schema.tables.columns import TABLES
+
+ROBOT = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),))
+BIRTH = BirthId(2, 7)
+ONE = Evaluated(BIRTH, Evaluation(0.25, 0.0, 0.05, 12.0), Provenance("a", "p", 0.1))
+OTHER = replace(ONE, provenance=Provenance("b", "q", 0.7))
+DIFFERENT = replace(OTHER, evaluation=replace(ONE.evaluation, fitness=0.25 + 1e-16))
+FAILED = EvaluationFailed(BIRTH, "flew away", Provenance("c", "p", 0.1))
+
+
+def chosen(share: float) -> list[int]:
+    audits = Audits(share)
+    births = (Evaluate(BirthId(0, number), ROBOT) for number in range(4000))
+    return [each.birth.number for each in births if audits.chooses(each)]
+
+
+def test_a_share_is_chosen_by_who_is_evaluated() -> None:
+    assert chosen(0.0) == []
+    assert len(chosen(1.0)) == 4000
+    some = chosen(0.05)
+    # Within four standard deviations of a binomial law.
+    assert abs(len(some) - 200) < 4 * (4000 * 0.05 * 0.95) ** 0.5
+    assert some == chosen(0.05)
+    assert set(some) < set(chosen(0.2))
+
+
+def test_the_first_of_equal_answers_is_the_answer_whoever_comes_first() -> None:
+    for order in ((4, 5), (5, 4)):
+        audits = Audits(1.0)
+        audits.pair(4, 5)
+        outcomes = {4: ONE, 5: OTHER}
+        first, second = order
+        assert audits.settle(first, outcomes[first]) == []
+        both = audits.settle(second, outcomes[second])
+        assert both == [Audited(ONE, OTHER), ONE]
+
+
+@pytest.mark.parametrize("other", [FAILED, replace(DIFFERENT)])
+def test_unequal_answers_are_no_answer(other: Evaluated | EvaluationFailed) -> None:
+    audits = Audits(1.0)
+    audits.pair(4, 5)
+    audits.settle(5, other)
+    (audited,) = audits.settle(4, replace(ONE, evaluation=_far()))
+    assert isinstance(audited, Audited)
+    assert not audited.agrees
+    told = describe(audited)
+    assert "birth 7 of island 2" in told
+    assert "a (p) says fitness 9.5" in told
+    assert other.provenance.agent in told
+
+
+def _far() -> Evaluation:
+    return replace(ONE.evaluation, fitness=9.5)
+
+
+def test_equal_failures_agree() -> None:
+    assert Audited(FAILED, replace(FAILED, provenance=Provenance("d"))).agrees
+    assert not Audited(FAILED, replace(FAILED, reason="fell")).agrees
+
+
+def test_what_is_no_pair_passes() -> None:
+    audits = Audits(1.0)
+    vetted = VettingFailed(BIRTH, 0, "why")
+    assert audits.settle(1, ONE) == [ONE]
+    assert audits.settle(2, vetted) == [vetted]
+
+
+@pytest.mark.parametrize("event", [Audited(ONE, OTHER), Audited(FAILED, DIFFERENT)])
+def test_a_journal_keeps_both(event: Audited) -> None:
+    assert decode_entry(encode_entry(event)) == event
+
+
+def test_rows_have_the_columns_of_their_table() -> None:
+    records = audit_records(Audited(ONE, FAILED))
+    for record in records:
+        assert ["record", *record.row] == TABLES["audits"].names
+    assert [record.row["fitness"] for record in records] == [0.25, None]

@@ -1,0 +1,228 @@
+"""Runs side by side: each as if it were alone, as many as keep the workers busy."""
+
+from collections.abc import Callable
+from functools import partial
+from itertools import count
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+import analyzer.jobs
+import worker.serve.null
+from coordinator.dispatch.events import DispatchEvent, Joined
+from coordinator.dispatch.fleet import Agents, Fleet
+from coordinator.network.local import LocalAgents
+from coordinator.run.active import ActiveRun
+from coordinator.run.conductor import SLACK, Conductor, Planned
+from coordinator.storage.campaign import Campaign
+from coordinator.storage.compare import compare
+from coordinator.storage.folder import LOCK, RunDetails, RunFolder, read_state
+from coordinator.storage.folder_status import folder_status, unbegun_status
+from schema.errors import RevolveError, RunFolderError
+from schema.experiment.file import read_experiment
+
+BIRTHS = 24
+EXPERIMENTS = tuple(
+    replace(read_experiment(name), births=BIRTHS) for name in ("scenario2", "scenario1")
+)
+CLOCK = partial(next, map(float, count()))
+CAMPAIGN = Campaign(EXPERIMENTS, 2, 3)
+
+
+def local() -> LocalAgents:
+    answers = {"analyzer": analyzer.jobs.answer, "worker": worker.serve.null.answer}
+    return LocalAgents(answers, "any")  # type: ignore[arg-type]
+
+
+def plan(folder: Path) -> list[Planned]:
+    """Return the runs of the campaign, taken up where they stand."""
+    planned = []
+    for path, details in CAMPAIGN.runs(folder):
+        if path.exists():
+            planned.append(
+                Planned(details, folder_status(path), partial(RunFolder, path))
+            )
+        else:
+            status = unbegun_status(path, details)
+            planned.append(Planned(details, status, partial(RunFolder, path, details)))
+    return planned
+
+
+def conductor_of(
+    planned: list[Planned],
+    agents: Agents,
+    report: Callable[[RunDetails, RevolveError], None] = lambda *_: None,
+) -> Conductor:
+    fleet = Fleet(agents)
+    return Conductor(
+        planned,
+        fleet,
+        open_run=lambda held, _watched: ActiveRun(held, fleet),
+        most=50,
+        conclude=lambda _run: None,
+        report=report,
+    )
+
+
+def conduct(conductor: Conductor, turns: int = 10**6) -> None:
+    for _ in range(turns):
+        if conductor.is_finished:
+            return
+        conductor.turn(0.0, CLOCK)
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with the same runs, made one after the other."""
+    folder = tmp_path_factory.mktemp("alone")
+    for planned in plan(folder):
+        conduct(conductor_of([planned], local()))
+    return folder
+
+
+def test_each_run_is_as_if_it_were_alone(tmp_path: Path, alone: Path) -> None:
+    conductor = conductor_of(plan(tmp_path), local())
+    conduct(conductor)
+    status = conductor.status(0.0)
+    assert {run.state for run in status.runs} == {"finished"}
+    assert (status.births, status.wanted) == (4 * BIRTHS, 4 * BIRTHS)
+    for path, _ in CAMPAIGN.runs(alone):
+        assert compare(path, tmp_path / path.name) == []
+    repeats = compare(tmp_path / "scenario1-0", tmp_path / "scenario1-1")
+    assert repeats != []
+
+
+def test_stopped_runs_go_on_and_finished_ones_are_not_begun(
+    tmp_path: Path, alone: Path
+) -> None:
+    for turns in (30, 60, 60):
+        conductor = conductor_of(plan(tmp_path), local())
+        conduct(conductor, turns)
+        conductor.stop()
+        assert not conductor.is_finished
+        assert conductor.active == []
+    states = {path: read_state(path) for path, _ in CAMPAIGN.runs(tmp_path)}
+    assert "stopped" in states.values()
+    conduct(conductor_of(plan(tmp_path), local()))
+    for path, _ in CAMPAIGN.runs(alone):
+        assert compare(path, tmp_path / path.name) == []
+    finished = [replaced(each) for each in plan(tmp_path)]
+    assert conductor_of(finished, local()).is_finished
+
+
+def test_the_pace_is_known_though_nobody_looked_before(tmp_path: Path) -> None:
+    conductor = conductor_of(plan(tmp_path), local())
+    conductor.do_chores(0.0)
+    conduct(conductor, 100)
+    status = conductor.status(2.0)
+    assert status.births_per_s == status.births / 2.0 > 0.0
+
+
+def test_whatever_fails_in_a_run_that_another_took_over_is_that(tmp_path: Path) -> None:
+    """It slept just after it had found the run its own."""
+    conductor = conductor_of(plan(tmp_path)[:1], local())
+    conduct(conductor, 30)
+    (run,) = conductor.active
+    (run.held.path / LOCK).unlink()
+    conduct(conductor_of(plan(tmp_path)[:1], local()))
+    with pytest.raises(RunFolderError):
+        run.do_chores()
+    conductor.guard(run, broken)
+    ((_, error),) = conductor.failed
+    assert "coordinator 2 has taken it over: stop" in str(error)
+    assert conductor.active == []
+
+
+def broken() -> None:
+    raise RunFolderError("finished with 15 rows, and more came")
+
+
+def replaced(planned: Planned) -> Planned:
+    """Return the same, but it must not be begun."""
+    return Planned(planned.details, planned.status, never)
+
+
+def never() -> RunFolder:
+    raise AssertionError("a finished run was begun")
+
+
+class Silent:
+    """Two workers and an analyzer that never answer."""
+
+    def __init__(self) -> None:
+        self._news: list[DispatchEvent] = [
+            Joined("one", "worker", 1, "p"),
+            Joined("two", "worker", 1, "p"),
+            Joined("judge", "analyzer", 1, "p"),
+        ]
+
+    def send(self, number: int, agent: str, payload: bytes) -> None:
+        """Take a job, for ever."""
+
+    def cancel(self, agent: str, payload: bytes, /) -> None:
+        """Go on all the same."""
+
+    def receive(
+        self, _timeout_s: float, _pause_s: float = 0.0, /
+    ) -> list[DispatchEvent]:
+        news, self._news = self._news, []
+        return news
+
+
+def test_so_many_runs_are_begun_that_questions_are_twice_the_credits(
+    tmp_path: Path,
+) -> None:
+    one_at_a_time = replace(
+        EXPERIMENTS[0], selection=replace(EXPERIMENTS[0].selection, population=5)
+    )
+    details = Campaign((one_at_a_time,), 30, 1).runs(tmp_path)
+    planned = [
+        Planned(each, unbegun_status(path, each), partial(RunFolder, path, each))
+        for path, each in details
+    ]
+    conductor = conductor_of(planned, Silent())
+    conductor.turn(0.0, lambda: 0.0)
+    assert len(conductor.active) == 1
+    conductor.turn(0.0, lambda: 1.0)
+    # Five founders of each are open; credits are 2 x 2.
+    assert conductor.fleet.open == 10
+    assert conductor.fleet.open >= SLACK * conductor.fleet.credits
+    assert len(conductor.active) == 2
+    conductor.close()
+
+
+def test_a_run_that_cannot_go_on_stops_no_other(tmp_path: Path, alone: Path) -> None:
+    planned = plan(tmp_path)
+    said: list[str] = []
+    (tmp_path / "scenario2-1").mkdir()
+    (tmp_path / "scenario2-1" / "mine.txt").write_text("not empty")
+    conductor = conductor_of(
+        planned, local(), lambda details, error: said.append(f"{details.run} {error}")
+    )
+    conduct(conductor)
+    assert [type(error) for _, error in conductor.failed] == [RunFolderError]
+    assert len(said) == 1
+    assert said[0].startswith("1 ")
+    assert "mine.txt" in said[0]
+    states = [run.state for run in conductor.status(0.0).runs]
+    assert sorted(states) == ["failed", "finished", "finished", "finished"]
+    assert compare(alone / "scenario2-0", tmp_path / "scenario2-0") == []
+
+
+def test_a_disk_that_fails_a_run_in_the_middle_stops_no_other(
+    tmp_path: Path, alone: Path
+) -> None:
+    conductor = conductor_of(plan(tmp_path), local())
+    conduct(conductor, 60)
+    # Another coordinator has opened it since, by its epoch.
+    victim = conductor.active[0].held.path
+    (victim / "epoch").write_text("7")
+    conductor.do_chores(0.0)
+    conduct(conductor)
+    assert [details.name for details, _ in conductor.failed] == [
+        victim.name.rpartition("-")[0]
+    ]
+    others = [path for path, _ in CAMPAIGN.runs(alone) if path.name != victim.name]
+    for path in others:
+        assert compare(path, tmp_path / path.name) == []

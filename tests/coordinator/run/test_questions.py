@@ -1,0 +1,281 @@
+"""Questions about single robots: what becomes of answers, good and bad."""
+
+from collections.abc import Callable
+
+import pytest
+from msgspec.structs import replace
+
+from coordinator.dispatch.events import (
+    Died,
+    DispatchEvent,
+    Joined,
+    Left,
+    Returned,
+    Ticked,
+)
+from coordinator.dispatch.fleet import Fleet
+from coordinator.islands.events import (
+    Answered,
+    Audited,
+    Evaluate,
+    Evaluated,
+    EvaluationFailed,
+    Vet,
+    Vetted,
+    VettingFailed,
+)
+from coordinator.run.questions import QUARANTINED, REMEMBERED, Question, Questions
+from schema.errors import JobRefused
+from schema.experiment.identity import NOBODY, Identity, Origin
+from schema.robot.brain import Brain, Connection, Neuron
+from schema.robot.names import BirthId
+from schema.robot.results import Evaluation, Provenance, Report
+from schema.robot.robot import Part, Robot
+from schema.wire import revolve_pb2 as pb
+from schema.wire.codec import (
+    Answer,
+    decode_body,
+    decode_request,
+    encode_answer,
+    encode_body,
+    encode_robot,
+)
+
+EPOCH = 3
+ORIGIN = Origin(seed=5, run=2)
+BIRTH = BirthId(0, 7)
+ROBOT = Robot(
+    (Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),),
+    Brain(
+        (
+            *(Neuron("input", "Input", 0) for _ in range(6)),
+            Neuron("hidden", "Simple", 0, (0.25, 0.5)),
+        ),
+        (Connection(0, 6, 0.75),),
+    ),
+)
+JUDGED = Evaluation(0.25, 0.0, 0.05, 12.0)
+VIABLE = Report(True, "", (), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.1, 1)
+
+
+class Desk:
+    """Questions whose jobs are caught, with two workers and an analyzer."""
+
+    def __init__(self, evaluation: bytes = b"evaluation", audit: float = 0.0) -> None:
+        self.sent: list[tuple[int, str, bytes]] = []
+        self.cancelled: list[tuple[int, str]] = []
+        self.fleet = Fleet(self)
+        question = Question(
+            "run", EPOCH, ORIGIN, b"vetting", {0: evaluation, 2: evaluation}
+        )
+        self.questions = Questions(question, self.fleet, audit)
+        for name in ("one", "two"):
+            self.tell(Joined(name, "worker", 1, f"platform-{name}"))
+        self.tell(Joined("judge", "analyzer", 1, "platform"))
+        self.tell(Ticked(0.0))
+
+    def send(self, number: int, agent: str, payload: bytes) -> None:
+        self.sent.append((number, agent, payload))
+
+    def cancel(self, agent: str, payload: bytes) -> None:
+        asked = decode_request(payload, decode_body)
+        self.cancelled.append((asked.number, agent))
+
+    def receive(
+        self, _timeout_s: float, _pause_s: float = 0.0, /
+    ) -> list[DispatchEvent]:
+        return []
+
+    def tell(self, event: DispatchEvent) -> list[Answered | Audited]:
+        """Tell the fleet; return the answers that this comes to."""
+        self.fleet.tell(event)
+        return self.questions.take()
+
+    def reply(self, result: Evaluation | Report | str, **changes: int) -> Returned:
+        """Return the answer to the newest job."""
+        number, agent, _ = self.sent[-1]
+        fields = {"epoch": EPOCH, "number": number, **changes}
+        data = encode_answer(Answer(**fields, wall_s=0.5, result=result))
+        return Returned(number, agent, "ok", data)
+
+
+@pytest.fixture
+def desk() -> Desk:
+    return Desk()
+
+
+def test_a_request_carries_the_run_its_settings_and_the_robot(desk: Desk) -> None:
+    desk.questions.ask(Vet(BIRTH, 2, ROBOT))
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    (vet, judge, vetting), (_, worker, evaluation) = desk.sent
+    assert (judge, worker) == ("judge", "one")
+    asked = decode_request(vetting, decode_body)
+    assert (asked.run, asked.epoch, asked.number) == ("run", EPOCH, vet)
+    assert (asked.settings, asked.robot) == (b"vetting", Robot(ROBOT.parts))
+    asked = decode_request(evaluation)
+    assert (asked.settings, asked.robot) == (b"evaluation", ROBOT)
+
+
+def test_a_body_is_vetted_and_a_robot_evaluated_vetted_before_or_not(
+    desk: Desk,
+) -> None:
+    other = Robot(ROBOT.parts, Brain(ROBOT.brain.neurons))
+    desk.questions.ask(Vet(BIRTH, 0, ROBOT))
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    desk.questions.ask(Evaluate(BIRTH, ROBOT, trial=1))
+    desk.questions.ask(Vet(BirthId(0, 8), 0, ROBOT))
+    # Of the same birth, and yet not the one that was vetted.
+    desk.questions.ask(Evaluate(BirthId(0, 8), other))
+    for number, agent, _ in desk.sent[:2]:
+        result = VIABLE if agent == "judge" else JUDGED
+        data = encode_answer(Answer(EPOCH, number, 0.5, result))
+        desk.tell(Returned(number, agent, "ok", data))
+    sent = {
+        number: pb.Request.FromString(payload).robot for number, _, payload in desk.sent
+    }
+    body, whole = encode_body(ROBOT), encode_robot(ROBOT)
+    assert [sent[number] for number in sorted(sent)] == [
+        body,
+        whole,
+        whole,
+        body,
+        encode_robot(other),
+    ]
+    assert body != whole
+
+
+def test_noise_is_drawn_by_who_is_judged_for_whom_and_how_often(desk: Desk) -> None:
+    guest = BirthId(3, 9)
+    for question in (
+        Evaluate(BIRTH, ROBOT),
+        Evaluate(guest, ROBOT, trial=4, asker=2),
+        Vet(BIRTH, 1, ROBOT),
+    ):
+        desk.questions.ask(question)
+    found = [
+        decode_request(payload, decode_body).identity for _, _, payload in desk.sent
+    ]
+    there = replace(ORIGIN, island=2)
+    assert found == [Identity(ORIGIN, BIRTH, 0), Identity(there, guest, 4), NOBODY]
+
+
+def test_the_two_of_an_audit_draw_the_same_noise() -> None:
+    desk = Desk(audit=1.0)
+    desk.questions.ask(Evaluate(BIRTH, ROBOT, trial=1))
+    first, second = (decode_request(payload) for _, _, payload in desk.sent)
+    assert first.number != second.number
+    assert first.identity == second.identity == Identity(ORIGIN, BIRTH, 1)
+
+
+def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    (event,) = desk.tell(desk.reply(JUDGED))
+    assert isinstance(event, Evaluated)
+    assert (event.birth, event.evaluation) == (BIRTH, JUDGED)
+    assert event.provenance.agent == "one"
+    assert event.provenance.platform == "platform-one"
+    assert event.provenance.wall_s == 0.5
+
+
+def test_robots_that_are_never_evaluated_are_forgotten(desk: Desk) -> None:
+    """An arena's robots are vetted, born and gone: 3000 of them in a run."""
+    for number in range(REMEMBERED + 50):
+        desk.questions.ask(Vet(BirthId(0, number), 0, ROBOT))
+        (event,) = desk.tell(desk.reply(VIABLE))
+        assert isinstance(event, Vetted)
+    assert len(desk.questions._bodies) == REMEMBERED
+
+
+def test_a_request_names_its_plug_ins_by_what_they_are() -> None:
+    desk = Desk(
+        b'{"fitness":{"function":"plugged:speed"},"space":["schema.parts:CORE"]}'
+    )
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    sent = pb.Request.FromString(desk.sent[0][2])
+    assert sent.plugins == "plugged="  # it is not here
+
+
+@pytest.mark.parametrize("kind", ["evaluate", "vet"])
+def test_a_robot_that_ends_three_processes_is_told_apart(desk: Desk, kind: str) -> None:
+    ask = Vet(BIRTH, 2, ROBOT) if kind == "vet" else Evaluate(BIRTH, ROBOT)
+    desk.questions.ask(ask)
+    (number, agent, _) = desk.sent[0]
+    of_others = [Died("another", EPOCH, number, "x", "SIGBUS")]
+    of_others += [Died("run", EPOCH - 1, number, "x", "SIGBUS")]
+    own = [Died("run", EPOCH, number, each, "SIGSEGV") for each in ("a", "b", "c")]
+    told = [desk.tell(event) for event in (*of_others, *own)]
+    assert told[:-1] == [[]] * 4
+    ((event,),) = told[-1:]
+    why = "ended its own process 3 times, by SIGSEGV"
+    if kind == "vet":
+        assert event == VettingFailed(BIRTH, 2, f"the analyzer {why}")
+    else:
+        signed = Provenance("c")
+        assert event == EvaluationFailed(BIRTH, f"{QUARANTINED}{why}", signed)
+    assert desk.cancelled == [(number, agent)]
+    assert desk.tell(desk.reply(JUDGED)) == []
+
+
+def test_a_failed_simulation_is_a_result(desk: Desk) -> None:
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    (event,) = desk.tell(desk.reply("diverged"))
+    assert isinstance(event, EvaluationFailed)
+    assert event.reason == "diverged"
+
+
+def test_a_report_is_a_verdict_and_a_failure_a_failed_attempt(desk: Desk) -> None:
+    desk.questions.ask(Vet(BIRTH, 4, ROBOT))
+    assert desk.tell(desk.reply(VIABLE)) == [Vetted(BIRTH, 4, VIABLE)]
+    desk.questions.ask(Vet(BIRTH, 5, ROBOT))
+    failed = VettingFailed(BIRTH, 5, "no box")
+    assert desk.tell(desk.reply("no box")) == [failed]
+
+
+def test_a_second_answer_and_one_to_nothing_change_nothing(desk: Desk) -> None:
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    reply = desk.reply(JUDGED)
+    assert len(desk.tell(reply)) == 1
+    assert desk.tell(reply) == []
+    assert desk.tell(Returned(99, "one", "ok", b"")) == []
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda desk: desk.reply(JUDGED, epoch=EPOCH - 1),
+        lambda desk: desk.reply(JUDGED, number=41),
+        lambda desk: desk.reply(VIABLE),
+        lambda desk: Returned(desk.sent[-1][0], desk.sent[-1][1], "ok", b"\xff"),
+    ],
+    ids=["other epoch", "other job", "a verdict", "no message"],
+)
+def test_a_useless_answer_is_counted_and_the_job_goes_to_another(
+    desk: Desk, spoil: Callable[[Desk], Returned]
+) -> None:
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    assert desk.tell(spoil(desk)) == []
+    assert desk.questions.malformed == 1
+    assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
+    (event,) = desk.tell(desk.reply(JUDGED))
+    assert isinstance(event, Evaluated)
+
+
+def test_a_lost_job_goes_to_another(desk: Desk) -> None:
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    assert desk.tell(Left("one")) == []
+    assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
+
+
+def test_a_job_that_several_refuse_stops_the_run_and_is_no_result(
+    desk: Desk,
+) -> None:
+    desk.tell(Joined("three", "worker", 1, ""))
+    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    for _ in range(2):
+        number, agent, _ = desk.sent[-1]
+        refusal = Returned(number, agent, "error", reason="no such plug-in")
+        assert desk.tell(refusal) == []
+    number, agent, _ = desk.sent[-1]
+    with pytest.raises(JobRefused, match=r"birth 7.*cannot evaluate.*no such plug-in"):
+        desk.tell(Returned(number, agent, "error", reason="no such plug-in"))
+    assert sorted(agent for _, agent, _ in desk.sent) == ["one", "three", "two"]

@@ -1,0 +1,134 @@
+"""A run that dies again and again comes to the tables of one that never did.
+
+Everything is real but the physics: island, loop, analyzer, journal and tables.
+"""
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+import pytest
+
+import analyzer.jobs
+from coordinator.dispatch.fleet import Fleet
+from coordinator.islands.island import Island
+from coordinator.network.local import LocalAgents
+from coordinator.run.loop import Loop
+from coordinator.run.questions import Question
+from coordinator.storage.compare import compare
+from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.journal import NAME, Journal
+from coordinator.storage.recorder import Recorder
+from coordinator.storage.snapshots import Snapshots
+from schema.experiment.document import Experiment, Selection
+from schema.experiment.file import experiment_text
+from schema.robot.results import Evaluation
+from schema.tables.files import read_table
+from schema.wire.codec import Answer, decode_request, encode_answer, encode_robot
+
+EXPERIMENT = Experiment(
+    name="resume", births=40, selection=Selection(population=8, children=6)
+)
+DETAILS = RunDetails("resume", 0, 3, experiment_text(EXPERIMENT))
+
+
+class Killed(BaseException):
+    """The coordinator dies here."""
+
+
+@dataclass
+class Worker:
+    """Answers at once, by the robot's bytes, and dies after some answers."""
+
+    left: int
+    asked: int = field(default=0)
+
+    def answer(self, request: bytes) -> bytes:
+        """Return a fitness that depends on the robot alone; one in nine fails."""
+        self.asked += 1
+        if self.asked > self.left:
+            raise Killed
+        question = decode_request(request)
+        number = crc32(encode_robot(question.robot))
+        fitness = Evaluation(number / 2**32, 0.1, 0.2, 12.0)
+        result = "diverged" if number % 9 == 0 else fitness
+        return encode_answer(Answer(question.epoch, question.number, 0.0, result))
+
+
+def run(path: Path, *, answers: int = 10**9) -> int:
+    """Run, or go on, until the end or a number of evaluations; return their number."""
+    worker = Worker(answers)
+    details = None if (path / NAME).exists() else DETAILS
+    with RunFolder(path, details) as folder, Journal.open(path) as journal:
+        rows = Recorder(path, DETAILS)
+        fleet = Fleet(
+            LocalAgents(
+                {"analyzer": analyzer.jobs.answer, "worker": worker.answer}, "any"
+            )
+        )
+        loop = Loop(
+            {0: Island(EXPERIMENT, DETAILS.seed, DETAILS.run)},
+            question=Question.of("resume", folder.epoch, EXPERIMENT, DETAILS.origin),
+            fleet=fleet,
+            log=journal,
+            rows=rows,
+            vault=Snapshots(path),
+        )
+        try:
+            loop.start(journal.replay())
+            while not loop.is_finished:
+                fleet.listen(0.0, 0.0)
+                loop.act(0.0)
+                rows.flush()
+        except Killed:
+            rows.close()
+            return worker.asked - 1
+        rows.finish()
+    return worker.asked
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a run that nothing happened to."""
+    path = tmp_path_factory.mktemp("undisturbed") / "run"
+    assert run(path) == EXPERIMENT.births
+    return path
+
+
+def test_no_answer_is_asked_for_twice(tmp_path: Path, undisturbed: Path) -> None:
+    path = tmp_path / "run"
+    asked = [run(path, answers=answers) for answers in (0, 1, 5, 13, 2)]
+    assert asked == [0, 1, 5, 13, 2]
+    assert run(path) == EXPERIMENT.births - sum(asked)
+    assert compare(undisturbed, path) == []
+    # Every row stands once, and the failed are among them.
+    table = read_table(path, "evaluations")
+    assert table["record"].to_pylist() == list(range(EXPERIMENT.births))
+    assert {"ok", "failed"} == set(table["status"].to_pylist())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_lost_ends_of_all_files_are_made_good(
+    tmp_path: Path, undisturbed: Path, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    path = tmp_path / "run"
+    for _ in range(3):
+        run(path, answers=int(rng.integers(0, 12)))
+        # As a failing power supply may leave them, each by itself.
+        for file in [path / NAME, *sorted((path / "segments").iterdir())]:
+            os.truncate(file, int(file.stat().st_size * rng.uniform(0.3, 1.0)))
+    run(path)
+    assert compare(undisturbed, path) == []
+
+
+def test_a_finished_run_may_be_resumed_to_no_effect(
+    tmp_path: Path, undisturbed: Path
+) -> None:
+    path = tmp_path / "run"
+    run(path, answers=20)
+    run(path)
+    assert run(path) == 0
+    assert compare(undisturbed, path) == []

@@ -1,0 +1,172 @@
+"""What a campaign is, how it is written down, and which runs are taken as they are."""
+
+import shlex
+from dataclasses import replace as changed
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from coordinator.cli.wording import about_arenas, best_of, duration
+from coordinator.run.rate import Tempo
+from coordinator.storage.campaign import (
+    Campaign,
+    CampaignFolder,
+    check_adopted,
+    is_campaign,
+    read_campaign,
+    read_experiments,
+    refuse_used,
+    shipped_campaigns,
+    write_campaign,
+)
+from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.hints import command
+from schema.errors import ExperimentError, RunFolderError
+from schema.experiment.file import experiment_text, read_experiment
+from schema.wire.status import IslandStatus, RunStatus
+
+FIRST, SECOND = read_experiment("scenario1"), read_experiment("no-selection")
+CAMPAIGN = Campaign((FIRST, SECOND), 3, 5)
+
+
+def test_all_first_repeats_come_first(tmp_path: Path) -> None:
+    runs = CAMPAIGN.runs(tmp_path)
+    assert [path.name for path, _ in runs] == [
+        "scenario1-0", "no-selection-0", "scenario1-1", "no-selection-1",
+        "scenario1-2", "no-selection-2",
+    ]  # fmt: skip
+    assert [(details.name, details.run) for _, details in runs[2:4]] == [
+        ("scenario1", 1),
+        ("no-selection", 1),
+    ]
+    assert {details.seed for _, details in runs} == {5}
+
+
+def test_the_thesis_is_its_five_experiments() -> None:
+    names = [experiment.name for experiment in read_experiments(["thesis"])]
+    assert names == list(shipped_campaigns()["thesis"])
+    assert set(names) == {
+        "scenario1", "scenario2", "scenario3", "no-selection", "no-reproduction",
+    }  # fmt: skip
+
+
+def test_a_campaign_comes_back_from_its_folder(tmp_path: Path) -> None:
+    odd = replace(FIRST, name="it's \"odd\" ''' \\")
+    campaign = Campaign((odd, replace(SECOND, births=77)), 3, 5)
+    assert not is_campaign(tmp_path)
+    write_campaign(tmp_path, campaign)
+    assert is_campaign(tmp_path)
+    assert read_campaign(tmp_path) == campaign
+
+
+def test_a_used_folder_is_refused(tmp_path: Path) -> None:
+    refuse_used(tmp_path)
+    write_campaign(tmp_path, CAMPAIGN)
+    with pytest.raises(RunFolderError, match="revolve resume"):
+        refuse_used(tmp_path)
+    with RunFolder(tmp_path / "run", RunDetails("a", 0, 1, "{}")):
+        pass
+    with pytest.raises(RunFolderError, match="already holds a run"):
+        refuse_used(tmp_path / "run")
+
+
+def test_a_second_coordinator_is_refused(tmp_path: Path) -> None:
+    with CampaignFolder(tmp_path), pytest.raises(RunFolderError, match="process"):
+        CampaignFolder(tmp_path)
+    with CampaignFolder(tmp_path):
+        pass
+
+
+@pytest.mark.parametrize("text", ["", "seed = 1", "seed = ", "experiments = 3"])
+def test_a_damaged_campaign_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / "campaign.toml").write_text(text)
+    with pytest.raises(RunFolderError, match="is not one of a campaign"):
+        read_campaign(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "sources", [["scenario1", "scenario1"], ["thesis", "scenario3"]]
+)
+def test_names_must_differ(sources: list[str]) -> None:
+    with pytest.raises(ExperimentError, match="names of their own"):
+        read_experiments(sources)
+
+
+WANTED = RunDetails("scenario1", 1, 5, experiment_text(FIRST))
+
+
+def _made(folder: Path, details: RunDetails) -> Path:
+    with RunFolder(folder / "run", details):
+        return folder / "run"
+
+
+def test_a_run_made_alone_is_taken(tmp_path: Path) -> None:
+    check_adopted(tmp_path, WANTED, WANTED)
+
+
+def test_a_run_with_births_of_its_own_is_taken_as_it_is(tmp_path: Path) -> None:
+    short = changed(WANTED, document=experiment_text(replace(FIRST, births=600)))
+    check_adopted(tmp_path, short, WANTED)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        changed(WANTED, run=2),
+        changed(WANTED, seed=6),
+        changed(
+            WANTED,
+            document=experiment_text(
+                replace(FIRST, selection=replace(FIRST.selection, children=9))
+            ),
+        ),
+    ],
+    ids=["another repeat", "another seed", "another experiment"],
+)
+def test_another_run_is_refused(tmp_path: Path, other: RunDetails) -> None:
+    with pytest.raises(RunFolderError, match="must be run 1 of seed 5"):
+        check_adopted(tmp_path, other, WANTED)
+
+
+def test_a_rate_is_that_of_the_last_seconds() -> None:
+    tempo = Tempo()
+    assert tempo.per_s == 0.0
+    tempo.note(0.0, 1000)
+    assert tempo.per_s == 0.0
+    for second in range(1, 31):
+        tempo.note(
+            float(second), 1000 + (50 if second <= 20 else 50 + 3 * (second - 20))
+        )
+    assert tempo.per_s == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [
+        (None, "?"),
+        (0.0, "0 s"),
+        (59.4, "59 s"),
+        (61.0, "1 min 01 s"),
+        (3600.0 + 5 * 60, "1 h 05 min"),
+        (3 * 86400.0 + 7200, "3 d 2 h"),
+    ],
+)
+def test_durations_in_words(seconds: float | None, said: str) -> None:
+    assert duration(seconds) == said
+
+
+def test_a_command_can_be_pasted() -> None:
+    said = command("resume", Path("runs/it's mine"))
+    assert shlex.split(said) == ["revolve", "resume", "runs/it's mine"]
+
+
+def test_the_best_of_few_islands_stand_side_by_side() -> None:
+    islands = (IslandStatus(1, 9, 0.25, 3), IslandStatus(0, 9, None, 0))
+    run = RunStatus("a", "a", 0, "running", islands=islands)
+    assert best_of(run) == "best 0.250 -"
+    assert best_of(islands[1]) == "best -"
+    assert about_arenas(run) == ""
+    arena = IslandStatus(1, 9, 0.5, 4, simulated_s=20.0, is_paused=True)
+    both = changed(run, islands=(*islands, arena))
+    assert about_arenas(both) == ", 20 s simulated, 4 alive, paused"

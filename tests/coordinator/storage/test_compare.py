@@ -1,0 +1,141 @@
+"""Two runs side by side, finished or not."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from coordinator.islands.events import Record
+from coordinator.storage.compare import compare
+from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.recorder import Recorder
+from schema.errors import RunFolderError
+
+DETAILS = RunDetails("test", 0, 1, "{}")
+Make = Callable[..., list[Record]]
+
+
+def written(path: Path, rows: list[Record], *, is_finished: bool = True) -> Path:
+    """Write a run; return its folder."""
+    with RunFolder(path, DETAILS):
+        recorder = Recorder(path, DETAILS)
+        for record in rows:
+            recorder.write(record)
+        if is_finished:
+            recorder.finish()
+        else:
+            recorder.flush()
+            recorder.close()
+    return path
+
+
+def changed(rows: list[Record], index: int, column: str, value: object) -> list[Record]:
+    """Return rows with one value changed."""
+    record = rows[index]
+    new = replace(record, row={**record.row, column: value})
+    return [*rows[:index], new, *rows[index + 1 :]]
+
+
+@pytest.mark.parametrize("is_finished", [True, False])
+def test_equal_runs_have_no_difference(
+    tmp_path: Path, make_records: Make, *, is_finished: bool
+) -> None:
+    first = written(tmp_path / "a", make_records(12))
+    second = written(tmp_path / "b", make_records(12), is_finished=is_finished)
+    assert compare(first, second) == []
+    assert compare(second, first) == []
+
+
+def test_who_evaluated_and_where_is_no_difference(
+    tmp_path: Path, make_records: Make
+) -> None:
+    first = written(tmp_path / "a", make_records(12))
+    second = written(tmp_path / "b", make_records(12, "worker-9", "arm"))
+    assert compare(first, second) == []
+
+
+@pytest.mark.parametrize("is_finished", [True, False])
+def test_the_first_difference_of_a_table_is_named(
+    tmp_path: Path, make_records: Make, *, is_finished: bool
+) -> None:
+    rows = make_records(12)
+    # Record 3 and, in an earlier column, record 7 of the births.
+    births = [index for index, each in enumerate(rows) if each.table == "births"]
+    other = changed(rows, births[3], "genome", b"\x00" * 100)
+    other = changed(other, births[7], "island", 4)
+    first = written(tmp_path / "a", rows)
+    second = written(tmp_path / "b", other, is_finished=is_finished)
+    (line,) = compare(first, second)
+    assert line.startswith(
+        r"births: first at record 3, column genome: b'\x03\x03\x03' against b'\x00\x00"
+    )
+    assert line.endswith("...")
+
+
+def test_the_smallest_change_of_a_number_is_seen(
+    tmp_path: Path, make_records: Make
+) -> None:
+    rows = make_records(2)
+    first = written(tmp_path / "a", rows)
+    second = written(tmp_path / "b", changed(rows, 3, "fitness", 0.33333333333333337))
+    assert compare(first, second) == [
+        (
+            "evaluations: first at record 1, column fitness: "
+            "0.3333333333333333 against 0.33333333333333337"
+        )
+    ]
+
+
+def test_a_failed_evaluation_differs_from_one_that_is_zero(
+    tmp_path: Path, make_records: Make
+) -> None:
+    rows = make_records(7)
+    failed = next(
+        index for index, each in enumerate(rows) if each.row.get("status") == "failed"
+    )
+    first = written(tmp_path / "a", rows)
+    second = written(tmp_path / "b", changed(rows, failed, "fitness", 0.0))
+    assert compare(first, second) == [
+        "evaluations: first at record 6, column fitness: None against 0.0"
+    ]
+
+
+def test_not_a_number_equals_itself(tmp_path: Path, make_records: Make) -> None:
+    rows = changed(make_records(2), 3, "fitness", float("nan"))
+    first = written(tmp_path / "a", rows)
+    second = written(tmp_path / "b", rows)
+    assert compare(first, second) == []
+
+
+def test_missing_rows_are_counted_and_the_common_ones_compared(
+    tmp_path: Path, make_records: Make
+) -> None:
+    first = written(tmp_path / "a", make_records(12))
+    second = written(tmp_path / "b", make_records(9), is_finished=False)
+    assert compare(first, second) == [
+        "births: 12 rows against 9",
+        "evaluations: 12 rows against 9",
+        "population: 12 rows against 9",
+    ]
+
+
+def test_different_platforms_are_named_beside_a_difference(
+    tmp_path: Path, make_records: Make
+) -> None:
+    rows = make_records(3, "w", "arm")
+    first = written(tmp_path / "a", make_records(3))
+    second = written(tmp_path / "b", changed(rows, 1, "fitness", 9.0))
+    assert compare(first, second) == [
+        "evaluations: first at record 0, column fitness: 0.0 against 9.0",
+        (
+            "platforms differ: linux-x86 against arm; equality is only promised on "
+            "equal ones"
+        ),
+    ]
+
+
+def test_a_folder_without_a_run_is_refused(tmp_path: Path, make_records: Make) -> None:
+    first = written(tmp_path / "a", make_records(3))
+    with pytest.raises(RunFolderError, match="no run is there"):
+        compare(first, tmp_path)

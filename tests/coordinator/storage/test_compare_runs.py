@@ -1,0 +1,75 @@
+"""What two runs ran: documents of two versions, platforms of arenas."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from coordinator.islands.events import Record
+from coordinator.storage.compare import compare
+from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.recorder import Recorder
+from schema.experiment.document import Experiment, Simulation
+from schema.experiment.file import experiment_text
+
+DETAILS = RunDetails("test", 0, 1, "{}")
+START = datetime(2026, 1, 1, tzinfo=UTC)
+
+
+def written(path: Path, birth: Record, **row: Any) -> Path:  # noqa: ANN401 - any value
+    """Write a finished run of one birth."""
+    whole = {
+        "name": "test", "run": 0, "seed": 1, "state": "finished", "versions": "{}",
+        "document": experiment_text(Experiment(name="test")), "platform": "here",
+        "cpu_flags": "", "start": START, "end": START, **row,
+    }  # fmt: skip
+    with RunFolder(path, DETAILS):
+        recorder = Recorder(path, DETAILS)
+        recorder.write(birth)
+        recorder.write(Record("runs", whole))
+        recorder.finish()
+    return path
+
+
+def older(experiment: Experiment) -> str:
+    """Return a document from before some keys, whose defaults it means."""
+    document = msgspec.json.decode(experiment_text(experiment))
+    del document["simulation"]["evaluation_s"]
+    del document["selection"]["culling"]
+    return msgspec.json.encode(document).decode()
+
+
+def test_an_older_document_of_the_same_experiment_is_no_difference(
+    tmp_path: Path,
+    make_records: Any,  # noqa: ANN401 - the fixture
+) -> None:
+    birth = make_records(1)[0]
+    document = older(Experiment(name="test"))
+    assert document != experiment_text(Experiment(name="test"))
+    first = written(tmp_path / "a", birth)
+    assert compare(first, written(tmp_path / "b", birth, document=document)) == []
+
+
+def test_another_experiment_is_a_difference(
+    tmp_path: Path,
+    make_records: Any,  # noqa: ANN401 - the fixture
+) -> None:
+    birth = make_records(1)[0]
+    other = Experiment(name="test", simulation=Simulation(friction=0.5))
+    first = written(tmp_path / "a", birth)
+    (line,) = compare(first, written(tmp_path / "b", birth, document=older(other)))
+    assert line.startswith("runs: first at record 0, column document:")
+
+
+def test_where_nothing_is_evaluated_the_platforms_are_the_runs_(
+    tmp_path: Path,
+    make_records: Any,  # noqa: ANN401 - the fixture
+) -> None:
+    birth = make_records(1)[0]
+    other = Record("births", {**birth.row, "rank": 9})
+    first = written(tmp_path / "a", birth)
+    lines = compare(first, written(tmp_path / "b", other, platform="there"))
+    assert lines[1:] == [
+        "platforms differ: here against there; equality is only promised on equal ones"
+    ]

@@ -1,0 +1,120 @@
+"""Writing where there is no room left."""
+
+import errno
+import os
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import pytest
+
+from coordinator.storage.disk import AppendedFile, replace_durably
+from schema.errors import RunFolderError
+
+ROOM = 64 * 1024
+PAGE = 4096
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """Mount a disk of 64 KiB; skip where that takes rights that we lack."""
+    mount = shutil.which("mount")
+    command = ["mount", "-t", "tmpfs", "-o", f"size={ROOM}", "tmpfs", str(tmp_path)]
+    if (
+        mount is None
+        or subprocess.run(command, capture_output=True, check=False).returncode
+    ):
+        pytest.skip("no right to mount a small disk")
+    yield tmp_path
+    subprocess.run(["umount", str(tmp_path)], check=True)
+
+
+def test_a_piece_for_which_there_is_no_room_leaves_nothing(small_disk: Path) -> None:
+    file = AppendedFile(small_disk / "f", fsync=True)
+    piece = b"x" * 10_000
+    taken = 0
+    while (taken + 1) * len(piece) < ROOM - 4 * PAGE:
+        file.append(piece)
+        taken += 1
+    with pytest.raises(RunFolderError, match=r"f: disk full .*resume the run when"):
+        file.append(b"x" * ROOM)
+    assert (small_disk / "f").read_bytes() == piece * taken
+    assert file.size == len(piece) * taken
+    # What does fit is taken still.
+    file.append(b"y")
+    assert (small_disk / "f").read_bytes() == piece * taken + b"y"
+    file.close()
+
+
+def test_a_replacement_for_which_there_is_no_room_leaves_the_old(
+    small_disk: Path,
+) -> None:
+    path = small_disk / "f"
+    replace_durably(path, lambda file: file.write_bytes(b"old"))
+    with pytest.raises(RunFolderError, match="f: disk full"):
+        replace_durably(path, lambda file: file.write_bytes(b"n" * 2 * ROOM))
+    assert [(each.name, each.read_bytes()) for each in small_disk.iterdir()] == [
+        ("f", b"old")
+    ]
+
+
+def test_a_closed_file_takes_nothing(tmp_path: Path) -> None:
+    file = AppendedFile(tmp_path / "f")
+    file.append(b"one")
+    file.close()
+    with pytest.raises(RunFolderError, match="cannot be written"):
+        file.append(b"two")
+    assert (tmp_path / "f").read_bytes() == b"one"
+
+
+@pytest.mark.parametrize("room", [0, 3])
+def test_a_failure_takes_back_nothing_that_another_wrote(
+    tmp_path: Path,
+    full_beyond: Callable[[int], AbstractContextManager[None]],
+    room: int,
+) -> None:
+    """A coordinator that slept through its replacement, on a full disk."""
+    old = AppendedFile(tmp_path / "f")
+    old.append(b"old")
+    new = AppendedFile(tmp_path / "f")
+    new.append(b" and new")
+    with full_beyond(11 + room), pytest.raises(RunFolderError, match="disk full"):
+        old.append(b" again")
+    new.append(b" still")
+    assert (tmp_path / "f").read_bytes() == b"old and new still"
+    for file in (old, new):
+        file.close()
+
+
+def test_a_failure_behind_which_another_wrote_takes_back_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = AppendedFile(tmp_path / "f", fsync=True)
+    new = AppendedFile(tmp_path / "f")
+
+    def fail(_descriptor: int) -> None:
+        new.append(b"new")
+        raise OSError(errno.EIO, "gone")
+
+    monkeypatch.setattr(os, "fsync", fail)
+    with pytest.raises(RunFolderError, match="cannot be written: gone"):
+        old.append(b"old ")
+    assert (tmp_path / "f").read_bytes() == b"old new"
+    for file in (old, new):
+        file.close()
+
+
+def test_a_file_is_continued_at_its_end(tmp_path: Path) -> None:
+    (tmp_path / "f").write_bytes(b"one")
+    file = AppendedFile(tmp_path / "f")
+    file.append(b" two")
+    file.close()
+    assert file.size == 7
+    assert (tmp_path / "f").read_bytes() == b"one two"
+
+
+def test_a_missing_folder_is_an_error_in_words(tmp_path: Path) -> None:
+    with pytest.raises(RunFolderError, match="No such file"):
+        AppendedFile(tmp_path / "none" / "f")

@@ -1,0 +1,259 @@
+"""Who may run in a folder, and how often it was opened."""
+
+import fcntl
+import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from coordinator.islands.events import VettingFailed
+from coordinator.storage.folder import (
+    RunDetails,
+    RunFolder,
+    read_details,
+    read_holder,
+    read_state,
+)
+from coordinator.storage.journal import Journal
+from schema.errors import RunFolderError
+from schema.robot.names import BirthId
+
+DETAILS = RunDetails("scenario1", 3, 2**64 - 1, '{"name": "scenario1", "ü": 1}')
+HOLD = """
+import sys
+from pathlib import Path
+from coordinator.storage.folder import RunFolder
+with RunFolder(Path(sys.argv[1])):
+    print("held", flush=True)
+    sys.stdin.read()
+"""
+LOOKED_AT_S = 0.05
+
+
+def test_what_is_run_there_comes_back(tmp_path: Path) -> None:
+    path = tmp_path / "deep" / "run"
+    with RunFolder(path, DETAILS) as folder:
+        assert folder.details == DETAILS
+        assert folder.epoch == 1
+    assert read_details(path) == DETAILS
+
+
+def test_the_epoch_grows_with_every_opening(tmp_path: Path) -> None:
+    RunFolder(tmp_path / "run", DETAILS).close()
+    epochs = []
+    for _ in range(3):
+        with RunFolder(tmp_path / "run") as folder:
+            epochs.append(folder.epoch)
+    assert epochs == [2, 3, 4]
+
+
+def test_a_folder_that_is_begun_anew_is_another_run(tmp_path: Path) -> None:
+    """Workers that outlive a run would take the new one for an old incarnation."""
+    path = tmp_path / "run"
+    with RunFolder(path, DETAILS) as first:
+        assert first.name.endswith(f":{path}")
+    with RunFolder(path) as resumed:
+        assert resumed.name == first.name
+    shutil.rmtree(path)
+    with RunFolder(path, DETAILS) as anew:
+        assert anew.epoch == 1
+        assert anew.name != first.name
+
+
+def test_a_run_of_before_names_were_unique_is_still_read(tmp_path: Path) -> None:
+    RunFolder(tmp_path, DETAILS).close()
+    entries = json.loads((tmp_path / "run.json").read_text())
+    del entries["nonce"]
+    (tmp_path / "run.json").write_text(json.dumps(entries))
+    with RunFolder(tmp_path) as folder:
+        assert folder.details == DETAILS
+
+
+@pytest.mark.parametrize("left", [None, "1"])
+def test_a_lost_epoch_voids_nothing_that_is_written_later(
+    tmp_path: Path, left: str | None
+) -> None:
+    """The file is gone, or an older one was put in its place."""
+    path = tmp_path / "run"
+    RunFolder(path, DETAILS).close()
+    events = [VettingFailed(BirthId(0, number), 0, "refused") for number in range(5)]
+    for number, event in enumerate(events):
+        if number == 2 and left is None:
+            (path / "epoch").unlink()
+        elif number == 2 and left is not None:
+            (path / "epoch").write_text(left)
+        with (
+            RunFolder(path) as folder,
+            Journal.open(path, epoch=folder.epoch) as journal,
+        ):
+            folder.confirm()
+            assert journal.replay() == events[:number]
+            journal.append([event])
+    with Journal.open(path) as journal:
+        assert journal.replay() == events
+
+
+def test_a_used_folder_is_refused(tmp_path: Path) -> None:
+    RunFolder(tmp_path / "run", DETAILS).close()
+    with pytest.raises(
+        RunFolderError, match="already holds a run; to go on with it: revolve "
+    ):
+        RunFolder(tmp_path / "run", DETAILS)
+    assert RunFolder(tmp_path / "run").epoch == 2
+
+
+def test_only_who_described_a_run_and_did_not_begin_it_forgets_it(
+    tmp_path: Path,
+) -> None:
+    """One that was archived without its epoch and journal is still described."""
+    path = tmp_path / "run"
+    with RunFolder(path, DETAILS) as folder:
+        folder.forget()
+    assert [entry.name for entry in path.iterdir()] == ["lock"]
+    RunFolder(path, DETAILS).close()
+    (path / "epoch").unlink()
+    with RunFolder(path) as folder:
+        folder.forget()
+    assert read_details(path) == DETAILS
+    other = tmp_path / "other"
+    with RunFolder(other, DETAILS) as folder, Journal.open(other):
+        folder.forget()
+    assert read_details(other) == DETAILS
+
+
+def test_a_folder_with_something_else_is_refused_and_left_alone(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(RunFolderError, match=r"not empty \('thesis.tex' is there\)"):
+        RunFolder(tmp_path, DETAILS)
+    assert (tmp_path / "thesis.tex").read_text() == "years of work"
+
+
+@pytest.mark.parametrize("leftover", ["lock", ".run.json.new"])
+def test_a_kill_while_a_folder_was_taken_does_not_spoil_it(
+    tmp_path: Path, leftover: str
+) -> None:
+    (tmp_path / leftover).write_text("{")
+    with RunFolder(tmp_path, DETAILS) as folder:
+        assert folder.epoch == 1
+
+
+@pytest.mark.parametrize("details", [None, DETAILS])
+def test_a_second_coordinator_is_refused_with_the_first_ones_name(
+    tmp_path: Path, details: RunDetails | None
+) -> None:
+    path = tmp_path / "run"
+    RunFolder(path, DETAILS).close()
+    with subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+    ) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == b"held\n"
+        name = f"process {child.pid} on {socket.gethostname()}"
+        assert read_holder(path) == name
+        with pytest.raises(RunFolderError, match=f"in use by {name}"):
+            RunFolder(path, details)
+        # Not even SIGKILL leaves the folder locked.
+        child.send_signal(signal.SIGKILL)
+        child.wait()
+        assert read_holder(path) == ""
+        with RunFolder(path) as folder:
+            # The refused one did not count.
+            assert folder.epoch == 3
+
+
+def test_who_looks_at_a_folder_is_no_reason_to_refuse_it(tmp_path: Path) -> None:
+    path = tmp_path / "run"
+    RunFolder(path, DETAILS).close()
+    with (path / "lock").open() as lock:
+        fcntl.flock(lock, fcntl.LOCK_SH)
+        assert read_holder(path) == ""
+        end = threading.Timer(LOOKED_AT_S, fcntl.flock, (lock, fcntl.LOCK_UN))
+        end.start()
+        with RunFolder(path) as folder:
+            assert folder.epoch == 2
+        end.join()
+
+
+def test_a_child_process_does_not_keep_the_lock(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path / "run", DETAILS)
+    assert not os.get_inheritable(folder._lock)
+    with subprocess.Popen(
+        [sys.executable, "-c", "import sys; sys.stdin.read()"],
+        stdin=subprocess.PIPE,
+        close_fds=False,
+    ):
+        folder.close()
+        with RunFolder(tmp_path / "run") as again:
+            assert again.epoch == 2
+
+
+def test_a_coordinator_that_slept_through_its_replacement_finds_out(
+    tmp_path: Path,
+) -> None:
+    with RunFolder(tmp_path / "run", DETAILS) as old:
+        old.confirm()
+        # A lock that does not hold: its file was removed, or the disk knows none.
+        (tmp_path / "run" / "lock").unlink()
+        with RunFolder(tmp_path / "run") as new:
+            new.confirm()
+            with pytest.raises(RunFolderError, match="coordinator 2 has taken it over"):
+                old.confirm()
+
+
+def test_a_folder_without_a_run_is_refused_and_nothing_is_made(tmp_path: Path) -> None:
+    for path in (tmp_path / "none", tmp_path):
+        with pytest.raises(RunFolderError, match="no run is there"):
+            RunFolder(path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "story"),
+    [
+        ("{", "cannot be read"),
+        ('{"name": "a"}', "must have name, run, seed, document, has name"),
+        ('{"name": "a", "run": "0", "seed": 1, "document": ""}', "run: must be int"),
+    ],
+)
+def test_a_damaged_description_is_refused(
+    tmp_path: Path, text: str, story: str
+) -> None:
+    (tmp_path / "run.json").write_text(text)
+    with pytest.raises(RunFolderError, match=story):
+        read_details(tmp_path)
+
+
+def test_a_damaged_epoch_is_refused_and_the_lock_let_go(tmp_path: Path) -> None:
+    RunFolder(tmp_path / "run", DETAILS).close()
+    (tmp_path / "run" / "epoch").write_text("many")
+    with pytest.raises(RunFolderError, match="greater than any before"):
+        RunFolder(tmp_path / "run")
+    assert read_holder(tmp_path / "run") == ""
+
+
+def test_the_state_can_be_read_from_outside(tmp_path: Path) -> None:
+    with RunFolder(tmp_path / "run", DETAILS) as folder:
+        assert read_state(folder.path) == "running"
+        folder.set_state("finished")
+        assert read_state(folder.path) == "finished"
+        (folder.path / "state").write_text("asleep")
+        with pytest.raises(RunFolderError, match="must be one of running"):
+            read_state(folder.path)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(RunFolderError, match="cannot be written"):
+        RunFolder(tmp_path / "run", DETAILS)

@@ -1,0 +1,209 @@
+"""Tables of a living run, killed at any byte, and on full disks."""
+
+import os
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from coordinator.islands.events import Record
+from coordinator.storage.folder import RunDetails
+from coordinator.storage.recorder import WAITING, Recorder
+from schema.errors import RunFolderError
+from schema.tables.columns import BIRTHS, POPULATION, TABLES
+from schema.tables.files import (
+    parquet_path,
+    read_segment,
+    read_table,
+    segment_path,
+    segments_of,
+)
+
+DETAILS = RunDetails("a/b c", 2, 1, "{}")
+Make = Callable[..., list[Record]]
+Feed = Callable[..., Recorder]
+Check = Callable[[Path, list[Record]], None]
+FullBeyond = Callable[[int], AbstractContextManager[None]]
+
+
+def test_rows_come_back_before_and_after_the_end(
+    tmp_path: Path, make_records: Make, feed_rows: Feed, check_complete: Check
+) -> None:
+    rows = make_records(20)
+    recorder = feed_rows(tmp_path, rows)
+    recorder.flush()
+    check_complete(tmp_path, rows)
+    recorder.finish()
+    check_complete(tmp_path, rows)
+    files = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert sorted(files) == sorted(
+        parquet_path(tmp_path, "a/b c", 2, name) for name in TABLES
+    )
+
+
+def test_enough_rows_are_on_disk_without_a_flush(
+    tmp_path: Path, make_records: Make
+) -> None:
+    recorder = Recorder(tmp_path, DETAILS)
+    births = [record for record in make_records(WAITING) if record.table == "births"]
+    for record in births[:-1]:
+        recorder.write(record)
+    assert read_table(tmp_path, "births").num_rows == 0
+    recorder.write(births[-1])
+    assert read_table(tmp_path, "births").num_rows == WAITING
+    recorder.close()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_many_incarnations_write_what_one_does(
+    tmp_path: Path,
+    make_records: Make,
+    seed: int,
+    feed_rows: Feed,
+    check_complete: Check,
+) -> None:
+    rng = np.random.default_rng(seed)
+    rows = make_records(30)
+    for stop in sorted(rng.integers(0, len(rows), 5)):
+        # Each is killed after some rows: what waits is lost.
+        feed_rows(tmp_path, rows[:stop], every=int(rng.integers(1, 20))).close()
+    recorder = feed_rows(tmp_path, rows)
+    recorder.finish()
+    check_complete(tmp_path, rows)
+
+
+@pytest.mark.parametrize("begun", [0, 10])
+def test_rows_of_one_that_was_replaced_count_once(
+    tmp_path: Path,
+    make_records: Make,
+    feed_rows: Feed,
+    check_complete: Check,
+    begun: int,
+) -> None:
+    """It slept with rows at hand, in a segment or before its first, and wakes up."""
+    rows = make_records(30)
+    old = feed_rows(tmp_path, rows[:begun])
+    for record in rows[begun:25]:
+        old.write(record)
+    new = feed_rows(tmp_path, rows[:40])
+    old.flush()
+    for record in rows[40:60]:
+        new.write(record)
+    new.flush()
+    old.close()
+    check_complete(tmp_path, rows[:60])
+    new.close()
+    third = feed_rows(tmp_path, rows)
+    third.finish()
+    check_complete(tmp_path, rows)
+
+
+def test_a_segment_cut_at_any_byte_gives_exactly_its_whole_batches(
+    tmp_path: Path, make_records: Make
+) -> None:
+    rows = [record for record in make_records(2) if record.table == "births"]
+    recorder = Recorder(tmp_path, DETAILS)
+    path = segment_path(tmp_path, "births", 0)
+    ends = []
+    for record in rows:
+        recorder.write(record)
+        recorder.flush()
+        ends.append(path.stat().st_size)
+    recorder.close()
+    data = path.read_bytes()
+    whole = pa.Table.from_batches(read_segment(path, BIRTHS))
+    for cut in range(len(data)):
+        path.write_bytes(data[:cut])
+        batches = read_segment(path, BIRTHS)
+        assert len(batches) == sum(end <= cut for end in ends)
+        kept = pa.Table.from_batches(batches, BIRTHS)
+        assert kept.equals(whole.slice(0, len(batches)))
+
+
+def test_a_run_resumes_from_a_segment_cut_anywhere(
+    tmp_path: Path, make_records: Make, feed_rows: Feed, check_complete: Check
+) -> None:
+    rows = make_records(9)
+    first = tmp_path / "first"
+    first.mkdir()
+    feed_rows(first, rows[:15], every=4).close()
+    data = segment_path(first, "births", 0).read_bytes()
+    rng = np.random.default_rng(7)
+    for cut in [0, 1, len(data), *rng.integers(0, len(data), 25)]:
+        folder = tmp_path / f"run-{cut}"
+        (folder / "segments").mkdir(parents=True)
+        segment_path(folder, "births", 0).write_bytes(data[:cut])
+        recorder = feed_rows(folder, rows)
+        recorder.flush()
+        check_complete(folder, rows)
+        recorder.finish()
+        check_complete(folder, rows)
+
+
+def test_rows_behind_a_damaged_segment_are_written_again(
+    tmp_path: Path, make_records: Make, feed_rows: Feed, check_complete: Check
+) -> None:
+    rows = make_records(20)
+    feed_rows(tmp_path, rows[:20], every=5).close()
+    feed_rows(tmp_path, rows[:40], every=5).close()
+    path = segment_path(tmp_path, "births", 0)
+    os.truncate(path, path.stat().st_size // 2)
+    kept = read_table(tmp_path, "births").num_rows
+    assert 0 < kept < 8
+    recorder = feed_rows(tmp_path, rows)
+    recorder.flush()
+    check_complete(tmp_path, rows)
+    # The number of the segment that was of no use is free again.
+    assert [number for number, _ in segments_of(tmp_path, "births")] == [0, 1]
+    recorder.finish()
+    check_complete(tmp_path, rows)
+
+
+def test_a_full_disk_loses_no_row(
+    tmp_path: Path,
+    make_records: Make,
+    feed_rows: Feed,
+    check_complete: Check,
+    full_beyond: FullBeyond,
+) -> None:
+    rows = make_records(20)
+    recorder = feed_rows(tmp_path, rows[:20], every=20)
+    size = segment_path(tmp_path, "births", 0).stat().st_size
+    for record in rows[20:]:
+        recorder.write(record)
+    with full_beyond(size + 500), pytest.raises(RunFolderError, match="disk full"):
+        recorder.flush()
+    assert segment_path(tmp_path, "births", 0).stat().st_size == size
+    recorder.flush()
+    check_complete(tmp_path, rows)
+    with full_beyond(1000), pytest.raises(RunFolderError, match="disk full"):
+        recorder.finish()
+    check_complete(tmp_path, rows)
+    recorder.finish()
+    check_complete(tmp_path, rows)
+
+
+def test_a_segment_of_another_version_is_refused(
+    tmp_path: Path, make_records: Make, feed_rows: Feed
+) -> None:
+    feed_rows(tmp_path, make_records(3)).close()
+    path = segment_path(tmp_path, "population", 0)
+    newer = POPULATION.with_metadata({"revolve.schema_version": "999"})
+    path.write_bytes(newer.serialize().to_pybytes())
+    with pytest.raises(RunFolderError, match="another version of Revolve"):
+        Recorder(tmp_path, DETAILS)
+
+
+def test_a_row_without_a_column_is_our_own_fault(
+    tmp_path: Path, make_records: Make
+) -> None:
+    row = dict(make_records(1)[0].row)
+    del row["rank"]
+    recorder = Recorder(tmp_path, DETAILS)
+    recorder.write(Record("births", row))
+    with pytest.raises(KeyError, match="rank"):
+        recorder.flush()
+    recorder.close()

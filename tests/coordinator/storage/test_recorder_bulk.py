@@ -1,0 +1,156 @@
+"""Rows that come as columns: on disk before the journal, counted after it."""
+
+from pathlib import Path
+
+import pyarrow as pa
+import pytest
+
+from coordinator.islands.events import Append
+from coordinator.storage.folder import RunDetails
+from coordinator.storage.recorder import Recorder
+from schema.errors import MalformedMessage, RunFolderError
+from schema.robot.names import BirthId
+from schema.tables.columns import POSES, TABLES, read_columns
+from schema.tables.files import read_table, segment_path, segments_of
+from tests.coordinator.arena_world import poses
+
+DETAILS = RunDetails("scenario3", 0, 1, "{}")
+
+
+def bulk(number: int, rows: int = 3) -> Append:
+    births = [BirthId(0, each) for each in range(rows)]
+    return Append("poses", rows, poses(births, float(number)))
+
+
+def bare(append: Append) -> Append:
+    """Return what a replay says of rows that stand on disk."""
+    return Append(append.table, append.rows, b"")
+
+
+def times(folder: Path) -> list[float]:
+    table = read_table(folder, "poses")
+    assert table["record"].to_pylist() == list(range(table.num_rows))
+    found: list[float] = table["sim_time_s"].to_pylist()
+    return found
+
+
+def written(folder: Path, *numbers: int) -> Recorder:
+    """Return a recorder that stored and counted some bulk rows."""
+    recorder = Recorder(folder, DETAILS)
+    for number in numbers:
+        recorder.store(bulk(number))
+        recorder.append(bulk(number))
+    return recorder
+
+
+def test_bulk_rows_are_on_disk_when_they_are_stored(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, DETAILS)
+    recorder.store(bulk(1))
+    assert times(tmp_path) == [1.0] * 3
+    recorder.append(bulk(1))
+    assert times(tmp_path) == [1.0] * 3
+    recorder.append(bulk(2))
+    assert times(tmp_path) == [1.0] * 3 + [2.0] * 3
+
+
+def test_several_may_be_stored_before_they_are_counted(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, DETAILS)
+    for number in (1, 2, 3):
+        recorder.store(bulk(number))
+    for number in (1, 2, 3):
+        recorder.append(bulk(number))
+    recorder.store(bulk(4))
+    assert times(tmp_path)[::3] == [1.0, 2.0, 3.0, 4.0]
+
+
+def test_a_replay_passes_over_what_stands(tmp_path: Path) -> None:
+    written(tmp_path, 1, 2).close()
+    recorder = Recorder(tmp_path, DETAILS)
+    for number in (1, 2):
+        recorder.append(bare(bulk(number)))
+    recorder.store(bulk(3))
+    recorder.append(bulk(3))
+    assert times(tmp_path)[::3] == [1.0, 2.0, 3.0]
+    recorder.finish()
+    assert times(tmp_path)[::3] == [1.0, 2.0, 3.0]
+    assert read_table(tmp_path, "poses").schema == POSES
+
+
+@pytest.mark.parametrize("kept", [0, 1, 2, 3])
+def test_rows_that_no_journal_knows_are_cut(tmp_path: Path, kept: int) -> None:
+    """Three advances were stored over two segments; the journal has a few of them."""
+    written(tmp_path, 1, 2).close()
+    second = Recorder(tmp_path, DETAILS)
+    for number in (1, 2):
+        second.append(bare(bulk(number)))
+    second.store(bulk(3))
+    second.close()
+    recorder = Recorder(tmp_path, DETAILS)
+    for number in range(1, kept + 1):
+        recorder.append(bare(bulk(number)))
+    recorder.store(bulk(9))
+    recorder.append(bulk(9))
+    assert times(tmp_path)[::3] == [*map(float, range(1, kept + 1)), 9.0]
+
+
+def test_a_cut_segment_reads_on_after_a_kill(tmp_path: Path) -> None:
+    written(tmp_path, 1, 2, 3).close()
+    path = segment_path(tmp_path, "poses", 0)
+    data = path.read_bytes()
+    path.write_bytes(data[:-20])
+    recorder = Recorder(tmp_path, DETAILS)
+    for number in (1, 2):
+        recorder.append(bare(bulk(number)))
+    recorder.store(bulk(3))
+    assert times(tmp_path)[::3] == [1.0, 2.0, 3.0]
+
+
+def test_rows_that_are_lost_are_not_passed_over(tmp_path: Path) -> None:
+    recorder = written(tmp_path, 1)
+    recorder.close()
+    recorder = Recorder(tmp_path, DETAILS)
+    recorder.append(bare(bulk(1)))
+    with pytest.raises(RunFolderError, match="poses: rows 3 to 5 are missing"):
+        recorder.append(bare(bulk(2)))
+
+
+def test_no_rows_make_no_segment(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path, DETAILS)
+    recorder.store(Append("poses", 0, b""))
+    recorder.append(Append("poses", 0, b""))
+    assert segments_of(tmp_path, "poses") == []
+
+
+@pytest.mark.parametrize(
+    ("append", "message"),
+    [
+        (Append("poses", 4, bulk(1).columns), "must be 4 rows, got 3"),
+        (Append("poses", 3, b"no stream"), "no Arrow stream"),
+        (Append("poses", 3, bulk(1).columns[:-40]), "no Arrow stream"),
+        (Append("touches", 3, bulk(1).columns), "touches: columns must be island"),
+    ],
+)
+def test_wrong_columns_are_refused_and_nothing_is_written(
+    tmp_path: Path, append: Append, message: str
+) -> None:
+    recorder = written(tmp_path, 1)
+    with pytest.raises(MalformedMessage, match=message):
+        recorder.store(append)
+    recorder.store(bulk(2))
+    assert times(tmp_path)[::3] == [1.0, 2.0]
+
+
+def test_no_bytes_are_no_rows() -> None:
+    table = read_columns("poses", b"")
+    assert table.num_rows == 0
+    assert table.schema == POSES.remove(0)
+
+
+def test_columns_of_several_batches_become_one() -> None:
+    schema = TABLES["poses"].remove(0)
+    sink = pa.BufferOutputStream()
+    batches = read_columns("poses", bulk(1).columns).to_batches()
+    with pa.ipc.new_stream(sink, schema) as writer:
+        for batch in batches * 2:
+            writer.write_batch(batch)
+    assert read_columns("poses", bytes(sink.getvalue())).num_rows == 6

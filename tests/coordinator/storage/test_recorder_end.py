@@ -1,0 +1,125 @@
+"""The end of a run: Parquet for segments, killed at any step; and its readers."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import duckdb
+import polars as pl
+import pytest
+
+from coordinator.islands.events import Record
+from coordinator.storage.folder import RunDetails
+from coordinator.storage.recorder import Recorder
+from schema.errors import RunFolderError
+from schema.tables.files import campaign, read_table
+
+DETAILS = RunDetails("a/b c", 2, 1, "{}")
+Make = Callable[..., list[Record]]
+Feed = Callable[..., Recorder]
+Check = Callable[[Path, list[Record]], None]
+
+
+class Killed(BaseException):
+    """The process dies here."""
+
+
+def kill_at(monkeypatch: pytest.MonkeyPatch, step: int) -> list[str]:
+    """Make the ``step``-th change to the disk the last; return the steps' names."""
+    steps: list[str] = []
+
+    def dying(name: str, real: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:  # noqa: ANN401 - whatever the real one takes
+            steps.append(name)
+            if len(steps) > step:
+                raise Killed
+            return real(*arguments)
+
+        return call
+
+    monkeypatch.setattr(os, "fsync", dying("fsync", os.fsync))
+    monkeypatch.setattr(Path, "replace", dying("replace", Path.replace))
+
+    def unlink(path: Path, *, missing_ok: bool = False) -> None:
+        del missing_ok
+        steps.append("unlink")
+        if len(steps) > step:
+            raise Killed
+        os.unlink(path)  # noqa: PTH108 - the real one is what stands in its place
+
+    monkeypatch.setattr(Path, "unlink", unlink)
+    monkeypatch.setattr(Path, "rmdir", dying("rmdir", Path.rmdir))
+    return steps
+
+
+def test_the_end_may_be_interrupted_at_any_step(
+    tmp_path: Path, make_records: Make, feed_rows: Feed, check_complete: Check
+) -> None:
+    rows = make_records(8)
+    interrupted = 0
+    for step in range(100):
+        folder = tmp_path / str(step)
+        folder.mkdir()
+        feed_rows(folder, rows[:7]).close()
+        recorder = feed_rows(folder, rows)
+        with pytest.MonkeyPatch.context() as monkeypatch:
+            kill_at(monkeypatch, step)
+            try:
+                recorder.finish()
+            except Killed:
+                interrupted += 1
+                is_done = False
+            else:
+                is_done = True
+        # Whoever reads now sees every row, and so does the next coordinator.
+        check_complete(folder, rows)
+        again = feed_rows(folder, rows)
+        again.finish()
+        check_complete(folder, rows)
+        assert not (folder / "segments").exists()
+        if is_done:
+            break
+    # Four tables to sync, rename and sync; at least four segments to remove.
+    assert interrupted >= 4 * 3 + 4
+
+
+def test_rows_after_the_end_are_refused(
+    tmp_path: Path, make_records: Make, feed_rows: Feed
+) -> None:
+    feed_rows(tmp_path, make_records(5)).finish()
+    recorder = feed_rows(tmp_path, make_records(6), every=1000)
+    with pytest.raises(RunFolderError, match="finished with 5 rows, and more came"):
+        recorder.flush()
+
+
+def test_one_call_reads_a_campaign(tmp_path: Path, make_records: Make) -> None:
+    for run, count in enumerate((4, 7)):
+        folder = tmp_path / "runs" / f"any-{run}"
+        folder.mkdir(parents=True)
+        recorder = Recorder(folder, RunDetails("a/b c", run, 1, "{}"))
+        for record in make_records(count):
+            recorder.write(record)
+        recorder.finish()
+    table = campaign(tmp_path / "runs", "births").to_table()
+    counts = table.group_by(["experiment", "run"]).aggregate([("birth", "count")])
+    assert sorted(tuple(row.values()) for row in counts.to_pylist()) == [
+        ("a/b c", 0, 4),
+        ("a/b c", 1, 7),
+    ]
+    assert table.schema.field("rank").metadata[b"repeatable"] == b"true"
+    # The same files to the readers of others, bodies and all.
+    files = str(tmp_path / "runs" / "**" / "births.parquet")
+    frame = pl.read_parquet(files, hive_partitioning=True)
+    assert frame.group_by("run").len().sort("run").rows() == [(0, 4), (1, 7)]
+    relation = duckdb.read_parquet(files, hive_partitioning=True)
+    bodies = relation.aggregate("run, sum(len(body))", "run").order("run")
+    # Bodies of 1, 2, 3, 4, 1, 2, 3 parts.
+    assert bodies.fetchall() == [(0, 10), (1, 16)]
+
+
+def test_a_campaign_without_a_finished_run_is_an_error_in_words(tmp_path: Path) -> None:
+    with pytest.raises(RunFolderError, match="no finished run"):
+        campaign(tmp_path, "births")
+    with pytest.raises(RunFolderError, match="no such folder"):
+        read_table(tmp_path / "none", "births")

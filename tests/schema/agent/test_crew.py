@@ -1,0 +1,135 @@
+"""What one process asks of the system for itself and for all that it starts."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from schema.agent.crew import stop_on_signals
+
+_ASK = "import os; print(os.sched_getscheduler(0) == os.SCHED_{policy})"
+_START = (
+    "import subprocess, sys\n"
+    "from schema.agent.crew import prepare_process\n"
+    "{before}\n"
+    "prepare_process()\n"
+    "{ask}\n"
+    "subprocess.run([sys.executable, '-c', {ask!r}], check=True)\n"
+)
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux", reason="other systems have no such policies"
+)
+
+
+def _said(policy: str, before: str = "") -> list[str]:
+    """Return whether a process and its child have a policy, in their words."""
+    text = _START.format(before=before, ask=_ASK.format(policy=policy))
+    done = subprocess.run(
+        [sys.executable, "-c", text], check=True, capture_output=True, text=True
+    )
+    return done.stdout.split()
+
+
+def test_nobody_who_wakes_up_interrupts_who_computes() -> None:
+    assert _said("BATCH") == ["True", "True"]
+
+
+def test_a_policy_of_the_user_s_own_stays() -> None:
+    idle = "import os; os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))"
+    assert _said("IDLE", idle) == ["True", "True"]
+
+
+_FORGET = """
+import ctypes, os
+libc = ctypes.CDLL(None)
+libc.malloc.restype = ctypes.c_void_p
+libc.malloc.argtypes = [ctypes.c_size_t]
+libc.free.argtypes = [ctypes.c_void_p]
+def resident():
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGESIZE")
+libc.free(libc.malloc(8 << 20))  # from such a block a C library may learn
+before = resident()
+large = []
+for _ in range(50):
+    large.append(libc.malloc(1 << 20))
+    ctypes.memset(large[-1], 1, 1 << 20)
+    libc.malloc(1 << 10)  # stays, and so would what lies below it
+for block in large:
+    libc.free(block)
+print((resident() - before) >> 20)
+"""
+
+
+def test_a_child_gives_back_what_it_leaves() -> None:
+    """Of 50 MiB of models whose robots died, with what lives on between them."""
+    start = (
+        "import subprocess, sys\n"
+        "from schema.agent.crew import prepare_process\n"
+        "prepare_process()\n"
+        f"subprocess.run([sys.executable, '-c', {_FORGET!r}], check=True)\n"
+    )
+    bare = {k: v for k, v in os.environ.items() if not k.startswith("MALLOC_")}
+    left_mib = [
+        int(subprocess.check_output([sys.executable, "-c", text], env=bare))
+        for text in (_FORGET, start)
+    ]
+    assert left_mib[0] > 40
+    assert left_mib[1] < 5
+
+
+_SHIELDED = """
+import pathlib, signal, sys
+from schema.agent.crew import Crew
+
+def body(folder, post):
+    masked = signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    pathlib.Path(folder, str(post.index)).write_text(str(signal.SIGINT in masked))
+
+if __name__ == "__main__":
+    with Crew(body, (sys.argv[1],), size=2) as crew:
+        while len(crew.exit_codes) < 2:
+            crew.wait(1.0)
+            crew.look_after()
+    print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))
+"""
+
+
+def test_a_ctrl_c_reaches_no_child_from_its_birth_on(tmp_path: Path) -> None:
+    """Nor the first one, with which Python starts a process of its own."""
+    script = tmp_path / "crew.py"
+    script.write_text(_SHIELDED)
+    done = subprocess.check_output(
+        [sys.executable, script, tmp_path],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
+        text=True,
+    )
+    assert [(tmp_path / name).read_text() for name in "01"] == ["True", "True"]
+    assert done.split() == ["False"]
+
+
+@pytest.fixture
+def _own_signals() -> Iterator[None]:
+    before = {each: signal.getsignal(each) for each in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("_own_signals")
+def test_ctrl_c_pressed_twice_at_once_is_one_wish(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("schema.agent.crew._ONE_WISH_S", 60.0)
+    stop = stop_on_signals()
+    for _ in range(2):
+        signal.raise_signal(signal.SIGINT)
+        assert stop.is_set()
+    monkeypatch.setattr("schema.agent.crew._ONE_WISH_S", 0.0)
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)

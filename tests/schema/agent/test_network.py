@@ -1,0 +1,110 @@
+"""Who listens where, and who lets whom in."""
+
+import json
+from typing import Any
+
+import pytest
+import zenoh
+
+from schema.agent.network import (
+    THIS_MACHINE,
+    Tls,
+    client_config,
+    hub_config,
+    parse_address,
+)
+from schema.errors import NetworkError
+
+TLS = Tls("ca.pem", "own.pem", "own.key")
+
+
+def hub(*listen: str, tls: Tls | None = None) -> Any:  # noqa: ANN401 - JSON
+    return json.loads(hub_config(listen, tls))
+
+
+@pytest.mark.parametrize(
+    ("address", "parsed"),
+    [
+        ("tcp/127.0.0.1:7447", ("tcp", "127.0.0.1", 7447)),
+        ("tls/hub.example:0", ("tls", "hub.example", 0)),
+        ("tcp/[::1]:65535", ("tcp", "::1", 65535)),
+    ],
+)
+def test_addresses(address: str, parsed: tuple[str, str, int]) -> None:
+    assert parse_address(address) == parsed
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["", "7447", "host:7447", "udp/h:1", "tcp/h", "tcp/h:", "tcp/h:65536", "tcp/h:1#x"],
+)
+def test_no_address(address: str) -> None:
+    with pytest.raises(NetworkError, match="must be tcp/HOST:PORT or tls/HOST:PORT"):
+        parse_address(address)
+
+
+@pytest.mark.parametrize(
+    "address", [THIS_MACHINE, "tcp/localhost:1", "tcp/[::1]:1", "tcp/127.8.8.8:1"]
+)
+def test_a_hub_on_this_machine_needs_nothing(address: str) -> None:
+    assert hub(address)["listen"]["endpoints"] == [address]
+
+
+@pytest.mark.parametrize(
+    "address", ["tcp/0.0.0.0:1", "tcp/[::]:1", "tcp/192.168.1.2:1", "tcp/hub.example:1"]
+)
+@pytest.mark.parametrize("tls", [None, TLS])
+def test_nothing_listens_beyond_this_machine_unguarded(
+    address: str, tls: Tls | None
+) -> None:
+    with pytest.raises(NetworkError, match="beyond this machine without protection"):
+        hub_config((THIS_MACHINE, address), tls)
+
+
+def test_tls_needs_its_files() -> None:
+    with pytest.raises(NetworkError, match=r"tls/h:1 needs --tls-ca"):
+        hub_config(("tls/h:1",))
+    with pytest.raises(NetworkError, match=r"tls/h:1 needs --tls-ca"):
+        client_config("tls/h:1")
+
+
+def test_a_guarded_hub_asks_for_certificates_and_tells_nothing() -> None:
+    config = hub("tcp/127.0.0.1:7447", "tls/0.0.0.0:7448", tls=TLS)
+    link = config["transport"]["link"]
+    assert link["protocols"] == ["tcp", "tls"]
+    assert link["tls"]["enable_mtls"] is True
+    assert config["adminspace"]["enabled"] is False
+
+
+def test_a_guarded_hub_needs_its_ports_told() -> None:
+    with pytest.raises(NetworkError, match="each address needs a port"):
+        hub_config((THIS_MACHINE, "tls/h:1"), TLS)
+
+
+def test_a_hub_listens_somewhere() -> None:
+    with pytest.raises(NetworkError, match="got none"):
+        hub_config(())
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        hub_config((THIS_MACHINE,)),
+        hub_config(("tls/h:1",), TLS),
+        client_config("tcp/h:1"),
+        client_config("tls/h:1", TLS),
+    ],
+)
+def test_the_engine_takes_them_and_nobody_looks_around(text: str) -> None:
+    zenoh.Config.from_json5(text)  # raises on a key that it does not know
+    config = json.loads(text)
+    assert config["scouting"]["multicast"]["enabled"] is False
+    assert config["scouting"]["gossip"]["enabled"] is False
+    assert config["transport"]["shared_memory"]["enabled"] is False
+
+
+def test_a_client_listens_nowhere() -> None:
+    config = json.loads(client_config("tcp/far.example:7447"))
+    assert config["mode"] == "client"
+    assert config["listen"]["endpoints"] == []
+    assert config["connect"]["endpoints"] == ["tcp/far.example:7447"]

@@ -1,0 +1,122 @@
+"""Every request gets one reply, and a bad one its reason."""
+
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from schema.agent.network import FENCED, UNFIT, Agent
+from schema.agent.serving import Reply, Server
+from schema.agent.supervision import Death, Post, Task
+from schema.errors import InvalidRobot, UnknownPlugin
+from schema.experiment.plugin_source import check_plugins, plugins_of
+from schema.wire import revolve_pb2 as pb
+
+
+def request(number: int = 1, epoch: int = 1, plugins: str = "") -> bytes:
+    message = pb.Request(run="r", epoch=epoch, number=number, plugins=plugins)
+    return message.SerializeToString()
+
+
+def server(compute: Callable[[bytes], bytes] = lambda _: b"answer") -> Server:
+    return Server(compute, Agent("worker", "w", "tcp/h:1", version="1"))
+
+
+def test_an_answer() -> None:
+    made = server()
+    assert made.reply(request()) == Reply(b"answer")
+    assert (made.tally.answered, made.tally.refused) == (1, 0)
+
+
+def test_an_older_epoch_is_fenced() -> None:
+    made = server()
+    made.reply(request(epoch=2))
+    reply = made.reply(request(epoch=1))
+    assert reply.reason.startswith(FENCED)
+    assert made.reply(request(epoch=2)) == Reply(b"answer")
+
+
+def test_what_nobody_waits_for_is_not_done_once() -> None:
+    made = server()
+    made.cancel(request(7))
+    made.cancel(b"\xff")
+    assert made.reply(request(6)) == Reply(b"answer")
+    assert made.reply(request(7)).reason == "nobody waits for this job any more"
+    assert made.reply(request(7)) == Reply(b"answer")
+    assert (made.tally.skipped, made.tally.malformed) == (1, 1)
+
+
+def test_cancelled_jobs_are_not_remembered_for_ever() -> None:
+    made = server()
+    for number in range(3000):
+        made.cancel(request(number))
+    assert len(made._cancelled) == 1000
+    assert made.reply(request(2999)).reason
+
+
+def raising(error: Exception) -> Callable[[bytes], bytes]:
+    def compute(_: bytes) -> bytes:
+        raise error
+
+    return compute
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (InvalidRobot("no core"), "no core"),
+        (UnknownPlugin("fitness: no module"), f"{UNFIT}fitness: no module"),
+        (ZeroDivisionError("by zero"), "ZeroDivisionError: by zero"),
+    ],
+)
+def test_an_error_is_a_reason(error: Exception, reason: str) -> None:
+    made = server(raising(error))
+    assert made.reply(request()) == Reply(reason=reason)
+    assert made.tally.refused == 1
+
+
+def test_who_lacks_a_plug_in_is_unfit() -> None:
+    reply = server().reply(request(plugins="nowhere_to_be_found=abc"))
+    assert reply.reason == f"{UNFIT}has no plug-in 'nowhere_to_be_found'"
+
+
+@settings(derandomize=True, deadline=None)
+@given(st.binary(max_size=64))
+def test_any_bytes_get_a_reply(data: bytes) -> None:
+    reply = server().reply(data)
+    assert bool(reply.answer) != bool(reply.reason)
+
+
+def test_an_agent_tells_of_the_dead() -> None:
+    death = Death(Task("v", "r", 3, 7), "SIGSEGV")
+    agent = Agent("worker", "w", "tcp/h:1", version="1", platform="p")
+    info = pb.AgentInfo.FromString(Server(bytes, agent, Post(0, None, (death,))).info)
+    (told,) = info.deaths
+    assert (told.agent, told.run, told.epoch, told.number) == ("v", "r", 3, 7)
+    assert told.cause == "SIGSEGV"
+
+
+def test_plug_ins_are_known_by_their_source(
+    tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path_factory.mktemp("plugged")
+    (folder / "plugged_one.py").write_text("x = 1\n")
+    (folder / "plugged_two").mkdir()
+    (folder / "plugged_two" / "inner.py").write_text("y = 1\n")
+    (folder / "plugged_two" / "__init__.py").write_text("")
+    monkeypatch.syspath_prepend(str(folder))
+    named = b'["plugged_two.inner:y", "schema.parts:CORE", "plugged_one:x", "a:b c"]'
+    wanted = plugins_of(named)
+    one, two = wanted.split()
+    assert one.startswith("plugged_one=")
+    assert two.startswith("plugged_two=")
+    check_plugins(wanted)
+    reply = server().reply(request(plugins=f"plugged_one=0 {two}"))
+    digest = one.partition("=")[2]
+    assert reply.reason == (
+        f"{UNFIT}its plug-in 'plugged_one' is another than the coordinator's: source "
+        f"{digest}, wanted 0"
+    )
+    assert server().reply(request(plugins=wanted)) == Reply(b"answer")
+    assert plugins_of(b'{"function":"worker.fitness:thesis"}') == ""

@@ -1,0 +1,143 @@
+"""What a process died of, as whoever started it can tell."""
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from schema.agent.crew import Crew
+from schema.agent.supervision import Death, JobNote, Post, Task, own_doing
+
+TASK = Task("worker-0.ab", "host:some/folder", 3, 2**40)
+PATIENCE_S = 30.0
+
+
+def test_a_note_stands_from_begin_to_end() -> None:
+    note = JobNote()
+    assert note.read() is None
+    note.begin(TASK)
+    assert note.read() == TASK
+    note.end()
+    assert note.read() is None
+
+
+def test_a_note_of_a_longest_name_is_cut_and_not_refused() -> None:
+    note = JobNote()
+    note.begin(Task("a" * 999, "r" * 9999, 1, 2))
+    held = note.read()
+    assert held is not None
+    assert (held.agent, held.number) == ("a" * 255, 2)
+    assert "r" * 1000 in held.run
+
+
+@pytest.mark.parametrize(
+    ("code", "doing"),
+    [
+        (-signal.SIGSEGV, "SIGSEGV"),
+        (-signal.SIGABRT, "SIGABRT"),
+        (-signal.SIGBUS, "SIGBUS"),
+        (-signal.SIGFPE, "SIGFPE"),
+        (-signal.SIGILL, "SIGILL"),
+        (-signal.SIGPROF, "use of too much CPU time"),
+        (3, "exit with status 3"),
+        (0, "exit with status 0"),
+        (-signal.SIGKILL, ""),
+        (-signal.SIGTERM, ""),
+        (-signal.SIGHUP, ""),
+    ],
+)
+def test_only_some_ends_are_a_jobs_own_doing(code: int, doing: str) -> None:
+    assert own_doing(code) == doing
+
+
+def test_a_job_is_noted_while_it_is_done_and_limited() -> None:
+    post = Post(0, JobNote())
+    assert post.note is not None
+    seen: list[object] = []
+
+    def job() -> bytes:
+        assert post.note is not None
+        seen.append(post.note.read())
+        seen.append(signal.getitimer(signal.ITIMER_PROF)[0] > 1000.0)
+        return b"done"
+
+    assert post.do(job, TASK, 2000.0) == b"done"
+    assert seen == [TASK, True]
+    assert post.note.read() is None
+    assert signal.getitimer(signal.ITIMER_PROF)[0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("error", "is_noted"), [(ZeroDivisionError, False), (SystemExit, True)]
+)
+def test_an_error_is_no_death_but_leaving_is(
+    error: type[BaseException], is_noted: object
+) -> None:
+    post = Post(0, JobNote())
+
+    def job() -> bytes:
+        raise error
+
+    with pytest.raises(error):
+        post.do(job, TASK, 100.0)
+    assert post.note is not None
+    assert (post.note.read() == TASK) is is_noted
+
+
+def die(signal_number: int, log: str, post: Post) -> None:
+    """Die of a job the first time, and write down who died before."""
+    with Path(log).open("a", encoding="utf-8") as file:
+        file.write(f"{[death.cause for death in post.deaths]}\n")
+    if len(post.deaths) < 2:
+        post.do(lambda: _kill(signal_number), TASK, 100.0)
+
+
+def _kill(signal_number: int) -> bytes:
+    os.kill(os.getpid(), signal_number)
+    time.sleep(PATIENCE_S)
+    return b""
+
+
+def until(crew: Crew, is_enough: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + PATIENCE_S
+    while not is_enough():
+        assert time.monotonic() < end_s
+        crew.look_after()
+        crew.wait(0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_who_takes_a_dead_ones_place_is_told_what_it_died_of(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    with Crew(die, (signal.SIGSEGV, str(log)), size=1) as crew:
+        until(crew, lambda: crew.exit_codes == [0])
+        assert crew.deaths == [Death(TASK, "SIGSEGV")] * 2
+        assert crew.restarts == 2
+    lines = log.read_text().splitlines()
+    assert lines == ["[]", "['SIGSEGV']", "['SIGSEGV', 'SIGSEGV']"]
+
+
+def leave(how: str, post: Post) -> None:
+    """End between two jobs."""
+    assert post.note is not None
+    if how == "by an error":
+        raise RuntimeError("the network's, not a job's")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("how", "code"), [("as asked", 0), ("by an error", 1)])
+def test_who_ends_by_itself_is_replaced_later_each_time(how: str, code: int) -> None:
+    """After 1 s, then 2 s: whatever befell it may befall it again."""
+    began_s = time.monotonic()
+    with Crew(leave, (how,), size=1) as crew:
+        until(crew, lambda: crew.exit_codes == [code])
+        assert crew.restarts == 0
+        until(crew, lambda: crew.restarts == 2)
+        assert crew.exit_codes == []
+        assert time.monotonic() - began_s > 3.0
+    assert crew.deaths == []

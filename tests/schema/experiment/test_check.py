@@ -1,0 +1,93 @@
+"""Settings between off-line and on-line: what is taken, and what cannot be."""
+
+import pytest
+
+from schema.errors import ExperimentError
+from schema.experiment.document import Experiment
+from schema.experiment.file import parse_experiment
+
+
+def parse(text: str) -> Experiment:
+    return parse_experiment(f'name = "test"\n{text}', "test.toml")
+
+
+def test_none_of_it_is_the_default() -> None:
+    experiment = parse("")
+    assert experiment.selection.culling is None
+    assert experiment.selection.reevaluation is None
+    assert experiment.simulation.evaluation_s is None
+
+
+def test_a_table_alone_means_the_values_of_an_arena() -> None:
+    culling = parse("[selection.culling]").selection.culling
+    assert culling is not None
+    assert (culling.population_limit, culling.population_floor) == (30, 8)
+    assert (culling.survive_share_of_mean, culling.full_cull_share) == (0.7, 0.7)
+    # A birth every 15 s, a cull every 30 s.
+    assert culling.interval == 2
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[selection]\npopulation = 8\n[selection.culling]\npopulation_limit = 9",
+        "[selection.culling]\nfull_cull_share = 0.02",
+        "[selection.reevaluation]\nshare = 1",
+        "[simulation]\nevaluation_s = [12.0, 12.0]",
+        "[simulation]\nwarmup_steps = 600\nevaluation_s = [15, 20]",
+    ],
+)
+def test_the_edge_of_what_is_possible_is_taken(text: str) -> None:
+    parse(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[selection.culling]\npopulation_floor = 4", "population_floor: must be >= 5"),
+        ("[selection.culling]\npopulation_limit = 14", "population_limit: .* 15, got"),
+        (
+            "[selection.culling]\npopulation_limit = 20\npopulation_floor = 20",
+            "population_limit: must be > population_floor .* 21, got 20",
+        ),
+        ("[selection.culling]\nfull_cull_share = 0.01", "full_cull_share: must make"),
+        (
+            '[selection]\nsurvivors = "random"\n[selection.culling]',
+            "selection.culling: who is fit enough survives",
+        ),
+        (
+            "[selection]\nkeep_parents = false\n[selection.culling]",
+            "selection.culling: who is fit enough survives",
+        ),
+        (
+            "[selection]\nkeep_parents = false\n[selection.reevaluation]",
+            "selection.reevaluation: nobody lives beyond a brood",
+        ),
+        ("[selection.reevaluation]\nshare = 0", "share: Expected `float` > 0"),
+        ("[selection.reevaluation]\nintervall = 3", "did you mean 'interval'"),
+        ("[simulation]\nevaluation_s = [11.9, 30]", "must be >= 12 s, .* got 11.9"),
+        (
+            "[simulation]\nwarmup_steps = 600\nevaluation_s = [14, 20]",
+            "must be >= 15 s",
+        ),
+        ("[simulation]\nevaluation_s = [30, 20]", r"\[shortest, longest\], got \[30"),
+        ("[simulation]\nevaluation_s = [30]", "length 2, got 1"),
+        ("[simulation]\nevaluation_s = [12, inf]", "must be finite"),
+        ("[arena]\n[selection.culling]", "selection.culling: an arena has"),
+        ("[arena]\n[selection.reevaluation]", "selection.reevaluation: an arena"),
+        ("[arena]\n[simulation]\nevaluation_s = [12, 20]", "evaluation_s: an arena's"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(text: str, message: str) -> None:
+    with pytest.raises(ExperimentError, match=message) as raised:
+        parse(text)
+    assert str(raised.value).startswith("test.toml: ")
+    assert "\n" not in str(raised.value)
+
+
+def test_immigrants_may_come_on_top_where_a_population_varies() -> None:
+    migration = '[[islands]]\ncount = 2\n[migration]\ntopology = "ring"\n'
+    migration += 'replaced = "none"\n'
+    parse(f"[selection.culling]\n{migration}")
+    with pytest.raises(ExperimentError, match="without selection"):
+        parse(migration)

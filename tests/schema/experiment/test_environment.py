@@ -1,0 +1,126 @@
+"""Ground and scenery as documents tell of them."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from schema.errors import ExperimentError
+from schema.experiment.document import island_experiment
+from schema.experiment.environment import FLAT, Environment, relief
+from schema.experiment.file import (
+    experiment_from_text,
+    experiment_text,
+    parse_experiment,
+    read_experiment,
+)
+from schema.experiment.identity import Origin
+from schema.experiment.settings import (
+    arena_settings,
+    evaluation_settings,
+    read_arena_settings,
+    read_evaluation_settings,
+)
+
+HEAD = 'name = "mine"\nbirths = 60\n'
+WALL = '<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>'
+
+
+def refused(text: str) -> str:
+    """Return the one line that a document is refused with."""
+    with pytest.raises(ExperimentError) as told:
+        parse_experiment(HEAD + text, "mine.toml")
+    (line,) = str(told.value).splitlines()
+    return line
+
+
+def test_the_ground_is_flat_unless_a_document_says_otherwise() -> None:
+    assert parse_experiment(HEAD, "it").environment == FLAT
+    assert FLAT.is_even
+    # Not -0.0: it would change the sign of zeros in what robots feel.
+    assert repr(FLAT.gravity_vector(9.81)) == "(0.0, 0.0, -9.81)"
+
+
+def test_gravity_pulls_downhill() -> None:
+    """Half of it at 30 degrees, and the cosine into the ground."""
+    x, y, z = Environment(slope_deg=30.0).gravity_vector(10.0)
+    assert x == pytest.approx(-5.0)
+    assert y == 0.0
+    assert z == pytest.approx(-10.0 * math.sqrt(0.75))
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("slope_deg = 45.0", "slope_deg: Expected `float` < 45.0, got 45.0"),
+        ("slope_deg = -1.0", "slope_deg: Expected `float` >= 0.0, got -1.0"),
+        ("roughness_m = -0.1", "roughness_m: Expected `float` >= 0.0, got -0.1"),
+        ("ground_seed = -1", "ground_seed: Expected `int` >= 0, got -1"),
+        ("rougness_m = 0.1", "no such key; did you mean 'roughness_m'?"),
+        ("roughness_m = 0.1\npatch_m = 0.3", "multiple of environment.patch_m = 0.3"),
+        ("roughness_m = 0.1\npatch_m = 9.0", "multiple of environment.patch_m = 9,"),
+        ("roughness_m = 0.1\npatch_m = 0.01", "patch_m: must be >= 2 environment"),
+        ('scenery = "none.xml"', "environment.scenery: none.xml: cannot be read: "),
+        ("scenery = 3", "environment.scenery: Expected `str`, got `int`"),
+        ('scenery = "<mujoco>"', "environment.scenery: no XML: no element found"),
+    ],
+)
+def test_what_is_refused(text: str, told: str) -> None:
+    line = refused(f"[environment]\n{text}")
+    assert line.startswith("mine.toml: environment.")
+    assert told in line
+
+
+@pytest.mark.parametrize("text", ["", " \n\t", "\ufeff"])
+def test_an_empty_file_is_no_scenery(tmp_path: Path, text: str) -> None:
+    (tmp_path / "empty.xml").write_text(text, encoding="utf-8")
+    document = 'name = "a"\n[environment]\nscenery = "empty.xml"\n'
+    with pytest.raises(ExperimentError, match=r"scenery: empty\.xml: is empty$"):
+        parse_experiment(document, str(tmp_path / "a.toml"))
+
+
+def test_scenery_is_read_from_beside_the_document_and_goes_along(
+    tmp_path: Path,
+) -> None:
+    """On any island; whoever reads the record of a run needs no file."""
+    (tmp_path / "worlds").mkdir()
+    (tmp_path / "worlds" / "wall.xml").write_text(WALL, encoding="utf-8-sig")
+    text = (
+        'births = 60\nname = "two"\n[environment]\nslope_deg = 5.0\n'
+        "[[islands]]\n[[islands]]\n[islands.environment]\n"
+        'scenery = "worlds/wall.xml"\n[islands.arena]\n'
+    )
+    (tmp_path / "mine.toml").write_text(text)
+    experiment = read_experiment(str(tmp_path / "mine.toml"))
+    here, there = (island_experiment(experiment, number) for number in (0, 1))
+    assert here.environment == Environment(slope_deg=5.0)
+    assert there.environment == Environment(slope_deg=5.0, scenery=WALL)
+    (tmp_path / "worlds" / "wall.xml").unlink()
+    assert experiment_from_text(experiment_text(experiment)) == experiment
+    alone = read_evaluation_settings(evaluation_settings(here))
+    assert alone.environment == here.environment
+    together = read_arena_settings(arena_settings(there, Origin()))
+    assert together.environment == there.environment
+
+
+def test_rough_ground_is_as_high_as_it_says_and_comes_down_to_the_plane() -> None:
+    environment = Environment(roughness_m=0.1, patch_m=0.1, extent_m=1.0)
+    shares = relief(environment)
+    assert shares.shape == (21, 21)
+    assert (shares.min(), shares.max()) == (0.0, 1.0)
+    for rim in (shares[0], shares[-1], shares[:, 0], shares[:, -1]):
+        assert not rim.any()
+    # One node from the rim at most half as high: 0.1 m of the 0.2 m that it takes.
+    assert 0.0 < shares[1, 1:-1].max() <= 0.6
+    assert (shares[2:-2, 2:-2] > 0.0).all()
+
+
+def test_the_seed_of_the_ground_is_all_that_draws_it() -> None:
+    one = Environment(roughness_m=0.1, ground_seed=1)
+    again = Environment(roughness_m=0.1, ground_seed=1, slope_deg=3.0)
+    other = Environment(roughness_m=0.1, ground_seed=2)
+    assert relief(one).tobytes() == relief(again).tobytes()
+    assert np.abs(relief(one) - relief(other)).max() > 0.5
+    # Written down: any machine draws the same.
+    assert relief(one)[50, 50:52].tolist() == [0.7018105387687683, 0.8332703709602356]

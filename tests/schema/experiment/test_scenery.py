@@ -1,0 +1,100 @@
+"""What a user's MJCF becomes, and what of it is refused."""
+
+import mujoco
+import pytest
+
+from schema.errors import ExperimentError
+from schema.experiment.document import Simulation
+from schema.experiment.environment import Environment
+from schema.experiment.file import parse_experiment
+from schema.mjcf.model import solo_model
+from schema.parts import BUILT_IN
+from schema.robot.robot import Part, Robot
+
+CORE = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),))
+YARD = """
+<!-- a yard -->
+<mujoco model="yard">
+  <compiler angle="degree"/>
+  <default><geom rgba="1 0 0 1"/><default class="ice"><geom friction="0.1 0 0"/>
+  </default></default>
+  <worldbody>
+    <geom name="wall" type="box" size="0.1 2 0.5" pos="2 0 0.5"/>
+    <body pos="0 3 0" euler="0 0 90">
+      <geom class="ice" type="capsule" fromto="1 0 0.2  1 1 0.2" size="0.1"/>
+      <replicate count="3" offset="0.5 0 0"><geom type="sphere" size="0.1"/></replicate>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def scene(inside: str, outside: str = "") -> str:
+    return f"<mujoco>{outside}<worldbody>{inside}</worldbody></mujoco>"
+
+
+def test_scenery_is_geoms_of_the_world_and_nothing_else() -> None:
+    simulation = Simulation(friction=0.7, contact_time_s=0.02)
+    empty = solo_model(CORE, BUILT_IN, simulation, Environment())
+    model = solo_model(CORE, BUILT_IN, simulation, Environment(scenery=YARD))
+    assert (model.nbody, model.nq) == (empty.nbody, empty.nq)
+    assert model.ngeom == empty.ngeom + 5
+    names = [f"scenery/{index}" for index in range(5)]
+    wall, rod, *balls = (model.geom(name) for name in names)
+    assert {int(model.geom(name).bodyid[0]) for name in names} == {0}
+    # The ground's friction and contact, where it says nothing of them.
+    assert wall.friction.tolist() == [0.7, 0.0, 0.0]
+    assert wall.solref.tolist() == [0.02, 1.0]
+    assert wall.condim[0] == 3
+    assert rod.friction.tolist() == [0.1, 0.0, 0.0]
+    assert wall.pos.tolist() == [2.0, 0.0, 0.5]
+    assert wall.size.tolist() == [0.1, 2.0, 0.5]
+    assert rod.rgba.tolist() == [1.0, 0.0, 0.0, 1.0]
+    # The body's x axis is the world's y: its (1, 0.5) is (-0.5, 3 + 1).
+    assert rod.pos.tolist() == pytest.approx([-0.5, 4.0, 0.2])
+    assert rod.size[:2].tolist() == pytest.approx([0.1, 0.5])
+    assert [ball.pos[1] for ball in balls] == pytest.approx([3.0, 3.5, 4.0])
+
+
+def test_a_turned_geom_stays_turned() -> None:
+    environment = Environment(
+        scenery=scene('<body euler="0 0 30"><geom type="box" size="1 .1 .1" '
+                      'pos="5 0 1" euler="0 0 15"/></body>')
+    )  # fmt: skip
+    model = solo_model(CORE, BUILT_IN, Simulation(), environment)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    axis = data.geom("scenery/0").xmat.reshape(3, 3)[:, 0]
+    assert axis.tolist() == pytest.approx([0.5**0.5, 0.5**0.5, 0.0])
+
+
+BOX = '<geom type="box" size="1 1 1"/>'
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("<mujoco><worldbody>", "no XML: "),
+        ("<sdf/>", "must be <mujoco>, got <sdf>"),
+        (scene(""), "must have a <geom>, got none"),
+        (scene(f"<body><freejoint/>{BOX}</body>"), "<freejoint> is not allowed"),
+        (scene(f"<body><joint type='hinge'/>{BOX}</body>"), "<joint> is not allowed"),
+        (scene(BOX, "<actuator><motor/></actuator>"), "<actuator> is not allowed"),
+        (scene(BOX, "<option gravity='0 0 0'/>"), "<option> is not allowed"),
+        (scene(BOX, "<include file='other.xml'/>"), "<include> is not allowed"),
+        (scene(BOX, "<asset><mesh file='a.stl'/></asset>"), "<asset> is not allowed"),
+        (scene(f"<body mocap='true' name='a'>{BOX}</body>"), "'a'> must not be mocap"),
+        (scene('<geom type="plane" size="1 1 1"/>'), "geom 0 '' must be one of sphere"),
+        (scene('<geom size="nan"/>'), "<geom size='nan'> must be finite"),
+        (scene(f'<body pos="0 -inf 0">{BOX}</body>'), "<body pos='0 -inf 0'> must be"),
+        (scene('<geom type="mesh" mesh="a"/>'), "no MJCF: "),
+        (scene('<geom type="box" sise="1 1 1"/>'), "no MJCF: "),
+    ],
+)  # fmt: skip
+def test_what_is_refused_at_the_start(text: str, told: str) -> None:
+    document = f'name = "mine"\n[environment]\nscenery = """{text}"""\n'
+    with pytest.raises(ExperimentError) as error:
+        parse_experiment(document, "mine.toml")
+    (line,) = str(error.value).splitlines()
+    assert line.startswith("mine.toml: environment.scenery: ")
+    assert told in line

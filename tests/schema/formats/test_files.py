@@ -1,0 +1,247 @@
+"""Robots in files: nothing is lost, and what is wrong is said in one line."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.strategies import DataObject, SearchStrategy
+
+from schema.errors import InvalidRobot, MalformedMessage, RevolveError
+from schema.formats.files import read_robot, write_robot
+from schema.formats.yaml import robot_from_yaml, robot_to_yaml
+from schema.parts import BUILT_IN
+from schema.robot.brain import Connection, Neuron
+from schema.robot.genome import Node, develop
+from schema.robot.robot import Robot, check_robot
+from schema.wire.codec import encode_robot
+
+NodeMaker = Callable[..., Node]
+
+TEXT = """\
+body:
+  id: trunk
+  type: Core
+  gene: 3
+  children:
+    2:
+      slot: 0
+      id: leg
+      type: ActiveHinge
+      orientation: 90
+      params: {red: 1}
+      children:
+        1:
+          slot: 0
+          type: ParametricBarJoint
+          params: {connection_length: 20.5, alpha: 1e-3}
+    0: {slot: 0, type: TouchSensor}
+brain:
+  neurons:
+  - {part: trunk, layer: hidden, type: Simple, params: {bias: -1.0e-5}}
+  - {id: out, part: leg, layer: output, type: Oscillator}
+  connections:
+  - {source: trunk-in-2, target: out, weight: 0.25}
+  - {source: part-1-in-1, target: trunk-hidden-0, weight: .5}
+"""
+
+
+def read(text: str) -> Robot:
+    return robot_from_yaml(text, "mine.yaml", BUILT_IN)
+
+
+@given(data=st.data())
+def test_yaml_loses_nothing(robots: SearchStrategy[Robot], data: DataObject) -> None:
+    robot = data.draw(robots)
+    text = robot_to_yaml(robot, BUILT_IN)
+    again = read(text)
+    # A repr tells -0.0 from 0.0 and every bit of a float.
+    assert repr(again) == repr(robot)
+    assert robot_to_yaml(again, BUILT_IN) == text
+
+
+def test_what_a_person_writes() -> None:
+    robot = read(TEXT)
+    check_robot(robot, BUILT_IN)
+    assert [part.kind for part in robot.parts] == [
+        "Core",
+        "TouchSensor",
+        "ActiveHinge",
+        "ParametricBarJoint",
+    ]
+    core, touch, hinge, bar = robot.parts
+    assert (core.gene, touch.gene) == (3, 0)
+    assert (touch.parent, touch.parent_slot, touch.slot) == (0, 0, 0)
+    assert (hinge.parent_slot, hinge.orientation) == (2, 90)
+    assert hinge.parameters == (1.0, 0.5, 0.5)
+    assert bar.parameters == (20.5, 0.001, 0.0, 0.5, 0.5, 0.5)
+    assert robot.brain.neurons[6:] == (
+        Neuron("input", "Input", 1),
+        Neuron("input", "Input", 1),
+        Neuron("output", "Oscillator", 2, (5.0, 0.0, 1.0)),
+        Neuron("hidden", "Simple", 0, (-1e-5, 0.5)),
+    )
+    assert robot.brain.connections == (Connection(2, 8, 0.25), Connection(7, 9, 0.5))
+
+
+def test_a_body_without_a_brain() -> None:
+    assert len(read("body: {type: Core}").brain.neurons) == 6
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "message"),
+    [
+        ("type: ActiveHinge", "type: ActivHinge", 9, "type: .*mean 'ActiveHinge'"),
+        ("orientation", "orientaton", 10, "no such key; did you mean 'orientation'"),
+        ("red: 1", "redd: 1", 11, r"params.redd: no such key.*'red'\?; allowed: red,"),
+        ("red: 1", "red: 2", 11, r"red: must be in \[0.0, 1.0\], got 2"),
+        ("red: 1", "red: blue", 11, "params.red: must be a finite number, got 'blue'"),
+        ("red: 1", "red: .nan", 11, "params.red: must be a finite number"),
+        ("red: 1", "red: 1e999", 11, "params.red: must be a finite number"),
+        ("red: 1", "red: [1]", 11, "params.red: must be a word, got a list"),
+        ("{red: 1}", "7", 11, "params: must be a mapping, got '7'"),
+        ("orientation: 90", "orientation: 91", 10, "orientation: must be one of"),
+        ("orientation: 90", "orientation: x", 10, "must be a whole number, got 'x'"),
+        ("    2:", "    4:", 7, "parent_slot: Core has slots 0..3, got 4"),
+        ("    2:", "    0:", 17, "children.0: stands here twice"),
+        ("    2:", "    two:", 6, "must be the number of a slot"),
+        ("    2:", "    007:", 6, "must be the number of a slot"),
+        ("    2:", "    -1:", 6, "must be the number of a slot"),
+        ("    2:", "    [1, 2]:", 6, "a key must be a word or a number"),
+        ("slot: 0, type: T", "type: T", 17, "children.0.slot: is missing"),
+        ("      slot: 0\n", "      slot: 5\n", 7, "slot: ActiveHinge has slots 0..1"),
+        ("id: leg", "id: trunk", 8, "id: second part named 'trunk'"),
+        ("id: leg", "id:", 8, "id: must be a word, got nothing"),
+        ("gene: 3", "gene: -3", 4, "gene: must be"),
+        ("gene: 3", "slot: 3", 4, "slot: no such key"),
+        ("gene: 3", "type: Core", 4, "type: stands here twice"),
+        ("type: TouchSensor", "type: Core", 17, "exactly the first part"),
+        ("part: leg", "part: lag", 21, "part: must be one of trunk, .*mean 'leg'"),
+        ("layer: output", "layer: input", 21, "must be one of output, hidden"),
+        ("Oscillator", "Oscilator", 21, "type: .*did you mean 'Oscillator'"),
+        ("id: out", "id: trunk-in-0", 21, "second neuron named 'trunk-in-0'"),
+        ("bias", "period", 20, "period: no such key.*; allowed: bias, gain"),
+        ("target: out", "target: trunk-in-1", 23, "target: neuron 1 is an input"),
+        ("target: out", "target: oat", 23, "target: must be one of .*mean 'out'"),
+        (", weight: .5", "", 24, r"connections\[1\].weight: is missing"),
+        ("  neurons:", "  nurons:", 19, "brain.nurons: .*'neurons'"),
+        ("- {id: out, part", "- {id: out; part", 21, "not YAML: "),
+        ("brain:\n", "brian:\n", 18, "brian: no such key; did you mean 'brain'"),
+        ("body:\n", "revolve_robot: 2\nbody:\n", 1, "must be 1, got 2"),
+    ],
+)
+def test_what_is_wrong_is_said_with_file_line_and_field(
+    old: str, new: str, line: int, message: str
+) -> None:
+    assert old in TEXT
+    expected = rf"^mine\.yaml:{line}: .*{message}"
+    with pytest.raises(InvalidRobot, match=expected) as error:
+        read(TEXT.replace(old, new, 1))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "# nothing",
+        "3",
+        "[]",
+        "body:",
+        "body: 1",
+        "body: {type: Core}\nbrain: []",
+        "body: {type: Core}\nbrain: {neurons: {}}",
+        "body: {type: Core}\nbrain: {neurons: [1]}",
+        "body: {type: Core}\n---\nbody: {type: Core}",
+        "body: &a {type: Core, children: {0: *a}}",
+        "body: !!python/object:os.system {type: Core}\nx: 1",
+        "body: \x00",
+        "body: {type: Core",
+        "\tbody: x",
+        "body: " + "[" * 3000,
+        "body: " + "{a: " * 3000,
+        "a: " * 20,
+        "{? [a]: b}",
+    ],
+)
+def test_what_is_no_robot_is_refused_in_one_line(text: str) -> None:
+    with pytest.raises(InvalidRobot, match=r"^mine\.yaml:?") as error:
+        read(text)
+    assert "\n" not in str(error.value)
+
+
+@given(text=st.text(max_size=40))
+def test_any_text_is_a_robot_or_is_refused(text: str) -> None:
+    with pytest.raises(InvalidRobot):
+        read(text)
+
+
+@given(data=st.data())
+def test_any_damage_leaves_a_robot_or_is_refused(data: DataObject) -> None:
+    place = data.draw(st.integers(0, len(TEXT) - 1))
+    patch = data.draw(st.text(st.characters(max_codepoint=127), max_size=3))
+    damaged = TEXT[:place] + patch + TEXT[place + 1 :]
+    try:
+        robot = read(damaged)
+    except InvalidRobot:
+        return
+    check_robot(robot, BUILT_IN)
+
+
+@pytest.mark.parametrize("ending", [".yaml", ".yml", ".pb", ".YAML"])
+def test_file_round_trip(tmp_path: Path, ending: str) -> None:
+    robot, path = read(TEXT), tmp_path / f"robot{ending}"
+    write_robot(robot, path)
+    assert read_robot(path) == robot
+    is_text = path.read_bytes().startswith(b"revolve_robot: 1\n")
+    assert is_text == (ending != ".pb")
+
+
+@pytest.mark.parametrize("name", ["robot", "robot.toml", "robot.pb.gz"])
+def test_another_ending_is_refused(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    with pytest.raises(InvalidRobot, match=r"must end in one of \.yaml, \.yml, \.pb"):
+        write_robot(read(TEXT), path)
+    assert not path.exists()
+    with pytest.raises(InvalidRobot, match="must end in one of"):
+        read_robot(path)
+
+
+def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
+    with pytest.raises(InvalidRobot, match=r"none\.pb: cannot be read: No such file"):
+        read_robot(tmp_path / "none.pb")
+    path = tmp_path / "folder.yaml"
+    path.mkdir()
+    with pytest.raises(InvalidRobot, match="cannot be written: Is a directory"):
+        write_robot(read(TEXT), path)
+
+
+def test_broken_bytes(tmp_path: Path) -> None:
+    path = tmp_path / "robot.pb"
+    path.write_bytes(encode_robot(read(TEXT))[:-3])
+    with pytest.raises(MalformedMessage, match=r"robot\.pb: not the bytes of a Robot"):
+        read_robot(path)
+    path = tmp_path / "robot.yaml"
+    path.write_bytes(b"body: \xff")
+    with pytest.raises(InvalidRobot, match=r"robot\.yaml: byte 6 is no text"):
+        read_robot(path)
+
+
+def test_bytes_of_a_robot_that_this_space_does_not_have(tmp_path: Path) -> None:
+    path = tmp_path / "robot.pb"
+    path.write_bytes(encode_robot(read(TEXT)))
+    space = {name: kind for name, kind in BUILT_IN.items() if name != "TouchSensor"}
+    with pytest.raises(InvalidRobot, match=r"robot\.pb: body\.parts\[1\]\.kind: must"):
+        read_robot(path, space)
+
+
+def test_a_robot_that_is_none_is_not_written(node: NodeMaker, tmp_path: Path) -> None:
+    robot = develop(node("Core"), BUILT_IN)
+    broken = replace(robot, brain=replace(robot.brain, neurons=()))
+    for ending in (".yaml", ".pb"):
+        path = tmp_path / f"robot{ending}"
+        with pytest.raises(RevolveError, match="input neurons must belong"):
+            write_robot(broken, path)
+        assert not path.exists()

@@ -1,0 +1,263 @@
+"""RoboGen's robots: places worked out from its frames, names and errors."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from schema.errors import InvalidRobot
+from schema.experiment.document import Space, body_space
+from schema.formats.files import read_robot
+from schema.formats.robogen_json import robot_from_robogen_json
+from schema.formats.robogen_text import robot_from_robogen_text
+from schema.parts import BUILT_IN
+from schema.robogen_parts import ROBOGEN_2016
+from schema.robot.brain import Connection
+from schema.robot.frames import place_parts, shapes_of
+from schema.robot.robot import Robot
+
+# A starfish as RoboGen's manual describes one, with numbers of our own.
+STARFISH = """\
+0 CoreComponent Heart 0
+\t0 ActiveHinge HipL 1
+\t\t0 FixedBrick ThighL 1
+\t\t\t0 ActiveHinge KneeL 0
+\t1 ActiveHinge HipR 3
+\t2 I HipF 0
+\t\t0 F ThighF 1
+\t3 PassiveHinge HipB 0
+\t\t0 TouchSensor ToeB 0
+
+Heart sigmoid
+KneeL oscillator
+
+Heart 2 HipL 0 0.5
+ToeB 1 Heart 6 -1.25
+Heart 6 KneeL 0 3
+HipR 0 HipR 0 0.125
+
+HipL 0 0.75
+HipR 0 simple -0.5
+KneeL 0 Oscillator 2 -0.25 0.9
+KneeL 1 oscillator 1 0 1
+"""
+
+
+def read(text: str) -> Robot:
+    return robot_from_robogen_text(text, "it.txt", BUILT_IN)
+
+
+def axes(robot: Robot, part: int) -> tuple[list[float], list[float]]:
+    """Return a part's own y and z in the frame of the core."""
+    rotations, _ = place_parts(robot, shapes_of(robot, BUILT_IN))
+    return rotations[part][:, 1].round(9).tolist(), rotations[part][:, 2].tolist()
+
+
+def test_parts_go_where_robogen_has_them() -> None:
+    robot = read(STARFISH)
+    kinds = [part.kind for part in robot.parts]
+    assert kinds.count("ActiveHinge") == 4
+    # Its slots are left, right, front, back: -x, +x, -y, +y.
+    _, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
+    of_core = [index for index, part in enumerate(robot.parts) if part.parent == 0]
+    ways = [np.sign(positions[index][:2].round(6)).tolist() for index in of_core]
+    assert ways == [[0, -1], [0, 1], [1, 0], [-1, 0]]
+    assert [kinds[index] for index in of_core] == [
+        "ActiveHinge", "Hinge", "ActiveHinge", "ActiveHinge",
+    ]  # fmt: skip
+
+
+def test_quarter_turns_turn_the_axis_of_a_hinge() -> None:
+    robot = read(STARFISH)
+    # By hand from its tangents: without a turn the axis (own y) is upright in front
+    # and level at the sides; 1 and 3 quarter turns raise it at the sides.
+    for index, part in enumerate(robot.parts):
+        if part.kind == "ActiveHinge" and part.parent == 0:
+            assert np.abs(axes(robot, index)[0]).tolist() == [0.0, 0.0, 1.0]
+    knee = robot.parts.index(
+        next(part for part in robot.parts if part.kind == "ActiveHinge" and part.parent)
+    )
+    assert abs(axes(robot, knee)[0][2]) < 1e-9
+    level = read("0 E C 0\n\t0 I left 0\n\t2 I front 1\n")
+    assert abs(axes(level, 1)[0][2]) < 1e-9
+    assert abs(axes(level, 2)[0][2]) < 1e-9
+
+
+def test_bricks_are_level_whatever_their_turn() -> None:
+    for turn in range(4):
+        for slot in range(4):
+            text = (
+                f"0 E C 0\n\t{slot} I hip 1\n\t\t0 F brick {turn}\n\t\t\t1 F next 2\n"
+            )
+            robot = read(text)
+            for part in (2, 3):
+                assert axes(robot, part)[1] == pytest.approx([0, 0, 1], abs=1e-9)
+
+
+def test_neurons_find_their_places() -> None:
+    robot = read(STARFISH)
+    named = {(n.layer, n.part, n.kind): n for n in robot.brain.neurons}
+    assert len(robot.brain.neurons) == 6 + 2 + 4 + 2
+    parameters = sorted(n.parameters for n in robot.brain.neurons if n.parameters)
+    assert parameters == [
+        (-0.5, 1.0), (0.0, 1.0), (0.0, 1.0), (0.75, 1.0), (1.0, 0.0, 1.0),
+        (2.0, -0.25, 0.9),
+    ]  # fmt: skip
+    assert ("hidden", 0, "Sigmoid") in named
+    # The oscillator at the knee listens to nobody.
+    weights = sorted(edge.weight for edge in robot.brain.connections)
+    assert weights == [-1.25, 0.125, 0.5]
+
+
+def test_a_bar_in_our_units() -> None:
+    robot = read("0 E C 0\n\t0 ParametricJoint bar 2 0.05 -60 0\n")
+    length, alpha, beta = robot.parts[1].parameters[:3]
+    assert (length, beta) == (50.0, 0.0)
+    assert alpha == pytest.approx(-1.0471975512)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "it.txt:1: must hold the core"),
+        ("0 Core C 0", "it.txt:1: type must be one of CoreComponent, .*got 'Core'"),
+        ("0 E C 0\n\t0 J w 0 0.04", "it.txt:2: type must be one of .*got 'J'"),
+        ("0 E C 0\n\t0 F a", "it.txt:2: must be TABS SLOT TYPE NAME"),
+        ("0 E C 0\n\t0 F a 4", "it.txt:2: orientation must be 0..3, got 4"),
+        ("0 E C 0\n\t0 B a 0 0.05", "it.txt:2: ParametricJoint takes 3 numbers, got 1"),
+        ("0 E C 0\n\t0 B a 0 0.05 x 0", "it.txt:2: must be a number, got 'x'"),
+        ("0 E C 0\n\t0 B a 0 0.5 0 0", r"_length: must be in \[20.0, 100.0\]"),
+        ("0 E C 0\n\t0 F a 0\n\t0 F b 0", "it.txt:3: slot 0 of 'C' is taken"),
+        ("0 E C 0\n\t0 F a 0\n\t\t3 F b 0", "it.txt:3: 'a' has 3 slots to put"),
+        ("0 E C 0\n\t\t0 F a 0", "it.txt:2: tabs must be 1..1, got 2"),
+        ("0 E C 0\n0 F a 0", "it.txt:2: tabs must be 1..1, got 0"),
+        ("0 E C 0\n\t0 F C 0", "it.txt:2: a second part 'C'"),
+        ("0 E C 0\n\nX sigmoid", "it.txt:3: no part 'X'"),
+        ("0 E C 0\n\nC gauss", "it.txt:3: must be one of simple, .*got 'gauss'"),
+        ("0 E C 0\n\n\nC 0 C 9 1", "it.txt: no neuron 9 on part 'C'"),
+        ("0 E C 0\n\n\nC 0 C", "it.txt:4: must be PART NUMBER PART NUMBER WEIGHT"),
+        ("0 E C 0\n\nC simple\n\n\nC 6 Simple", "it.txt:6: must be a number"),
+        ("0 E C 0\n\n\n\nC 6 oscillator 1 2", "it.txt:5: oscillator takes 3 numbers"),
+        ("0 E C 0\n\n\n\n\nC", "it.txt:6: a fifth section"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_with_its_line(text: str, message: str) -> None:
+    with pytest.raises(InvalidRobot, match=message):
+        read(text)
+
+
+def document() -> dict[str, object]:
+    """Return a hinge on a core, in the keys of RoboGen's evolution."""
+    return {
+        "id": 1,
+        "body": {
+            "part": [
+                {"id": "C", "type": "CoreComponent", "root": True, "orientation": 0},
+                {"id": "H", "type": "ActiveHinge", "root": False, "orientation": 1},
+            ],
+            "connection": [{"src": "C", "dest": "H", "srcSlot": 0, "destSlot": 0}],
+        },
+        "brain": {
+            "neuron": [
+                {"id": "C-0", "layer": "input", "type": "simple", "bodyPartId": "C",
+                 "ioId": 0, "gain": 1.0},
+                {"id": "H-0", "layer": "output", "type": "sigmoid", "bodyPartId": "H",
+                 "ioId": 0, "bias": 0.25, "gain": 0.5},
+            ],
+            "connection": [{"src": "C-0", "dest": "H-0", "weight": 2}],
+        },
+    }  # fmt: skip
+
+
+def test_json_says_what_the_text_says() -> None:
+    robot = robot_from_robogen_json(json.dumps(document()), "it.json", BUILT_IN)
+    text = "0 E C 0\n\t0 I H 1\n\n\nC 0 H 0 2\n\nH 0 0.25\n"
+    assert robot.parts == read(text).parts
+    assert robot.brain.neurons[6].parameters == (0.25, 0.5)
+    assert robot.brain.connections == (Connection(0, 6, 2.0),)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        (("body", "part", 1, "id"), "C", r"it: body.part\[1\].id: a second part 'C'"),
+        (("body", "part", 1, "type"), 3, r"it: body.part\[1\].type: must be of"),
+        (("body", "part", 0, "root"), False, "exactly one must be the root, got 0"),
+        (("body", "connection"), [], "it: body.part: 'H' sits nowhere"),
+        (("body", "connection", 0, "src"), "X", r"connection\[0\].src: nothing .*'X'"),
+        (("body", "connection", 0, "src"), "H", "slot 0 is taken"),
+        (("body", "connection", 0, "srcSlot"), 4, "Core has no slot 4"),
+        (("brain", "connection", 0, "dest"), "X", r"connection\[0\].dest: nothing"),
+        (("brain", "neuron", 1, "type"), "x", r"neuron\[1\].type: must be one of"),
+        (("brain", "neuron", 1, "layer"), "x", r"neuron\[1\].layer: must be one of in"),
+        (("brain", "neuron", 1, "bodyPartId"), "X", "no neuron 0 on part 'X'"),
+        (("brain", "neuron", 1, "ioId"), 3, "no neuron 3 on part 'H'"),
+        (("brain",), 3, "it: must be an object with 'neuron'"),
+        (("body", "part"), 3, "it: body.part must be a list"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_with_its_path(
+    path: tuple[str | int, ...], value: object, message: str
+) -> None:
+    changed = document()
+    inner: object = changed
+    for key in path[:-1]:
+        inner = inner[key]  # type: ignore[index]
+    inner[path[-1]] = value  # type: ignore[index]
+    with pytest.raises(InvalidRobot, match=message):
+        robot_from_robogen_json(json.dumps(changed), "it", BUILT_IN)
+
+
+def test_text_that_is_no_json() -> None:
+    for text, message in (
+        ("{\n]", "it:2: no JSON"),
+        ('{"a": NaN}', "NaN is no number"),
+    ):
+        with pytest.raises(InvalidRobot, match=message):
+            robot_from_robogen_json(text, "it", BUILT_IN)
+
+
+def test_files_by_their_endings(tmp_path: Path) -> None:
+    (tmp_path / "star.txt").write_text(STARFISH)
+    (tmp_path / "arm.json").write_text(json.dumps(document()))
+    assert read_robot(tmp_path / "star.txt") == read(STARFISH)
+    assert len(read_robot(tmp_path / "arm.json").parts) == 2
+
+
+def test_dimensions_of_2016() -> None:
+    # Grams and millimetres from the facts, section 1.5.
+    def mass_g(name: str, *values: float) -> float:
+        shape = ROBOGEN_2016[name].shape((*values, 0.5, 0.5, 0.5))
+        return 1000.0 * sum(box.mass for box in shape.boxes)
+
+    assert mass_g("Core") == pytest.approx(44.5)
+    assert mass_g("FixedBrick") == pytest.approx(10.2)
+    assert mass_g("ActiveHinge") == pytest.approx(13 + 1 + 2 + 2)
+    assert mass_g("Hinge") == pytest.approx(6)
+    assert mass_g("TouchSensor") == pytest.approx(3)
+    # 50 mm of bar, 6 of stub and half of a 5 mm cylinder at 1.37 g/cm, two plates.
+    bar = mass_g("ParametricBarJoint", 50.0, 0.3, 0.0)
+    assert bar == pytest.approx(2 + 1.37 * (5.0 + 0.6 + 0.5))
+    straight = ROBOGEN_2016["ParametricBarJoint"].shape((50.0, 0.0, 0.0, 0, 0, 0))
+    reach = straight.slots[1].position[0] - straight.slots[0].position[0]
+    assert reach == pytest.approx(0.0015 + 0.006 + 0.05 + 0.0015)
+
+
+def test_both_sets_take_the_same_robots() -> None:
+    names = tuple(
+        f"schema.robogen_parts:{name}"
+        for name in (
+            "CORE", "FIXED_BRICK", "ACTIVE_HINGE", "HINGE", "PARAMETRIC_BAR_JOINT",
+            "TOUCH_SENSOR", "LIGHT_SENSOR",
+        )
+    )  # fmt: skip
+    space = body_space(Space(part_types=names))
+    assert robot_from_robogen_text(STARFISH, "it", space) == read(STARFISH)
+    for name, kind in space.items():
+        ours = BUILT_IN[name]
+        values = tuple(parameter.default for parameter in ours.parameters)
+        turned = [(s.normal, s.tangent, s.segment) for s in kind.shape(values).slots]
+        assert turned == [
+            (s.normal, s.tangent, s.segment) for s in ours.shape(values).slots
+        ]

@@ -1,0 +1,83 @@
+"""URDF: MuJoCo's own reader of it finds the same masses in the same places."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.strategies import DataObject, SearchStrategy
+
+from schema.errors import InvalidRobot
+from schema.experiment.document import Simulation
+from schema.formats.files import read_robot, write_robot
+from schema.formats.urdf import robot_to_urdf
+from schema.mjcf.model import robot_spec
+from schema.parts import BUILT_IN
+from schema.robot.brain import INPUT, Brain, Neuron
+from schema.robot.robot import Part, Robot
+
+GREY = (0.5, 0.5, 0.5)
+SENSES = tuple(Neuron("input", INPUT, 0) for _ in range(6))
+SIMULATION = Simulation()
+
+
+@settings(max_examples=25, deadline=None)
+@given(data=st.data())
+def test_it_moves_as_the_robot_does(
+    robots: SearchStrategy[Robot], data: DataObject
+) -> None:
+    robot = data.draw(robots)
+    ours = robot_spec(robot, BUILT_IN, SIMULATION).spec.compile()
+    spec = mujoco.MjSpec.from_string(robot_to_urdf(robot, BUILT_IN, SIMULATION))
+    # The root segment must stay a body of its own to be compared.
+    spec.compiler.fusestatic = False
+    theirs = spec.compile()
+    angles = np.random.default_rng(1).uniform(-0.7, 0.7, ours.njnt - 1)
+    one, other = mujoco.MjData(ours), mujoco.MjData(theirs)
+    one.qpos[7:] = angles
+    for joint in range(1, ours.njnt):
+        same = theirs.joint(ours.joint(joint).name)
+        other.qpos[same.qposadr[0]] = angles[joint - 1]
+        assert same.range == pytest.approx(ours.jnt_range[joint], abs=1e-9)
+    mujoco.mj_kinematics(ours, one)
+    mujoco.mj_kinematics(theirs, other)
+    for body in range(1, ours.nbody):
+        name = ours.body(body).name
+        # MuJoCo makes the root link part of the world.
+        same_body = 0 if name == "root" else theirs.body(name).id
+        assert other.xpos[same_body] == pytest.approx(one.xpos[body], abs=1e-9)
+        if same_body:
+            mass = theirs.body_mass[same_body]
+            assert mass == pytest.approx(ours.body_mass[body], rel=1e-9)
+            centre = other.xipos[same_body]
+            assert centre == pytest.approx(one.xipos[body], abs=1e-9)
+            inertia = np.sort(theirs.body_inertia[same_body])
+            expected = np.sort(ours.body_inertia[body])
+            assert inertia == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_motor_and_a_free_hinge() -> None:
+    robot = Robot(
+        (
+            Part("Core", -1, -1, -1, 0, GREY),
+            Part("ActiveHinge", 0, 0, 0, 0, GREY),
+            Part("Hinge", 0, 1, 0, 0, GREY),
+        ),
+        Brain((*SENSES, Neuron("output", "Simple", 1, (0.0, 0.5)))),
+    )
+    text = robot_to_urdf(robot, BUILT_IN, SIMULATION)
+    # 1.8 kg cm and 50 rpm within 45 degrees; 60 degrees without a motor.
+    assert 'lower="-0.785398' in text
+    assert 'effort="0.17658" velocity="5.236"' in text
+    assert 'lower="-1.047197' in text
+    assert 'effort="0.0"' in text
+
+
+def test_it_is_written_only(tmp_path: Path) -> None:
+    path = tmp_path / "core.urdf"
+    write_robot(Robot((Part("Core", -1, -1, -1, 0, GREY),), Brain(SENSES)), path)
+    assert path.read_text().startswith("<?xml")
+    with pytest.raises(InvalidRobot, match=r"must end in one of .*, got '\.urdf'"):
+        read_robot(path)

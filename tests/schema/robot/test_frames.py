@@ -1,0 +1,162 @@
+"""Where parts sit: facts of the original, 1.1 (golden positions) and 2 (rule)."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.strategies import DataObject, SearchStrategy
+
+from schema.parts import BUILT_IN, Slot
+from schema.robot.frames import attach, place_parts, shapes_of
+from schema.robot.genome import Genome, Node, develop
+from schema.robot.results import Floats
+from schema.robot.robot import ORIENTATIONS, Robot
+
+NodeMaker = Callable[..., Node]
+
+
+def turned(vector: Floats, axis: Floats, degrees: float) -> Floats:
+    """Return a vector turned about a unit axis, by Rodrigues' formula."""
+    angle = math.radians(degrees)
+    along = axis * np.dot(axis, vector)
+    return np.asarray(
+        vector * math.cos(angle)
+        + np.cross(axis, vector) * math.sin(angle)
+        + along * (1 - math.cos(angle))
+    )
+
+
+def world(slot: Slot, rotation: Floats, position: Floats) -> tuple[Floats, ...]:
+    """Return a slot's position, normal and tangent in the core's frame."""
+    return (
+        rotation @ slot.position + position,
+        rotation @ slot.normal,
+        rotation @ slot.tangent,
+    )
+
+
+def level(genome: Genome, above: int = 0) -> Genome:
+    """Return a genome whose bricks and bars lie in the core's plane."""
+    turn = genome.orientation
+    if BUILT_IN[genome.kind].is_levelled:
+        turn = -above % 360
+    below = (above + turn) % 360
+    return Node(
+        genome.kind,
+        genome.slot,
+        turn,
+        genome.parameters,
+        children=tuple((slot, level(child, below)) for slot, child in genome.children),
+    )
+
+
+def body(genome: Genome) -> Robot:
+    """Return a body alone: `develop` takes any number of outputs."""
+    return develop(genome, BUILT_IN)
+
+
+def test_golden_position_of_a_hinge_on_the_front(node: NodeMaker) -> None:
+    core = node("Core", children=((0, node("Hinge")),))
+    robot = body(core)
+    rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
+    boxes = BUILT_IN["Hinge"].shape(core.children[0][1].parameters).boxes
+    centres = {box.name: rotations[1] @ box.position + positions[1] for box in boxes}
+    assert centres["root"] == pytest.approx((0.0, -0.04575, 0.0), abs=1e-12)
+    assert centres["conn_a"] == pytest.approx((0.0, -0.05685, 0.0), abs=1e-12)
+
+
+def test_core_stays_where_it_is(node: NodeMaker) -> None:
+    robot = body(node("Core"))
+    rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
+    assert (rotations[0] == np.eye(3)).all()
+    assert (positions[0] == 0.0).all()
+
+
+def test_quarter_turn_on_the_right_face() -> None:
+    """The child's own z turns to its y about -x, which then meets the core's z."""
+    parent = BUILT_IN["Core"].shape(()).slots[2]
+    child = BUILT_IN["ActiveHinge"].shape(()).slots[0]
+    rotation, position = attach(parent, child, 90)
+    expected = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    assert rotation == pytest.approx(expected, abs=1e-12)
+    assert position == pytest.approx((0.04575, 0.0, 0.0), abs=1e-12)
+
+
+@given(data=st.data())
+def test_rule_of_attachment(robots: SearchStrategy[Robot], data: DataObject) -> None:
+    robot = data.draw(robots)
+    rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
+    slots = [BUILT_IN[p.kind].shape(p.parameters).slots for p in robot.parts]
+    for index, part in enumerate(robot.parts[1:], start=1):
+        above = part.parent
+        place, normal, tangent = world(
+            slots[above][part.parent_slot], rotations[above], positions[above]
+        )
+        own_place, own_normal, own_tangent = world(
+            slots[index][part.slot], rotations[index], positions[index]
+        )
+        assert own_place == pytest.approx(place, abs=1e-9)
+        assert own_normal == pytest.approx(-normal, abs=1e-9)
+        met = turned(own_tangent, own_normal, part.orientation)
+        assert met == pytest.approx(tangent, abs=1e-9)
+        assert np.linalg.det(rotations[index]) == pytest.approx(1.0)
+
+
+@given(data=st.data())
+def test_frames_are_products_along_the_tree_to_the_last_bit(
+    robots: SearchStrategy[Robot], data: DataObject
+) -> None:
+    robot = data.draw(robots)
+    shapes = shapes_of(robot, BUILT_IN)
+    rotations, positions = place_parts(robot, shapes)
+    for index, part in enumerate(robot.parts[1:], start=1):
+        above = part.parent
+        rotation, offset = attach(
+            shapes[above].slots[part.parent_slot],
+            shapes[index].slots[part.slot],
+            part.orientation,
+        )
+        turned_by = rotations[above] @ rotation
+        moved_by = positions[above] + rotations[above] @ offset
+        assert rotations[index].tobytes() == turned_by.tobytes()
+        assert positions[index].tobytes() == moved_by.tobytes()
+
+
+@given(data=st.data())
+def test_level_bodies_are_flat_and_stand_on_their_core(
+    genomes: SearchStrategy[Genome], data: DataObject
+) -> None:
+    robot = body(level(data.draw(genomes)))
+    rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
+    lowest = math.inf
+    corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    for part, rotation, position in zip(robot.parts, rotations, positions, strict=True):
+        shape = BUILT_IN[part.kind].shape(part.parameters)
+        for slot in shape.slots:
+            assert abs((rotation @ slot.normal)[2]) < 1e-9
+        for box in shape.boxes:
+            local = (corners * box.size / 2) @ np.array(box.rotation).T + box.position
+            lowest = min(lowest, float((local @ rotation.T + position)[:, 2].min()))
+    assert lowest == pytest.approx(-0.0225, abs=1e-12)
+
+
+def test_four_quarter_turns_are_none() -> None:
+    slot = BUILT_IN["Core"].shape(()).slots[1]
+    child = BUILT_IN["FixedBrick"].shape(()).slots[3]
+    quarter, _ = attach(slot, child, 90)
+    rotations = {turn: attach(slot, child, turn)[0] for turn in ORIENTATIONS}
+    step = rotations[0].T @ quarter
+    for number, turn in enumerate(ORIENTATIONS):
+        expected = rotations[0] @ np.linalg.matrix_power(step, number)
+        assert rotations[turn] == pytest.approx(expected, abs=1e-12)
+    assert np.linalg.matrix_power(step, 4) == pytest.approx(np.eye(3), abs=1e-12)
+
+
+def test_shared_frames_cannot_be_written_to() -> None:
+    slot = BUILT_IN["Core"].shape(()).slots[0]
+    rotation, _ = attach(slot, slot, 0)
+    with pytest.raises(ValueError, match="read-only"):
+        rotation[0, 0] = 2.0

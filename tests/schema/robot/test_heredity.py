@@ -1,0 +1,28 @@
+"""Genomes of robots that have none."""
+
+from dataclasses import replace
+
+from hypothesis import given
+from hypothesis.strategies import SearchStrategy
+
+from schema.parts import BUILT_IN
+from schema.robot.genome import develop
+from schema.robot.heredity import genome_of
+from schema.robot.robot import Robot
+
+
+def unordered(robot: Robot) -> Robot:
+    """Return a robot whose connections stand in one order, whatever theirs was."""
+    edges = sorted(robot.brain.connections, key=lambda edge: (edge.source, edge.target))
+    return replace(robot, brain=replace(robot.brain, connections=tuple(edges)))
+
+
+def test_a_robot_comes_back(robots: SearchStrategy[Robot]) -> None:
+    @given(robots)
+    def check(robot: Robot) -> None:
+        again = develop(genome_of(robot), BUILT_IN)
+        assert unordered(again) == unordered(robot)
+        # From there on nothing changes any more, the order included.
+        assert develop(genome_of(again), BUILT_IN) == again
+
+    check()

@@ -1,0 +1,157 @@
+"""The columns of a run's tables, and the counts that fill them."""
+
+import io
+from collections.abc import Callable
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.strategies import DataObject, SearchStrategy
+
+from schema.parts import BUILT_IN
+from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop
+from schema.tables.columns import (
+    BIRTHS,
+    EVALUATIONS,
+    TABLES,
+    body_rows,
+    repeatable,
+    sizes,
+)
+from schema.wire.codec import decode_genome, encode_genome
+
+NodeMaker = Callable[..., Node]
+HIDDEN = NeuronGene("Simple", (0.0, 0.5))
+
+
+def birth(genome: Genome, record: int) -> dict[str, object]:
+    robot = develop(genome, BUILT_IN)
+    return {
+        "record": record,
+        "island": 0,
+        "birth": record,
+        "parents": [{"island": 0, "birth": 1}, {"island": 0, "birth": 0}],
+        "generation": None,
+        "rank": 2,
+        "attempts": 1,
+        "genome": encode_genome(genome),
+        "body": body_rows(robot),
+        **sizes(robot, genome, BUILT_IN),
+        "sim_time_s": None if record else 15.0,
+        "x": None if record else -1.5,
+        "y": None if record else 0.0,
+    }
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_every_table_says_what_it_holds(name: str) -> None:
+    schema = TABLES[name]
+    assert schema.names[0] == "record"
+    assert schema.metadata[b"revolve.schema"] == name.encode()
+    assert int(schema.metadata[b"revolve.schema_version"]) >= 1
+    for field in schema:
+        assert set(field.metadata) - {b"absent"} == {b"unit", b"repeatable"}
+        if field.name.endswith("_s"):
+            assert field.metadata[b"unit"] == b"s"
+        if field.name.endswith("velocity"):
+            assert field.metadata[b"unit"] == b"m/s"
+
+
+@pytest.mark.parametrize(
+    ("name", "others"),
+    [
+        ("births", set()),
+        ("evaluations", {"wall_s", "worker", "platform"}),
+        ("population", set()),
+        ("fitness", set()),
+        ("poses", set()),
+        ("deaths", set()),
+        ("touches", set()),
+        ("runs", {"versions", "platform", "cpu_flags", "start", "end"}),
+    ],
+)
+def test_what_machines_and_clocks_decide_does_not_repeat(
+    name: str, others: set[str]
+) -> None:
+    schema = TABLES[name]
+    assert set(schema.names) - set(repeatable(schema)) == others
+
+
+def test_no_column_hides_behind_a_folder_name() -> None:
+    assert all("experiment" not in schema.names for schema in TABLES.values())
+
+
+def test_sizes_by_hand(node: NodeMaker) -> None:
+    nowhere = ConnectionGene(("input", 0), (3, 3), ("output", 0), 1.0)
+    loop = ConnectionGene(("output", 0), (), ("output", 0), 1.0)
+    touch = node("TouchSensor", connections=(nowhere,))
+    hinge = node(
+        "ActiveHinge", children=((1, touch),), hidden=(HIDDEN,), connections=(loop,)
+    )
+    passive = node("Hinge", children=((1, node("FixedBrick")),))
+    core = node("Core", children=((0, hinge), (3, passive)), hidden=(HIDDEN, HIDDEN))
+    assert sizes(develop(core, BUILT_IN), core, BUILT_IN) == {
+        "parts": 5,
+        "joints": 2,
+        "motors": 1,
+        "extremities": 2,
+        "inputs": 8,
+        "outputs": 1,
+        "hidden": 3,
+        "connections": 2,
+    }
+
+
+@pytest.mark.parametrize("length", [0, 1, 3])
+def test_a_tree_with_one_leaf_has_one_extremity(node: NodeMaker, length: int) -> None:
+    chain: tuple[tuple[int, Node], ...] = ()
+    for _ in range(length):
+        chain = ((1, node("FixedBrick", children=chain)),)
+    core = node("Core", children=chain)
+    counts = sizes(develop(core, BUILT_IN), core, BUILT_IN)
+    assert (counts["parts"], counts["extremities"]) == (length + 1, 1)
+
+
+@given(data=st.data())
+def test_births_survive_stream_and_parquet(
+    genomes: SearchStrategy[Genome], data: DataObject
+) -> None:
+    genome = data.draw(genomes)
+    rows = [birth(genome, record) for record in range(2)]
+    assert set(rows[0]) == set(BIRTHS.names)
+    batch = pa.RecordBatch.from_pylist(rows, schema=BIRTHS)
+    batch.validate(full=True)
+    sink = io.BytesIO()
+    pq.write_table(pa.Table.from_batches([batch]), sink)
+    table = pq.read_table(io.BytesIO(sink.getvalue()))
+    assert table.schema.metadata[b"revolve.schema"] == b"births"
+    (first, second) = table.to_pylist()
+    assert decode_genome(first["genome"]) == genome
+    parts = develop(genome, BUILT_IN).parts
+    assert [tuple(row["params"]) for row in first["body"]] == [
+        part.parameters for part in parts
+    ]
+    assert [row["gene"] for row in first["body"]] == [part.gene for part in parts]
+    assert [row["idx"] for row in second["body"]] == list(range(len(parts)))
+    assert [row["birth"] for row in first["parents"]] == [1, 0]
+
+
+def test_a_failed_evaluation_has_a_reason_and_no_fitness() -> None:
+    row = dict.fromkeys(EVALUATIONS.names) | {
+        "record": 0,
+        "island": 0,
+        "birth": 0,
+        "trial": 0,
+        "status": "failed",
+        "reason": "diverged",
+        "wall_s": 0.1,
+        "worker": "a",
+        "platform": "b",
+    }
+    batch = pa.RecordBatch.from_pylist([row], schema=EVALUATIONS)
+    pq.write_table(pa.Table.from_batches([batch]), io.BytesIO())
+    assert batch.to_pylist() == [row]
+    required = {field.name for field in EVALUATIONS if not field.nullable}
+    assert required == {name for name, value in row.items() if value is not None}

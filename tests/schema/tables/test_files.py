@@ -1,0 +1,83 @@
+"""Runs of before a table got its newest column are read as if it had been there."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from schema.errors import RunFolderError
+from schema.tables.columns import EVALUATIONS, TABLES
+from schema.tables.files import parquet_path, read_table, segment_path
+
+ROW = {
+    "record": 0,
+    "island": 0,
+    "birth_island": None,
+    "birth": 7,
+    "trial": 3,
+    "status": "ok",
+    "reason": "",
+    "fitness": 0.5,
+    "path_velocity": 0.1,
+    "straight_velocity": 0.08,
+    "simulated_s": 12.0,
+    "wall_s": 0.1,
+    "worker": "w",
+    "platform": "p",
+}
+
+
+def without(*names: str) -> pa.Table:
+    """Return one row of the table as it was before it had some columns."""
+    kept = [field for field in EVALUATIONS if field.name not in names]
+    return pa.Table.from_pylist([ROW], pa.schema(kept, EVALUATIONS.metadata))
+
+
+def write_segment(folder: Path, rows: pa.Table) -> None:
+    path = segment_path(folder, "evaluations", 0)
+    path.parent.mkdir()
+    with pa.OSFile(str(path), "wb") as file, pa.ipc.new_stream(file, rows.schema) as to:
+        to.write_table(rows)
+
+
+def write_parquet(folder: Path, rows: pa.Table) -> None:
+    path = parquet_path(folder, "old", 0, "evaluations")
+    path.parent.mkdir(parents=True)
+    pq.write_table(rows, path)
+
+
+@pytest.mark.parametrize("write", [write_segment, write_parquet])
+def test_an_older_run_s_evaluations_are_first_trials(
+    tmp_path: Path, write: Callable[[Path, pa.Table], None]
+) -> None:
+    write(tmp_path, without("trial"))
+    found = read_table(tmp_path, "evaluations")
+    assert found.schema.equals(TABLES["evaluations"], check_metadata=True)
+    assert found.to_pylist() == [{**ROW, "trial": 0}]
+
+
+@pytest.mark.parametrize("write", [write_segment, write_parquet])
+def test_rows_of_now_are_read_as_they_are(
+    tmp_path: Path, write: Callable[[Path, pa.Table], None]
+) -> None:
+    write(tmp_path, without())
+    assert read_table(tmp_path, "evaluations").to_pylist() == [ROW]
+
+
+def test_a_nullable_column_is_null_in_older_rows(tmp_path: Path) -> None:
+    write_segment(tmp_path, without("fitness"))
+    assert read_table(tmp_path, "evaluations")["fitness"].to_pylist() == [None]
+
+
+def test_rows_that_lack_what_was_always_there_are_refused(tmp_path: Path) -> None:
+    write_segment(tmp_path, without("status"))
+    with pytest.raises(RunFolderError, match="another version of Revolve"):
+        read_table(tmp_path, "evaluations")
+
+
+def test_a_file_that_lacks_what_was_always_there_is_refused(tmp_path: Path) -> None:
+    write_parquet(tmp_path, without("status"))
+    with pytest.raises(RunFolderError, match="cannot be read"):
+        read_table(tmp_path, "evaluations")

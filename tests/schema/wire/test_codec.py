@@ -1,0 +1,263 @@
+"""Round trips, and bytes of nobody knows what."""
+
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.strategies import DataObject, SearchStrategy
+
+from schema.errors import MalformedMessage
+from schema.experiment.identity import NOBODY, Identity, Origin
+from schema.parts import BUILT_IN
+from schema.robot.genome import Genome, Node, develop
+from schema.robot.names import BirthId
+from schema.robot.results import Evaluation, Report
+from schema.robot.robot import Robot
+from schema.wire import revolve_pb2 as pb
+from schema.wire.codec import (
+    Answer,
+    Request,
+    decode_answer,
+    decode_body,
+    decode_genome,
+    decode_request,
+    decode_robot,
+    encode_answer,
+    encode_body,
+    encode_brain,
+    encode_genome,
+    encode_request,
+    encode_robot,
+)
+from schema.wire.messages import robot_to_message
+
+NodeMaker = Callable[..., Node]
+DECODERS: list[Callable[[bytes], object]] = [
+    decode_robot,
+    decode_body,
+    decode_genome,
+    decode_request,
+    decode_answer,
+]
+U64 = st.integers(0, 2**64 - 1)
+U32 = st.integers(0, 2**32 - 1)
+IDENTITIES = st.just(NOBODY) | st.builds(
+    Identity,
+    st.builds(Origin, seed=U64, run=U32, island=U32),
+    st.builds(BirthId, U32, U64),
+    U32,
+)
+NUMBER = st.floats(allow_nan=False, allow_infinity=False)
+VECTOR = st.tuples(NUMBER, NUMBER, NUMBER)
+EVALUATIONS = st.builds(Evaluation, NUMBER, NUMBER, NUMBER, NUMBER)
+PAIRS = st.lists(st.tuples(U32, U32), max_size=4).map(tuple)
+REPORTS = st.builds(
+    Report, st.just(value=False), st.text(), PAIRS, VECTOR, VECTOR, NUMBER, U32
+) | st.builds(
+    Report, st.just(value=True), st.just(""), PAIRS, VECTOR, VECTOR, NUMBER, U32
+)
+ANSWERS = st.builds(Answer, U64, U64, NUMBER, REPORTS | EVALUATIONS | st.text())
+REPORT = Report(
+    is_viable=True,
+    reason="",
+    intersections=(),
+    lower=(-1.0, -1.0, -1.0),
+    upper=(1.0, 1.0, 1.0),
+    mass=0.3,
+    motors=1,
+)
+
+
+def exact(value: object) -> str:
+    """Return a text that tells -0.0 from 0.0, too."""
+    return repr(value)
+
+
+@given(data=st.data())
+def test_robot_round_trip(robots: SearchStrategy[Robot], data: DataObject) -> None:
+    robot = data.draw(robots)
+    encoded = encode_robot(robot)
+    assert exact(decode_robot(encoded)) == exact(robot)
+    assert encode_robot(decode_robot(encoded)) == encoded
+
+
+@given(data=st.data())
+def test_a_body_and_a_brain_add_up_to_a_robot(
+    robots: SearchStrategy[Robot], data: DataObject
+) -> None:
+    robot = data.draw(robots)
+    body, brain = encode_body(robot), encode_brain(robot)
+    whole = robot_to_message(robot).SerializeToString(deterministic=True)
+    assert body + brain == encode_robot(robot) == whole
+    bare = Robot(robot.parts)
+    assert exact(decode_body(whole)) == exact(decode_body(body)) == exact(bare)
+    assert encode_robot(bare) == body
+
+
+def test_a_brain_is_not_looked_at_with_a_body(node: NodeMaker) -> None:
+    message = pb.Robot.FromString(encode_body(develop(node("Core"), BUILT_IN)))
+    message.neurons.add(kind="no such kind", part=7)
+    data = message.SerializeToString()
+    with pytest.raises(MalformedMessage):
+        decode_robot(data)
+    assert [part.kind for part in decode_body(data).parts] == ["Core"]
+
+
+@given(data=st.data())
+def test_genome_round_trip(genomes: SearchStrategy[Genome], data: DataObject) -> None:
+    genome = data.draw(genomes)
+    encoded = encode_genome(genome)
+    assert exact(decode_genome(encoded)) == exact(genome)
+    assert encode_genome(decode_genome(encoded)) == encoded
+
+
+@given(data=st.data())
+def test_request_round_trip(robots: SearchStrategy[Robot], data: DataObject) -> None:
+    robot = data.draw(robots)
+    run, epoch, number = data.draw(st.tuples(st.text(), U64, U64))
+    settings = data.draw(st.binary())
+    identity = data.draw(IDENTITIES)
+    encoded = encode_request(
+        run=run,
+        epoch=epoch,
+        number=number,
+        settings=settings,
+        robot=encode_robot(robot),
+        identity=identity,
+    )
+    assert decode_request(encoded) == Request(
+        run, epoch, number, settings, robot, identity=identity
+    )
+
+
+@given(answer=ANSWERS)
+def test_answer_round_trip(answer: Answer) -> None:
+    assert exact(decode_answer(encode_answer(answer))) == exact(answer)
+
+
+@given(data=st.binary(max_size=64))
+def test_any_bytes_decode_or_are_malformed(data: bytes) -> None:
+    for decode in DECODERS:
+        with suppress(MalformedMessage):
+            decode(data)
+
+
+@given(data=st.data())
+def test_damaged_bytes_decode_or_are_malformed(
+    genomes: SearchStrategy[Genome], data: DataObject
+) -> None:
+    genome = data.draw(genomes)
+    encoded = data.draw(
+        st.sampled_from(
+            [
+                encode_genome(genome),
+                encode_robot(develop(genome, BUILT_IN)),
+                encode_answer(Answer(1, 2, 0.5, REPORT)),
+            ]
+        )
+    )
+    place = data.draw(st.integers(0, len(encoded) - 1))
+    byte = bytes([data.draw(st.integers(0, 255))])
+    cut = data.draw(st.sampled_from([place + 1, len(encoded)]))
+    damaged = encoded[:place] + byte + encoded[place + 1 : cut]
+    with suppress(MalformedMessage):
+        robot = decode_robot(damaged)
+        assert decode_robot(encode_robot(robot)) == robot
+    with suppress(MalformedMessage):
+        other = decode_genome(damaged)
+        assert decode_genome(encode_genome(other)) == other
+    with suppress(MalformedMessage):
+        answer = decode_answer(damaged)
+        assert decode_answer(encode_answer(answer)) == answer
+
+
+@pytest.mark.parametrize(
+    "decode", [decode_robot, decode_body, decode_genome, decode_request]
+)
+def test_nothing_is_no_robot(decode: Callable[[bytes], object]) -> None:
+    with pytest.raises(MalformedMessage, match="at least its core"):
+        decode(b"")
+
+
+def test_an_answer_holds_a_result() -> None:
+    with pytest.raises(MalformedMessage, match="holds no result"):
+        decode_answer(pb.Answer(epoch=1, number=2).SerializeToString())
+
+
+def test_a_report_of_nothing_but_zeros_is_still_one() -> None:
+    nowhere = (0.0, 0.0, 0.0)
+    report = replace(REPORT, is_viable=False, lower=nowhere, upper=nowhere, mass=0.0)
+    report = replace(report, motors=0)
+    answer = Answer(0, 0, 0.0, report)
+    assert decode_answer(encode_answer(answer)) == answer
+
+
+def test_an_empty_reason_is_still_a_failure() -> None:
+    answer = Answer(1, 2, 0.0, "")
+    assert decode_answer(encode_answer(answer)) == answer
+
+
+@pytest.mark.parametrize(
+    "result",
+    [
+        Evaluation(math.nan, 0.0, 0.0, 12.0),
+        Evaluation(0.0, math.inf, 0.0, 12.0),
+        Evaluation(0.0, 0.0, -math.inf, 12.0),
+        Evaluation(0.0, 0.0, 0.0, math.nan),
+        replace(REPORT, mass=math.inf),
+        replace(REPORT, lower=(0.0, math.nan, 0.0)),
+        replace(REPORT, reason="it is viable all the same"),
+    ],
+)
+def test_a_result_that_is_none_is_malformed(result: Report | Evaluation) -> None:
+    with pytest.raises(MalformedMessage):
+        decode_answer(encode_answer(Answer(1, 2, 0.5, result)))
+
+
+def test_a_report_without_corners_is_malformed() -> None:
+    message = pb.Answer(report=pb.Report(is_viable=True))
+    with pytest.raises(MalformedMessage, match="both corners"):
+        decode_answer(message.SerializeToString())
+
+
+@pytest.mark.parametrize("decode", [decode_robot, decode_body])
+def test_a_part_out_of_the_tree_is_malformed(
+    node: NodeMaker, decode: Callable[[bytes], Robot]
+) -> None:
+    message = pb.Robot()
+    message.ParseFromString(encode_robot(develop(node("Core"), BUILT_IN)))
+    message.parts.add(kind="FixedBrick", parent=4, parent_slot=0, slot=0)
+    with pytest.raises(MalformedMessage, match=r"Robot: body.parts\[1\].parent"):
+        decode(message.SerializeToString())
+
+
+def test_an_unknown_layer_is_malformed(node: NodeMaker) -> None:
+    message = pb.Robot()
+    message.ParseFromString(encode_robot(develop(node("Core"), BUILT_IN)))
+    message.neurons.add(kind="Simple", parameters=(0.0, 0.5))
+    with pytest.raises(MalformedMessage, match="layer: must be one of"):
+        decode_robot(message.SerializeToString())
+
+
+@pytest.mark.parametrize("parameters", [(0.0,), (0.0, math.nan)])
+def test_a_neuron_gene_has_its_parameters(
+    node: NodeMaker, parameters: tuple[float, ...]
+) -> None:
+    message = pb.Genome()
+    message.ParseFromString(encode_genome(node("Core")))
+    message.nodes[0].hidden.add(kind="Simple", parameters=parameters)
+    with pytest.raises(MalformedMessage, match="Simple takes 2 finite numbers"):
+        decode_genome(message.SerializeToString())
+    message.nodes[0].hidden[0].kind = "Cosine"
+    with pytest.raises(MalformedMessage, match="got 'Cosine'"):
+        decode_genome(message.SerializeToString())
+
+
+def test_a_newer_field_does_no_harm(node: NodeMaker) -> None:
+    robot = develop(node("Core"), BUILT_IN)
+    # Field 99, a number.
+    assert decode_robot(encode_robot(robot) + b"\x98\x06\x01") == robot

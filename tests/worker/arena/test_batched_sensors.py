@@ -1,0 +1,52 @@
+"""Batches feel and command what one robot does, to the last bit."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from schema.robot.robot import Robot
+from tests.worker.arena_cases import SETTINGS, crowd, inhabited, seconds
+from worker.arena.world import World
+
+
+def lonely(world: World) -> list[tuple[np.ndarray, list[float]]]:
+    """Return readings and commands of all, felt and told one by one."""
+    found = []
+    tick_s = 25 * 0.005
+    outputs = np.random.default_rng(3).uniform(-0.2, 1.2, (len(world.births), 40))
+    for one, own in zip(world.company.everybody, outputs, strict=True):
+        seat, velocities = one.seat, list(one.seat.senses.velocities)
+        readings, commands = seat.senses.readings.copy(), seat.ctrl.copy()
+        seat.feel(tick_s)
+        felt = seat.senses.readings.copy()
+        seat.senses.readings[:], seat.senses.velocities = readings, velocities
+        seat.drive(own)
+        told = seat.ctrl.tolist()
+        seat.ctrl[:] = commands
+        found.append((felt, told))
+    return found
+
+
+def test_a_batch_feels_and_commands_as_each_alone_would(
+    robot_of: Callable[[int], Robot],
+) -> None:
+    world = inhabited(SETTINGS, crowd(robot_of, 16, 0.6))
+    seconds(world, 2.0)
+    world.advance(world.step + 23)
+    expected = lonely(world)
+    nerves, layout = world._nerves, world.company.layout
+    assert any(len(cluster.members) > 1 for cluster in world.company.clusters)
+    state = layout.read()
+    nerves.settle(layout)
+    nerves.feel(state)
+    outputs = np.random.default_rng(3).uniform(-0.2, 1.2, (len(world.births), 40))
+    nerves.drive(state, outputs)
+    pads = 0
+    for row, (one, (felt, told)) in enumerate(
+        zip(world.company.everybody, expected, strict=True)
+    ):
+        assert nerves.readings[row].tobytes() == felt.tobytes()
+        assert one.seat.senses.readings is not felt
+        assert one.seat.ctrl.tolist() == told
+        pads += len(one.seat.senses.pads)
+    assert pads > 0

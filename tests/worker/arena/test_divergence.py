@@ -1,0 +1,170 @@
+"""A robot whose physics breaks is gone, with the reason; the others feel nothing."""
+
+from collections.abc import Callable
+from dataclasses import replace as changed
+
+import pytest
+from msgspec.structs import replace
+
+from schema import parts
+from schema.parts import Box, Shape
+from schema.robot.brain import Brain, Connection
+from schema.robot.names import BirthId
+from schema.robot.robot import Robot
+from schema.wire.arena import Casualty, Changes, Insertion
+from tests.worker.arena_cases import (
+    SETTINGS,
+    crowd,
+    inhabited,
+    seconds,
+    settings_of,
+    state_of,
+)
+from worker.arena.world import World
+
+Robots = Callable[[int], Robot]
+BAD = BirthId(0, 99)
+
+
+def _brick(height: float, mass: float) -> Callable[[tuple[float, ...]], Shape]:
+    box = Box("body", (0.041, 0.041, height), (0.0, 0.0, 0.0), mass)
+    slots = parts.FIXED_BRICK.shape((0.5,) * 3).slots
+    return lambda _values: Shape((box,), slots)
+
+
+HEAVY = changed(parts.FIXED_BRICK, name="Heavy", shape=_brick(0.0355, 1e40))
+NOTHING = changed(parts.FIXED_BRICK, name="Nothing", shape=_brick(0.0, 0.01))
+SPACE = replace(
+    SETTINGS.space,
+    part_types=(
+        *SETTINGS.space.part_types,
+        "tests.worker.arena.test_divergence:HEAVY",
+        "tests.worker.arena.test_divergence:NOTHING",
+    ),
+)
+ABSURD = replace(SETTINGS, space=SPACE)
+
+
+def with_brick(turtle: Robot, kind: str) -> Robot:
+    """Return the turtle with one of its bricks of another kind."""
+    made = [
+        replace(part, kind=kind) if index == 2 else part
+        for index, part in enumerate(turtle.parts)
+    ]
+    return Robot(tuple(made), turtle.brain)
+
+
+def test_absurd_weights_break_nothing(turtle: Robot) -> None:
+    """Outputs are clipped before they drive anything, and states stay finite."""
+    neurons = turtle.brain.neurons
+    edges = tuple(
+        Connection(source, target, 1e300)
+        for source in range(len(neurons))
+        for target in range(8, len(neurons))
+    )
+    wild = Robot(turtle.parts, Brain(neurons, edges))
+    world = inhabited(SETTINGS, [Insertion(BAD, wild, (0.0, 0.0))])
+    assert seconds(world, 5.0).casualties == ()
+
+
+@pytest.mark.parametrize("kind", ["Heavy", "Nothing"])
+def test_absurd_masses_end_their_robot_and_nobody_else(
+    turtle: Robot, robot_of: Robots, kind: str
+) -> None:
+    others = crowd(robot_of, 4, 0.5)
+    calm, struck = inhabited(ABSURD, others), inhabited(ABSURD, others)
+    guest = Insertion(BAD, with_brick(turtle, kind), (1.5, 0.0))
+    struck.apply(Changes(insertions=(guest,)))
+    seconds(calm, 3.0)
+    [casualty] = seconds(struck, 3.0).casualties
+    assert casualty.birth == BAD
+    assert "diverged" in casualty.reason or "cannot be built" in casualty.reason
+    assert casualty.place[:2] == pytest.approx((1.5, 0.0), abs=0.5)
+    assert struck.births == calm.births
+    for birth in calm.births:
+        assert state_of(struck, birth) == state_of(calm, birth)
+
+
+def test_in_a_cluster_only_the_broken_one_falls(turtle: Robot) -> None:
+    near = [Insertion(BirthId(0, n), turtle, (0.262 * n, 0.0)) for n in range(3)]
+    world = inhabited(SETTINGS, near)
+    seconds(world, 1.0)
+    middle = world.company.find(BirthId(0, 1))
+    assert len(world.company.clusters) == 1
+    middle.seat.qvel[0] = float("nan")
+    fallen = seconds(world, 1.0).casualties
+    assert [casualty.birth for casualty in fallen] == [middle.birth]
+    assert fallen[0].reason == "physics diverged: state not finite"
+    assert 200 < fallen[0].step <= 208
+    assert world.births == (BirthId(0, 0), BirthId(0, 2))
+    assert seconds(world, 1.0).casualties == ()
+
+
+def test_a_core_that_flies_off_has_broken_the_physics(turtle: Robot) -> None:
+    world = inhabited(SETTINGS, [Insertion(BAD, turtle, (0.0, 0.0))])
+    seconds(world, 1.0)
+    world.company.find(BAD).seat.qvel[:3] = (30.0, 0.0, 30.0)
+    [casualty] = seconds(world, 1.0).casualties
+    assert "m/s, more than 20 m/s" in casualty.reason
+    assert world.births == ()
+
+
+def test_what_cannot_be_built_is_told_even_after_a_restore(turtle: Robot) -> None:
+    world = World(ABSURD)
+    guest = Insertion(BAD, with_brick(turtle, "Nothing"), (1.0, 0.0))
+    world.apply(Changes(insertions=(guest,)))
+    restored = World.restore(ABSURD, world.snapshot())
+    [casualty] = seconds(restored, 1.0).casualties
+    assert isinstance(casualty, Casualty)
+    assert casualty.birth == BAD
+    assert seconds(restored, 1.0).casualties == ()
+
+
+@pytest.mark.parametrize(
+    ("memory", "drop_m", "told"),
+    [
+        (1 << 9, 0.25, "cannot be built: "),
+        (1 << 12, 0.25, "physics diverged: "),
+        (1 << 11, 0.0, "physics diverged: "),
+    ],
+)
+def test_an_engine_that_gives_up_on_a_robot_ends_it_and_nobody_else(
+    turtle: Robot,
+    monkeypatch: pytest.MonkeyPatch,
+    memory: int,
+    drop_m: float,
+    told: str,
+) -> None:
+    """When it is built, in the air, or at birth; the world goes on."""
+    world = inhabited(
+        settings_of(drop_m=drop_m), [Insertion(BirthId(0, 1), turtle, (0.0, 0.0))]
+    )
+    with monkeypatch.context() as patch:
+        patch.setattr("schema.mjcf.model.MEMORY_BYTES", memory)
+        world.apply(Changes(insertions=(Insertion(BAD, turtle, (1.5, 0.0)),)))
+    [casualty] = seconds(world, 1.0).casualties
+    assert casualty.birth == BAD
+    assert casualty.reason.startswith(told)
+    assert "out of memory" in casualty.reason
+    assert "\n" not in casualty.reason
+    assert world.births == (BirthId(0, 1),)
+    assert seconds(world, 1.0).casualties == ()
+
+
+def never(_track: object, _fitness: object) -> float:
+    """Judge nobody."""
+    raise ZeroDivisionError
+
+
+def test_a_fitness_that_cannot_be_told_is_a_death_with_its_reason(
+    turtle: Robot,
+) -> None:
+    fitness = replace(
+        SETTINGS.fitness, function="tests.worker.arena.test_divergence:never"
+    )
+    settings = replace(SETTINGS, fitness=fitness)
+    world = inhabited(settings, [Insertion(BAD, turtle, (0.0, 0.0))])
+    assert seconds(world, 5.0).casualties == ()
+    [casualty] = seconds(world, 2.0).casualties
+    assert "ZeroDivisionError" in casualty.reason
+    assert world.births == ()

@@ -1,0 +1,210 @@
+"""Robots on a slope, on rough ground and among scenery do what physics asks."""
+
+import math
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from schema.experiment.document import Simulation, Space
+from schema.experiment.environment import Environment
+from schema.experiment.settings import ArenaSettings
+from schema.robot.brain import INPUT, Brain, Neuron
+from schema.robot.names import BirthId
+from schema.robot.robot import Part, Robot
+from schema.wire.arena import Changes, Insertion
+from tests.worker.arena_cases import SECOND, crowd, inhabited, seconds, settings_of
+from worker.arena.world import World
+from worker.robot.evaluation import simulate
+
+Robots = Callable[[int], Robot]
+A, B = BirthId(0, 0), BirthId(0, 1)
+GREY = (0.5, 0.5, 0.5)
+CORE = Part("Core", -1, -1, -1, 0, GREY)
+BOX = Robot((CORE,), Brain(tuple(Neuron("input", INPUT, 0) for _ in range(6))))
+"""A core alone: 9 cm by 9 cm by 4.5 cm, feeling how it is moved."""
+FEELER = Robot(
+    (CORE, Part("TouchSensor", 0, 3, 0, 0, GREY)),
+    Brain((*BOX.brain.neurons, *(Neuron("input", INPUT, 1) for _ in range(2)))),
+)
+"""The same with two pads in front of its face towards -x."""
+G = 9.81
+
+
+def scene(*geoms: str) -> str:
+    return f"<mujoco><worldbody>{''.join(geoms)}</worldbody></mujoco>"
+
+
+WILD = Environment(
+    slope_deg=8.0,
+    roughness_m=0.04,
+    extent_m=2.0,
+    scenery=scene(
+        '<geom type="box" size="0.1 0.1 0.1" pos="0.3 0 0.1" euler="0 0 20"/>',
+        '<geom type="sphere" size="0.15" pos="-0.2 0.3 0"/>',
+    ),
+)
+WALL = scene('<geom type="box" size="0.05 2 0.3" pos="-1.05 0 0.3"/>')
+
+
+def arena(environment: Environment, **keys: object) -> ArenaSettings:
+    return replace(settings_of(**keys), environment=environment)
+
+
+@pytest.mark.parametrize("slope_deg", [0.0, 20.0, 35.0])
+def test_a_box_at_rest_on_a_slope_feels_that_it_leans(slope_deg: float) -> None:
+    """It is g sin a along x, towards uphill, and g cos a along z; nothing else."""
+    world = inhabited(
+        arena(Environment(slope_deg=slope_deg), drop_m=0.01),
+        [Insertion(A, BOX, (0.5, 0.0))],
+    )
+    seconds(world, 2.0)
+    readings = world.company.find(A).seat.senses.readings[0, :6].tolist()
+    slope = math.radians(slope_deg)
+    expected = [G * math.sin(slope), 0.0, G * math.cos(slope), 0.0, 0.0, 0.0]
+    assert readings == pytest.approx(expected, abs=0.01)
+
+
+@pytest.mark.parametrize("slope_deg", [5.0, 30.0])
+def test_without_friction_a_box_slides_down_as_on_an_inclined_plane(
+    slope_deg: float,
+) -> None:
+    """By g sin(a) t^2 / 2 towards -x: 2.45 m in a second at 30 degrees."""
+    clock = Simulation(friction=0.0, window_steps=400)
+    track = simulate(BOX, Space(), clock, Environment(slope_deg=slope_deg))
+    times = np.arange(len(track.core_position)) * track.interval_s
+    expected = -0.5 * G * math.sin(math.radians(slope_deg)) * times**2
+    assert track.core_position[:, 0] == pytest.approx(expected, rel=0.01, abs=0.02)
+    assert np.abs(track.core_position[:, 1]).max() < 1e-6
+    assert np.ptp(track.core_position[:, 2]) < 1e-3
+
+
+def test_a_wall_stops_what_slides_and_pads_feel_it() -> None:
+    """Pads reach 5.5 cm from the core's centre; the wall's face is at x = -1 m."""
+    settings = arena(Environment(slope_deg=20.0, scenery=WALL), drop_m=0.0)
+    slippery = replace(settings, simulation=replace(settings.simulation, friction=0.0))
+    world = inhabited(slippery, [Insertion(A, FEELER, (0.0, 0.0))])
+    seat = world.company.find(A).seat
+    seconds(world, 0.5)
+    assert seat.senses.readings[0, 6:8].tolist() == [0.0, 0.0]
+    assert -1.0 < seat.qpos[0] < -0.3
+    seconds(world, 3.0)
+    assert seat.senses.readings[0, 6:8].tolist() == [1.0, 1.0]
+    assert seat.qpos[0] == pytest.approx(-1.0 + 0.0555, abs=2e-3)
+    assert np.abs(seat.qvel[:3]).max() < 1e-3
+    free = inhabited(
+        replace(slippery, environment=Environment(slope_deg=20.0)),
+        [Insertion(A, FEELER, (0.0, 0.0))],
+    )
+    seconds(free, 3.5)
+    assert free.company.find(A).seat.qpos[0] < -10.0
+
+
+def test_robots_stay_above_rough_ground(robot_of: Robots) -> None:
+    """They begin clear of it, and sink no deeper than contacts are soft."""
+    environment = Environment(roughness_m=0.05, patch_m=0.05, extent_m=1.0)
+    depths: list[float] = []
+
+    def watch(data: mujoco.MjData) -> None:
+        # The ground and what rises above it are the model's first two geoms.
+        is_ground = data.contact.geom.min(axis=1) <= 1
+        depths.append(-float(data.contact.dist[is_ground].min(initial=0.0)))
+        assert data.geom_xpos[2:, 2].min() > 0.0
+
+    for seed in (0, 2, 3):
+        depths.clear()
+        clock = Simulation(window_steps=800)
+        simulate(robot_of(seed), Space(), clock, environment, watch=watch)
+        assert depths[0] == 0.0
+        assert 0.0 < max(depths) < 0.004
+
+
+def test_a_robot_alone_in_an_arena_moves_as_it_does_off_line(robot_of: Robots) -> None:
+    """On a slope, on rough ground, beside scenery: the same to the last bit."""
+    robot, settings = robot_of(3), arena(WILD)
+    world = inhabited(settings, [Insertion(A, robot, (0.0, 0.0))])
+    world.advance(600 + 800)
+    simulation = replace(
+        settings.simulation, drop_m=settings.arena.drop_m, window_steps=800
+    )
+    track = simulate(robot, settings.space, simulation, WILD)
+    own = world.company.find(A).window.track()
+    positions = np.asarray(own.core_position)[-len(track.core_position) :]
+    assert positions.tobytes() == track.core_position.tobytes()
+
+
+@pytest.mark.slow
+def test_a_wild_arena_repeats_with_any_threads_and_after_a_restore(
+    robot_of: Robots,
+) -> None:
+    """Births on top of obstacles, merges on rough ground, deaths, all in there."""
+    settings, found = arena(WILD), []
+    for threads in (1, 2):
+        world = inhabited(settings, crowd(robot_of, 10, 0.5), threads)
+        seconds(world, 1.5)
+        middle = world.snapshot()
+        newcomers = crowd(robot_of, 3, 0.3, seed=2, first=20)
+        changes = Changes(removals=world.births[:2], insertions=newcomers)
+        world.apply(changes)
+        found.append((middle, seconds(world, 1.5)))
+        assert world.company.merges > 0
+        world.close()
+    assert found[0] == found[1]
+    middle, advance = found[0]
+    restored = World.restore(settings, middle)
+    restored.apply(changes)
+    assert seconds(restored, 1.5) == advance
+
+
+def test_two_robots_on_one_rock_do_not_touch_each_other() -> None:
+    """Scenery belongs to nobody: no contact of robots, no cluster of two."""
+    slab = scene('<geom type="box" size="2 2 0.1" pos="0 0 0.1"/>')
+    settings = arena(Environment(scenery=slab), record_touches=True, drop_m=0.0)
+    apart = [Insertion(A, BOX, (-0.3, 0.0)), Insertion(B, BOX, (0.3, 0.0))]
+    world = inhabited(settings, apart)
+    assert seconds(world, 1.0).touches == ()
+    assert world.company.merges == 0
+    near = [Insertion(A, BOX, (0.0, 0.0)), Insertion(B, BOX, (0.095, 0.0))]
+    world = inhabited(settings, near)
+    assert seconds(world, 1.0).touches == ()
+    assert world.company.merges == 1
+    (cluster,) = world.company.clusters
+    assert cluster.data.ncon >= 8
+    for birth in (A, B):
+        core = world.company.find(birth).seat
+        assert core.qpos[2] == pytest.approx(0.2 + 0.0225, abs=1e-3)
+        assert core.geoms[1] - core.geoms[0] == 1
+
+
+def test_robots_are_born_on_top_of_what_stands_at_their_place() -> None:
+    """A block 0.2 m high and a drop of 0.05 m; a heading of 45 degrees clears it."""
+    block = scene('<geom type="box" size="0.1 0.1 0.1" pos="0 0 0.1"/>')
+    settings = arena(Environment(scenery=block), drop_m=0.05)
+    # The core's side is 45 mm away, its corner 63.6 mm.
+    for place, heading, expected in (
+        ((0.0, 0.0), 0.0, 0.2),
+        ((0.14, 0.0), 0.0, 0.2),
+        ((0.15, 0.0), 0.0, 0.0),
+        ((0.15, 0.0), 0.25 * math.pi, 0.2),
+    ):
+        world = inhabited(settings, [Insertion(A, BOX, place, heading)])
+        one = world.company.find(A)
+        assert one.place == tuple(one.seat.qpos[:3])
+        assert one.place[2] == pytest.approx(expected + 0.05 + 0.0225, abs=3e-5)
+
+
+def test_scenery_hides_the_light() -> None:
+    lamp = Part("LightSensor", 0, 3, 0, 0, GREY)
+    neurons = (*BOX.brain.neurons, Neuron("input", INPUT, 1))
+    robot = Robot((CORE, lamp), Brain(neurons))
+    types = (*Space().part_types, "schema.parts:LIGHT_SENSOR")
+    found = []
+    for environment in (Environment(), Environment(scenery=WALL)):
+        settings = arena(environment, light=(-2.0, 0.0, 0.02), drop_m=0.0)
+        settings = replace(settings, space=Space(part_types=types))
+        world = inhabited(settings, [Insertion(A, robot, (0.0, 0.0))])
+        world.advance(SECOND)
+        found.append(float(world.company.find(A).seat.senses.readings[0, 6]))
+    assert found == [pytest.approx((1.0 / 1.95) ** 2, abs=0.02), 0.0]

@@ -1,0 +1,61 @@
+"""What an arena came to, done again: the same, or told to be another."""
+
+from collections.abc import Callable, Sequence
+
+from schema.experiment.file import read_experiment
+from schema.experiment.identity import Origin
+from schema.experiment.settings import arena_settings, read_arena_settings
+from schema.robot.names import BirthId
+from schema.robot.robot import Robot
+from schema.wire.arena import BrainChange, Changes
+from schema.wire.arena_codec import PastAdvance, Rebuild
+from tests.worker.arena_cases import crowd
+from worker.arena.replay import Scene, together
+from worker.arena.world import World
+
+Robots = Callable[[int], Robot]
+SETTINGS = arena_settings(read_experiment("scenario3"), Origin())
+TURN, TICKS = 50, 2
+A, B, C = (BirthId(0, number) for number in range(3))
+
+
+def lived(turns: Sequence[Changes]) -> tuple[PastAdvance, ...]:
+    """Return what became of an arena, with changes at the start of each turn."""
+    world = World(read_arena_settings(SETTINGS))
+    history: list[PastAdvance] = []
+    for changes in turns:
+        world.apply(changes)
+        advance = world.advance(world.step + TURN)
+        history.append(PastAdvance(changes, advance.step, advance.digest))
+    return tuple(history)
+
+
+def scenes(history: Sequence[PastAdvance], birth: BirthId) -> list[Scene]:
+    past = Rebuild(b"", tuple(history))
+    found = list(together(SETTINGS, past, frozenset({birth})))
+    assert [scene.step for scene in found] == [past.until for past in history]
+    return found
+
+
+def test_what_happened_here_happens_again(robot_of: Robots) -> None:
+    newcomers = crowd(robot_of, 3, 0.4)
+    found = scenes(lived([Changes((), newcomers), Changes((A,)), Changes()]), A)
+    assert [scene.is_equal for scene in found] == [True] * 3
+    assert [scene.motion.num_rows for scene in found] == [TICKS, 0, 0]
+
+
+def test_of_a_drift_it_does_what_is_possible_and_tells_that_it_is_another(
+    robot_of: Robots,
+) -> None:
+    """C fell here only; A there only, from where it came back as a migrant."""
+    one, other = crowd(robot_of, 2, 0.4)
+    swaps = tuple(BrainChange(birth, robot_of(0).brain) for birth in (A, C))
+    there = Changes(removals=(C,), insertions=(one,), brains=swaps)
+    history = [
+        *lived([Changes((), (one, other))]),
+        PastAdvance(there, 2 * TURN, bytes(32)),
+        PastAdvance(Changes((B,)), 3 * TURN, bytes(32)),
+    ]
+    found = scenes(history, A)
+    assert [scene.is_equal for scene in found] == [True, False, False]
+    assert [scene.motion.num_rows for scene in found] == [TICKS] * 3

@@ -1,0 +1,110 @@
+"""A restored world goes on as the one that it was taken from, bit for bit."""
+
+import sys
+import time
+from collections.abc import Callable
+from hashlib import sha256
+
+import numpy as np
+import pytest
+
+from schema.errors import MalformedMessage
+from schema.robot.names import BirthId
+from schema.robot.robot import Robot
+from schema.wire.arena import Changes, Insertion
+from tests.worker.arena_cases import (
+    SECOND,
+    SETTINGS,
+    crowd,
+    inhabited,
+    seconds,
+    settings_of,
+)
+from worker.arena.world import World
+
+Robots = Callable[[int], Robot]
+RECORDING = settings_of(record_touches=True)
+
+
+@pytest.mark.slow
+def test_thirty_robots_go_on_after_a_snapshot_in_contact_and_merge(
+    robot_of: Robots,
+) -> None:
+    """Taken within a step of merges and in contacts; size and time are told."""
+    world = inhabited(RECORDING, crowd(robot_of, 30, 0.8))
+    taken: list[tuple[int, bytes]] = []
+    merges = 0
+    while len(taken) < 3:
+        world.advance(world.step + 8)
+        touching = sum(len(c.touching()) for c in world.company.clusters)
+        if world.company.merges > merges and touching:
+            merges = world.company.merges
+            began = time.perf_counter()
+            taken.append((world.step, world.snapshot()))
+            write_s = time.perf_counter() - began
+    end = world.step + SECOND + 3
+    world.advance(end)
+    expected = _continued(world)
+    for step, data in taken:
+        began = time.perf_counter()
+        restored = World.restore(RECORDING, data, threads=2)
+        read_s = time.perf_counter() - began
+        assert restored.step == step
+        assert restored.snapshot() == data
+        restored.advance(end)
+        assert _continued(restored) == expected
+        restored.close()
+    sys.stdout.write(
+        f"\nsnapshot of 30 robots: {len(taken[-1][1]) / 1024:.0f} KiB, written in "
+        f"{1000 * write_s:.1f} ms, restored in {1000 * read_s:.0f} ms\n"
+    )
+
+
+def _continued(world: World) -> list[object]:
+    """Return what further life of a world comes to: all of two more advances."""
+    first = seconds(world, 0.7)
+    world.apply(Changes(removals=(world.births[4],)))
+    return [first, seconds(world, 0.5)]
+
+
+def test_an_advance_tells_the_digest_of_its_snapshot(robot_of: Robots) -> None:
+    """By which a coordinator knows whose state a file holds."""
+    world = inhabited(RECORDING, crowd(robot_of, 14, 0.5))
+    advance = seconds(world, 2.0)
+    assert advance.touches
+    assert sha256(world.snapshot()).digest() == advance.digest
+
+
+def test_a_snapshot_right_after_changes_goes_on_as_well(robot_of: Robots) -> None:
+    """Newborns in the air, a robot that could not be built still untold."""
+    world = inhabited(SETTINGS, crowd(robot_of, 3, 0.3))
+    seconds(world, 1.0)
+    newcomers = crowd(robot_of, 3, 0.3, seed=5, first=10)
+    world.apply(Changes(removals=(BirthId(0, 1),), insertions=newcomers))
+    restored = World.restore(SETTINGS, world.snapshot())
+    assert seconds(restored, 1.0) == seconds(world, 1.0)
+
+
+def test_snapshots_are_equal_whatever_the_cache_has_seen(robot_of: Robots) -> None:
+    """A world restored again and again is one that never was."""
+    steady = inhabited(SETTINGS, crowd(robot_of, 5, 0.3))
+    passed = inhabited(SETTINGS, crowd(robot_of, 5, 0.3))
+    for until in range(50, 1001, 50):
+        passed.advance(until)
+        passed = World.restore(SETTINGS, passed.snapshot())
+    steady.advance(1000)
+    assert passed.digest() == steady.digest()
+
+
+def test_no_other_bytes_are_a_snapshot(turtle: Robot) -> None:
+    world = inhabited(SETTINGS, [Insertion(BirthId(0, 0), turtle, (0.0, 0.0))])
+    data = world.snapshot()
+    rng = np.random.default_rng(1)
+    with pytest.raises(MalformedMessage, match="other settings"):
+        World.restore(RECORDING, data)
+    for cut in (0, 1, 40, len(data) // 2, len(data) - 1):
+        with pytest.raises(MalformedMessage):
+            World.restore(SETTINGS, data[:cut])
+    for _ in range(50):
+        with pytest.raises(MalformedMessage):
+            World.restore(SETTINGS, rng.bytes(int(rng.integers(200))))

@@ -1,0 +1,232 @@
+"""A world is a function of its settings, changes and advances, and of no more."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from msgspec.structs import replace
+
+from schema.errors import UnexpectedEvent
+from schema.experiment.document import Space
+from schema.experiment.environment import FLAT
+from schema.parts import LIGHT_SENSOR
+from schema.robot.brain import Brain, Neuron
+from schema.robot.names import BirthId
+from schema.robot.robot import Part, Robot
+from schema.tables.columns import read_columns
+from schema.wire.arena import BrainChange, Changes, Insertion
+from tests.worker.arena_cases import (
+    EXPERIMENT,
+    SECOND,
+    SETTINGS,
+    crowd,
+    inhabited,
+    seconds,
+    settings_of,
+    state_of,
+)
+from worker.arena.world import World
+from worker.robot.evaluation import simulate
+
+Robots = Callable[[int], Robot]
+A, B = BirthId(0, 0), BirthId(0, 1)
+
+
+@pytest.mark.slow
+def test_any_number_of_threads_comes_to_the_same(robot_of: Robots) -> None:
+    """Births, deaths, merges and falls included; then the whole advance is equal."""
+    found = []
+    for threads in (1, 2, 4):
+        world = inhabited(SETTINGS, crowd(robot_of, 14, 0.7), threads)
+        advances = [seconds(world, 2.0)]
+        world.apply(
+            Changes(world.births[:3], crowd(robot_of, 4, 0.3, seed=2, first=20))
+        )
+        advances.append(seconds(world, 2.0))
+        assert world.company.merges > 0
+        world.close()
+        found.append(advances)
+    assert found[0] == found[1] == found[2]
+
+
+def test_how_many_advances_it_takes_does_not_matter(robot_of: Robots) -> None:
+    newcomers = crowd(robot_of, 6, 0.4)
+    whole, pieces = inhabited(SETTINGS, newcomers), inhabited(SETTINGS, newcomers)
+    once = whole.advance(700)
+    for until in (1, 13, 64, 200, 333, 698, 700):
+        last = pieces.advance(until)
+    assert last.digest == once.digest
+    assert last.judgements == once.judgements
+
+
+def test_a_robot_alone_moves_as_it_does_off_line(turtle: Robot) -> None:
+    """Same drop, same warm-up, at the origin: the same track to the last bit."""
+    world = inhabited(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
+    advance = world.advance(600 + 2400)
+    simulation = replace(SETTINGS.simulation, drop_m=SETTINGS.arena.drop_m)
+    track = simulate(turtle, SETTINGS.space, simulation, FLAT)
+    own = world.company.find(A).window.track()
+    assert np.array_equal(own.core_position, track.core_position)
+    assert own.interval_s == track.interval_s
+    assert advance.judgements[0].is_mature
+
+
+def test_those_far_away_do_not_feel_births_and_deaths(robot_of: Robots) -> None:
+    far = crowd(robot_of, 4, 0.4)
+    calm, busy = inhabited(SETTINGS, far), inhabited(SETTINGS, far)
+    seconds(calm, 3.0)
+    for turn in range(3):
+        others = [
+            Insertion(BirthId(0, 10 * turn + number), robot_of(number), (5.0, y))
+            for number, y in ((10, 0.0), (11, 0.2))
+        ]
+        gone = tuple(birth for birth in busy.births if birth.number >= 10)
+        busy.apply(Changes(gone, tuple(others)))
+        seconds(busy, 1.0)
+    for insertion in far:
+        birth = insertion.birth
+        assert state_of(calm, birth) == state_of(busy, birth)
+
+
+def test_changes_that_cannot_be_made_change_nothing(robot_of: Robots) -> None:
+    world = inhabited(SETTINGS, crowd(robot_of, 2, 1.0))
+    before = world.digest()
+    guest = Insertion(BirthId(0, 9), robot_of(9), (0.0, 0.0))
+    wrong = [
+        Changes(removals=(BirthId(0, 7),), insertions=(guest,)),
+        Changes(insertions=(guest, guest)),
+        Changes(insertions=(Insertion(A, robot_of(0), (1.0, 1.0)),)),
+        Changes(brains=(BrainChange(BirthId(0, 7), Brain()),)),
+        Changes(removals=(A,), brains=(BrainChange(A, robot_of(0).brain),)),
+    ]
+    for changes in wrong:
+        with pytest.raises(UnexpectedEvent):
+            world.apply(changes)
+        assert world.digest() == before
+    world.advance(13)
+    with pytest.raises(UnexpectedEvent, match="brain_steps = 25, got step 13"):
+        world.apply(Changes(insertions=(guest,)))
+    with pytest.raises(UnexpectedEvent, match="until must be > step = 13"):
+        world.advance(13)
+
+
+def test_a_reset_world_is_a_new_one(robot_of: Robots) -> None:
+    world = inhabited(SETTINGS, crowd(robot_of, 3, 0.4))
+    seconds(world, 1.0)
+    world.reset()
+    assert world.digest() == World(SETTINGS).digest()
+    assert (world.step, world.births) == (0, ())
+
+
+def test_poses_tell_where_all_were(turtle: Robot) -> None:
+    world = inhabited(
+        SETTINGS,
+        [Insertion(A, turtle, (1.0, 2.0), 0.5), Insertion(B, turtle, (9.0, 2.0))],
+    )
+    seen: list[bytes] = []
+    advance = world.advance(80, seen.append)
+    rows = read_columns("poses", advance.poses)
+    assert rows["birth"].to_pylist() == [0, 1, 0, 1]
+    assert rows["sim_time_s"].to_pylist() == [0.2, 0.2, 0.4, 0.4]
+    assert rows["x"].to_pylist() == pytest.approx([1.0, 9.0] * 2, abs=0.01)
+    assert rows["qz"][0].as_py() == pytest.approx(math.sin(0.25), abs=0.01)
+    assert [len(angles) for angles in rows["angles"].to_pylist()] == [2] * 4
+    tables = [read_columns("poses", data) for data in seen]
+    assert pa.concat_tables(tables).equals(rows.combine_chunks())
+    assert read_columns("poses", world.poses()).equals(tables[-1])
+
+
+def test_another_brain_starts_at_rest_with_its_own_clock(turtle: Robot) -> None:
+    """A turtle whose outputs become constant goes where these tell it."""
+    world = inhabited(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
+    seconds(world, 4.0)
+    still = Brain(
+        tuple(
+            Neuron("output", "Simple", neuron.part, (-1.0, 0.5))
+            if neuron.layer == "output"
+            else neuron
+            for neuron in turtle.brain.neurons
+        )
+    )
+    world.apply(Changes(brains=(BrainChange(A, still),)))
+    assert not world.company.find(A).states.any()
+    copy = World.restore(SETTINGS, world.snapshot())
+    seconds(world, 8.0)
+    assert np.abs(world.company.find(A).seat.qpos[7:]).max() < 0.02
+    seconds(copy, 8.0)
+    assert copy.digest() == world.digest()
+
+
+def test_a_ring_wall_holds_robots_in(turtle: Robot) -> None:
+    """Pushed against it at 1 m/s a robot stays inside; without it, it slides out."""
+    for diameter, is_in in ((1.0, True), (0.0, False)):
+        world = inhabited(
+            settings_of(wall_diameter_m=diameter, drop_m=0.0),
+            [Insertion(A, turtle, (0.0, 0.0))],
+        )
+        seconds(world, 0.5)
+        for _ in range(40):
+            world.company.find(A).seat.qvel[0] = 1.0
+            seconds(world, 0.1)
+        assert (world.company.find(A).place[0] < 0.5) is is_in
+
+
+def test_robots_feel_each_other_and_it_is_counted(turtle: Robot) -> None:
+    """One dropped onto another touches it; their pads and tallies say so."""
+    settings = settings_of(record_touches=True, drop_m=0.3)
+    world = inhabited(settings, [Insertion(A, turtle, (0.0, 0.0))])
+    alone = seconds(world, 1.0)
+    world.apply(Changes(insertions=(Insertion(B, turtle, (0.02, 0.01)),)))
+    together = seconds(world, 2.0)
+    assert alone.touches == ()
+    [touch] = together.touches
+    assert (touch.first, touch.second) == (A, B)
+    assert 0.5 < touch.duration_s < 2.0
+    assert world.company.cluster_of(A) is world.company.cluster_of(B)
+
+
+def lamp_bearer() -> Robot:
+    """Return a turned core with a light sensor that looks along world +x."""
+    core = Part("Core", -1, -1, -1, 0, (0.5,) * 3)
+    hinge = Part("ActiveHinge", 0, 3, 0, 0, (0.5,) * 3)
+    lamp = Part("LightSensor", 0, 2, 0, 0, (0.5,) * 3)
+    neurons = (
+        *(Neuron("input", "Input", 0) for _ in range(6)),
+        Neuron("input", "Input", 1),
+        Neuron("output", "Simple", 2, (0.0, 0.5)),
+    )
+    return Robot((core, lamp, hinge), Brain(neurons))
+
+
+@pytest.mark.parametrize(
+    ("light", "hider", "expected"),
+    [
+        ((0.5, 0.0, 0.0225), False, 1.0),
+        ((2.0, 0.0, 0.0225), False, (1.0 / 1.9525) ** 2),
+        ((0.5, 0.0, 0.0225), True, 0.0),
+        ((-0.5, 0.0, 0.0225), False, 0.0),
+    ],
+)
+def test_light_falls_off_and_can_be_hidden(
+    turtle: Robot,
+    light: tuple[float, float, float],
+    hider: bool,  # noqa: FBT001 - a case
+    expected: float,
+) -> None:
+    space = Space(
+        part_types=(*EXPERIMENT.space.part_types, "schema.parts:LIGHT_SENSOR")
+    )
+    assert LIGHT_SENSOR.name == "LightSensor"
+    settings = replace(settings_of(light=light, drop_m=0.0), space=space)
+    newcomers = [Insertion(A, lamp_bearer(), (0.0, 0.0))]
+    if hider:
+        newcomers.append(Insertion(B, turtle, (0.25, 0.0), 0.5 * math.pi))
+    world = inhabited(settings, newcomers)
+    reading = world.company.find(A).seat.senses.readings[0, 6]
+    assert reading == pytest.approx(expected, abs=0.02)
+    world.advance(SECOND)
+    reading = world.company.find(A).seat.senses.readings[0, 6]
+    assert reading == pytest.approx(expected, abs=0.1)
+    assert World.restore(settings, world.snapshot()).digest() == world.digest()

@@ -1,0 +1,86 @@
+"""The thesis's benchmarks: the right robots, in the right places, told in a table."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from schema.errors import RevolveError
+from schema.experiment.document import Simulation
+from schema.experiment.environment import FLAT
+from schema.mjcf.model import solo_model
+from schema.parts import BUILT_IN
+from schema.robot.robot import check_robot
+from worker.bench import command as bench
+from worker.bench.arena_bench import RESULTS
+from worker.bench.arena_timing import Stopwatch
+from worker.bench.spider import grid, spider
+
+
+def test_the_spider_is_the_thesis_s() -> None:
+    """383 g, 8 servos, underside 2.25 cm below the core (facts, section 9)."""
+    robot = spider()
+    check_robot(robot, BUILT_IN)
+    model = solo_model(robot, BUILT_IN, Simulation(), FLAT)
+    assert model.body_mass.sum() == pytest.approx(0.3832)
+    assert model.nu == 8
+    assert model.qpos0[2] == pytest.approx(0.0225)
+    assert robot.brain.count("input") == 10
+
+
+def test_the_grid_has_rows_of_five() -> None:
+    places = np.array(grid(12))
+    assert places[4] == pytest.approx((1.6, 0.0))
+    assert places[5] == pytest.approx((0.0, 0.4))
+
+
+@pytest.mark.parametrize("what", ["arena", "spider"])
+def test_a_benchmark_writes_a_row_per_repetition(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], what: str
+) -> None:
+    out = tmp_path / "results.parquet"
+    words = ["--sizes", "1", "2", "3", "--seconds", "1", "--repetitions", "2", "--out"]
+    assert bench.main(["bench", what, *words, str(out)]) == 0
+    table = pq.read_table(out)
+    assert table.schema.equals(RESULTS, check_metadata=True)
+    assert table["population"].to_pylist() == [1, 1, 2, 2, 3, 3]
+    assert table["simulated_s"].to_pylist() == [1.0] * 6
+    factor, wall = table["factor"].to_numpy(), table["wall_s"].to_numpy()
+    assert factor == pytest.approx(1.0 / wall)
+    said = capsys.readouterr().out
+    assert said.count("x real time") == 3
+    assert ("thesis: factor = -0.26 +34.78 / p +20.41 / p^2" in said) is (
+        what == "arena"
+    )
+
+
+def test_a_file_that_cannot_be_written_is_told_before_the_minutes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "nowhere" / "results.parquet")
+    with pytest.raises(RevolveError, match="cannot be written: No such file"):
+        bench.main(["bench", "arena", "--out", out])
+    assert capsys.readouterr().out == ""
+
+
+class Sleeper:
+    """Takes a second for one thing and two for another that does it, too."""
+
+    now = 0.0
+
+    def short(self) -> None:
+        self.now += 1.0
+
+    def long(self) -> None:
+        self.now += 1.0
+        self.short()
+
+
+def test_a_stopwatch_counts_nested_calls_once() -> None:
+    sleeper = Sleeper()
+    watch = Stopwatch(lambda: sleeper.now)
+    watch.wrap(sleeper, "short", "long")
+    sleeper.long()
+    sleeper.short()
+    assert watch.total_s == 3.0

@@ -1,0 +1,77 @@
+"""The fidelity study's own arithmetic."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+from scipy.stats import spearmanr
+
+from schema.errors import ExperimentError, RunFolderError
+from schema.experiment.document import Experiment, Simulation
+from schema.robot.robot import Robot
+from worker.bench.fidelity import (
+    compare,
+    finer,
+    read_population,
+    sample_thirds,
+    spearman,
+    winners,
+)
+
+
+def test_spearman_is_scipy_s_ties_included() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        first = rng.integers(0, 6, 25).astype(float)
+        second = first + rng.integers(-2, 3, 25).astype(float)
+        assert spearman(first, second) == pytest.approx(
+            spearmanr(first, second).statistic, abs=1e-12
+        )
+
+
+def test_each_third_gives_its_share() -> None:
+    fitness = np.random.default_rng(4).permutation(30).astype(float)
+    chosen = fitness[sample_thirds(fitness, 4)]
+    assert (chosen[:4] < 10).all()
+    assert ((chosen[4:8] >= 10) & (chosen[4:8] < 20)).all()
+    assert (chosen[8:] >= 20).all()
+    assert len(set(chosen.tolist())) == 12
+    with pytest.raises(ExperimentError, match="3 x 11 robots are needed"):
+        sample_thirds(fitness, 11)
+
+
+def test_winners_are_the_ten_fittest_in_order() -> None:
+    fitness = np.arange(20.0)
+    assert winners(fitness) == list(range(19, 9, -1))
+
+
+def test_a_finer_world_lasts_as_long() -> None:
+    world = finer(Simulation(warmup_steps=600))
+    assert world.timestep_s == pytest.approx(0.001)
+    assert (world.brain_steps, world.pose_steps) == (125, 200)
+    assert (world.window_steps, world.warmup_steps) == (12_000, 3000)
+
+
+def test_a_folder_without_a_run_is_told(tmp_path: Path) -> None:
+    with pytest.raises(RunFolderError, match="no run is there"):
+        read_population(tmp_path)
+
+
+def test_the_same_world_agrees_and_a_wild_one_counts_nothing(turtle: Robot) -> None:
+    short = Simulation(window_steps=400)
+    experiment = Experiment(name="test", simulation=short)
+    same = compare([turtle], experiment, short)
+    assert same.first.tolist() == same.second.tolist() != [0.0]
+    wild = replace(short, timestep_s=0.5, servo_armature=0.0, servo_stiffness=1e9)
+    assert compare([turtle], experiment, wild).second.tolist() == [0.0]
+
+
+def test_random_robots_agree_with_finer_steps(robot_of: Callable[[int], Robot]) -> None:
+    """A small sign of what ``revolve bench fidelity`` measures at length."""
+    experiment = Experiment(name="test", simulation=Simulation(window_steps=1200))
+    robots = [robot_of(seed) for seed in range(12)]
+    found = compare(robots, experiment, finer(experiment.simulation))
+    assert found.spearman > 0.8
+    assert found.of(slice(0, 6)).first.tolist() == found.first[:6].tolist()

@@ -1,0 +1,111 @@
+"""Clusters overlook no contact, whatever falls onto whatever."""
+
+import sys
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from schema.robot.names import BirthId
+from schema.robot.robot import Robot
+from schema.wire.arena import Casualty, Changes, Insertion
+from tests.worker.arena_cases import SETTINGS, crowd, inhabited, seconds, settings_of
+from tests.worker.arena_oracle import Oracle
+from worker.arena.world import World
+
+Robots = Callable[[int], Robot]
+
+
+def live(
+    robot_of: Robots, *, radius_m: float, drop_m: float, lives: int, seed: int
+) -> tuple[World, Oracle]:
+    """Return an arena in which for some seconds robots fell, lived and went.
+
+    Never more than 30 at a time; each second four come and the oldest go.
+    """
+    world = World(settings_of(drop_m=drop_m), threads=2)
+    oracle = Oracle(world)
+    rng = np.random.default_rng(seed)
+    for second in range(lives):
+        newcomers = crowd(robot_of, 4, radius_m, seed=seed + second, first=4 * second)
+        gone = world.births[: max(0, len(world.births) + 4 - 30)]
+        world.apply(Changes(gone, newcomers))
+        seconds(world, 1.0)
+        if rng.random() < 0.2:
+            world.apply(Changes(removals=world.births[::5]))
+    world.close()
+    return world, oracle
+
+
+@pytest.mark.parametrize(("radius_m", "drop_m"), [(0.9, 0.25), (0.35, 0.6)])
+def test_no_contact_comes_late(
+    robot_of: Robots, radius_m: float, drop_m: float
+) -> None:
+    """Against a joint model of all, at every physics step."""
+    world, oracle = live(robot_of, radius_m=radius_m, drop_m=drop_m, lives=6, seed=1)
+    assert oracle.missed == []
+    assert oracle.pair_steps > 200
+    assert world.company.merges > 10
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_no_contact_comes_late_in_long_lives(robot_of: Robots) -> None:
+    """Promise of the issue: over 10,000 pair-steps in contact and 200 merges."""
+    pair_steps = merges = 0
+    for radius_m, drop_m in ((1.4, 0.25), (0.9, 0.25), (0.5, 0.5), (0.35, 1.0)):
+        world, oracle = live(
+            robot_of, radius_m=radius_m, drop_m=drop_m, lives=16, seed=7
+        )
+        sys.stdout.write(
+            f"\nradius {radius_m} m, drop {drop_m} m: {oracle.pair_steps} pair-steps "
+            f"in contact, {len(oracle.missed)} missed, {world.company.merges} merges, "
+            f"{world.company.splits} partings"
+        )
+        assert oracle.missed == []
+        pair_steps += oracle.pair_steps
+        merges += world.company.merges
+    assert pair_steps >= 10_000
+    assert merges >= 200
+
+
+@pytest.mark.slow
+def test_a_pile_of_thirty_stays_finite(robot_of: Robots) -> None:
+    world = World(settings_of(drop_m=0.8), threads=2)
+    rng = np.random.default_rng(3)
+    fallen: list[Casualty] = []
+    for number in range(30):
+        place = (float(rng.uniform(-0.05, 0.05)), float(rng.uniform(-0.05, 0.05)))
+        newcomer = Insertion(BirthId(0, number), robot_of(number), place)
+        world.apply(Changes(insertions=(newcomer,)))
+        fallen += seconds(world, 0.5).casualties
+    advance = seconds(world, 2.0)
+    assert not fallen
+    assert not advance.casualties
+    largest = max(len(cluster.members) for cluster in world.company.clusters)
+    assert largest == 30
+    for judgement in advance.judgements:
+        assert np.isfinite(judgement.place).all()
+        assert np.hypot(*judgement.place[:2]) < 1.5
+        assert -0.01 < judgement.place[2] < 0.6
+    world.close()
+
+
+def test_those_who_part_live_alone_again(turtle: Robot) -> None:
+    """Merged below 2 cm, together until beyond 6 cm, then each in its own home."""
+    near = [
+        Insertion(BirthId(0, number), turtle, (0.3 * number, 0.0)) for number in (0, 1)
+    ]
+    world = inhabited(SETTINGS, near)
+    seconds(world, 1.0)
+    first, second = (world.company.find(i.birth) for i in near)
+    sizes = []
+    for gap in (0.3, 0.2, 0.3, 0.6):
+        for one, x in ((first, 0.0), (second, gap)):
+            one.seat.qpos[:2] = (x, 0.0)
+        seconds(world, 1.0)
+        sizes.append(len(world.company.clusters))
+    assert sizes[1] == 1
+    assert sizes[-1] == 2
+    assert first.seat is first.body.home.seats[0]
+    assert (world.company.merges, world.company.splits) == (1, 1)

@@ -1,0 +1,63 @@
+"""The sliding window, worked by hand."""
+
+import pytest
+from msgspec.structs import replace
+
+from schema.experiment.document import Simulation
+from tests.worker.arena_cases import SETTINGS
+from worker.clusters.window import Window
+from worker.fitness import path_velocity, straight_velocity
+from worker.robot.evaluation import judge
+
+CLOCK = Simulation(
+    timestep_s=0.01, pose_steps=10, brain_steps=10, window_steps=80, warmup_steps=20
+)
+"""Samples every 0.1 s, a window of 0.8 s, a warm-up of 0.2 s."""
+
+
+def test_the_fall_and_the_warm_up_do_not_count() -> None:
+    window = Window(CLOCK, born=100)
+    window.add(110, (9.0, 9.0, 9.0))
+    assert not window.positions
+    window.add(120, (0.0, 0.0, 0.0))
+    window.add(130, (0.1, 0.0, 0.0))
+    judged = [window.is_judged]
+    window.add(140, (0.1, 0.1, 5.0))
+    judged.append(window.is_judged)
+    assert judged == [False, True]
+    track = window.track()
+    assert path_velocity(track) == pytest.approx(1.0)
+    assert straight_velocity(track) == pytest.approx(2**0.5 / 2)
+
+
+def test_it_is_mature_after_warm_up_and_a_whole_window() -> None:
+    """200 + 800 ms: with the sample at age 1 s, not with the one before."""
+    window = Window(CLOCK, born=50)
+    mature = []
+    for step in range(50, 200, 10):
+        window.add(step, (0.0, 0.0, 0.0))
+        mature.append(window.is_mature)
+    assert mature.index(True) == (20 + 80) // 10
+
+
+def test_old_samples_leave_so_that_velocities_are_the_latest() -> None:
+    """East at 1 m/s for 0.8 s, then back west: after 0.4 s of that s is 0."""
+    window = Window(CLOCK, born=0)
+    places = [0.1 * min(n, 16 - n) for n in range(17)]
+    straight, path = [], []
+    for number, x in enumerate(places):
+        window.add(20 + 10 * number, (x, 0.0, 0.0))
+        if window.is_mature:
+            straight.append(straight_velocity(window.track()))
+            path.append(path_velocity(window.track()))
+    assert straight == pytest.approx([1.0, 0.75, 0.5, 0.25, 0.0, 0.25, 0.5, 0.75, 1.0])
+    assert path == pytest.approx([1.0] * 9)
+    assert len(window.positions) == 9
+
+
+def test_fitness_is_the_experiment_s_own_over_the_window() -> None:
+    window = Window(CLOCK, born=0)
+    for number in range(9):
+        window.add(20 + 10 * number, (0.01 * number, 0.0, 0.0))
+    fitness = replace(SETTINGS.fitness, path_weight=1.0, straight_weight=5.0)
+    assert judge(window.track(), fitness) == pytest.approx(0.6)

@@ -1,0 +1,144 @@
+"""Brains in motion: the formulas, and each robot's arithmetic its own."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from schema.errors import InvalidRobot
+from schema.experiment.document import Space
+from schema.robot.brain import INPUT, Brain, Connection, Neuron
+from schema.robot.robot import Robot
+from worker.robot.controller import STATE_LIMIT, Bank, Network, Widths, pack, widths
+
+WIDTH = widths(Space())
+TICK_S = 0.125
+
+
+def outputs_of(brain: Brain, readings: list[float], ticks: int) -> list[float]:
+    """Return the first output after each of some ticks of constant readings."""
+    bank = Bank([pack(brain, WIDTH)], WIDTH, TICK_S)
+    row = np.zeros((1, WIDTH.inputs))
+    row[0, : len(readings)] = readings
+    return [float(bank.step(row, float(tick))[0, 0]) for tick in range(ticks)]
+
+
+def test_widths_are_the_limits_of_the_experiment() -> None:
+    assert Widths(10, 10, 10) == WIDTH
+    assert WIDTH.states == 20
+
+
+def test_a_simple_neuron_scales_what_exceeds_its_bias() -> None:
+    brain = Brain(
+        (Neuron("input", INPUT, 0), Neuron("output", "Simple", 1, (0.25, 0.5))),
+        (Connection(0, 1, 0.75),),
+    )
+    assert outputs_of(brain, [2.0], 1) == [0.5 * (0.75 * 2.0 - 0.25)]
+
+
+def test_a_sigmoid_squeezes_what_exceeds_its_bias() -> None:
+    brain = Brain(
+        (Neuron("input", INPUT, 0), Neuron("output", "Sigmoid", 1, (0.25, 0.5))),
+        (Connection(0, 1, 0.75),),
+    )
+    expected = 1.0 / (1.0 + math.exp(-0.5 * (0.75 * 2.0 - 0.25)))
+    assert outputs_of(brain, [2.0], 1) == pytest.approx([expected], abs=1e-15)
+
+
+def test_an_oscillator_counts_phase_in_periods_and_ignores_inputs() -> None:
+    brain = Brain(
+        (Neuron("input", INPUT, 0), Neuron("output", "Oscillator", 1, (2.0, 0.3, 1.6))),
+        (Connection(0, 1, 0.75), Connection(1, 1, 1.0)),
+    )
+    expected = [
+        0.5 - 0.8 + 1.6 * (math.sin(2 * math.pi / 2.0 * (t - 2.0 * 0.3)) + 1) / 2
+        for t in (0.0, 0.125, 0.25, 0.375)
+    ]
+    assert outputs_of(brain, [9.0], 4) == pytest.approx(expected, abs=1e-14)
+
+
+def test_neurons_change_together_from_the_states_before() -> None:
+    """A chain input -> hidden -> output takes one tick a link."""
+    brain = Brain(
+        (
+            Neuron("input", INPUT, 0),
+            Neuron("output", "Simple", 1, (0.0, 1.0)),
+            Neuron("hidden", "Simple", 1, (0.0, 1.0)),
+        ),
+        (Connection(0, 2, 1.0), Connection(2, 1, 1.0)),
+    )
+    assert outputs_of(brain, [3.0], 3) == [0.0, 3.0, 3.0]
+
+
+def test_a_growing_state_stops_at_the_limit() -> None:
+    brain = Brain(
+        (
+            Neuron("output", "Simple", 0, (-1.0, 1.0)),
+            Neuron("hidden", "Simple", 0, (0.0, 1.0)),
+        ),
+        (
+            Connection(0, 0, 1e300),
+            Connection(0, 1, -1e300),
+            Connection(1, 0, 1e300),
+            Connection(1, 1, 1e300),
+        ),
+    )
+    found = outputs_of(brain, [], 20)
+    assert np.isfinite(found).all()
+    assert max(map(abs, found)) == STATE_LIMIT
+
+
+@pytest.mark.parametrize("period", [0.0, 1e-300, 1e-9, -1.0])
+def test_a_tiny_period_stays_a_number(period: float) -> None:
+    brain = Brain((Neuron("output", "Oscillator", 0, (period, 1.0, 2.0)),))
+    found = outputs_of(brain, [], 50)
+    assert all(-0.5 <= value <= 1.5 for value in found)
+
+
+def test_more_neurons_than_the_limit_are_refused() -> None:
+    brain = Brain(tuple(Neuron("hidden", "Simple", 0, (0.0, 1.0)) for _ in range(11)))
+    with pytest.raises(InvalidRobot, match="hidden neurons must be <= 10, got 11"):
+        pack(brain, WIDTH)
+
+
+@pytest.fixture(scope="module")
+def networks(robot_of: Callable[[int], Robot]) -> list[Network]:
+    return [pack(robot_of(seed).brain, WIDTH) for seed in range(100)]
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 30, 100])
+def test_a_robot_thinks_the_same_in_any_company(
+    networks: list[Network], count: int
+) -> None:
+    """To the last bit: alone, in batches, and wherever it stands in them."""
+    rng = np.random.default_rng(count)
+    ticks = 96
+    readings = rng.normal(0.0, 5.0, (ticks, 100, WIDTH.inputs))
+    ages = rng.integers(0, 100_000, (100, 1)).astype(float)
+    chosen = rng.permutation(100)[:count]
+    batch = Bank([networks[i] for i in chosen], WIDTH, TICK_S)
+    alone = [Bank([networks[i]], WIDTH, TICK_S) for i in chosen]
+    for tick in range(ticks):
+        together = batch.step(readings[tick, chosen], ages[chosen] + tick)
+        for row, i in enumerate(chosen):
+            single = alone[row].step(
+                readings[tick, i : i + 1], float(ages[i, 0] + tick)
+            )
+            assert single.tobytes() == together[row].tobytes()
+            assert alone[row].states.tobytes() == batch.states[row].tobytes()
+
+
+def test_states_can_be_carried_to_another_batch(networks: list[Network]) -> None:
+    rng = np.random.default_rng(1)
+    readings = rng.normal(0.0, 5.0, (20, 3, WIDTH.inputs))
+    whole = Bank(networks[:3], WIDTH, TICK_S)
+    expected = [whole.step(readings[t], float(t)).copy() for t in range(20)]
+    first = Bank(networks[:3], WIDTH, TICK_S)
+    for t in range(10):
+        first.step(readings[t], float(t))
+    second = Bank(networks[:3][::-1], WIDTH, TICK_S)
+    second.states[...] = first.states[::-1]
+    for t in range(10, 20):
+        found = second.step(readings[t, ::-1], float(t))
+        assert found[::-1].tobytes() == expected[t].tobytes()

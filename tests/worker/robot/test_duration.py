@@ -1,0 +1,71 @@
+"""Evaluations that last as long as their request says, judged over the same window."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from msgspec.structs import replace
+
+from schema.errors import ExperimentError
+from schema.experiment.document import Experiment, Simulation
+from schema.experiment.environment import FLAT
+from schema.experiment.settings import evaluation_settings
+from schema.robot.results import Evaluation
+from schema.robot.robot import Robot
+from schema.wire.codec import (
+    decode_answer,
+    decode_request,
+    encode_request,
+    encode_robot,
+)
+from worker.robot.evaluation import simulate
+from worker.serve.jobs import answer
+
+WORLD = Simulation(window_steps=400, pose_steps=40, warmup_steps=80)
+EXPERIMENT = Experiment(name="test", simulation=WORLD)
+
+
+def request(robot: Robot, steps: int = 0) -> bytes:
+    return encode_request(
+        run="run",
+        epoch=3,
+        number=17,
+        settings=evaluation_settings(EXPERIMENT),
+        robot=encode_robot(robot),
+        steps=steps,
+    )
+
+
+def judged(robot: Robot, steps: int = 0) -> Evaluation:
+    result = decode_answer(answer(request(robot, steps))).result
+    assert isinstance(result, Evaluation)
+    return result
+
+
+def test_no_steps_are_no_bytes_and_the_settings_warm_up(turtle: Robot) -> None:
+    assert len(request(turtle, steps=1)) == len(request(turtle)) + 2
+    assert decode_request(request(turtle)).steps == 0
+    assert judged(turtle).simulated_s == pytest.approx(2.4)
+    assert judged(turtle) == judged(turtle, steps=480)
+
+
+def test_the_last_window_of_a_longer_life_is_judged(turtle: Robot) -> None:
+    found = judged(turtle, steps=1200)
+    assert found.simulated_s == pytest.approx(6.0)
+    # All 6 s as one window, of which the last 2 s are the last 11 of 31 samples.
+    whole = replace(WORLD, warmup_steps=0, window_steps=1200)
+    track = simulate(turtle, EXPERIMENT.space, whole, FLAT).core_position[-11:]
+    hops = [math.dist(a[:2], b[:2]) for a, b in pairwise(track)]
+    assert found.path_velocity == pytest.approx(sum(hops) / 2.0, rel=1e-12)
+    net = math.dist(track[0][:2], track[-1][:2])
+    assert found.straight_velocity == pytest.approx(net / 2.0, rel=1e-12)
+    assert found.path_velocity != judged(turtle).path_velocity
+
+
+def test_a_duration_that_is_no_multiple_of_a_pose_is_fine(turtle: Robot) -> None:
+    assert judged(turtle, steps=401).simulated_s == pytest.approx(2.005)
+
+
+def test_less_than_the_window_is_refused(turtle: Robot) -> None:
+    with pytest.raises(ExperimentError, match="400 steps, got 399"):
+        answer(request(turtle, steps=399))

@@ -1,0 +1,241 @@
+"""One robot, alone, from birth to a number."""
+
+import hashlib
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import msgspec
+import mujoco
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from schema.errors import (
+    ExperimentError,
+    FitnessUndefined,
+    InvalidRobot,
+    SimulationDiverged,
+)
+from schema.experiment.document import Fitness, Simulation, Space
+from schema.experiment.environment import FLAT
+from schema.experiment.settings import EvaluationSettings
+from schema.robot.brain import INPUT, Brain, Neuron
+from schema.robot.results import Track
+from schema.robot.robot import Part, Robot
+from schema.wire.codec import decode_answer, encode_request, encode_robot
+from worker.fitness import FitnessFunction, path_velocity, straight_velocity
+from worker.robot import evaluation
+from worker.robot.evaluation import evaluate, simulate
+from worker.serve.jobs import answer
+
+RobotOf = Callable[[int], Robot]
+WORLD = Simulation()
+SETTINGS = EvaluationSettings(space=Space(), simulation=WORLD, fitness=Fitness())
+
+
+def test_an_evaluation_is_the_fitness_of_the_track(turtle: Robot) -> None:
+    track = simulate(turtle, Space(), WORLD, FLAT)
+    found = evaluate(turtle, SETTINGS)
+    assert found.path_velocity == path_velocity(track) > 0
+    assert found.straight_velocity == straight_velocity(track) > 0
+    assert found.fitness == found.path_velocity + 5 * found.straight_velocity
+    assert found.simulated_s == 12.0
+
+
+def test_a_track_has_both_ends_of_its_window(turtle: Robot) -> None:
+    track = simulate(turtle, Space(), WORLD, FLAT)
+    assert track.core_position.shape == (61, 3)
+    assert track.interval_s == 0.2
+    assert track.core_position[0] == pytest.approx([0, 0, 0.0225], abs=1e-12)
+
+
+def test_the_window_begins_after_the_warm_up(turtle: Robot) -> None:
+    """Dropped robots fall before the window, and the window is as long."""
+    whole = simulate(turtle, Space(), replace(WORLD, window_steps=2400 + 600), FLAT)
+    late = simulate(turtle, Space(), replace(WORLD, warmup_steps=600), FLAT)
+    assert late.core_position.shape == (61, 3)
+    assert late.core_position.tobytes() == whole.core_position[15:].tobytes()
+
+
+def test_clocks_need_not_divide_each_other(turtle: Robot) -> None:
+    """A pose in the middle of a tick changes nothing of the motion."""
+    coarse = simulate(turtle, Space(), replace(WORLD, pose_steps=2400), FLAT)
+    fine = simulate(turtle, Space(), replace(WORLD, pose_steps=32), FLAT)
+    assert coarse.core_position[-1].tobytes() == fine.core_position[-1].tobytes()
+
+
+def test_the_physics_are_stepped_as_often_as_the_window_says(
+    turtle: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps: list[int] = []
+    step = mujoco.mj_step
+
+    def counted(model: mujoco.MjModel, data: mujoco.MjData, nstep: int) -> None:
+        steps.append(nstep)
+        step(model, data, nstep=nstep)
+
+    monkeypatch.setattr(mujoco, "mj_step", counted)
+    simulate(turtle, Space(), replace(WORLD, warmup_steps=7), FLAT)
+    assert sum(steps) == 2407
+
+
+def test_a_robot_without_a_brain_stays_where_it_is() -> None:
+    grey = (0.5, 0.5, 0.5)
+    robot = Robot(
+        (Part("Core", -1, -1, -1, 0, grey),),
+        Brain(tuple(Neuron("input", INPUT, 0) for _ in range(6))),
+    )
+    assert evaluate(robot, SETTINGS).fitness < 1e-4
+
+
+def bits(track: Track) -> bytes:
+    return track.core_position.tobytes()
+
+
+def test_the_same_robot_goes_the_same_way_again(robot_of: RobotOf) -> None:
+    for seed in range(5):
+        robot = robot_of(seed)
+        first = simulate(robot, Space(), WORLD, FLAT)
+        assert bits(simulate(robot, Space(), WORLD, FLAT)) == bits(first)
+
+
+def test_threads_do_not_change_the_way(robot_of: RobotOf) -> None:
+    robots = [robot_of(seed) for seed in range(8)]
+    alone = [bits(simulate(robot, Space(), WORLD, FLAT)) for robot in robots]
+    with ThreadPoolExecutor(4) as pool:
+        found = list(
+            pool.map(lambda r: bits(simulate(r, Space(), WORLD, FLAT)), robots)
+        )
+    assert found == alone
+
+
+ELSEWHERE = """
+import hashlib, sys
+from schema.wire.codec import decode_robot
+from schema.experiment.environment import FLAT
+from schema.experiment.document import Simulation, Space
+from worker.robot.evaluation import simulate
+for line in sys.stdin:
+    track = simulate(decode_robot(bytes.fromhex(line)), Space(), Simulation(), FLAT)
+    print(hashlib.sha256(track.core_position.tobytes()).hexdigest())
+"""
+
+
+def test_another_process_goes_the_same_way(robot_of: RobotOf) -> None:
+    robots = [robot_of(seed) for seed in range(4)]
+    found = subprocess.run(
+        [sys.executable, "-c", ELSEWHERE],
+        input="\n".join(encode_robot(robot).hex() for robot in robots),
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=Path(__file__).parents[3],
+    ).stdout.split()
+    assert found == [
+        hashlib.sha256(bits(simulate(robot, Space(), WORLD, FLAT))).hexdigest()
+        for robot in robots
+    ]
+
+
+def test_a_robot_that_explodes_is_a_result_with_reason_and_time(
+    robot_of: RobotOf,
+    capfd: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And the engine writes neither to the screen nor to a file."""
+    monkeypatch.chdir(tmp_path)
+    absurd = replace(
+        WORLD, timestep_s=0.5, servo_armature=0.0, armature=0.0, servo_stiffness=1e9
+    )
+    with pytest.raises(SimulationDiverged, match=r"diverged by \d+\.\d{3} s: .*BADQ"):
+        simulate(robot_of(3), Space(), absurd, FLAT)
+    assert capfd.readouterr() == ("", "")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_diverged_robot_does_not_harm_the_next(robot_of: RobotOf) -> None:
+    before = bits(simulate(robot_of(4), Space(), WORLD, FLAT))
+    absurd = replace(WORLD, timestep_s=0.5, servo_armature=0.0, armature=0.0)
+    with pytest.raises(SimulationDiverged):
+        simulate(robot_of(3), Space(), absurd, FLAT)
+    assert bits(simulate(robot_of(4), Space(), WORLD, FLAT)) == before
+
+
+@pytest.mark.parametrize(
+    ("memory", "told"),
+    [
+        (1 << 9, "cannot be built: .*out of memory"),
+        (1 << 12, r"physics diverged by 0\.060 s: .*out of memory"),
+    ],
+)
+def test_an_engine_that_gives_up_on_a_robot_is_a_result(
+    turtle: Robot, monkeypatch: pytest.MonkeyPatch, memory: int, told: str
+) -> None:
+    """Too many contacts for the memory that a robot has; it is told in a line."""
+    before = bits(simulate(turtle, Space(), WORLD, FLAT))
+    with monkeypatch.context() as patch:
+        patch.setattr("schema.mjcf.model.MEMORY_BYTES", memory)
+        with pytest.raises(SimulationDiverged, match=told) as caught:
+            simulate(turtle, Space(), WORLD, FLAT)
+    assert "\n" not in str(caught.value)
+    assert bits(simulate(turtle, Space(), WORLD, FLAT)) == before
+
+
+def test_a_light_sensor_in_a_world_without_light_is_refused() -> None:
+    grey = (0.5, 0.5, 0.5)
+    parts = (
+        Part("Core", -1, -1, -1, 0, grey),
+        Part("LightSensor", 0, 2, 0, 0, grey),
+    )
+    inputs = tuple(Neuron("input", INPUT, part) for part in (0,) * 6 + (1,))
+    space = Space(part_types=("schema.parts:CORE", "schema.parts:LIGHT_SENSOR"))
+    with pytest.raises(ExperimentError, match="no light in this world"):
+        simulate(Robot(parts, Brain(inputs)), space, WORLD, FLAT)
+
+
+def test_a_brain_beyond_the_limits_is_refused(turtle: Robot) -> None:
+    with pytest.raises(InvalidRobot, match="input neurons must be <= 6, got 8"):
+        simulate(turtle, Space(max_inputs=6), WORLD, FLAT)
+
+
+def not_a_number(_track: Track, _fitness: Fitness) -> float:
+    return float("nan")
+
+
+def undecided(_track: Track, _fitness: Fitness) -> float:
+    raise ZeroDivisionError("by nothing")
+
+
+@pytest.mark.parametrize(
+    ("function", "told"),
+    [
+        (not_a_number, "must return a finite number, got nan"),
+        (undecided, "raised ZeroDivisionError: by nothing"),
+    ],
+)
+def test_a_fitness_function_that_cannot_judge_is_a_result(
+    turtle: Robot,
+    monkeypatch: pytest.MonkeyPatch,
+    function: FitnessFunction,
+    told: str,
+) -> None:
+    monkeypatch.setattr(evaluation, "fitness_function", lambda _fitness: function)
+    with pytest.raises(FitnessUndefined, match=told):
+        evaluate(turtle, SETTINGS)
+    request = encode_request(
+        run="run",
+        epoch=1,
+        number=2,
+        settings=msgspec.json.encode(SETTINGS),
+        robot=encode_robot(turtle),
+    )
+    assert told in str(decode_answer(answer(request)).result)
+
+
+def test_positions_are_those_of_the_core_not_of_the_mass(turtle: Robot) -> None:
+    track = simulate(turtle, Space(), replace(WORLD, window_steps=40), FLAT)
+    assert np.abs(track.core_position[0, :2]).max() == 0.0

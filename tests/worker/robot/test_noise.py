@@ -1,0 +1,309 @@
+"""Noise: whose it is and when decides it, and nothing else does."""
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from schema.errors import MalformedMessage
+from schema.experiment.document import Fitness, Simulation, Space
+from schema.experiment.environment import FLAT
+from schema.experiment.identity import NOBODY, Identity, Origin
+from schema.experiment.settings import ArenaSettings, EvaluationSettings
+from schema.robot.brain import Brain, Connection, Neuron
+from schema.robot.names import BirthId
+from schema.robot.results import Floats, Track
+from schema.robot.robot import Robot
+from schema.wire.arena import Changes, Insertion
+from tests.worker.arena_cases import (
+    SETTINGS,
+    crowd,
+    inhabited,
+    seconds,
+    settings_of,
+    state_of,
+)
+from worker.arena.replay import alone
+from worker.arena.world import World
+from worker.robot.controller import widths
+from worker.robot.evaluation import evaluate, simulate
+from worker.robot.noise import BLOCK_TICKS, Noise, Source
+from worker.robot.sensors import HIGHEST_OUTPUT, LOWEST_OUTPUT
+
+Robots = Callable[[int], Robot]
+A, B = BirthId(0, 0), BirthId(0, 1)
+ORIGIN = Origin(seed=7, run=1, island=2)
+IDENTITY = Identity(ORIGIN, BirthId(2, 5), 0)
+OTHERS = (
+    Identity(replace(ORIGIN, seed=8), BirthId(2, 5), 0),
+    Identity(replace(ORIGIN, run=2), BirthId(2, 5), 0),
+    Identity(replace(ORIGIN, island=3), BirthId(2, 5), 0),
+    Identity(ORIGIN, BirthId(3, 5), 0),
+    Identity(ORIGIN, BirthId(2, 6), 0),
+    Identity(ORIGIN, BirthId(2, 5), 1),
+)
+LOUD = Simulation(sensor_noise=0.3, actuator_noise=0.05, window_steps=800)
+NOISY = replace(
+    settings_of(record_touches=True),
+    simulation=replace(
+        SETTINGS.simulation, sensor_noise=0.3, actuator_noise=0.05, window_steps=800
+    ),
+    origin=ORIGIN,
+)
+WIDTH = widths(Space())
+
+
+def noise_of(
+    *births: BirthId, simulation: Simulation = LOUD, identity: Identity = IDENTITY
+) -> Noise:
+    return Noise(Source(simulation, WIDTH, identity.origin), births, identity.trial)
+
+
+def drawn(identity: Identity, ticks: int = 200) -> Floats:
+    """Return what is added to a robot's readings and outputs, (T, I + O)."""
+    noise = noise_of(identity.birth, identity=identity)
+    silence = np.zeros((1, WIDTH.inputs)), np.zeros((1, WIDTH.outputs))
+    return np.array(
+        [
+            np.hstack(
+                [noise.blur(tick, silence[0])[0], noise.shake(tick, silence[1])[0]]
+            )
+            for tick in range(ticks)
+        ]
+    )
+
+
+def test_noise_has_the_mean_and_the_deviation_that_are_set() -> None:
+    found = drawn(IDENTITY, 5000)
+    for part, sd in ((found[:, :10], 0.3), (found[:, 10:], 0.05)):
+        # 50000 draws: three standard errors.
+        assert abs(part.mean()) < 3 * sd / np.sqrt(part.size)
+        assert part.std() == pytest.approx(sd, rel=3 / np.sqrt(2 * part.size))
+        # A tenth lies beyond 1.645 deviations of a normal distribution.
+        assert np.mean(np.abs(part) > 1.645 * sd) == pytest.approx(0.1, abs=0.005)
+    ticks = np.corrcoef(found[:-1].ravel(), found[1:].ravel())[0, 1]
+    neurons = np.corrcoef(found[:, :-1].ravel(), found[:, 1:].ravel())[0, 1]
+    assert max(abs(ticks), abs(neurons)) < 3 / np.sqrt(found.size)
+
+
+@pytest.mark.parametrize("other", OTHERS)
+def test_another_name_draws_something_else(other: Identity) -> None:
+    ours, theirs = drawn(IDENTITY), drawn(other)
+    assert abs(np.corrcoef(ours.ravel(), theirs.ravel())[0, 1]) < 0.05
+    assert np.array_equal(drawn(IDENTITY), ours)
+
+
+def test_neither_company_nor_the_order_of_ticks_matters() -> None:
+    births = [BirthId(2, 5), BirthId(0, 1), BirthId(2, 4)]
+    readings = np.linspace(-1.0, 1.0, 3 * WIDTH.inputs).reshape(3, -1)
+    company, own = noise_of(*births), [noise_of(birth) for birth in births]
+    ticks = [0, BLOCK_TICKS - 1, BLOCK_TICKS, 5 * BLOCK_TICKS + 3, 1, 0]
+    for tick in ticks:
+        whole = company.blur(tick, readings)
+        for row, noise in enumerate(own):
+            single = noise.blur(tick, readings[row : row + 1])
+            assert np.array_equal(whole[row : row + 1], single)
+    assert not np.array_equal(company.blur(0, readings), company.blur(64, readings))
+
+
+def test_one_kind_of_noise_is_the_same_without_the_other() -> None:
+    rows = np.ones((1, 10))
+    both = noise_of(A)
+    deaf = noise_of(A, simulation=replace(LOUD, actuator_noise=0.0))
+    shaky = noise_of(A, simulation=replace(LOUD, sensor_noise=0.0))
+    assert np.array_equal(deaf.blur(3, rows), both.blur(3, rows))
+    assert np.array_equal(shaky.shake(3, rows), both.shake(3, rows))
+    assert deaf.shake(3, rows) is rows
+    assert shaky.blur(3, rows) is rows
+
+
+# --- off-line ---------------------------------------------------------------------
+
+
+def bits(track: Track) -> bytes:
+    return track.core_position.tobytes()
+
+
+def test_an_evaluation_repeats_and_another_one_differs(robot_of: Robots) -> None:
+    settings = EvaluationSettings(space=Space(), simulation=LOUD, fitness=Fitness())
+    robot = robot_of(3)
+    found = evaluate(robot, settings, IDENTITY)
+    assert evaluate(robot, settings, IDENTITY) == found
+    fitness = {evaluate(robot, settings, other).fitness for other in OTHERS}
+    assert len(fitness | {found.fitness}) == 1 + len(OTHERS)
+    again, poses = alone(robot, settings, IDENTITY)
+    assert again == found
+    assert set(poses["birth"].to_pylist()) == {5}
+    other, moved = alone(robot, settings, OTHERS[-1])
+    assert other != found
+    assert moved["x"][-1] != poses["x"][-1]
+
+
+def test_without_noise_it_does_not_matter_who_asks(robot_of: Robots) -> None:
+    """And nothing is drawn: a generator would not start."""
+    silent = replace(LOUD, sensor_noise=0.0, actuator_noise=0.0)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(np.random, "Philox", None)
+        found = {
+            bits(simulate(robot_of(3), Space(), silent, FLAT, identity=identity))
+            for identity in (NOBODY, IDENTITY, *OTHERS)
+        }
+    assert len(found) == 1
+
+
+def test_noise_of_sensors_moves_only_those_who_listen(turtle: Robot) -> None:
+    """The turtle's motors follow clocks; wired to its imu, they do not."""
+    still = replace(LOUD, sensor_noise=0.0, actuator_noise=0.0)
+    deaf = replace(LOUD, actuator_noise=0.0)
+    plain = bits(simulate(turtle, Space(), still, FLAT))
+    assert bits(simulate(turtle, Space(), deaf, FLAT, identity=IDENTITY)) == plain
+    listening = wired(turtle, [(0, 0.1)])
+    assert bits(simulate(listening, Space(), deaf, FLAT, identity=IDENTITY)) != bits(
+        simulate(listening, Space(), still, FLAT)
+    )
+
+
+def wired(turtle: Robot, edges: list[tuple[int, float]]) -> Robot:
+    """Return a turtle whose motors take 0.5 and what (input, weight) add."""
+    inputs = turtle.brain.neurons[:8]
+    motors = [Neuron("output", "Simple", part, (-0.5, 1.0)) for part in (1, 3)]
+    wires = [
+        Connection(source, target, weight)
+        for source, weight in edges
+        for target in (8, 9)
+    ]
+    return Robot(turtle.parts, Brain((*inputs, *motors), tuple(wires)))
+
+
+def shares(robot: Robot, simulation: Simulation) -> Floats:
+    """Return where in its range each joint was told to go, (T, 2)."""
+    found: list[Floats] = []
+
+    def watch(data: mujoco.MjData) -> None:
+        # ctrl = gain (low + share span - angle), 0.9 and from -45 to 45 degrees.
+        target = data.ctrl / 0.9 + data.qpos[7:]
+        found.append((target + np.pi / 4) / (np.pi / 2))
+
+    simulate(robot, Space(), simulation, FLAT, identity=IDENTITY, watch=watch)
+    return np.array(found)
+
+
+def test_motors_are_told_as_much_otherwise_as_is_set(turtle: Robot) -> None:
+    world = Simulation(window_steps=8000, actuator_noise=0.05)
+    found = shares(wired(turtle, []), world) - 0.5
+    assert found.shape == (320, 2)
+    assert found.std() == pytest.approx(0.05, rel=3 / np.sqrt(2 * found.size))
+    assert abs(found.mean()) < 3 * 0.05 / np.sqrt(found.size)
+
+
+def test_networks_are_told_as_much_otherwise_as_is_set(turtle: Robot) -> None:
+    """Both pads of the turtle hang in the air: they read 0, and the noise."""
+    world = Simulation(window_steps=8000, sensor_noise=0.2)
+    found = shares(wired(turtle, [(6, 0.25), (7, 0.0)]), world) - 0.5
+    assert np.allclose(found[:, 0], found[:, 1])
+    assert found.std() == pytest.approx(0.05, rel=3 / np.sqrt(len(found)))
+    assert abs(found.mean()) < 3 * 0.05 / np.sqrt(len(found))
+
+
+def test_outputs_are_clipped_after_the_noise(turtle: Robot) -> None:
+    found = shares(wired(turtle, []), replace(LOUD, actuator_noise=1e6))
+    assert found.min() == pytest.approx(LOWEST_OUTPUT, abs=1e-9)
+    assert found.max() == pytest.approx(HIGHEST_OUTPUT, abs=1e-9)
+
+
+def test_the_loudest_noise_is_survived(robot_of: Robots) -> None:
+    loudest = replace(LOUD, sensor_noise=1e6, actuator_noise=1e6)
+    for seed in range(4):
+        track = simulate(robot_of(seed), Space(), loudest, FLAT, identity=IDENTITY)
+        assert np.isfinite(track.core_position).all()
+
+
+# --- arenas -----------------------------------------------------------------------
+
+
+def test_a_robot_alone_moves_as_it_does_off_line(robot_of: Robots) -> None:
+    """Of one name, from step 0 on: two ways to the same noise, to the last bit."""
+    for seed in (3, 4):
+        world = inhabited(NOISY, [Insertion(A, robot_of(seed), (0.0, 0.0))])
+        world.advance(600 + 800)
+        simulation = replace(NOISY.simulation, drop_m=NOISY.arena.drop_m)
+        identity = Identity(ORIGIN, A, 0)
+        track = simulate(robot_of(seed), Space(), simulation, FLAT, identity=identity)
+        own = world.company.find(A).window.track()
+        assert np.array_equal(own.core_position, track.core_position)
+        calm = simulate(robot_of(seed), Space(), SETTINGS.simulation, FLAT)
+        assert not np.array_equal(
+            own.core_position, calm.core_position[: len(own.core_position)]
+        )
+
+
+def test_those_far_away_change_nothing(robot_of: Robots) -> None:
+    """Whoever lives, is born and dies there, before us and behind us by name."""
+    own = Insertion(BirthId(0, 5), robot_of(3), (0.0, 0.0))
+    lonely, busy = inhabited(NOISY, [own]), inhabited(NOISY, [own])
+    seconds(lonely, 3.0)
+    for turn in range(3):
+        others = [
+            Insertion(BirthId(0, number), robot_of(number), (5.0, 0.2 * number))
+            for number in (2 * turn + 10, 4 - turn)
+        ]
+        gone = tuple(birth for birth in busy.births if birth != own.birth)
+        busy.apply(Changes(gone, tuple(others)))
+        seconds(busy, 1.0)
+    assert state_of(lonely, own.birth) == state_of(busy, own.birth)
+
+
+def test_a_newborn_feels_the_noise_of_its_name_at_once(turtle: Robot) -> None:
+    held = [
+        inhabited(settings, [Insertion(A, wired(turtle, []), (0.0, 0.0))])
+        for settings in (NOISY, NOISY, replace(NOISY, origin=Origin(seed=8)))
+    ]
+    first, same, other = (world.company.find(A).seat.ctrl.copy() for world in held)
+    assert np.array_equal(first, same)
+    assert not np.array_equal(first, other)
+
+
+def lived(world: World, robot_of: Robots) -> list[bytes]:
+    """Return digests of a life with births and deaths, in which robots meet."""
+    digests = [seconds(world, 1.0).digest]
+    world.apply(Changes(world.births[:2], crowd(robot_of, 2, 0.3, seed=2, first=20)))
+    return [*digests, seconds(world, 1.0).digest]
+
+
+def test_neither_threads_nor_advances_nor_restoring_matter(robot_of: Robots) -> None:
+    newcomers = crowd(robot_of, 8, 0.4)
+    plain = inhabited(NOISY, newcomers)
+    expected = lived(plain, robot_of)
+    assert plain.company.merges > 0
+    threaded = inhabited(NOISY, newcomers, threads=2)
+    assert lived(threaded, robot_of) == expected
+    threaded.close()
+    pieces = inhabited(NOISY, newcomers)
+    for until in (1, 13, 77, 130, 199):
+        pieces.advance(until)
+        pieces = World.restore(NOISY, pieces.snapshot(), threads=2)
+    pieces.advance(200)
+    assert pieces.digest() == expected[0]
+    pieces.close()
+
+
+def test_a_snapshot_is_of_one_run_only(turtle: Robot) -> None:
+    world = inhabited(NOISY, [Insertion(A, turtle, (0.0, 0.0))])
+    other: ArenaSettings = replace(NOISY, origin=replace(ORIGIN, seed=8))
+    with pytest.raises(MalformedMessage, match="other settings"):
+        World.restore(other, world.snapshot())
+
+
+def test_a_silent_arena_is_the_same_in_every_run(robot_of: Robots) -> None:
+    newcomers = crowd(robot_of, 3, 0.4)
+    worlds = [
+        inhabited(replace(SETTINGS, origin=origin), newcomers)
+        for origin in (Origin(), ORIGIN)
+    ]
+    found = []
+    for world in worlds:
+        seconds(world, 1.0)
+        found.append([state_of(world, one.birth) for one in newcomers])
+    assert found[0] == found[1]

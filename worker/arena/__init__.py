@@ -1,0 +1,1 @@
+"""The on-line world: clock, insertions, batched control, snapshots."""

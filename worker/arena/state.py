@@ -1,0 +1,122 @@
+"""From a living arena to its snapshot and back."""
+
+import numpy as np
+
+from schema.experiment.settings import ArenaSettings
+from schema.robot.names import BirthId
+from schema.wire.arena import Casualty
+from schema.wire.codec import decode_robot
+from worker.arena.births import inhabitant
+from worker.arena.snapshot import (
+    FORMAT,
+    ArenaState,
+    CasualtyState,
+    RobotState,
+    decode_state,
+    encode_state,
+    pack_floats,
+    settings_digest,
+    unpack_floats,
+)
+from worker.clusters.population import Company
+from worker.clusters.robot import Inhabitant
+from worker.clusters.window import Window
+
+
+def write(
+    settings: ArenaSettings,
+    step: int,
+    company: Company,
+    casualties: tuple[Casualty, ...],
+) -> bytes:
+    """Return an arena's whole state.
+
+    Args:
+        settings: it goes with.
+        step: the arena's.
+        company: the living.
+        casualties: not yet told.
+    """
+    rows = {one.birth: row for row, one in enumerate(company.everybody)}
+    return encode_state(
+        ArenaState(
+            format=FORMAT,
+            settings=settings_digest(settings),
+            step=step,
+            robots=[_robot_state(one) for one in company.everybody],
+            clusters=[[rows[b] for b in c.members] for c in company.clusters],
+            casualties=[
+                CasualtyState(_name(c.birth), c.step, c.reason, c.place)
+                for c in casualties
+            ],
+        )
+    )
+
+
+def read(
+    settings: ArenaSettings, data: bytes, company: Company
+) -> tuple[int, tuple[Casualty, ...]]:
+    """Fill an empty company from a snapshot.
+
+    Args:
+        settings: of the arena.
+        data: the snapshot.
+        company: nobody yet.
+
+    Returns:
+        The arena's step, and the casualties not yet told.
+
+    Raises:
+        MalformedMessage: not a snapshot, or of other settings.
+    """
+    state = decode_state(data, settings)
+    company.add([_inhabitant(robot, company) for robot in state.robots])
+    births = [one.birth for one in company.everybody]
+    company.regroup([tuple(births[row] for row in g) for g in state.clusters])
+    company.merges = company.splits = 0
+    return state.step, tuple(
+        Casualty(BirthId(*c.birth), c.step, c.reason, c.place) for c in state.casualties
+    )
+
+
+def _name(birth: BirthId) -> tuple[int, int]:
+    return birth.island, birth.number
+
+
+def _robot_state(one: Inhabitant) -> RobotState:
+    seat = one.seat
+    return RobotState(
+        birth=_name(one.birth),
+        robot=one.encoded,
+        born=one.window.born,
+        thinks_since=one.thinks_since,
+        qpos=pack_floats(seat.qpos),
+        qvel=pack_floats(seat.qvel),
+        ctrl=pack_floats(seat.ctrl),
+        readings=pack_floats(seat.senses.readings),
+        velocities=pack_floats(np.array(seat.senses.velocities)),
+        states=pack_floats(one.states),
+        window=pack_floats(np.array(one.window.positions)),
+        place=one.place,
+    )
+
+
+def _inhabitant(state: RobotState, company: Company) -> Inhabitant:
+    birth, robot = BirthId(*state.birth), decode_robot(state.robot)
+    body = company.shop.body(birth, robot)
+    window = Window(company.shop.settings.simulation, state.born)
+    for x, y, z in unpack_floats(state.window, -1, 3).tolist():
+        window.positions.append((x, y, z))
+    one = inhabitant(birth, robot, body, window, company)
+    seat = one.seat
+    seat.qpos[:] = unpack_floats(state.qpos, *seat.qpos.shape)
+    seat.qvel[:] = unpack_floats(state.qvel, *seat.qvel.shape)
+    seat.ctrl[:] = unpack_floats(state.ctrl, *seat.ctrl.shape)
+    readings = seat.senses.readings
+    readings[:] = unpack_floats(state.readings, *readings.shape)
+    seat.senses.velocities = [
+        (x, y, z) for x, y, z in unpack_floats(state.velocities, -1, 3).tolist()
+    ]
+    one.states = unpack_floats(state.states, *one.states.shape)
+    one.thinks_since, one.place = state.thinks_since, state.place
+    return one

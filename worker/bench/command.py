@@ -1,0 +1,261 @@
+"""Measures this machine, and how far the physics can be trusted on it.
+
+``revolve bench evaluate`` compares whole evaluations with the bare engine doing
+the same steps; ``revolve bench fidelity RUN`` simulates a run's robots anew with a
+time step five times finer (``worker.bench.fidelity``); ``revolve bench arena`` and
+``revolve bench spider`` repeat the thesis's benchmarks (``worker.bench.arena_bench``).
+"""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import cast
+
+import mujoco
+import numpy as np
+from msgspec.structs import replace
+from rich.console import Console
+from rich.progress import track
+
+from schema.errors import SimulationDiverged
+from schema.experiment.document import Experiment, Simulation, body_space
+from schema.experiment.file import parse_experiment, read_experiment
+from schema.experiment.plugin import load
+from schema.experiment.settings import EvaluationSettings
+from schema.flags import Flags, add_count
+from schema.mjcf.model import solo_model
+from schema.robot.genome import Genome, develop
+from schema.robot.names import BirthId
+from schema.robot.results import Floats
+from schema.robot.robot import Robot
+from worker.bench import arena_bench, fidelity
+from worker.robot import evaluation
+
+LEAST_RATIO = 0.85
+"""Of bare engine time to evaluation time: the promise of the design, section 9."""
+LEAST_SPEARMAN = 0.95
+"""Of fitness against a time step five times finer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """CPU time of whole evaluations and of their engine steps alone.
+
+    Attributes:
+        robots: how many were timed.
+        evaluation_s: build, control, sensors, fitness and steps [s].
+        engine_s: the same steps with the same controls, nothing else [s].
+    """
+
+    robots: int
+    evaluation_s: float
+    engine_s: float
+
+    @property
+    def ratio(self) -> float:
+        """Share of an evaluation that the engine needs; 1 would be perfect."""
+        return self.engine_s / self.evaluation_s
+
+
+def time_evaluations(
+    robots: Iterable[Robot], settings: EvaluationSettings, repeats: int = 7
+) -> Timing:
+    """Return how long evaluations take beside the bare engine.
+
+    Both are timed in turn, now one first, now the other, and of each robot the
+    least time of either counts: a busy machine only adds. Diverging ones are left out.
+
+    Args:
+        robots: checked robots.
+        settings: of their evaluation.
+        repeats: of each measurement.
+    """
+    count, whole, bare = 0, 0.0, 0.0
+    for robot in robots:
+        try:
+            commands = _commands(robot, settings)
+        except SimulationDiverged:
+            continue
+        wholes, bares = [], []
+        for turn in range(2 * repeats):
+            if turn % 4 in {0, 3}:
+                wholes.append(_whole(robot, settings))
+            else:
+                bares.append(_replay(robot, settings, commands))
+        count += 1
+        whole += min(wholes)
+        bare += min(bares)
+    return Timing(count, whole, bare)
+
+
+def _whole(robot: Robot, settings: EvaluationSettings) -> float:
+    """Return the time of an evaluation [s]."""
+    start = time.thread_time()
+    evaluation.evaluate(robot, settings)
+    return time.thread_time() - start
+
+
+def _commands(robot: Robot, settings: EvaluationSettings) -> list[Floats]:
+    """Return the controls of each tick of a robot's life."""
+    found: list[Floats] = []
+    evaluation.simulate(
+        robot,
+        settings.space,
+        settings.simulation,
+        settings.environment,
+        watch=lambda data: found.append(data.ctrl.copy()),
+    )
+    return found
+
+
+def _replay(
+    robot: Robot, settings: EvaluationSettings, commands: list[Floats]
+) -> float:
+    """Return the time of the engine's steps under recorded controls [s]."""
+    clock = settings.simulation
+    space = body_space(settings.space)
+    model = solo_model(robot, space, clock, settings.environment)
+    data = mujoco.MjData(model)
+    left = clock.warmup_steps + clock.window_steps
+    start = time.thread_time()
+    for command in commands:
+        data.ctrl[:] = command
+        mujoco.mj_step(model, data, nstep=min(left, clock.brain_steps))
+        left -= clock.brain_steps
+    return time.thread_time() - start
+
+
+def random_robots(experiment: Experiment, count: int, seed: int) -> list[Robot]:
+    """Return robots of the experiment's own generator, unvetted.
+
+    The generator belongs to another room, so it is named, as any plug-in is.
+    """
+    generate = cast(
+        "Callable[[np.random.Generator, Experiment, BirthId], Genome]",
+        load("coordinator.evolution.generation:generate", "generator"),
+    )
+    rng = np.random.default_rng(seed)
+    space = body_space(experiment.space)
+    return [
+        develop(generate(rng, experiment, BirthId(0, number)), space)
+        for number in range(count)
+    ]
+
+
+def main(arguments: list[str]) -> int:
+    """Run one of the commands ``revolve bench ...``.
+
+    Args:
+        arguments: the command's name first.
+
+    Returns:
+        0 if the measurement keeps the promise, 1 if not.
+    """
+    options = _parser().parse_args(arguments[1:])
+    if options.what == "evaluate":
+        return _evaluate(options)
+    if options.what in ("arena", "spider"):
+        return arena_bench.run(options)
+    return _fidelity(options)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = Flags(prog="revolve bench", description=__doc__)
+    kinds = parser.add_subparsers(dest="what", required=True)
+    timing = kinds.add_parser(
+        "evaluate", help="time evaluations against the bare engine"
+    )
+    arena_bench.add_experiment(timing, "scenario1")
+    add_count(timing, "--robots", 30, "random ones")
+    add_count(timing, "--seed", 1, "of the robots that are drawn", least=0)
+    study = kinds.add_parser(
+        "fidelity", help="simulate a run's robots anew with another world"
+    )
+    study.add_argument("run", type=Path, help="folder of a run")
+    add_count(study, "--per-third", 20, "robots of each third of the fitness")
+    add_count(study, "--seed", 1, "of the robots that are drawn", least=0)
+    study.add_argument(
+        "--against",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="compare with this simulation setting instead of a finer time step",
+    )
+    arena_bench.add_commands(kinds)
+    return parser
+
+
+def _evaluate(options: argparse.Namespace) -> int:
+    experiment = read_experiment(options.experiment)
+    robots = random_robots(experiment, options.robots, options.seed)
+    settings = EvaluationSettings(
+        space=experiment.space,
+        simulation=experiment.simulation,
+        fitness=experiment.fitness,
+        environment=experiment.environment,
+    )
+    timing = time_evaluations(_shown(robots, "random robots"), settings)
+    each_s = timing.evaluation_s / timing.robots
+    _say(
+        f"{timing.robots} random robots: {1000 * each_s:.1f} ms CPU each, "
+        f"{1 / each_s:.0f} per second and core",
+        f"bare engine / evaluation: {timing.ratio:.3f} (promised: {LEAST_RATIO})",
+    )
+    return 0 if timing.ratio >= LEAST_RATIO else 1
+
+
+def _fidelity(options: argparse.Namespace) -> int:
+    population = fidelity.read_population(options.run)
+    experiment = population.experiment
+    other = fidelity.finer(experiment.simulation)
+    if options.against:
+        other = _changed(experiment, options.against)
+    chosen = fidelity.sample_thirds(population.fitness, options.per_third, options.seed)
+    best = fidelity.winners(population.fitness)
+    found, top = (
+        fidelity.compare(
+            _shown([population.robots[index] for index in which], name),
+            experiment,
+            other,
+        )
+        for which, name in ((chosen, "robots drawn"), (best, "winners"))
+    )
+    size = options.per_third
+    thirds = [found.of(slice(k * size, (k + 1) * size)) for k in range(fidelity.THIRDS)]
+    _say(
+        f"{len(chosen)} robots of {options.run}: Spearman {found.spearman:.4f} "
+        f"(promised: {LEAST_SPEARMAN}); mean {found.first.mean():.4f} here, "
+        f"{found.second.mean():.4f} there",
+        "  by thirds, least fit first: "
+        + ", ".join(f"{third.spearman:.3f}" for third in thirds),
+        *(
+            f"  winner {rank}: {here:.4f} here, {there:.4f} there"
+            for rank, (here, there) in enumerate(
+                zip(top.first, top.second, strict=True), start=1
+            )
+        ),
+    )
+    return 0 if found.spearman >= LEAST_SPEARMAN else 1
+
+
+def _changed(experiment: Experiment, settings: Sequence[str]) -> Simulation:
+    """Return the experiment's world with some keys set, checked as a document."""
+    changes = "\n".join(settings)
+    text = f'name = "against"\n[simulation]\n{changes}'
+    wanted = parse_experiment(text, "--against").simulation
+    keys = [setting.partition("=")[0].strip() for setting in settings]
+    return replace(experiment.simulation, **{key: getattr(wanted, key) for key in keys})
+
+
+def _shown(robots: Sequence[Robot], what: str) -> Iterable[Robot]:
+    """Give robots one by one, and show on the terminal how many are done."""
+    # Nothing is drawn meanwhile: it would be measured, too.
+    console = Console(stderr=True)
+    return track(robots, what, console=console, transient=True, auto_refresh=False)
+
+
+def _say(*lines: str) -> None:
+    sys.stdout.write("\n".join(lines) + "\n")

@@ -1,0 +1,177 @@
+"""How far fitness depends on the numbers that the simulator asks for.
+
+Robots of a run, drawn from each third of its fitness, are simulated anew with a
+finer time step, or with any other setting changed; their ranks are compared.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from msgspec.structs import replace
+
+from schema.errors import ExperimentError, RunFolderError, SimulationDiverged
+from schema.experiment.document import Experiment, Simulation, body_space
+from schema.experiment.file import experiment_from_text
+from schema.experiment.settings import EvaluationSettings
+from schema.robot.genome import develop
+from schema.robot.results import Floats
+from schema.robot.robot import Robot
+from schema.tables.files import read_table
+from schema.wire.codec import decode_genome
+from worker.robot.evaluation import evaluate
+
+THIRDS = 3
+WINNERS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Population:
+    """The births of a run: its experiment, robots, and their fitness (N,)."""
+
+    experiment: Experiment
+    robots: tuple[Robot, ...]
+    fitness: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """Fitness of the same robots, (N,) each, in two simulations [m/s]."""
+
+    first: Floats
+    second: Floats
+
+    @property
+    def spearman(self) -> float:
+        """Rank correlation of the two, in [-1, 1]."""
+        return spearman(self.first, self.second)
+
+    def of(self, rows: slice) -> "Agreement":
+        """Return the agreement of some of the robots."""
+        return Agreement(self.first[rows], self.second[rows])
+
+
+def read_population(folder: Path) -> Population:
+    """Return the robots of a run and what they were found to be worth.
+
+    Args:
+        folder: of a run, finished or not; failed evaluations are left out.
+
+    Raises:
+        RunFolderError: no such folder, or not a run's.
+        MalformedMessage: a genome that is none.
+    """
+    runs = read_table(folder, "runs")
+    if not runs.num_rows:
+        raise RunFolderError(f"{folder}: no run is there, or none that has begun")
+    experiment = experiment_from_text(runs["document"][0].as_py())
+    space = body_space(experiment.space)
+    births = read_table(folder, "births").select(["island", "birth", "genome"])
+    genomes = {
+        (row["island"], row["birth"]): row["genome"] for row in births.to_pylist()
+    }
+    columns = ["island", "birth", "fitness"]
+    judged = [
+        row
+        for row in read_table(folder, "evaluations").select(columns).to_pylist()
+        if row["fitness"] is not None
+    ]
+    return Population(
+        experiment,
+        tuple(
+            develop(decode_genome(genomes[row["island"], row["birth"]]), space)
+            for row in judged
+        ),
+        np.array([row["fitness"] for row in judged]),
+    )
+
+
+def sample_thirds(fitness: Floats, per_third: int, seed: int = 1) -> list[int]:
+    """Return indices drawn from each third of fitness, the least fit third first.
+
+    Args:
+        fitness: (N,) of all.
+        per_third: how many of each third, without repetition.
+        seed: of the draw.
+
+    Raises:
+        ExperimentError: fewer robots than that.
+    """
+    if len(fitness) < THIRDS * per_third:
+        raise ExperimentError(
+            f"{THIRDS} x {per_third} robots are needed, the run has {len(fitness)}"
+        )
+    rng = np.random.default_rng(seed)
+    return [
+        int(index)
+        for third in np.array_split(np.argsort(fitness, kind="stable"), THIRDS)
+        for index in np.sort(rng.choice(third, per_third, replace=False))
+    ]
+
+
+def winners(fitness: Floats) -> list[int]:
+    """Return the indices of the ten fittest, fittest first."""
+    return [int(index) for index in np.argsort(-fitness, kind="stable")[:WINNERS]]
+
+
+def finer(simulation: Simulation, factor: int = 5) -> Simulation:
+    """Return the same world with a time step so many times finer."""
+    return replace(
+        simulation,
+        timestep_s=simulation.timestep_s / factor,
+        brain_steps=simulation.brain_steps * factor,
+        pose_steps=simulation.pose_steps * factor,
+        window_steps=simulation.window_steps * factor,
+        warmup_steps=simulation.warmup_steps * factor,
+    )
+
+
+def compare(
+    robots: Iterable[Robot], experiment: Experiment, other: Simulation
+) -> Agreement:
+    """Return the fitness of robots in their experiment's world and in another.
+
+    Args:
+        robots: checked robots.
+        experiment: limits, world and fitness.
+        other: the world to compare with; a robot that diverges there counts 0.
+    """
+    worlds = (experiment.simulation, other)
+    found = [
+        [_fitness(robot, experiment, world) for world in worlds] for robot in robots
+    ]
+    first, second = np.array(found).reshape(-1, 2).T
+    return Agreement(first, second)
+
+
+def _fitness(robot: Robot, experiment: Experiment, world: Simulation) -> float:
+    settings = EvaluationSettings(
+        space=experiment.space,
+        simulation=world,
+        fitness=experiment.fitness,
+        environment=experiment.environment,
+    )
+    try:
+        return evaluate(robot, settings).fitness
+    except SimulationDiverged:
+        return 0.0
+
+
+def spearman(first: Floats, second: Floats) -> float:
+    """Return the rank correlation of two samples; ties share their mean rank.
+
+    Args:
+        first: (N,), not all equal.
+        second: (N,), not all equal.
+
+    Source: Spearman, 1904; tested against scipy in tests/worker/test_fidelity.py.
+    """
+    return float(np.corrcoef(_ranks(first), _ranks(second))[0, 1])
+
+
+def _ranks(values: Floats) -> Floats:
+    _, place, count = np.unique(values, return_inverse=True, return_counts=True)
+    last = np.cumsum(count)
+    ranks: Floats = (last - (count - 1) / 2)[place]
+    return ranks

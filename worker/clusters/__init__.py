@@ -1,0 +1,1 @@
+"""Robots that share one engine model: merging, splitting, proximity."""

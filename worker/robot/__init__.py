@@ -1,0 +1,1 @@
+"""One robot: controller, sensors, noise and its off-line evaluation."""

@@ -1,0 +1,23 @@
+"""The worker on the network: one process that does jobs until told to end."""
+
+from schema.agent.network import Agent
+from schema.agent.service import Outlet, own_agent, serve_as_process
+from schema.agent.supervision import Post
+from schema.agent.topics import Member
+from schema.wire.arena_codec import Live, encode_live
+from worker.serve.jobs import Jobs
+
+
+def process(agent: Agent, post: Post) -> None:
+    """Be one process of a crew of workers; returns when asked to end."""
+    own = own_agent(agent, post.index)
+    member = Member(own.fleet, own.role, own.name)
+    outlet = Outlet()
+
+    def publish(live: Live) -> None:
+        key = member.poses(live.shard)
+        if outlet.has_listeners(key):
+            outlet.put(key, encode_live(live))
+
+    jobs = Jobs(threads=agent.threads, publish=publish)
+    serve_as_process(jobs.answer, own, post, outlet)
