@@ -32,7 +32,7 @@ def read_experiment(source: str) -> Experiment:
             raise ExperimentError(f"{source}: cannot be read: {error}") from None
         return parse_experiment(text, source)
     check_source(source, shipped_experiments())
-    folder = resources.files("coordinator") / "experiments"
+    folder = resources.files("schema.experiment") / "shipped"
     text = (folder / f"{source}.toml").read_text(encoding="utf-8")
     return parse_experiment(text, f"{source}.toml")
 
@@ -52,7 +52,7 @@ def check_source(source: str, shipped: Collection[str]) -> None:
 
 def shipped_experiments() -> list[str]:
     """Return the names of the experiments that come with the package."""
-    folder = resources.files("coordinator") / "experiments"
+    folder = resources.files("schema.experiment") / "shipped"
     return sorted(
         entry.name.removesuffix(".toml")
         for entry in folder.iterdir()

@@ -30,7 +30,7 @@ def test_wheel_holds_every_file_of_the_rooms(names: set[str]) -> None:
     }
     assert wanted <= names
     assert {"revolve.py", "schema/revolve.proto"} <= names
-    assert any(name.startswith("coordinator/experiments/") for name in names)
+    assert any(name.startswith("schema/experiment/shipped/") for name in names)
 
 
 def test_wheel_holds_nothing_else(names: set[str]) -> None:
