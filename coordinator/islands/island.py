@@ -27,7 +27,7 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.islands.island_migration import Harbour
+from coordinator.islands.island_migration import MigrantBuffer
 from coordinator.islands.migration import Exchange
 from coordinator.islands.reevaluation import Trials
 from coordinator.islands.rows import birth_record, evaluation_record, population_records
@@ -87,8 +87,8 @@ class Island:
         self._window = self._brood_end = experiment.selection.population
         self._unborn: dict[int, _Unborn] = {}
         self._brood: list[Individual] = []
-        self._harbour = (
-            None if exchange is None else Harbour(experiment, number, exchange)
+        self._migrant_buffer = (
+            None if exchange is None else MigrantBuffer(experiment, number, exchange)
         )
 
     @property
@@ -233,10 +233,14 @@ class Island:
         last = BirthId(self._number, self.births - 1)
         self.population = self._turnover.survivors(parents, self._brood, last)
         self._brood = []
-        harbour = self._harbour
-        if harbour is None or self.is_finished or not harbour.is_due(self.births):
+        migrant_buffer = self._migrant_buffer
+        if (
+            migrant_buffer is None
+            or self.is_finished
+            or not migrant_buffer.is_due(self.births)
+        ):
             return [*rows, *self._open_brood()]
-        commands, self.population = harbour.depart(self.population, self.births)
+        commands, self.population = migrant_buffer.depart(self.population, self.births)
         return [*rows, *commands, *self._land()]
 
     def _hear(self, event: Travelled | Evaluated | EvaluationFailed) -> None:
@@ -247,16 +251,16 @@ class Island:
         if isinstance(event, Evaluated | EvaluationFailed) and event.asker is None:
             self._trials.take(event)
             return
-        if self._harbour is None:
+        if self._migrant_buffer is None:
             raise self._unexpected(event, "it has no neighbours")
         if not self.is_finished:
-            self._harbour.take(event)
+            self._migrant_buffer.take(event)
 
     def _land(self) -> list[IslandCommand]:
         """Let immigrants live here, once all are there that were waited for."""
-        if self._harbour is None:
+        if self._migrant_buffer is None:
             return []
-        commands, population = self._harbour.land(self.population, self.births)
+        commands, population = self._migrant_buffer.land(self.population, self.births)
         timed = [
             self._trials.timed(each) if isinstance(each, Evaluate) else each
             for each in commands
@@ -271,7 +275,9 @@ class Island:
         commands: list[IslandCommand] = []
         commands += population_records(self._number, self.births, self.population)
         if self.is_finished:
-            neighbours = () if self._harbour is None else self._harbour.neighbours
+            neighbours = (
+                () if self._migrant_buffer is None else self._migrant_buffer.neighbours
+            )
             return [*commands, Finish(self._number, neighbours)]
         self._generation += 1
         self._window = self._experiment.window

@@ -28,7 +28,7 @@ from schema.robot.names import BirthId
 Outcome = Evaluated | EvaluationFailed
 
 
-class Harbour:
+class MigrantBuffer:
     """Those who leave an island and those who come."""
 
     def __init__(self, experiment: Experiment, number: int, exchange: Exchange) -> None:
