@@ -9,7 +9,7 @@ Source: Hupkes 2016, section 5.3.3; facts of the original, section 5.2.
 
 from math import isfinite
 
-from coordinator.arena.arena_migration import Landing
+from coordinator.arena.arena_migration import ImmigrantQueue
 from coordinator.arena.candidates import Nursery
 from coordinator.arena.changes import Pending
 from coordinator.arena.clock import ArenaClock
@@ -112,7 +112,7 @@ class Arena:
         self._advances = 0
         self._awaited: AdvanceShard | None = None
         self._has_started = self._is_held = self._is_starving = False
-        self._landing = None if exchange is None else Landing(exchange)
+        self._immigrant_queue = None if exchange is None else ImmigrantQueue(exchange)
 
     @property
     def population(self) -> tuple[Individual, ...]:
@@ -223,11 +223,13 @@ class Arena:
                 self._residents, self._number, self.births, now_s
             )
         if self.step % self._clock.birth == 0:
-            landing = self._landing
+            immigrant_queue = self._immigrant_queue
             is_few = not self._guests and (
                 len(self._residents) < self._experiment.selection.parents_needed
             )
-            self._is_starving = is_few and landing is not None and landing.is_hopeful
+            self._is_starving = (
+                is_few and immigrant_queue is not None and immigrant_queue.is_hopeful
+            )
             self.is_extinct = is_few and not self._is_starving
             if self.is_extinct or self.births >= self._experiment.births:
                 return [*commands, self._finish()]
@@ -259,9 +261,9 @@ class Arena:
             order = self._guests.pop(0)
             individual, robot = guest(order, self._nursery.take_number(), self._space)
             commands += self._insert(individual, robot, (), 1, order.place)
-        if self._landing is not None and not self._founders:
-            commands += self._trade(self._landing)
-            if self._landing.is_waiting or self.is_finished:
+        if self._immigrant_queue is not None and not self._founders:
+            commands += self._trade(self._immigrant_queue)
+            if self._immigrant_queue.is_waiting or self.is_finished:
                 return commands
         self._is_held = self.is_paused
         if not self.is_paused:
@@ -270,41 +272,51 @@ class Arena:
 
     def _finish(self) -> Finish:
         self.is_finished = True
-        neighbours = () if self._landing is None else self._landing.neighbours
+        neighbours = (
+            () if self._immigrant_queue is None else self._immigrant_queue.neighbours
+        )
         return Finish(self._number, neighbours)
 
     def _hear(self, event: Immigrated | NeighbourClosed) -> list[ArenaCommand]:
         """Take news of a neighbour, which may be the last that time stands for."""
-        if self._landing is None:
+        if self._immigrant_queue is None:
             raise self._unexpected(event, "it has no neighbours")
         if self.is_finished:
             return []
-        self._landing.take(event)
-        return self._conclude() if self._landing.is_complete else []
+        self._immigrant_queue.take(event)
+        return self._conclude() if self._immigrant_queue.is_complete else []
 
-    def _trade(self, landing: Landing) -> list[ArenaCommand]:
+    def _trade(self, immigrant_queue: ImmigrantQueue) -> list[ArenaCommand]:
         """Send migrants if they are due; let those in who came, as room allows."""
         commands: list[ArenaCommand] = []
         now_s = self._clock.seconds(self.step)
-        is_due = self._is_starving or landing.is_due(self.births, now_s)
-        if is_due and not landing.is_waiting and self.births < self._experiment.births:
+        is_due = self._is_starving or immigrant_queue.is_due(self.births, now_s)
+        if (
+            is_due
+            and not immigrant_queue.is_waiting
+            and self.births < self._experiment.births
+        ):
             mature = self._residents.mature()
             stay = self._experiment.selection.parents_needed
-            sent, gone = landing.depart(mature, len(self._residents), stay)
+            sent, gone = immigrant_queue.depart(mature, len(self._residents), stay)
             commands += [*migration_records(sent, self.births, now_s), *sent]
             for one in gone:
                 resident = self._residents.remove(one.birth)
                 commands.append(self._gone(resident, "migrated"))
-        if landing.is_complete:
+        if immigrant_queue.is_complete:
             living = [one.birth for one in self._residents]
-            came = landing.arrive(living, self.births, now_s)
+            came = immigrant_queue.arrive(living, self.births, now_s)
             self.is_extinct = self._is_starving and not came
             self._is_starving = False
             if self.is_extinct:
                 return [*commands, self._finish()]
-        return commands if landing.is_waiting else commands + self._admit(landing)
+        return (
+            commands
+            if immigrant_queue.is_waiting
+            else commands + self._admit(immigrant_queue)
+        )
 
-    def _admit(self, landing: Landing) -> list[ArenaCommand]:
+    def _admit(self, immigrant_queue: ImmigrantQueue) -> list[ArenaCommand]:
         """Let immigrants in, each at a place of chance.
 
         Nobody makes room where the living are few.
@@ -313,14 +325,14 @@ class Arena:
         while True:
             is_few = len(self._residents) < self._rules.population_floor
             mature = () if is_few else self._residents.mature()
-            found = landing.next_in(mature, has_room=self._has_room())
+            found = immigrant_queue.next_in(mature, has_room=self._has_room())
             if found is None:
                 return commands
             immigrant, replaced = found
             if replaced is not None:
                 resident = self._residents.remove(replaced.birth)
                 commands.append(self._gone(resident, "replaced"))
-            name = BirthId(self._number, landing.settled)
+            name = BirthId(self._number, immigrant_queue.settled)
             place = self._draw_place(name, Purpose.IMMIGRANT_PLACE)
             robot = develop(immigrant.genome, self._space)
             self._residents.add(Resident(immigrant, robot, place))

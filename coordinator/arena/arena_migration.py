@@ -9,7 +9,7 @@ from coordinator.islands.migration import Exchange
 from schema.robot.names import BirthId
 
 
-class Landing:
+class ImmigrantQueue:
     """Those who leave an arena, and those who wait for room in it.
 
     Whoever leaves is an empty place: the next immigrants take it, and nobody makes

@@ -46,7 +46,7 @@ class MigrantBuffer:
         self._settled = 0
         self._guests: dict[BirthId, Individual] = {}
         self._awaited: dict[BirthId, Outcome | None] = {}
-        self._is_landing = False
+        self._is_immigrating = False
 
     @property
     def neighbours(self) -> tuple[int, ...]:
@@ -95,13 +95,13 @@ class MigrantBuffer:
         commands: list[Evaluate | Record] = []
         if self._exchange.is_complete:
             commands += self._welcome(population, births)
-        if not self._is_landing or None in self._awaited.values():
+        if not self._is_immigrating or None in self._awaited.values():
             return commands, None
         for birth, outcome in self._awaited.items():
             assert outcome is not None
             self._guests[birth] = _judged(self._guests[birth], outcome)
             commands.append(evaluation_record(outcome))
-        self._is_landing = False
+        self._is_immigrating = False
         return commands, self._settle(population)
 
     def _welcome(self, population: Sequence[Individual], births: int) -> list[Evaluate]:
@@ -109,7 +109,7 @@ class MigrantBuffer:
         arrivals = self._exchange.arrive(births)
         living = {one.birth for one in population}
         news = [(one, anew) for one, anew in arrivals if one.birth not in living]
-        self._is_landing = True
+        self._is_immigrating = True
         self._guests = {one.birth: one for one, _ in news}
         self._awaited = {one.birth: None for one, is_anew in news if is_anew}
         trial = self._exchange.epoch
