@@ -50,7 +50,7 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.islands.migration import Exchange
+from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import birth_record, migration_records
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
@@ -77,7 +77,7 @@ class Arena:
         run: int,
         number: int = 0,
         *,
-        exchange: Exchange | None = None,
+        epochs: MigrationEpochs | None = None,
     ) -> None:
         """Make an arena in which nothing has happened.
 
@@ -86,7 +86,7 @@ class Arena:
             seed: of the experiment's execution.
             run: number of the repeat, from 0.
             number: of this island.
-            exchange: its side of migration; None if it has no neighbours.
+            epochs: its side of migration; None if it has no neighbours.
 
         Raises:
             ExperimentError: the experiment is off-line.
@@ -112,7 +112,7 @@ class Arena:
         self._advances = 0
         self._awaited: AdvanceShard | None = None
         self._has_started = self._is_held = self._is_starving = False
-        self._immigrant_queue = None if exchange is None else ImmigrantQueue(exchange)
+        self._immigrant_queue = None if epochs is None else ImmigrantQueue(epochs)
 
     @property
     def population(self) -> tuple[Individual, ...]:

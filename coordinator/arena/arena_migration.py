@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Emigrate, Travelled
-from coordinator.islands.migration import Exchange
+from coordinator.islands.migration import MigrationEpochs
 from schema.robot.names import BirthId
 
 
@@ -20,36 +20,36 @@ class ImmigrantQueue:
         settled: how many immigrants have been let in.
     """
 
-    def __init__(self, exchange: Exchange) -> None:
+    def __init__(self, epochs: MigrationEpochs) -> None:
         """Expect nobody."""
         self.queue: list[Individual] = []
         self.settled = 0
-        self._exchange = exchange
+        self._epochs = epochs
         self._empty = 0
 
     @property
     def is_waiting(self) -> bool:
         """The arena has sent its migrants, and waits for those of others."""
-        return self._exchange.is_waiting
+        return self._epochs.is_waiting
 
     @property
     def is_complete(self) -> bool:
         """All that it waits for is there."""
-        return self._exchange.is_complete
+        return self._epochs.is_complete
 
     @property
     def is_hopeful(self) -> bool:
         """Somebody waits for room, or may come at the next exchange."""
-        return bool(self.queue) or self._exchange.has_sources
+        return bool(self.queue) or self._epochs.has_sources
 
     @property
     def neighbours(self) -> tuple[int, ...]:
         """Whom the arena is connected with."""
-        return self._exchange.waters.neighbours
+        return self._epochs.waters.neighbours
 
     def is_due(self, births: int, now_s: float) -> bool:
         """Return whether the epoch ends at a time [s], with so many births."""
-        return not self.is_waiting and self._exchange.is_due(births, now_s)
+        return not self.is_waiting and self._epochs.is_due(births, now_s)
 
     def depart(
         self, mature: Sequence[Individual], living: int, stay: int
@@ -61,7 +61,7 @@ class ImmigrantQueue:
             living: how many live there.
             stay: so many of the mature are not moved away.
         """
-        sent, gone = self._exchange.leave(mature, living, len(mature) - stay)
+        sent, gone = self._epochs.leave(mature, living, len(mature) - stay)
         self._empty += len(gone)
         return sent, gone
 
@@ -71,7 +71,7 @@ class ImmigrantQueue:
         Raises:
             UnexpectedEvent: it cannot come; nothing has changed.
         """
-        self._exchange.take(event)
+        self._epochs.take(event)
 
     def arrive(
         self, living: Sequence[BirthId], births: int, now_s: float
@@ -86,7 +86,7 @@ class ImmigrantQueue:
         known = [*living, *(one.birth for one in self.queue)]
         came = [
             replace(one, fitness=0.0, has_failed=False)
-            for one, _ in self._exchange.arrive(births, now_s)
+            for one, _ in self._epochs.arrive(births, now_s)
             if one.birth not in known
         ]
         self.queue += came
@@ -103,7 +103,7 @@ class ImmigrantQueue:
         """
         gone = None
         if not self._empty:
-            gone = self._exchange.place_for(mature, self.settled)
+            gone = self._epochs.place_for(mature, self.settled)
         if not self.queue or not (gone or has_room):
             return None
         self._empty = max(0, self._empty - 1)

@@ -28,7 +28,7 @@ from coordinator.islands.events import (
     VettingFailed,
 )
 from coordinator.islands.island_migration import MigrantBuffer
-from coordinator.islands.migration import Exchange
+from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.reevaluation import Trials
 from coordinator.islands.rows import birth_record, evaluation_record, population_records
 from coordinator.islands.survival import Turnover
@@ -61,7 +61,7 @@ class Island:
         run: int,
         number: int = 0,
         *,
-        exchange: Exchange | None = None,
+        epochs: MigrationEpochs | None = None,
     ) -> None:
         """Make an island to which nothing has happened.
 
@@ -70,7 +70,7 @@ class Island:
             seed: of the experiment's execution.
             run: number of the repeat, from 0.
             number: of this island.
-            exchange: its side of migration; None if it has no neighbours.
+            epochs: its side of migration; None if it has no neighbours.
         """
         self.births = 0
         self.population: tuple[Individual, ...] = ()
@@ -88,7 +88,7 @@ class Island:
         self._unborn: dict[int, _Unborn] = {}
         self._brood: list[Individual] = []
         self._migrant_buffer = (
-            None if exchange is None else MigrantBuffer(experiment, number, exchange)
+            None if epochs is None else MigrantBuffer(experiment, number, epochs)
         )
 
     @property

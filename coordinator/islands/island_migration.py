@@ -18,7 +18,7 @@ from coordinator.islands.events import (
     Record,
     Travelled,
 )
-from coordinator.islands.migration import Exchange
+from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import evaluation_record, migration_records
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
@@ -31,7 +31,9 @@ Outcome = Evaluated | EvaluationFailed
 class MigrantBuffer:
     """Those who leave an island and those who come."""
 
-    def __init__(self, experiment: Experiment, number: int, exchange: Exchange) -> None:
+    def __init__(
+        self, experiment: Experiment, number: int, epochs: MigrationEpochs
+    ) -> None:
         """Expect nobody on an island."""
         self._space = body_space(experiment.space)
         culling = experiment.selection.culling
@@ -42,7 +44,7 @@ class MigrantBuffer:
         )
         self._stay = experiment.selection.parents_needed
         self._number = number
-        self._exchange = exchange
+        self._epochs = epochs
         self._settled = 0
         self._guests: dict[BirthId, Individual] = {}
         self._awaited: dict[BirthId, Outcome | None] = {}
@@ -51,18 +53,18 @@ class MigrantBuffer:
     @property
     def neighbours(self) -> tuple[int, ...]:
         """Whom the island is connected with."""
-        return self._exchange.waters.neighbours
+        return self._epochs.waters.neighbours
 
     def is_due(self, births: int) -> bool:
         """Return whether an epoch ends with so many births."""
-        return self._exchange.is_due(births)
+        return self._epochs.is_due(births)
 
     def depart(
         self, population: Sequence[Individual], births: int
     ) -> tuple[list[Record | Emigrate], tuple[Individual, ...]]:
         """End the epoch; return what follows, and who is left."""
         living = len(population)
-        sent, gone = self._exchange.leave(population, living, living - self._stay)
+        sent, gone = self._epochs.leave(population, living, living - self._stay)
         rows = migration_records(sent, births)
         left = tuple(one for one in population if one not in gone)
         return [*rows, *sent], left
@@ -74,9 +76,9 @@ class MigrantBuffer:
             UnexpectedEvent: it cannot come; nothing has changed.
         """
         if not isinstance(event, Evaluated | EvaluationFailed):
-            self._exchange.take(event)
+            self._epochs.take(event)
             return
-        epoch = self._exchange.epoch
+        epoch = self._epochs.epoch
         is_known = event.trial < epoch or event.birth in self._awaited
         if event.asker != self._number or event.trial > epoch or not is_known:
             raise UnexpectedEvent(
@@ -93,7 +95,7 @@ class MigrantBuffer:
     ) -> tuple[list[Evaluate | Record], tuple[Individual, ...] | None]:
         """Return what follows, and the new population once all have settled."""
         commands: list[Evaluate | Record] = []
-        if self._exchange.is_complete:
+        if self._epochs.is_complete:
             commands += self._welcome(population, births)
         if not self._is_immigrating or None in self._awaited.values():
             return commands, None
@@ -106,13 +108,13 @@ class MigrantBuffer:
 
     def _welcome(self, population: Sequence[Individual], births: int) -> list[Evaluate]:
         """Take in who came; return whom to judge."""
-        arrivals = self._exchange.arrive(births)
+        arrivals = self._epochs.arrive(births)
         living = {one.birth for one in population}
         news = [(one, anew) for one, anew in arrivals if one.birth not in living]
         self._is_immigrating = True
         self._guests = {one.birth: one for one, _ in news}
         self._awaited = {one.birth: None for one, is_anew in news if is_anew}
-        trial = self._exchange.epoch
+        trial = self._epochs.epoch
         return [
             Evaluate(
                 birth,
@@ -128,7 +130,7 @@ class MigrantBuffer:
         residents, settled = list(population), list[Individual]()
         for guest in self._guests.values():
             if len(residents) + len(settled) >= self._size:
-                gone = self._exchange.place_for(residents, self._settled)
+                gone = self._epochs.place_for(residents, self._settled)
                 if gone is None:
                     continue
                 residents.remove(gone)

@@ -41,7 +41,7 @@ class Waters:
         return tuple(sorted({*self.targets, *self.sources}))
 
 
-class Exchange:
+class MigrationEpochs:
     """What an island sends, and what has come for it.
 
     Attributes:

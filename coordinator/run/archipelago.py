@@ -2,7 +2,7 @@
 
 from coordinator.arena.arena import Arena
 from coordinator.islands.island import Island
-from coordinator.islands.migration import Exchange, Waters
+from coordinator.islands.migration import MigrationEpochs, Waters
 from coordinator.islands.topology import connections
 from schema.experiment.document import Experiment, island_count, island_experiment
 from schema.experiment.settings import evaluation_settings
@@ -26,9 +26,9 @@ def archipelago(
     waters = _waters(experiment, owns, seed, run)
     islands: dict[int, Island | Arena] = {}
     for number, own in enumerate(owns):
-        exchange = None
+        epochs = None
         if own.migration is not None and waters[number].neighbours:
-            exchange = Exchange(
+            epochs = MigrationEpochs(
                 own.migration,
                 number,
                 waters[number],
@@ -37,7 +37,7 @@ def archipelago(
                 run=run,
             )
         machine = Island if own.arena is None else Arena
-        islands[number] = machine(own, seed, run, number, exchange=exchange)
+        islands[number] = machine(own, seed, run, number, epochs=epochs)
     return islands
 
 
