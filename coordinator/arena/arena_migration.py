@@ -45,7 +45,7 @@ class ImmigrantQueue:
     @property
     def neighbours(self) -> tuple[int, ...]:
         """Whom the arena is connected with."""
-        return self._epochs.waters.neighbours
+        return self._epochs.links.neighbours
 
     def is_due(self, births: int, now_s: float) -> bool:
         """Return whether the epoch ends at a time [s], with so many births."""

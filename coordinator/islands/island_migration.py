@@ -53,7 +53,7 @@ class MigrantBuffer:
     @property
     def neighbours(self) -> tuple[int, ...]:
         """Whom the island is connected with."""
-        return self._epochs.waters.neighbours
+        return self._epochs.links.neighbours
 
     def is_due(self, births: int) -> bool:
         """Return whether an epoch ends with so many births."""

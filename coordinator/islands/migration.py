@@ -22,7 +22,7 @@ from schema.robot.names import BirthId
 
 
 @dataclass(frozen=True, slots=True)
-class Waters:
+class Neighbours:
     """Where an island lies.
 
     Attributes:
@@ -47,14 +47,14 @@ class MigrationEpochs:
     Attributes:
         epoch: that it is in, from 0.
         is_waiting: it has sent its migrants, and has not got all of those it is due.
-        waters: where it lies.
+        links: where it lies.
     """
 
     def __init__(
         self,
         migration: Migration,
         number: int,
-        waters: Waters,
+        links: Neighbours,
         *,
         tournament_size: int,
         seed: int,
@@ -65,14 +65,14 @@ class MigrationEpochs:
         Args:
             migration: the island's rules.
             number: of the island.
-            waters: where it lies.
+            links: where it lies.
             tournament_size: for emigrants, if they are chosen so.
             seed: of the experiment's execution.
             run: number of the repeat, from 0.
         """
         self.epoch = 0
         self.is_waiting = False
-        self.waters = waters
+        self.links = links
         self._migration = migration
         self._number = number
         self._tournament_size = tournament_size
@@ -80,8 +80,8 @@ class MigrationEpochs:
         self._due_births = migration.epoch
         self._due_s = inf if migration.epoch_s is None else migration.epoch_s
         self._inbox: dict[tuple[int, int], tuple[Individual, ...]] = {}
-        self._open = dict.fromkeys(waters.neighbours, 0)
-        self._meeting = waters.neighbours
+        self._open = dict.fromkeys(links.neighbours, 0)
+        self._meeting = links.neighbours
 
     def is_due(self, births: int, now_s: float = -inf) -> bool:
         """Return whether the epoch has ended.
@@ -95,7 +95,7 @@ class MigrationEpochs:
     @property
     def has_sources(self) -> bool:
         """Somebody came of late, or sent nobody, and may come again."""
-        return any(source in self._meeting for source in self.waters.sources)
+        return any(source in self._meeting for source in self.links.sources)
 
     @property
     def is_complete(self) -> bool:
@@ -115,7 +115,7 @@ class MigrationEpochs:
             spare: how many may be moved away at most.
         """
         self.is_waiting = True
-        targets = [to for to in self.waters.targets if to in self._meeting]
+        targets = [to for to in self.links.targets if to in self._meeting]
         count = migrant_count(self._migration, living)
         is_moved = self._migration.handling == "evict"
         if is_moved:
@@ -171,7 +171,7 @@ class MigrationEpochs:
         met = [one for one in self._meeting if (one, self.epoch) in self._inbox]
         arrivals: dict[BirthId, tuple[Individual, bool]] = {}
         for source in met:
-            is_strange = self._migration.judge_anew or source in self.waters.strange
+            is_strange = self._migration.judge_anew or source in self.links.strange
             for one in self._inbox.pop((source, self.epoch)):
                 arrivals.setdefault(one.birth, (one, is_strange))
         # Not those who are open by now: that would depend on who is faster.

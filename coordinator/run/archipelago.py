@@ -2,7 +2,7 @@
 
 from coordinator.arena.arena import Arena
 from coordinator.islands.island import Island
-from coordinator.islands.migration import MigrationEpochs, Waters
+from coordinator.islands.migration import MigrationEpochs, Neighbours
 from coordinator.islands.topology import connections
 from schema.experiment.document import Experiment, island_count, island_experiment
 from schema.experiment.settings import evaluation_settings
@@ -23,15 +23,15 @@ def archipelago(
     """
     count = island_count(experiment)
     owns = [island_experiment(experiment, number) for number in range(count)]
-    waters = _waters(experiment, owns, seed, run)
+    links = _links(experiment, owns, seed, run)
     islands: dict[int, Island | Arena] = {}
     for number, own in enumerate(owns):
         epochs = None
-        if own.migration is not None and waters[number].neighbours:
+        if own.migration is not None and links[number].neighbours:
             epochs = MigrationEpochs(
                 own.migration,
                 number,
-                waters[number],
+                links[number],
                 tournament_size=own.selection.tournament_size,
                 seed=seed,
                 run=run,
@@ -41,24 +41,24 @@ def archipelago(
     return islands
 
 
-def _waters(
+def _links(
     experiment: Experiment, owns: list[Experiment], seed: int, run: int
-) -> list[Waters]:
+) -> list[Neighbours]:
     """Return where each island lies."""
     edges: tuple[tuple[int, int], ...] = ()
     if experiment.migration is not None:
         edges = connections(experiment.migration, len(owns), seed, run)
-    waters = []
+    links = []
     for number, own in enumerate(owns):
         sources = tuple(source for source, to in edges if to == number)
-        waters.append(
-            Waters(
+        links.append(
+            Neighbours(
                 targets=tuple(to for source, to in edges if source == number),
                 sources=sources,
                 strange=tuple(each for each in sources if _differs(own, owns[each])),
             )
         )
-    return waters
+    return links
 
 
 def _differs(own: Experiment, other: Experiment) -> bool:
