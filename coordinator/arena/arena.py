@@ -10,7 +10,7 @@ Source: Hupkes 2016, section 5.3.3; facts of the original, section 5.2.
 from math import isfinite
 
 from coordinator.arena.arena_migration import ImmigrantQueue
-from coordinator.arena.candidates import Nursery
+from coordinator.arena.candidates import VettingQueue
 from coordinator.arena.changes import Pending
 from coordinator.arena.clock import ArenaClock
 from coordinator.arena.orders import check_order, guest, rewired
@@ -102,7 +102,9 @@ class Arena:
         self._space = body_space(experiment.space)
         self._seed, self._run, self._number = seed, run, number
         attempts = experiment.selection.max_mating_attempts
-        self._nursery = Nursery(Breeder(experiment, seed, run), number, attempts)
+        self._vetting_queue = VettingQueue(
+            Breeder(experiment, seed, run), number, attempts
+        )
         self._residents = Residents()
         self._pending = Pending()
         self._founders: list[Candidate] = []
@@ -146,7 +148,9 @@ class Arena:
         match event:
             case Started():
                 self._has_started = True
-                return [*self._nursery.found(self._experiment.selection.population)]
+                return [
+                    *self._vetting_queue.found(self._experiment.selection.population)
+                ]
             case Vetted() | VettingFailed():
                 return self._judge(event)
             case Advanced():
@@ -157,13 +161,13 @@ class Arena:
                 return self._hear(event)
 
     def _judge(self, event: Vetted | VettingFailed) -> list[ArenaCommand]:
-        was_busy = self._nursery.is_busy
-        vets = self._nursery.judge(event)
-        if not was_busy or self._nursery.is_busy:
+        was_busy = self._vetting_queue.is_busy
+        vets = self._vetting_queue.judge(event)
+        if not was_busy or self._vetting_queue.is_busy:
             return [*vets]
         if self.births:
             return self._conclude()
-        viable = self._nursery.viable
+        viable = self._vetting_queue.viable
         self._founders = [viable.pop(number) for number in sorted(viable)]
         return self._decide()
 
@@ -239,7 +243,7 @@ class Arena:
             for one in doomed:
                 resident = self._residents.remove(one.birth)
                 commands.append(self._gone(resident, reason))
-        return commands if self._nursery.is_busy else commands + self._conclude()
+        return commands if self._vetting_queue.is_busy else commands + self._conclude()
 
     def _mate(self) -> list[Vet]:
         """Begin a birth, if there is room and there are parents (trap B12)."""
@@ -247,19 +251,21 @@ class Arena:
         is_full = len(self._residents) >= self._rules.population_limit
         if is_full or len(mature) < self._experiment.selection.parents_needed:
             return []
-        return self._nursery.mate(mature)
+        return self._vetting_queue.mate(mature)
 
     def _conclude(self) -> list[ArenaCommand]:
         """Insert who is viable, carry out orders, and go on unless paused."""
         commands: list[ArenaCommand] = []
-        for number in sorted(self._nursery.viable):
-            commands += self._born(self._nursery.viable.pop(number))
+        for number in sorted(self._vetting_queue.viable):
+            commands += self._born(self._vetting_queue.viable.pop(number))
         orders, self._orders = self._orders, []
         for order in orders:
             commands += self._carry_out(order)
         while self._guests and not self._founders and self._has_room():
             order = self._guests.pop(0)
-            individual, robot = guest(order, self._nursery.take_number(), self._space)
+            individual, robot = guest(
+                order, self._vetting_queue.take_number(), self._space
+            )
             commands += self._insert(individual, robot, (), 1, order.place)
         if self._immigrant_queue is not None and not self._founders:
             commands += self._trade(self._immigrant_queue)

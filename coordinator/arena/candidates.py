@@ -9,7 +9,7 @@ from schema.errors import UnexpectedEvent
 from schema.robot.names import BirthId
 
 
-class Nursery:
+class VettingQueue:
     """Brings founders and children to the point where they can be inserted.
 
     A number is used when somebody is viable under it. Attempts that came to none go
