@@ -31,7 +31,7 @@ from coordinator.islands.island_migration import MigrantBuffer
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.reevaluation import Trials
 from coordinator.islands.rows import birth_record, evaluation_record, population_records
-from coordinator.islands.survival import Turnover
+from coordinator.islands.survival import SurvivorSelection
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
 from schema.robot.names import BirthId
@@ -78,7 +78,7 @@ class Island:
         self._number = number
         self._space = body_space(experiment.space)
         self._breeder = Breeder(experiment, seed, run)
-        self._turnover = Turnover(experiment, self._breeder)
+        self._survivor_selection = SurvivorSelection(experiment, self._breeder)
         self._trials = Trials(experiment, seed, run, number)
         self._has_started = False
         self._generation = 0
@@ -231,7 +231,7 @@ class Island:
         """Let the survivors be the population, and end the epoch if it is over."""
         parents, rows = self._trials.conclude(self.population)
         last = BirthId(self._number, self.births - 1)
-        self.population = self._turnover.survivors(parents, self._brood, last)
+        self.population = self._survivor_selection.survivors(parents, self._brood, last)
         self._brood = []
         migrant_buffer = self._migrant_buffer
         if (
@@ -281,5 +281,7 @@ class Island:
             return [*commands, Finish(self._number, neighbours)]
         self._generation += 1
         self._window = self._experiment.window
-        self._brood_end = self._turnover.brood_end(self.births, len(self.population))
+        self._brood_end = self._survivor_selection.brood_end(
+            self.births, len(self.population)
+        )
         return commands

@@ -15,7 +15,7 @@ from schema.experiment.document import Culling, Experiment
 from schema.robot.names import BirthId
 
 
-class Turnover:
+class SurvivorSelection:
     """Broods come and survivors stay, on one island."""
 
     def __init__(self, experiment: Experiment, breeder: Breeder) -> None:
