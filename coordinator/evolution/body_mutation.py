@@ -121,9 +121,11 @@ def add_parts(
     expected = expected_parts(root, experiment)
     if expected <= 0.0:
         return
-    trials = ceil(2.0 * expected) if experiment.variation.add_parts == "loop" else 1
-    for _ in range(trials):
-        if draws.chance(expected / trials):
+    reevaluations = (
+        ceil(2.0 * expected) if experiment.variation.add_parts == "loop" else 1
+    )
+    for _ in range(reevaluations):
+        if draws.chance(expected / reevaluations):
             _add_part(draws, root, genes, experiment)
 
 

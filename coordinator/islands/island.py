@@ -29,7 +29,7 @@ from coordinator.islands.events import (
 )
 from coordinator.islands.island_migration import MigrantBuffer
 from coordinator.islands.migration import MigrationEpochs
-from coordinator.islands.reevaluation import Trials
+from coordinator.islands.reevaluation import Reevaluations
 from coordinator.islands.rows import birth_record, evaluation_record, population_records
 from coordinator.islands.survival import SurvivorSelection
 from schema.errors import UnexpectedEvent
@@ -79,7 +79,7 @@ class Island:
         self._space = body_space(experiment.space)
         self._breeder = Breeder(experiment, seed, run)
         self._survivor_selection = SurvivorSelection(experiment, self._breeder)
-        self._trials = Trials(experiment, seed, run, number)
+        self._reevaluations = Reevaluations(experiment, seed, run, number)
         self._has_started = False
         self._generation = 0
         self._begun = 0
@@ -99,7 +99,9 @@ class Island:
     @property
     def is_finished(self) -> bool:
         """All births of the experiment have been recorded."""
-        return self.births == self._experiment.births and not self._trials.is_open
+        return (
+            self.births == self._experiment.births and not self._reevaluations.is_open
+        )
 
     def handle(self, event: IslandEvent) -> list[IslandCommand]:
         """Take an event and return what follows from it.
@@ -128,7 +130,11 @@ class Island:
             case Vetted(report=report) if report.is_viable:
                 unborn.is_viable = True
                 candidate = unborn.candidate
-                return [self._trials.timed(Evaluate(candidate.birth, candidate.robot))]
+                return [
+                    self._reevaluations.timed(
+                        Evaluate(candidate.birth, candidate.robot)
+                    )
+                ]
             case Vetted() | VettingFailed():
                 why = event.report if isinstance(event, Vetted) else event
                 return [self._retry(unborn.candidate, why.reason)]
@@ -173,8 +179,8 @@ class Island:
         while (first := self._unborn.get(self.births)) and first.outcome:
             commands += self._commit(first.candidate, first.outcome)
         if self.births == self._brood_end and self._brood:
-            commands += self._trials.ask_anew(self.births, self.population)
-            if not self._trials.is_open:
+            commands += self._reevaluations.ask_anew(self.births, self.population)
+            if not self._reevaluations.is_open:
                 commands += self._close_brood()
         while self._begun < min(self._brood_end, self.births + self._window):
             birth = BirthId(self._number, self._begun)
@@ -229,7 +235,7 @@ class Island:
 
     def _close_brood(self) -> list[IslandCommand]:
         """Let the survivors be the population, and end the epoch if it is over."""
-        parents, rows = self._trials.conclude(self.population)
+        parents, rows = self._reevaluations.conclude(self.population)
         last = BirthId(self._number, self.births - 1)
         self.population = self._survivor_selection.survivors(parents, self._brood, last)
         self._brood = []
@@ -249,7 +255,7 @@ class Island:
         For neighbours and immigrants nobody waits at the end.
         """
         if isinstance(event, Evaluated | EvaluationFailed) and event.asker is None:
-            self._trials.take(event)
+            self._reevaluations.take(event)
             return
         if self._migrant_buffer is None:
             raise self._unexpected(event, "it has no neighbours")
@@ -262,7 +268,7 @@ class Island:
             return []
         commands, population = self._migrant_buffer.land(self.population, self.births)
         timed = [
-            self._trials.timed(each) if isinstance(each, Evaluate) else each
+            self._reevaluations.timed(each) if isinstance(each, Evaluate) else each
             for each in commands
         ]
         if population is None:

@@ -37,7 +37,7 @@ class _Past:
     fitness: list[float | None] = field(default_factory=list)
 
 
-class Trials:
+class Reevaluations:
     """Asks for the evaluations of one island's robots, the first and all others."""
 
     def __init__(
@@ -105,13 +105,13 @@ class Trials:
             UnexpectedEvent: nobody asked, or the fitness is no number.
         """
         birth, past = outcome.birth, self._past.get(outcome.birth)
-        trials = len(past.fitness) if past else 0
-        if outcome.trial < trials:
+        reevaluations = len(past.fitness) if past else 0
+        if outcome.trial < reevaluations:
             return
-        if birth not in self._asked or outcome.trial > trials:
+        if birth not in self._asked or outcome.trial > reevaluations:
             raise UnexpectedEvent(
                 f"island {self._number}: {sorted(self._asked)} are judged anew, of "
-                f"{birth} {trials} trials have been, got {outcome}"
+                f"{birth} {reevaluations} trials have been, got {outcome}"
             )
         if isinstance(outcome, Evaluated) and not isfinite(outcome.evaluation.fitness):
             raise UnexpectedEvent(f"fitness must be finite, got {outcome}")
@@ -136,11 +136,11 @@ class Trials:
 
     def _judged(self, individual: Individual) -> Individual:
         """Return an individual with the fitness that all of its trials come to."""
-        trials = self._past[individual.birth].fitness
+        reevaluations = self._past[individual.birth].fitness
         if self._rules is None or self._rules.fitness == "replace":
-            trials = trials[-1:]
-        value = fsum(each or 0.0 for each in trials) / len(trials)
-        has_failed = all(each is None for each in trials)
+            reevaluations = reevaluations[-1:]
+        value = fsum(each or 0.0 for each in reevaluations) / len(reevaluations)
+        has_failed = all(each is None for each in reevaluations)
         return replace(individual, fitness=value, has_failed=has_failed)
 
     def _judged_at(self, individual: Individual) -> tuple[int, BirthId]:

@@ -97,8 +97,8 @@ def test_noise_is_the_same_whoever_draws_it(stage: Stage) -> None:
     agrees = read_table(two, "audits")["agrees"].to_pylist()
     assert agrees
     assert all(agrees)
-    trials = read_table(one, "evaluations").to_pylist()
-    again = {row["birth"] for row in trials if row["trial"]}
+    reevaluations = read_table(one, "evaluations").to_pylist()
+    again = {row["birth"] for row in reevaluations if row["trial"]}
     assert again
     robots = ("--robot", "best", "--robot", f"0:{min(again)}")
     out = stage.run("view", "one", *robots, "--save", "a.rrd")

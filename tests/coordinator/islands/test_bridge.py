@@ -96,13 +96,17 @@ def test_the_tables_of_a_life_are_complete() -> None:
     commands = live(BRIDGE)
     assert commands[-1] == Finish(0)
     assert [row["birth"] for row in rows(commands, "births")] == list(range(40))
-    trials = [(row["birth"], row["trial"]) for row in rows(commands, "evaluations")]
-    firsts = [birth for birth, trial in trials if trial == 0]
+    reevaluations = [
+        (row["birth"], row["trial"]) for row in rows(commands, "evaluations")
+    ]
+    firsts = [birth for birth, trial in reevaluations if trial == 0]
     assert firsts == list(range(40))
-    counts = Counter(birth for birth, _ in trials)
+    counts = Counter(birth for birth, _ in reevaluations)
     assert max(counts.values()) > 2
     for birth, count in counts.items():
-        assert [trial for one, trial in trials if one == birth] == list(range(count))
+        assert [trial for one, trial in reevaluations if one == birth] == list(
+            range(count)
+        )
 
 
 def test_everybody_lives_as_long_as_was_asked_and_no_two_alike() -> None:

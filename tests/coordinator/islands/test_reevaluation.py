@@ -7,7 +7,7 @@ import pytest
 
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Evaluate, Evaluated, EvaluationFailed
-from coordinator.islands.reevaluation import Trials
+from coordinator.islands.reevaluation import Reevaluations
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import (
     Experiment,
@@ -25,19 +25,19 @@ SPACE = body_space(Experiment(name="test").space)
 ROBOT = develop(CORE, SPACE)
 
 
-def trials(
+def reevaluations(
     simulation: Simulation | None = None,
     seed: int = 1,
     run: int = 0,
     **rules: Any,  # noqa: ANN401 - any setting
-) -> Trials:
+) -> Reevaluations:
     """Return an island's trials that comes round every 5 births after 4 founders."""
     wanted: dict[str, Any] = {"interval": 5, "share": 0.5, **rules}
     selection = Selection(population=4, reevaluation=Reevaluation(**wanted))
     experiment = Experiment(
         name="test", selection=selection, simulation=simulation or Simulation()
     )
-    return Trials(experiment, seed, run, 0)
+    return Reevaluations(experiment, seed, run, 0)
 
 
 def one(number: int, fitness: float = 0.5, island: int = 0) -> Individual:
@@ -53,7 +53,9 @@ def names(asked: list[Evaluate]) -> list[tuple[int, int]]:
     return [(command.birth.number, command.trial) for command in asked]
 
 
-def repeat(found: Trials, births: int, numbers: list[int]) -> list[tuple[int, int]]:
+def repeat(
+    found: Reevaluations, births: int, numbers: list[int]
+) -> list[tuple[int, int]]:
     """Judge anew whom it is time for; return who that was."""
     population = tuple(one(number) for number in numbers)
     asked = found.ask_anew(births, population)
@@ -65,12 +67,12 @@ def repeat(found: Trials, births: int, numbers: list[int]) -> list[tuple[int, in
 
 def test_without_a_range_no_request_says_how_long() -> None:
     command = Evaluate(BirthId(0, 3), ROBOT)
-    assert trials().timed(command) is command
+    assert reevaluations().timed(command) is command
 
 
 def test_durations_are_uniform_in_their_range_and_hit_both_ends() -> None:
     # 0.01 s is two steps of 0.005 s: 12.00, 12.005 and 12.01 s are three durations.
-    found = trials(Simulation(evaluation_s=(12.0, 12.01)))
+    found = reevaluations(Simulation(evaluation_s=(12.0, 12.01)))
     steps = [found.timed(Evaluate(BirthId(0, n), ROBOT)).steps for n in range(3000)]
     values, counts = np.unique(steps, return_counts=True)
     assert values.tolist() == [2400, 2401, 2402]
@@ -82,7 +84,7 @@ def test_a_duration_is_a_matter_of_seed_run_birth_and_trial_only() -> None:
 
     def steps(birth: int, trial: int, **whose: int) -> int:
         command = Evaluate(BirthId(0, birth), ROBOT, trial)
-        return trials(clock, **whose).timed(command).steps
+        return reevaluations(clock, **whose).timed(command).steps
 
     assert steps(3, 1) == steps(3, 1)
     others = [steps(3, 0), steps(4, 1), steps(3, 1, seed=2), steps(3, 1, run=1)]
@@ -90,24 +92,24 @@ def test_a_duration_is_a_matter_of_seed_run_birth_and_trial_only() -> None:
 
 
 def test_both_ends_may_be_the_same() -> None:
-    found = trials(Simulation(evaluation_s=(20.0, 20.0)))
+    found = reevaluations(Simulation(evaluation_s=(20.0, 20.0)))
     assert found.timed(Evaluate(BirthId(0, 0), ROBOT)).steps == 4000
 
 
 def test_every_five_births_after_the_founders_it_is_time() -> None:
-    found = trials(share=0.01)
+    found = reevaluations(share=0.01)
     when = [births for births in range(4, 26) if repeat(found, births, [0, 1, 2])]
     assert when == [9, 14, 19, 24]
 
 
 def test_a_brood_that_passes_several_times_asks_once() -> None:
-    found = trials(share=0.01)
+    found = reevaluations(share=0.01)
     when = [births for births in range(4, 60, 13) if repeat(found, births, [0, 1])]
     assert when == [17, 30, 43, 56]
 
 
 def test_who_was_judged_longest_ago_comes_first() -> None:
-    found = trials()
+    found = reevaluations()
     everybody = [0, 1, 2, 3]
     assert repeat(found, 9, everybody) == [(0, 1), (1, 1)]
     # 0 and 1 were judged when 9 had been born, 2 and 3 at their birth.
@@ -119,14 +121,14 @@ def test_who_was_judged_longest_ago_comes_first() -> None:
 
 def test_a_share_is_rounded_and_somebody_always_is_judged() -> None:
     counts = [
-        len(repeat(trials(share=share), 9, list(range(10))))
+        len(repeat(reevaluations(share=share), 9, list(range(10))))
         for share in (0.01, 0.24, 0.26, 1.0)
     ]
     assert counts == [1, 2, 3, 10]
 
 
 def test_immigrants_are_left_alone() -> None:
-    found = trials(share=1.0)
+    found = reevaluations(share=1.0)
     asked = found.ask_anew(9, (one(3), one(1, island=1)))
     assert names(asked) == [(3, 1)]
 
@@ -137,7 +139,7 @@ def test_immigrants_are_left_alone() -> None:
 def test_the_new_fitness_replaces_the_old_or_joins_the_mean(
     rule: str, values: list[float]
 ) -> None:
-    found = trials(fitness=rule)
+    found = reevaluations(fitness=rule)
     population: tuple[Individual, ...] = (one(0, 0.5), one(5, 0.7))
     for births, trial, fitness, value in zip(
         (9, 19), (1, 2), (0.2, 0.9), values, strict=True
@@ -160,7 +162,7 @@ def test_the_new_fitness_replaces_the_old_or_joins_the_mean(
 def test_a_failed_trial_counts_as_nothing(
     rule: str, value: float, *, has_failed: bool
 ) -> None:
-    found = trials(fitness=rule)
+    found = reevaluations(fitness=rule)
     population = (one(0, 0.5), one(5, 0.7))
     found.ask_anew(9, population)
     found.take(EvaluationFailed(BirthId(0, 0), "diverged", Provenance(), 1))
@@ -172,7 +174,7 @@ def test_a_failed_trial_counts_as_nothing(
 
 
 def test_who_failed_at_birth_may_yet_succeed() -> None:
-    found = trials(fitness="mean")
+    found = reevaluations(fitness="mean")
     population = (failed(one(0, 0.0)),)
     found.ask_anew(9, population)
     found.take(judged(0, 1, 0.6))
@@ -185,7 +187,7 @@ def failed(individual: Individual) -> Individual:
 
 
 def test_answers_count_once_and_come_only_to_what_was_asked() -> None:
-    found = trials(share=1.0)
+    found = reevaluations(share=1.0)
     population = (one(0), one(1))
     found.ask_anew(9, population)
     assert found.ask_anew(9, population) == []
@@ -205,7 +207,7 @@ def test_answers_count_once_and_come_only_to_what_was_asked() -> None:
 
 
 def test_rows_come_in_birth_order_whatever_the_answers_order() -> None:
-    found = trials(share=1.0)
+    found = reevaluations(share=1.0)
     population = tuple(one(number) for number in range(4))
     found.ask_anew(9, population)
     for number in (2, 0, 3, 1):
