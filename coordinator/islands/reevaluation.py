@@ -15,7 +15,7 @@ from coordinator.evolution.seeding import Purpose, stream
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Evaluate, Evaluated, EvaluationFailed, Record
 from coordinator.islands.rows import evaluation_record
-from coordinator.islands.survival import Rhythm
+from coordinator.islands.survival import EveryNBirths
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, body_space, steps_of
 from schema.robot.genome import develop
@@ -56,7 +56,7 @@ class Reevaluations:
         self._seed, self._run, self._number = seed, run, number
         self._rules = experiment.selection.reevaluation
         interval = self._rules.interval if self._rules else experiment.births
-        self._rhythm = Rhythm(interval, experiment.selection.population)
+        self._every = EveryNBirths(interval, experiment.selection.population)
         self._past: dict[BirthId, _Past] = {}
         self._asked: dict[BirthId, Outcome | None] = {}
 
@@ -84,7 +84,7 @@ class Reevaluations:
             population: those who were judged before the brood that has just been.
                 Immigrants among them stay with the judgement that they came with.
         """
-        if not (self._rules and self._rhythm.comes_round(births)):
+        if not (self._rules and self._every.is_due_at(births)):
             return []
         born_here = [one for one in population if one.birth.island == self._number]
         count = max(1, round(self._rules.share * len(born_here)))

@@ -30,7 +30,7 @@ class SurvivorSelection:
         self._rules = selection.culling
         self._breeder = breeder
         interval = self._rules.interval if self._rules else experiment.births
-        self._rhythm = Rhythm(interval, selection.population)
+        self._every = EveryNBirths(interval, selection.population)
 
     def brood_end(self, births: int, living: int) -> int:
         """Return how many will have been born after the next brood.
@@ -60,7 +60,7 @@ class SurvivorSelection:
     def _fit_enough(
         self, living: list[Individual], rules: Culling, births: int
     ) -> list[Individual]:
-        is_due = self._rhythm.comes_round(births)
+        is_due = self._every.is_due_at(births)
         if not is_due and len(living) < rules.population_limit:
             return living
         _, doomed = select_doomed(living, rules)
@@ -68,7 +68,7 @@ class SurvivorSelection:
         return [one for one in living if one.birth not in gone]
 
 
-class Rhythm:
+class EveryNBirths:
     """Comes round once in every interval of births, however they are counted on."""
 
     def __init__(self, interval: int, start: int) -> None:
@@ -76,7 +76,7 @@ class Rhythm:
         self._interval = interval
         self._next = start + interval
 
-    def comes_round(self, births: int) -> bool:
+    def is_due_at(self, births: int) -> bool:
         """Return whether the time has come; once for all that has passed by then."""
         if births < self._next:
             return False
