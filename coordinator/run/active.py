@@ -16,7 +16,7 @@ from coordinator.run.feed import Feed, Overheard
 from coordinator.run.loop import Loop
 from coordinator.run.pacing import Pace
 from coordinator.run.questions import Question
-from coordinator.run.rate import Tempo
+from coordinator.run.rate import RateMeter
 from coordinator.storage.folder import DETAILS, STATE, RunFolder
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.journal import Journal, is_begun
@@ -98,7 +98,7 @@ class ActiveRun:
                 caution=caution,
                 confirm=held.confirm,
             )
-            self._births, self._simulated = Tempo(), Tempo()
+            self._births, self._simulated = RateMeter(), RateMeter()
             self._owns = {
                 number: island_experiment(self.experiment, number)
                 for number in self.loop.islands

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from coordinator.dispatch.fleet import Asker, Fleet, Owner
 from coordinator.run.active import ActiveRun
-from coordinator.run.rate import Tempo
+from coordinator.run.rate import RateMeter
 from coordinator.storage.folder import RunDetails, RunFolder
 from schema.errors import RevolveError
 from schema.wire.status import RunStatus, Status
@@ -80,7 +80,7 @@ class Conductor:
         )
         self._places: dict[ActiveRun, int] = {}
         self._run_of: dict[Asker | Owner, ActiveRun] = {}
-        self._tempo = Tempo()
+        self._rate = RateMeter()
         self._is_stopped = False
 
     @property
@@ -196,12 +196,12 @@ class Conductor:
             new = run.status(now_s)
             born += new.births - runs[place].births
             runs[place] = new
-        self._tempo.note(now_s, born)
+        self._rate.note(now_s, born)
         return Status(
             runs=tuple(runs),
             workers=self.fleet.dispatch.agents("worker"),
             analyzers=self.fleet.dispatch.agents("analyzer"),
-            births_per_s=self._tempo.per_s,
+            births_per_s=self._rate.per_s,
         )
 
 

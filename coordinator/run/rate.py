@@ -6,7 +6,7 @@ SPAN_S = 10.0
 """Over how long a rate is taken [s]."""
 
 
-class Tempo:
+class RateMeter:
     """The rate of a count that somebody looks at now and then."""
 
     def __init__(self) -> None:

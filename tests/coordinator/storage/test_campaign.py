@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from coordinator.cli.wording import about_arenas, best_of, duration
-from coordinator.run.rate import Tempo
+from coordinator.run.rate import RateMeter
 from coordinator.storage.campaign import (
     Campaign,
     CampaignFolder,
@@ -130,15 +130,15 @@ def test_another_run_is_refused(tmp_path: Path, other: RunDetails) -> None:
 
 
 def test_a_rate_is_that_of_the_last_seconds() -> None:
-    tempo = Tempo()
-    assert tempo.per_s == 0.0
-    tempo.note(0.0, 1000)
-    assert tempo.per_s == 0.0
+    meter = RateMeter()
+    assert meter.per_s == 0.0
+    meter.note(0.0, 1000)
+    assert meter.per_s == 0.0
     for second in range(1, 31):
-        tempo.note(
+        meter.note(
             float(second), 1000 + (50 if second <= 20 else 50 + 3 * (second - 20))
         )
-    assert tempo.per_s == pytest.approx(3.0)
+    assert meter.per_s == pytest.approx(3.0)
 
 
 @pytest.mark.parametrize(
