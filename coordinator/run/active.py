@@ -14,9 +14,9 @@ from coordinator.run.archipelago import archipelago
 from coordinator.run.audits import CARELESS, Caution
 from coordinator.run.feed import Feed, Overheard
 from coordinator.run.loop import Loop
-from coordinator.run.pacing import Pace
 from coordinator.run.questions import Question
 from coordinator.run.rate import RateMeter
+from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.folder import DETAILS, STATE, RunFolder
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.journal import Journal, is_begun
@@ -94,7 +94,7 @@ class ActiveRun:
                 log=self._journal,
                 rows=rows,
                 vault=Snapshots(held.path),
-                pace=_pace(self.experiment, speed),
+                throttle=_throttle(self.experiment, speed),
                 caution=caution,
                 confirm=held.confirm,
             )
@@ -188,9 +188,13 @@ def _check_journal(folder: Path) -> None:
         )
 
 
-def _pace(experiment: Experiment, speed: float | None) -> Pace | None:
+def _throttle(experiment: Experiment, speed: float | None) -> RealTimeThrottle | None:
     """Return what holds arenas back, None if nothing shall."""
-    return None if speed is None else Pace(speed, experiment.simulation.timestep_s)
+    return (
+        None
+        if speed is None
+        else RealTimeThrottle(speed, experiment.simulation.timestep_s)
+    )
 
 
 def _island_status(island: Island | Arena, own: Experiment) -> IslandStatus:

@@ -103,12 +103,12 @@ class Conductor:
         while self._planned and self._has_room():
             self._begin(*self._planned.popleft())
         now_s = clock()
-        paced = [run for run in self.active if run.loop.is_paced]
-        for run in paced:
+        throttled = [run for run in self.active if run.loop.is_throttled]
+        for run in throttled:
             timeout_s = min(timeout_s, max(0.0, run.loop.wake_s - now_s))
         news = [
             *self.fleet.listen(timeout_s, now_s),
-            *(r.loop.askers[0] for r in paced),
+            *(r.loop.askers[0] for r in throttled),
         ]
         acting = {self._run_of[each]: None for each in news if each in self._run_of}
         now_s = clock()

@@ -41,8 +41,8 @@ from coordinator.islands.events import (
 from coordinator.islands.island import Island
 from coordinator.run.advances import Advances, Terms, Vault
 from coordinator.run.audits import CARELESS, Caution, audit_records, describe
-from coordinator.run.pacing import Pace
 from coordinator.run.questions import Question, Questions, is_quarantined
+from coordinator.run.throttle import RealTimeThrottle
 from schema.errors import RunPaused, UnexpectedEvent
 from schema.robot.names import BirthId
 
@@ -95,7 +95,7 @@ class Loop:
         log: Log,
         rows: Rows,
         vault: Vault,
-        pace: Pace | None = None,
+        throttle: RealTimeThrottle | None = None,
         caution: Caution = CARELESS,
         confirm: Callable[[], None] = lambda: None,
     ) -> None:
@@ -115,7 +115,7 @@ class Loop:
         self._fleet = fleet
         self._log = log
         self._rows = rows
-        self._pace = pace
+        self._throttle = throttle
         self._held_back: dict[int, float] = {}
         self._now_s = 0.0
 
@@ -125,9 +125,9 @@ class Loop:
         return all(island.is_finished for island in self.islands.values())
 
     @property
-    def is_paced(self) -> bool:
+    def is_throttled(self) -> bool:
         """Arenas may be held back."""
-        return self._pace is not None
+        return self._throttle is not None
 
     @property
     def askers(self) -> tuple[Asker, Owner]:
@@ -259,9 +259,9 @@ class Loop:
         """Ask for an advance, now or when it is due."""
         shard = command.island
         self.advances.note(command)
-        if self._pace is not None:
+        if self._throttle is not None:
             step = self.advances.step(shard)
-            due_s = self._pace.due_s(shard, step, self._now_s)
+            due_s = self._throttle.due_s(shard, step, self._now_s)
             if due_s > self._now_s:
                 self._held_back[shard] = due_s
                 return

@@ -20,8 +20,8 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.run.loop import Loop
 from coordinator.run.operators import Desk
-from coordinator.run.pacing import Pace
 from coordinator.run.questions import Question
+from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.journal import NAME, Journal
@@ -253,7 +253,7 @@ def test_lost_snapshots_are_done_without(tmp_path: Path, calm: Path) -> None:
 
 def test_pace_changes_nothing(tmp_path: Path, calm: Path) -> None:
     path = tmp_path / "run"
-    assert run(path, pace=Pace(2.0, EXPERIMENT.simulation.timestep_s))
+    assert run(path, throttle=RealTimeThrottle(2.0, EXPERIMENT.simulation.timestep_s))
     assert compare(calm, path) == []
 
 

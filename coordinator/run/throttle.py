@@ -4,7 +4,7 @@ Nothing that happens depends on it: it only says when an arena may go on.
 """
 
 
-class Pace:
+class RealTimeThrottle:
     """How fast arenas may go at most."""
 
     def __init__(self, speed: float, timestep_s: float) -> None:
