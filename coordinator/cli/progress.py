@@ -14,8 +14,8 @@ from rich.progress import (
 )
 
 from coordinator.cli.wording import about_arenas, best_of, duration
-from coordinator.run.conductor import Conductor
 from coordinator.run.rate import SPAN_S
+from coordinator.run.scheduler import RunScheduler
 from schema.wire.status import IslandStatus, RunStatus, Status
 
 MOST_BARS = 16
@@ -25,9 +25,9 @@ MOST_BARS = 16
 class Display:
     """Progress bars; a line every so often where there is no terminal."""
 
-    def __init__(self, conductor: Conductor, *, quiet: bool) -> None:
+    def __init__(self, scheduler: RunScheduler, *, quiet: bool) -> None:
         """Show all runs that somebody conducts."""
-        self._conductor = conductor
+        self._scheduler = scheduler
         self._console = Console(stderr=True)
         self._quiet = quiet
         self._progress = Progress(
@@ -65,7 +65,7 @@ class Display:
         """
         if self._quiet:
             return
-        status = self._conductor.status(now_s)
+        status = self._scheduler.status(now_s)
         if self._console.is_terminal:
             self._draw(status)
         elif now_s >= self._next_line_s:
@@ -118,7 +118,7 @@ class Display:
             self._console.print(f"waiting: no {' and no '.join(missing)} has joined")
         waiting = {
             f"arena {shard} of {run.held.path.name}": platform
-            for run in self._conductor.active
+            for run in self._scheduler.active
             for shard, platform in run.loop.advances.waiting.items()
         }
         if "worker" not in missing and waiting != self._said_waiting:

@@ -19,8 +19,8 @@ from coordinator.network.service import Network
 from coordinator.run.active import ActiveRun
 from coordinator.run.audience import Audience, open_viewer
 from coordinator.run.audits import CARELESS, Caution
-from coordinator.run.conductor import Conductor, Planned
 from coordinator.run.operators import Reception
+from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.storage.campaign import (
     Campaign,
     CampaignFolder,
@@ -174,7 +174,7 @@ def _alone(folder: Path, held: RunFolder, deployment: Deployment) -> int:
         status = unbegun_status(folder, held.details)
         said: list[Conclusion] = []
         try:
-            conductor = _conduct(
+            scheduler = _conduct(
                 folder,
                 [Planned(held.details, status, lambda: held)],
                 deployment,
@@ -184,9 +184,9 @@ def _alone(folder: Path, held: RunFolder, deployment: Deployment) -> int:
         except NetworkError:
             held.forget()
             raise
-    for _, error in conductor.failed:
+    for _, error in scheduler.failed:
         raise error
-    if not conductor.is_finished:
+    if not scheduler.is_finished:
         tell_user(stopped(folder))
         return 130
     print(said[0].text)
@@ -255,13 +255,13 @@ def _together(
         if not conclusion.is_judged:
             barren.append(run.held.path)
 
-    conductor = _conduct(folder, planned, deployment, conclude_run, _report)
-    if not conductor.is_finished:
+    scheduler = _conduct(folder, planned, deployment, conclude_run, _report)
+    if not scheduler.is_finished:
         tell_user(stopped(folder))
         return 130
-    if conductor.failed:
+    if scheduler.failed:
         tell_user(
-            f"{len(conductor.failed)} of {len(planned)} runs failed; when that is "
+            f"{len(scheduler.failed)} of {len(planned)} runs failed; when that is "
             f"mended: {command('resume', folder)}"
         )
         return 1
@@ -281,7 +281,7 @@ def _conduct(
     deployment: Deployment,
     conclude_run: Callable[[ActiveRun], object],
     report: Callable[[RunDetails, RevolveError], None],
-) -> Conductor:
+) -> RunScheduler:
     """Do runs until all are done or somebody says stop.
 
     Args:
@@ -294,12 +294,12 @@ def _conduct(
     stop = stop_on_signals()
     with ExitStack() as stack:
         agents, crews = stack.enter_context(_agents(place, deployment))
-        conductor = Conductor(
+        scheduler = RunScheduler(
             planned,
             Fleet(agents, allows_drift=deployment.allows_drift),
             open_run=lambda held, is_watched: ActiveRun(
                 held,
-                conductor.fleet,
+                scheduler.fleet,
                 fsync=deployment.fsync,
                 speed=deployment.speed,
                 is_watched=is_watched and isinstance(agents, Network),
@@ -309,12 +309,12 @@ def _conduct(
             conclude=conclude_run,
             report=report,
         )
-        stack.callback(conductor.close)
-        serve = _servant(conductor, agents)
-        with Display(conductor, quiet=deployment.quiet) as display:
+        stack.callback(scheduler.close)
+        serve = _servant(scheduler, agents)
+        with Display(scheduler, quiet=deployment.quiet) as display:
             shown_s = done_s = -math.inf
-            while not (conductor.is_finished or stop.is_set()):
-                conductor.turn(_LOOK_S, time.monotonic)
+            while not (scheduler.is_finished or stop.is_set()):
+                scheduler.turn(_LOOK_S, time.monotonic)
                 serve()
                 now_s = time.monotonic()
                 if now_s - shown_s >= _LOOK_S:
@@ -322,11 +322,11 @@ def _conduct(
                     display.update(now_s)
                 if now_s - done_s >= _CHORES_S:
                     done_s = now_s
-                    conductor.do_chores(now_s)
+                    scheduler.do_chores(now_s)
                     for look_after in crews:
                         look_after()
-        conductor.stop()
-    return conductor
+        scheduler.stop()
+    return scheduler
 
 
 def _report(details: RunDetails, error: RevolveError) -> None:
@@ -340,23 +340,23 @@ def _most_at_once() -> int:
     return max(1, (hard - _OTHER_FILES) // _FILES_OF_A_RUN)
 
 
-def _servant(conductor: Conductor, agents: Agents) -> Callable[[], None]:
+def _servant(scheduler: RunScheduler, agents: Agents) -> Callable[[], None]:
     """Return what serves operators and viewers; a run without a network has none."""
     if not isinstance(agents, Network):
         return lambda: None
-    reception = Reception(conductor)
+    reception = Reception(scheduler)
     audience: list[tuple[ActiveRun, Audience]] = []
 
     def serve() -> None:
         now_s = time.monotonic()
         for order in agents.orders():
             order.reply(reception.answer(order.data, now_s))
-        run = conductor.watched
+        run = scheduler.watched
         if audience and audience[0][0] is not run:
             audience.pop()[1].close()
         if run is not None and run.feed is not None:
             if not audience:
-                shown = Audience(run.feed, run.loop, conductor.fleet, agents)
+                shown = Audience(run.feed, run.loop, scheduler.fleet, agents)
                 audience.append((run, shown))
             audience[0][1].serve(now_s)
 

@@ -16,8 +16,8 @@ from coordinator.islands.events import (
     Resume,
 )
 from coordinator.run.active import ActiveRun
-from coordinator.run.conductor import Conductor
 from coordinator.run.loop import Loop
+from coordinator.run.scheduler import RunScheduler
 from schema.errors import MalformedMessage, RevolveError
 from schema.experiment.document import Experiment, body_space, island_experiment
 from schema.robot.heredity import genome_of
@@ -150,9 +150,9 @@ def _check_lives(birth: BirthId, arena: Arena) -> None:
 class Reception:
     """Tells how far all runs are; leads operators to the desk of theirs."""
 
-    def __init__(self, conductor: Conductor) -> None:
+    def __init__(self, scheduler: RunScheduler) -> None:
         """Receive for all runs of a process."""
-        self._conductor = conductor
+        self._scheduler = scheduler
 
     def answer(self, data: bytes, now_s: float) -> bytes:
         """Return the encoded reply to an encoded request.
@@ -164,14 +164,14 @@ class Reception:
         try:
             request = decode_operator_request(data)
             if isinstance(request.wish, StatusWish):
-                status = self._conductor.status(now_s)
+                status = self._scheduler.status(now_s)
                 return encode_operator_reply(OperatorReply("", status=status))
             run = self._run(request.run)
         except (MalformedMessage, Refused) as error:
             return encode_operator_reply(OperatorReply(str(error), is_refused=True))
         replies: list[bytes] = []
         desk = Desk(run.loop, run.experiment)
-        self._conductor.guard(run, lambda: replies.append(desk.answer(data)))
+        self._scheduler.guard(run, lambda: replies.append(desk.answer(data)))
         if replies:
             return replies[0]
         failed = OperatorReply("the run cannot go on", is_refused=True)
@@ -185,7 +185,7 @@ class Reception:
         """
         runs = [
             run
-            for run in self._conductor.active
+            for run in self._scheduler.active
             if run.held.path.name.endswith(name)
             and any(isinstance(each, Arena) for each in run.loop.islands.values())
         ]

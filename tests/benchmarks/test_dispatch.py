@@ -31,7 +31,7 @@ from coordinator.dispatch.events import DispatchEvent, Returned
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network
 from coordinator.run.active import ActiveRun
-from coordinator.run.conductor import Conductor, Planned
+from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.storage.campaign import Campaign
 from coordinator.storage.folder import RunFolder
 from coordinator.storage.folder_status import unbegun_status
@@ -70,7 +70,7 @@ class Watched:
 
 
 @contextmanager
-def campaign(folder: Path) -> Iterator[tuple[Conductor, Watched]]:
+def campaign(folder: Path) -> Iterator[tuple[RunScheduler, Watched]]:
     """Give a campaign that is about to begin, and its agents."""
     experiment = replace(read_experiment("scenario2"), births=BIRTHS)
     planned = [
@@ -89,7 +89,7 @@ def campaign(folder: Path) -> Iterator[tuple[Conductor, Watched]]:
         stack.enter_context(Crew(worker.serve.service.process, (hand,), size=2))
         watched = Watched(network)
         fleet = Fleet(watched)
-        conductor = Conductor(
+        scheduler = RunScheduler(
             planned,
             fleet,
             open_run=lambda held, _watched: ActiveRun(held, fleet),
@@ -97,16 +97,16 @@ def campaign(folder: Path) -> Iterator[tuple[Conductor, Watched]]:
             conclude=lambda _run: None,
             report=lambda _details, error: pytest.fail(str(error)),
         )
-        stack.callback(conductor.close)
-        yield conductor, watched
+        stack.callback(scheduler.close)
+        yield scheduler, watched
 
 
 def test_two_workers_of_a_campaign_are_busy(tmp_path: Path) -> None:
     marks: list[tuple[float, float, float]] = []
-    with campaign(tmp_path) as (conductor, watched):
+    with campaign(tmp_path) as (scheduler, watched):
         while len(marks) < 2:
-            conductor.turn(0.2, time.monotonic)
-            born = conductor.status(time.monotonic()).births
+            scheduler.turn(0.2, time.monotonic)
+            born = scheduler.status(time.monotonic()).births
             if born >= (0.1, 0.9)[len(marks)] * RUNS * BIRTHS:
                 now_s = time.monotonic()
                 marks.append((now_s, watched.busy_s, time.process_time()))

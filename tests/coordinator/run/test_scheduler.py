@@ -14,7 +14,7 @@ from coordinator.dispatch.events import DispatchEvent, Joined
 from coordinator.dispatch.fleet import Agents, Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.run.active import ActiveRun
-from coordinator.run.conductor import SLACK, Conductor, Planned
+from coordinator.run.scheduler import SLACK, Planned, RunScheduler
 from coordinator.storage.campaign import Campaign
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import LOCK, RunDetails, RunFolder, read_state
@@ -49,13 +49,13 @@ def plan(folder: Path) -> list[Planned]:
     return planned
 
 
-def conductor_of(
+def scheduler_of(
     planned: list[Planned],
     agents: Agents,
     report: Callable[[RunDetails, RevolveError], None] = lambda *_: None,
-) -> Conductor:
+) -> RunScheduler:
     fleet = Fleet(agents)
-    return Conductor(
+    return RunScheduler(
         planned,
         fleet,
         open_run=lambda held, _watched: ActiveRun(held, fleet),
@@ -65,11 +65,11 @@ def conductor_of(
     )
 
 
-def conduct(conductor: Conductor, turns: int = 10**6) -> None:
+def conduct(scheduler: RunScheduler, turns: int = 10**6) -> None:
     for _ in range(turns):
-        if conductor.is_finished:
+        if scheduler.is_finished:
             return
-        conductor.turn(0.0, CLOCK)
+        scheduler.turn(0.0, CLOCK)
 
 
 @pytest.fixture(scope="module")
@@ -77,14 +77,14 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with the same runs, made one after the other."""
     folder = tmp_path_factory.mktemp("alone")
     for planned in plan(folder):
-        conduct(conductor_of([planned], local()))
+        conduct(scheduler_of([planned], local()))
     return folder
 
 
 def test_each_run_is_as_if_it_were_alone(tmp_path: Path, alone: Path) -> None:
-    conductor = conductor_of(plan(tmp_path), local())
-    conduct(conductor)
-    status = conductor.status(0.0)
+    scheduler = scheduler_of(plan(tmp_path), local())
+    conduct(scheduler)
+    status = scheduler.status(0.0)
     assert {run.state for run in status.runs} == {"finished"}
     assert (status.births, status.wanted) == (4 * BIRTHS, 4 * BIRTHS)
     for path, _ in CAMPAIGN.runs(alone):
@@ -97,41 +97,41 @@ def test_stopped_runs_go_on_and_finished_ones_are_not_begun(
     tmp_path: Path, alone: Path
 ) -> None:
     for turns in (30, 60, 60):
-        conductor = conductor_of(plan(tmp_path), local())
-        conduct(conductor, turns)
-        conductor.stop()
-        assert not conductor.is_finished
-        assert conductor.active == []
+        scheduler = scheduler_of(plan(tmp_path), local())
+        conduct(scheduler, turns)
+        scheduler.stop()
+        assert not scheduler.is_finished
+        assert scheduler.active == []
     states = {path: read_state(path) for path, _ in CAMPAIGN.runs(tmp_path)}
     assert "stopped" in states.values()
-    conduct(conductor_of(plan(tmp_path), local()))
+    conduct(scheduler_of(plan(tmp_path), local()))
     for path, _ in CAMPAIGN.runs(alone):
         assert compare(path, tmp_path / path.name) == []
     finished = [replaced(each) for each in plan(tmp_path)]
-    assert conductor_of(finished, local()).is_finished
+    assert scheduler_of(finished, local()).is_finished
 
 
 def test_the_pace_is_known_though_nobody_looked_before(tmp_path: Path) -> None:
-    conductor = conductor_of(plan(tmp_path), local())
-    conductor.do_chores(0.0)
-    conduct(conductor, 100)
-    status = conductor.status(2.0)
+    scheduler = scheduler_of(plan(tmp_path), local())
+    scheduler.do_chores(0.0)
+    conduct(scheduler, 100)
+    status = scheduler.status(2.0)
     assert status.births_per_s == status.births / 2.0 > 0.0
 
 
 def test_whatever_fails_in_a_run_that_another_took_over_is_that(tmp_path: Path) -> None:
     """It slept just after it had found the run its own."""
-    conductor = conductor_of(plan(tmp_path)[:1], local())
-    conduct(conductor, 30)
-    (run,) = conductor.active
+    scheduler = scheduler_of(plan(tmp_path)[:1], local())
+    conduct(scheduler, 30)
+    (run,) = scheduler.active
     (run.held.path / LOCK).unlink()
-    conduct(conductor_of(plan(tmp_path)[:1], local()))
+    conduct(scheduler_of(plan(tmp_path)[:1], local()))
     with pytest.raises(RunFolderError):
         run.do_chores()
-    conductor.guard(run, broken)
-    ((_, error),) = conductor.failed
+    scheduler.guard(run, broken)
+    ((_, error),) = scheduler.failed
     assert "coordinator 2 has taken it over: stop" in str(error)
-    assert conductor.active == []
+    assert scheduler.active == []
 
 
 def broken() -> None:
@@ -181,15 +181,15 @@ def test_so_many_runs_are_begun_that_questions_are_twice_the_credits(
         Planned(each, unbegun_status(path, each), partial(RunFolder, path, each))
         for path, each in details
     ]
-    conductor = conductor_of(planned, Silent())
-    conductor.turn(0.0, lambda: 0.0)
-    assert len(conductor.active) == 1
-    conductor.turn(0.0, lambda: 1.0)
+    scheduler = scheduler_of(planned, Silent())
+    scheduler.turn(0.0, lambda: 0.0)
+    assert len(scheduler.active) == 1
+    scheduler.turn(0.0, lambda: 1.0)
     # Five founders of each are open; credits are 2 x 2.
-    assert conductor.fleet.open == 10
-    assert conductor.fleet.open >= SLACK * conductor.fleet.credits
-    assert len(conductor.active) == 2
-    conductor.close()
+    assert scheduler.fleet.open == 10
+    assert scheduler.fleet.open >= SLACK * scheduler.fleet.credits
+    assert len(scheduler.active) == 2
+    scheduler.close()
 
 
 def test_a_run_that_cannot_go_on_stops_no_other(tmp_path: Path, alone: Path) -> None:
@@ -197,15 +197,15 @@ def test_a_run_that_cannot_go_on_stops_no_other(tmp_path: Path, alone: Path) -> 
     said: list[str] = []
     (tmp_path / "scenario2-1").mkdir()
     (tmp_path / "scenario2-1" / "mine.txt").write_text("not empty")
-    conductor = conductor_of(
+    scheduler = scheduler_of(
         planned, local(), lambda details, error: said.append(f"{details.run} {error}")
     )
-    conduct(conductor)
-    assert [type(error) for _, error in conductor.failed] == [RunFolderError]
+    conduct(scheduler)
+    assert [type(error) for _, error in scheduler.failed] == [RunFolderError]
     assert len(said) == 1
     assert said[0].startswith("1 ")
     assert "mine.txt" in said[0]
-    states = [run.state for run in conductor.status(0.0).runs]
+    states = [run.state for run in scheduler.status(0.0).runs]
     assert sorted(states) == ["failed", "finished", "finished", "finished"]
     assert compare(alone / "scenario2-0", tmp_path / "scenario2-0") == []
 
@@ -213,14 +213,14 @@ def test_a_run_that_cannot_go_on_stops_no_other(tmp_path: Path, alone: Path) -> 
 def test_a_disk_that_fails_a_run_in_the_middle_stops_no_other(
     tmp_path: Path, alone: Path
 ) -> None:
-    conductor = conductor_of(plan(tmp_path), local())
-    conduct(conductor, 60)
+    scheduler = scheduler_of(plan(tmp_path), local())
+    conduct(scheduler, 60)
     # Another coordinator has opened it since, by its epoch.
-    victim = conductor.active[0].held.path
+    victim = scheduler.active[0].held.path
     (victim / "epoch").write_text("7")
-    conductor.do_chores(0.0)
-    conduct(conductor)
-    assert [details.name for details, _ in conductor.failed] == [
+    scheduler.do_chores(0.0)
+    conduct(scheduler)
+    assert [details.name for details, _ in scheduler.failed] == [
         victim.name.rpartition("-")[0]
     ]
     others = [path for path, _ in CAMPAIGN.runs(alone) if path.name != victim.name]

@@ -36,7 +36,7 @@ class Planned:
     take: Callable[[], RunFolder]
 
 
-class Conductor:
+class RunScheduler:
     """All runs of this process.
 
     Attributes:
