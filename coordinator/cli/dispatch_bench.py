@@ -28,7 +28,7 @@ from coordinator.dispatch.events import AgentKind, Deliver, Job, Returned
 from coordinator.dispatch.fleet import Fleet
 from coordinator.evolution.generation import generate
 from coordinator.network.service import Network
-from coordinator.run.active import ActiveRun
+from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
 from schema.agent.crew import Crew
 from schema.agent.network import Agent
@@ -179,7 +179,7 @@ def birth_cost(null: Body, analyzer: Body, births: int) -> Rate:
         real_fleet({"worker": (null, 1), "analyzer": (analyzer, 1)}) as fleet,
     ):
         details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
-        run = ActiveRun(RunFolder(Path(folder) / "run", details), fleet)
+        run = RunSession(RunFolder(Path(folder) / "run", details), fleet)
         run.start()
         wall_s, cpu_s = time.perf_counter(), time.process_time()
         while not run.loop.is_finished:

@@ -16,11 +16,11 @@ from coordinator.dispatch.events import AgentKind
 from coordinator.dispatch.fleet import Agents, Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.network.service import Network
-from coordinator.run.active import ActiveRun
 from coordinator.run.audience import Audience, open_viewer
 from coordinator.run.audits import CARELESS, Caution
 from coordinator.run.operators import Reception
 from coordinator.run.scheduler import Planned, RunScheduler
+from coordinator.run.session import RunSession
 from coordinator.storage.campaign import (
     Campaign,
     CampaignFolder,
@@ -248,7 +248,7 @@ def _together(
     if there:
         tell_user(f"{there} of {len(planned)} runs are finished already")
 
-    def conclude_run(run: ActiveRun) -> None:
+    def conclude_run(run: RunSession) -> None:
         conclusion = _conclusion(run)
         if conclusion.failures:
             tell_user(f"{run.held.path}: {conclusion.failures}")
@@ -271,7 +271,7 @@ def _together(
     return 1 if barren else 0
 
 
-def _conclusion(run: ActiveRun) -> Conclusion:
+def _conclusion(run: RunSession) -> Conclusion:
     return conclude(run.held.path, run.experiment, run.loop.islands)
 
 
@@ -279,7 +279,7 @@ def _conduct(
     place: Path,
     planned: Sequence[Planned],
     deployment: Deployment,
-    conclude_run: Callable[[ActiveRun], object],
+    conclude_run: Callable[[RunSession], object],
     report: Callable[[RunDetails, RevolveError], None],
 ) -> RunScheduler:
     """Do runs until all are done or somebody says stop.
@@ -297,7 +297,7 @@ def _conduct(
         scheduler = RunScheduler(
             planned,
             Fleet(agents, allows_drift=deployment.allows_drift),
-            open_run=lambda held, is_watched: ActiveRun(
+            open_run=lambda held, is_watched: RunSession(
                 held,
                 scheduler.fleet,
                 fsync=deployment.fsync,
@@ -345,7 +345,7 @@ def _servant(scheduler: RunScheduler, agents: Agents) -> Callable[[], None]:
     if not isinstance(agents, Network):
         return lambda: None
     reception = Reception(scheduler)
-    audience: list[tuple[ActiveRun, Audience]] = []
+    audience: list[tuple[RunSession, Audience]] = []
 
     def serve() -> None:
         now_s = time.monotonic()

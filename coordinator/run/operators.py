@@ -15,9 +15,9 @@ from coordinator.islands.events import (
     ReplaceBrain,
     Resume,
 )
-from coordinator.run.active import ActiveRun
 from coordinator.run.loop import Loop
 from coordinator.run.scheduler import RunScheduler
+from coordinator.run.session import RunSession
 from schema.errors import MalformedMessage, RevolveError
 from schema.experiment.document import Experiment, body_space, island_experiment
 from schema.robot.heredity import genome_of
@@ -177,7 +177,7 @@ class Reception:
         failed = OperatorReply("the run cannot go on", is_refused=True)
         return encode_operator_reply(failed)
 
-    def _run(self, name: str) -> ActiveRun:
+    def _run(self, name: str) -> RunSession:
         """Return whose operator asks.
 
         Raises:

@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from coordinator.dispatch.fleet import Asker, Fleet, Owner
-from coordinator.run.active import ActiveRun
 from coordinator.run.rate import RateMeter
+from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
 from schema.errors import RevolveError
 from schema.wire.status import RunStatus, Status
@@ -50,9 +50,9 @@ class RunScheduler:
         planned: Sequence[Planned],
         fleet: Fleet,
         *,
-        open_run: Callable[[RunFolder, bool], ActiveRun],
+        open_run: Callable[[RunFolder, bool], RunSession],
         most: int,
-        conclude: Callable[[ActiveRun], object],
+        conclude: Callable[[RunSession], object],
         report: Callable[[RunDetails, RevolveError], None],
     ) -> None:
         """Begin nothing yet.
@@ -65,7 +65,7 @@ class RunScheduler:
             conclude: told of each run that is finished.
             report: told of each run that cannot go on, and why.
         """
-        self.active: list[ActiveRun] = []
+        self.active: list[RunSession] = []
         self.failed: list[tuple[RunDetails, RevolveError]] = []
         self.fleet = fleet
         self._open_run = open_run
@@ -78,8 +78,8 @@ class RunScheduler:
             for place, one in enumerate(planned)
             if one.status.state != "finished"
         )
-        self._places: dict[ActiveRun, int] = {}
-        self._run_of: dict[Asker | Owner, ActiveRun] = {}
+        self._places: dict[RunSession, int] = {}
+        self._run_of: dict[Asker | Owner, RunSession] = {}
         self._rate = RateMeter()
         self._is_stopped = False
 
@@ -89,7 +89,7 @@ class RunScheduler:
         return not (self.active or self._planned or self._is_stopped)
 
     @property
-    def watched(self) -> ActiveRun | None:
+    def watched(self) -> RunSession | None:
         """The run that those who watch are shown."""
         return next((run for run in self.active if run.feed is not None), None)
 
@@ -132,7 +132,7 @@ class RunScheduler:
         self._run_of.update(dict.fromkeys(run.loop.askers, run))
         self.guard(run, run.start)
 
-    def guard(self, run: ActiveRun, act: Callable[[], None]) -> None:
+    def guard(self, run: RunSession, act: Callable[[], None]) -> None:
         """Let a run act; what goes wrong is its own affair."""
         try:
             act()
@@ -152,7 +152,7 @@ class RunScheduler:
         self._report(details, error)
         self._known[place] = replace(self._known[place], state="failed")
 
-    def _dismiss(self, run: ActiveRun) -> None:
+    def _dismiss(self, run: RunSession) -> None:
         run.close()
         self.active.remove(run)
         del self._places[run]
@@ -205,7 +205,7 @@ class RunScheduler:
         )
 
 
-def _cause(run: ActiveRun, error: RevolveError) -> RevolveError:
+def _cause(run: RunSession, error: RevolveError) -> RevolveError:
     """Return why a run cannot go on.
 
     Where another coordinator took it over while this one slept, whatever went wrong

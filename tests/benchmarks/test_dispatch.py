@@ -30,8 +30,8 @@ from coordinator.cli.fleet_model import Setting, most_workers
 from coordinator.dispatch.events import DispatchEvent, Returned
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network
-from coordinator.run.active import ActiveRun
 from coordinator.run.scheduler import Planned, RunScheduler
+from coordinator.run.session import RunSession
 from coordinator.storage.campaign import Campaign
 from coordinator.storage.folder import RunFolder
 from coordinator.storage.folder_status import unbegun_status
@@ -92,7 +92,7 @@ def campaign(folder: Path) -> Iterator[tuple[RunScheduler, Watched]]:
         scheduler = RunScheduler(
             planned,
             fleet,
-            open_run=lambda held, _watched: ActiveRun(held, fleet),
+            open_run=lambda held, _watched: RunSession(held, fleet),
             most=100,
             conclude=lambda _run: None,
             report=lambda _details, error: pytest.fail(str(error)),

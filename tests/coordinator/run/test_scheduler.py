@@ -13,8 +13,8 @@ import worker.serve.null
 from coordinator.dispatch.events import DispatchEvent, Joined
 from coordinator.dispatch.fleet import Agents, Fleet
 from coordinator.network.local import LocalAgents
-from coordinator.run.active import ActiveRun
 from coordinator.run.scheduler import SLACK, Planned, RunScheduler
+from coordinator.run.session import RunSession
 from coordinator.storage.campaign import Campaign
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import LOCK, RunDetails, RunFolder, read_state
@@ -58,7 +58,7 @@ def scheduler_of(
     return RunScheduler(
         planned,
         fleet,
-        open_run=lambda held, _watched: ActiveRun(held, fleet),
+        open_run=lambda held, _watched: RunSession(held, fleet),
         most=50,
         conclude=lambda _run: None,
         report=report,

@@ -34,7 +34,7 @@ from schema.wire.status import IslandStatus, RunStatus
 _LIBRARIES = ("mujoco-core", "eclipse-zenoh", "numpy", "pyarrow", "protobuf")
 
 
-class ActiveRun:
+class RunSession:
     """One run on its way.
 
     Attributes:
