@@ -5,8 +5,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from coordinator.cli.execute import Deployment, resume, start, start_campaign
 from coordinator.cli.flags import LISTEN, parser
-from coordinator.cli.running import Deployment, resume, start, start_campaign
 from coordinator.dispatch.events import AgentKind
 from coordinator.run.audits import Caution
 from coordinator.storage.campaign import (

@@ -7,7 +7,7 @@ from uuid import uuid4
 from rich.console import Console
 from rich.table import Table
 
-from coordinator.cli.running import ADDRESS
+from coordinator.cli.execute import ADDRESS
 from coordinator.cli.wording import about_arenas, best_of, duration
 from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, read_campaign
