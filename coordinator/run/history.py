@@ -11,7 +11,7 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Append, Journalled, Record
 from coordinator.run.archipelago import archipelago
 from coordinator.run.loop import Loop
-from coordinator.run.questions import Question
+from coordinator.run.requests import RunContext
 from coordinator.storage.folder import read_details
 from coordinator.storage.journal import NAME, Journal
 from coordinator.storage.snapshots import Snapshots
@@ -38,13 +38,13 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
     """
     details = read_details(folder)
     experiment = experiment_from_text(details.document)
-    question = Question.of(str(folder), 0, experiment, details.origin)
-    if island not in question.arena:
+    context = RunContext.of(str(folder), 0, experiment, details.origin)
+    if island not in context.arena:
         raise RunFolderError(f"{folder}: island {island} has no arena")
     vault = _Vault(Snapshots(folder), steps_of(from_s, experiment.simulation))
     loop = Loop(
         archipelago(experiment, details.seed, details.run),
-        question=question,
+        context=context,
         fleet=Fleet(_Nobody()),
         log=_Nothing(),
         rows=_Nothing(),
@@ -55,7 +55,7 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
         shutil.copy(folder / NAME, place)
         with Journal.open(Path(place)) as journal:
             loop.start(journal.replay())
-    return question.arena[island], loop.advances.past(island)
+    return context.arena[island], loop.advances.past(island)
 
 
 @dataclass(frozen=True, slots=True)

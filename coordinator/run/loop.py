@@ -41,7 +41,7 @@ from coordinator.islands.events import (
 from coordinator.islands.island import Island
 from coordinator.run.advances import Advances, Terms, Vault
 from coordinator.run.audits import CARELESS, Caution, audit_records, describe
-from coordinator.run.questions import Question, Questions, is_quarantined
+from coordinator.run.requests import Requests, RunContext, is_quarantined
 from coordinator.run.throttle import RealTimeThrottle
 from schema.errors import RunPaused, UnexpectedEvent
 from schema.robot.names import BirthId
@@ -90,7 +90,7 @@ class Loop:
         self,
         islands: Mapping[int, Island | Arena],
         *,
-        question: Question,
+        context: RunContext,
         fleet: Fleet,
         log: Log,
         rows: Rows,
@@ -105,11 +105,11 @@ class Loop:
         """
         self.islands = dict(islands)
         self.advances = Advances(
-            Terms(question.run, question.epoch, question.arena),
+            Terms(context.run, context.epoch, context.arena),
             vault,
             fleet,
         )
-        self._questions = Questions(question, fleet, caution.audit)
+        self._requests = Requests(context, fleet, caution.audit)
         self._caution = caution
         self._confirm = confirm
         self._fleet = fleet
@@ -132,7 +132,7 @@ class Loop:
     @property
     def askers(self) -> tuple[Asker, Owner]:
         """Whom the fleet names if there is news for this run."""
-        return self._questions, self.advances
+        return self._requests, self.advances
 
     @property
     def wake_s(self) -> float:
@@ -142,7 +142,7 @@ class Loop:
     @property
     def malformed(self) -> int:
         """Answers that did not decode or did not fit their question."""
-        return self._questions.malformed + self.advances.malformed
+        return self._requests.malformed + self.advances.malformed
 
     def start(self, history: Iterable[Journalled]) -> None:
         """Begin, or come back: replay a journal, then ask what is still open.
@@ -172,7 +172,7 @@ class Loop:
                 unanswered.pop(_key(event), None)
             note(self._tell(_island(event), event))
         for command in unanswered.values():
-            self._questions.ask(command)
+            self._requests.ask(command)
         for number in sorted(self.islands):
             self.advances.request(number)
 
@@ -194,11 +194,11 @@ class Loop:
             if due_s <= now_s:
                 del self._held_back[shard]
                 self.advances.request(shard)
-        self._take([*self._questions.take(), *self.advances.come()])
+        self._take([*self._requests.take(), *self.advances.come()])
 
     def leave(self) -> None:
         """Ask no more, and wait for nothing."""
-        self._fleet.leave(self._questions)
+        self._fleet.leave(self._requests)
         self.advances.release()
 
     def order(self, event: Commanded) -> None:
@@ -230,7 +230,7 @@ class Loop:
                 if isinstance(command, AdvanceShard):
                     self._advance(command)
                 else:
-                    self._questions.ask(command)
+                    self._requests.ask(command)
 
         self._take_care(events)
 

@@ -14,8 +14,8 @@ from coordinator.run.archipelago import archipelago
 from coordinator.run.audits import CARELESS, Caution
 from coordinator.run.feed import Feed, Overheard
 from coordinator.run.loop import Loop
-from coordinator.run.questions import Question
 from coordinator.run.rate import RateMeter
+from coordinator.run.requests import RunContext
 from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.folder import DETAILS, STATE, RunFolder
 from coordinator.storage.journal import NAME as JOURNAL
@@ -87,7 +87,7 @@ class RunSession:
             rows = Overheard(self._recorder, self.feed) if self.feed else self._recorder
             self.loop = Loop(
                 archipelago(self.experiment, details.seed, details.run),
-                question=Question.of(
+                context=RunContext.of(
                     held.name, held.epoch, self.experiment, details.origin
                 ),
                 fleet=fleet,

@@ -29,7 +29,7 @@ from coordinator.islands.island import Island
 from coordinator.islands.rows import evaluation_record
 from coordinator.network.service import Network
 from coordinator.run.loop import Loop
-from coordinator.run.questions import Question
+from coordinator.run.requests import RunContext
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.journal import Journal
 from coordinator.storage.recorder import Recorder
@@ -151,7 +151,7 @@ def started(
         fleet = Fleet(network)
         loop = Loop(
             {0: island},
-            question=Question.of(str(folder), held.epoch, experiment, details.origin),
+            context=RunContext.of(str(folder), held.epoch, experiment, details.origin),
             fleet=fleet,
             log=journal,
             rows=recorder,

@@ -81,7 +81,7 @@ def well(command: Vet | Evaluate) -> Answered:
     return Evaluated(command.birth, Evaluation(fitness, 0.1, 0.0, 12.0), SOMEBODY)
 
 
-def questions(commands: list[IslandCommand]) -> list[Vet | Evaluate]:
+def requests(commands: list[IslandCommand]) -> list[Vet | Evaluate]:
     return [one for one in commands if isinstance(one, Vet | Evaluate)]
 
 
@@ -90,12 +90,12 @@ def live(
 ) -> list[IslandCommand]:
     """Run an island to its end, answering questions in some order."""
     commands = island.handle(Started())
-    open_questions = deque(questions(commands))
-    while open_questions:
-        open_questions.rotate(-next(order) if order else 0)
-        found = island.handle(reply(open_questions.popleft()))
+    open_requests = deque(requests(commands))
+    while open_requests:
+        open_requests.rotate(-next(order) if order else 0)
+        found = island.handle(reply(open_requests.popleft()))
         commands += found
-        open_questions += questions(found)
+        open_requests += requests(found)
     return commands
 
 
@@ -110,14 +110,14 @@ def rows(commands: list[IslandCommand], table: str) -> list[Any]:
 def test_founders_are_all_asked_for_at_once() -> None:
     commands = Island(small(), 1, 0).handle(Started())
     assert all(isinstance(one, Vet) for one in commands)
-    assert [one.birth for one in questions(commands)] == [
+    assert [one.birth for one in requests(commands)] == [
         BirthId(0, number) for number in range(6)
     ]
 
 
 def test_a_viable_body_is_evaluated_and_an_unviable_one_replaced() -> None:
     island = Island(small(), 1, 0)
-    first, second, *_ = questions(island.handle(Started()))
+    first, second, *_ = requests(island.handle(Started()))
     assert island.handle(well(first)) == [Evaluate(first.birth, first.robot)]
     (again,) = island.handle(Vetted(second.birth, 0, CROWDED))
     assert isinstance(again, Vet)
@@ -130,8 +130,8 @@ def test_a_viable_body_is_evaluated_and_an_unviable_one_replaced() -> None:
 
 def test_births_are_committed_in_birth_order() -> None:
     island = Island(small(), 1, 0)
-    for question in questions(island.handle(Started())):
-        island.handle(well(question))
+    for context in requests(island.handle(Started())):
+        island.handle(well(context))
     late = [BirthId(0, number) for number in (3, 1, 0)]
     committed = []
     for birth in late:
@@ -257,11 +257,11 @@ def test_founders_alone_may_be_all() -> None:
 def test_no_more_births_are_in_flight_than_the_window_allows(window: int) -> None:
     island = Island(small(window=window), 7, 0)
     commands = island.handle(Started())
-    waiting = deque(questions(commands))
+    waiting = deque(requests(commands))
     most = 0
     while waiting:
         found = island.handle(answer(waiting.popleft()))
-        waiting += questions(found)
+        waiting += requests(found)
         if island.births >= 6:
             most = max(most, len({one.birth for one in waiting}))
     assert most == window
@@ -312,20 +312,20 @@ def test_without_selection_fitness_decides_nothing() -> None:
 
 def test_new_parents_come_after_so_many_attempts() -> None:
     island = Island(small(max_mating_attempts=3, population=9), 7, 0)
-    waiting = deque(questions(island.handle(Started())))
+    waiting = deque(requests(island.handle(Started())))
     couples = []
     while waiting:
-        question = waiting.popleft()
-        candidate = island._unborn[question.birth.number].candidate
-        if question.birth.number == 9 and candidate.attempt < 9:
+        context = waiting.popleft()
+        candidate = island._unborn[context.birth.number].candidate
+        if context.birth.number == 9 and candidate.attempt < 9:
             assert candidate.couple is not None
             names = tuple(one.birth.number for one in candidate.couple)
             couples.append((candidate.attempt // 3, names))
-            waiting += questions(
-                island.handle(Vetted(question.birth, candidate.attempt, CROWDED))
+            waiting += requests(
+                island.handle(Vetted(context.birth, candidate.attempt, CROWDED))
             )
-        elif question.birth.number <= 9:
-            waiting += questions(island.handle(well(question)))
+        elif context.birth.number <= 9:
+            waiting += requests(island.handle(well(context)))
     by_block = {block: {c for b, c in couples if b == block} for block in range(3)}
     assert all(len(found) == 1 for found in by_block.values())
     assert len(set.union(*by_block.values())) > 1
@@ -347,13 +347,13 @@ def test_whatever_order_answers_come_in_the_records_are_the_same(
 def test_duplicates_change_nothing(data: st.DataObject) -> None:
     island = Island(small(), 11, 0)
     commands = island.handle(Started())
-    waiting = deque(questions(commands))
+    waiting = deque(requests(commands))
     given_answers: list[Answered] = []
     while waiting:
         given_answers.append(answer(waiting.popleft()))
         found = island.handle(given_answers[-1])
         commands += found
-        waiting += questions(found)
+        waiting += requests(found)
         again = data.draw(st.sampled_from(given_answers[-8:]))
         assert island.handle(again) == []
     assert records(commands) == records(live(Island(small(), 11, 0)))
@@ -386,11 +386,11 @@ def test_what_cannot_come_is_refused_and_changes_nothing(event: Any, why: str) -
     commands = island.handle(Started())
     with pytest.raises(UnexpectedEvent, match=why):
         island.handle(event)
-    waiting = deque(questions(commands))
+    waiting = deque(requests(commands))
     while waiting:
         found = island.handle(answer(waiting.popleft()))
         commands += found
-        waiting += questions(found)
+        waiting += requests(found)
     assert records(commands) == records(live(Island(small(), 11, 0)))
 
 

@@ -20,7 +20,7 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.run.loop import Loop
 from coordinator.run.operators import Desk
-from coordinator.run.questions import Question
+from coordinator.run.requests import RunContext
 from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
@@ -120,7 +120,7 @@ class Run:
         )
         self.loop = Loop(
             {0: self.arena},
-            question=Question.of("resume", folder.epoch, EXPERIMENT, DETAILS.origin),
+            context=RunContext.of("resume", folder.epoch, EXPERIMENT, DETAILS.origin),
             fleet=self.fleet,
             log=Frail(journal, point, "append"),
             rows=Frail(self.rows, point, "store"),

@@ -16,7 +16,7 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.island import Island
 from coordinator.network.local import LocalAgents
 from coordinator.run.loop import Loop
-from coordinator.run.questions import Question
+from coordinator.run.requests import RunContext
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.journal import NAME, Journal
@@ -50,11 +50,11 @@ class Worker:
         self.asked += 1
         if self.asked > self.left:
             raise Killed
-        question = decode_request(request)
-        number = crc32(encode_robot(question.robot))
+        context = decode_request(request)
+        number = crc32(encode_robot(context.robot))
         fitness = Evaluation(number / 2**32, 0.1, 0.2, 12.0)
         result = "diverged" if number % 9 == 0 else fitness
-        return encode_answer(Answer(question.epoch, question.number, 0.0, result))
+        return encode_answer(Answer(context.epoch, context.number, 0.0, result))
 
 
 def run(path: Path, *, answers: int = 10**9) -> int:
@@ -70,7 +70,7 @@ def run(path: Path, *, answers: int = 10**9) -> int:
         )
         loop = Loop(
             {0: Island(EXPERIMENT, DETAILS.seed, DETAILS.run)},
-            question=Question.of("resume", folder.epoch, EXPERIMENT, DETAILS.origin),
+            context=RunContext.of("resume", folder.epoch, EXPERIMENT, DETAILS.origin),
             fleet=fleet,
             log=journal,
             rows=rows,

@@ -49,7 +49,7 @@ REMEMBERED = 256
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class RunContext:
     """What every request of a run carries beside the robot or the changes.
 
     Attributes:
@@ -87,24 +87,24 @@ class Question:
         )
 
 
-class Questions:
+class Requests:
     """The questions of all islands of a run.
 
     Attributes:
         malformed: answers that did not decode or did not fit their question.
     """
 
-    def __init__(self, question: Question, fleet: Fleet, audit: float = 0.0) -> None:
+    def __init__(self, context: RunContext, fleet: Fleet, audit: float = 0.0) -> None:
         """Have nothing to ask yet.
 
         Args:
-            question: what all of them have in common.
+            context: what all of them have in common.
             fleet: whom to ask.
             audit: share of evaluations that are done twice.
         """
         self.malformed = 0
         self._audits = Audits(audit)
-        self._question = question
+        self._context = context
         self._fleet = fleet
         self._open: dict[int, Vet | Evaluate] = {}
         self._came: list[Answered | Audited] = []
@@ -115,7 +115,7 @@ class Questions:
     def ask(self, command: Vet | Evaluate) -> None:
         """Have a robot vetted or evaluated."""
         birth = command.birth
-        asks = self._question
+        asks = self._context
         if isinstance(command, Vet):
             robot = self._body(command)
             attempt, steps, settings = command.attempt, 0, asks.vetting
@@ -169,7 +169,7 @@ class Questions:
 
     def is_of(self, run: str, epoch: int) -> bool:
         """Return whether the questions are those of a run's incarnation."""
-        return (run, epoch) == (self._question.run, self._question.epoch)
+        return (run, epoch) == (self._context.run, self._context.epoch)
 
     def deliver(self, command: Deliver) -> None:
         """Keep the end of a job until ``take``."""
@@ -208,7 +208,7 @@ class Questions:
             answer = decode_answer(event.answer)
         except MalformedMessage as error:
             return self._dropped(event, str(error))
-        expected = (self._question.epoch, event.number)
+        expected = (self._context.epoch, event.number)
         if (answer.epoch, answer.number) != expected:
             return self._dropped(
                 event,

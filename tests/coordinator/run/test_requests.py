@@ -24,7 +24,7 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.run.questions import QUARANTINED, REMEMBERED, Question, Questions
+from coordinator.run.requests import QUARANTINED, REMEMBERED, Requests, RunContext
 from schema.errors import JobRefused
 from schema.experiment.identity import NOBODY, Identity, Origin
 from schema.robot.brain import Brain, Connection, Neuron
@@ -65,10 +65,10 @@ class Desk:
         self.sent: list[tuple[int, str, bytes]] = []
         self.cancelled: list[tuple[int, str]] = []
         self.fleet = Fleet(self)
-        question = Question(
+        context = RunContext(
             "run", EPOCH, ORIGIN, b"vetting", {0: evaluation, 2: evaluation}
         )
-        self.questions = Questions(question, self.fleet, audit)
+        self.requests = Requests(context, self.fleet, audit)
         for name in ("one", "two"):
             self.tell(Joined(name, "worker", 1, f"platform-{name}"))
         self.tell(Joined("judge", "analyzer", 1, "platform"))
@@ -89,7 +89,7 @@ class Desk:
     def tell(self, event: DispatchEvent) -> list[Answered | Audited]:
         """Tell the fleet; return the answers that this comes to."""
         self.fleet.tell(event)
-        return self.questions.take()
+        return self.requests.take()
 
     def reply(self, result: Evaluation | Report | str, **changes: int) -> Returned:
         """Return the answer to the newest job."""
@@ -105,8 +105,8 @@ def desk() -> Desk:
 
 
 def test_a_request_carries_the_run_its_settings_and_the_robot(desk: Desk) -> None:
-    desk.questions.ask(Vet(BIRTH, 2, ROBOT))
-    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.ask(Vet(BIRTH, 2, ROBOT))
+    desk.requests.ask(Evaluate(BIRTH, ROBOT))
     (vet, judge, vetting), (_, worker, evaluation) = desk.sent
     assert (judge, worker) == ("judge", "one")
     asked = decode_request(vetting, decode_body)
@@ -120,12 +120,12 @@ def test_a_body_is_vetted_and_a_robot_evaluated_vetted_before_or_not(
     desk: Desk,
 ) -> None:
     other = Robot(ROBOT.parts, Brain(ROBOT.brain.neurons))
-    desk.questions.ask(Vet(BIRTH, 0, ROBOT))
-    desk.questions.ask(Evaluate(BIRTH, ROBOT))
-    desk.questions.ask(Evaluate(BIRTH, ROBOT, trial=1))
-    desk.questions.ask(Vet(BirthId(0, 8), 0, ROBOT))
+    desk.requests.ask(Vet(BIRTH, 0, ROBOT))
+    desk.requests.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.ask(Evaluate(BIRTH, ROBOT, trial=1))
+    desk.requests.ask(Vet(BirthId(0, 8), 0, ROBOT))
     # Of the same birth, and yet not the one that was vetted.
-    desk.questions.ask(Evaluate(BirthId(0, 8), other))
+    desk.requests.ask(Evaluate(BirthId(0, 8), other))
     for number, agent, _ in desk.sent[:2]:
         result = VIABLE if agent == "judge" else JUDGED
         data = encode_answer(Answer(EPOCH, number, 0.5, result))
@@ -146,12 +146,12 @@ def test_a_body_is_vetted_and_a_robot_evaluated_vetted_before_or_not(
 
 def test_noise_is_drawn_by_who_is_judged_for_whom_and_how_often(desk: Desk) -> None:
     guest = BirthId(3, 9)
-    for question in (
+    for context in (
         Evaluate(BIRTH, ROBOT),
         Evaluate(guest, ROBOT, trial=4, asker=2),
         Vet(BIRTH, 1, ROBOT),
     ):
-        desk.questions.ask(question)
+        desk.requests.ask(context)
     found = [
         decode_request(payload, decode_body).identity for _, _, payload in desk.sent
     ]
@@ -161,14 +161,14 @@ def test_noise_is_drawn_by_who_is_judged_for_whom_and_how_often(desk: Desk) -> N
 
 def test_the_two_of_an_audit_draw_the_same_noise() -> None:
     desk = Desk(audit=1.0)
-    desk.questions.ask(Evaluate(BIRTH, ROBOT, trial=1))
+    desk.requests.ask(Evaluate(BIRTH, ROBOT, trial=1))
     first, second = (decode_request(payload) for _, _, payload in desk.sent)
     assert first.number != second.number
     assert first.identity == second.identity == Identity(ORIGIN, BIRTH, 1)
 
 
 def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:
-    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.ask(Evaluate(BIRTH, ROBOT))
     (event,) = desk.tell(desk.reply(JUDGED))
     assert isinstance(event, Evaluated)
     assert (event.birth, event.evaluation) == (BIRTH, JUDGED)
@@ -180,17 +180,17 @@ def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:
 def test_robots_that_are_never_evaluated_are_forgotten(desk: Desk) -> None:
     """An arena's robots are vetted, born and gone: 3000 of them in a run."""
     for number in range(REMEMBERED + 50):
-        desk.questions.ask(Vet(BirthId(0, number), 0, ROBOT))
+        desk.requests.ask(Vet(BirthId(0, number), 0, ROBOT))
         (event,) = desk.tell(desk.reply(VIABLE))
         assert isinstance(event, Vetted)
-    assert len(desk.questions._bodies) == REMEMBERED
+    assert len(desk.requests._bodies) == REMEMBERED
 
 
 def test_a_request_names_its_plug_ins_by_what_they_are() -> None:
     desk = Desk(
         b'{"fitness":{"function":"plugged:speed"},"space":["schema.parts:CORE"]}'
     )
-    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.ask(Evaluate(BIRTH, ROBOT))
     sent = pb.Request.FromString(desk.sent[0][2])
     assert sent.plugins == "plugged="  # it is not here
 
@@ -198,7 +198,7 @@ def test_a_request_names_its_plug_ins_by_what_they_are() -> None:
 @pytest.mark.parametrize("kind", ["evaluate", "vet"])
 def test_a_robot_that_ends_three_processes_is_told_apart(desk: Desk, kind: str) -> None:
     ask = Vet(BIRTH, 2, ROBOT) if kind == "vet" else Evaluate(BIRTH, ROBOT)
-    desk.questions.ask(ask)
+    desk.requests.ask(ask)
     (number, agent, _) = desk.sent[0]
     of_others = [Died("another", EPOCH, number, "x", "SIGBUS")]
     of_others += [Died("run", EPOCH - 1, number, "x", "SIGBUS")]
@@ -217,22 +217,22 @@ def test_a_robot_that_ends_three_processes_is_told_apart(desk: Desk, kind: str) 
 
 
 def test_a_failed_simulation_is_a_result(desk: Desk) -> None:
-    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.ask(Evaluate(BIRTH, ROBOT))
     (event,) = desk.tell(desk.reply("diverged"))
     assert isinstance(event, EvaluationFailed)
     assert event.reason == "diverged"
 
 
 def test_a_report_is_a_verdict_and_a_failure_a_failed_attempt(desk: Desk) -> None:
-    desk.questions.ask(Vet(BIRTH, 4, ROBOT))
+    desk.requests.ask(Vet(BIRTH, 4, ROBOT))
     assert desk.tell(desk.reply(VIABLE)) == [Vetted(BIRTH, 4, VIABLE)]
-    desk.questions.ask(Vet(BIRTH, 5, ROBOT))
+    desk.requests.ask(Vet(BIRTH, 5, ROBOT))
     failed = VettingFailed(BIRTH, 5, "no box")
     assert desk.tell(desk.reply("no box")) == [failed]
 
 
 def test_a_second_answer_and_one_to_nothing_change_nothing(desk: Desk) -> None:
-    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.ask(Evaluate(BIRTH, ROBOT))
     reply = desk.reply(JUDGED)
     assert len(desk.tell(reply)) == 1
     assert desk.tell(reply) == []
@@ -252,16 +252,16 @@ def test_a_second_answer_and_one_to_nothing_change_nothing(desk: Desk) -> None:
 def test_a_useless_answer_is_counted_and_the_job_goes_to_another(
     desk: Desk, spoil: Callable[[Desk], Returned]
 ) -> None:
-    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.ask(Evaluate(BIRTH, ROBOT))
     assert desk.tell(spoil(desk)) == []
-    assert desk.questions.malformed == 1
+    assert desk.requests.malformed == 1
     assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
     (event,) = desk.tell(desk.reply(JUDGED))
     assert isinstance(event, Evaluated)
 
 
 def test_a_lost_job_goes_to_another(desk: Desk) -> None:
-    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.ask(Evaluate(BIRTH, ROBOT))
     assert desk.tell(Left("one")) == []
     assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
 
@@ -270,7 +270,7 @@ def test_a_job_that_several_refuse_stops_the_run_and_is_no_result(
     desk: Desk,
 ) -> None:
     desk.tell(Joined("three", "worker", 1, ""))
-    desk.questions.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.ask(Evaluate(BIRTH, ROBOT))
     for _ in range(2):
         number, agent, _ = desk.sent[-1]
         refusal = Returned(number, agent, "error", reason="no such plug-in")
