@@ -53,7 +53,7 @@ class Agents(Protocol):
         """Return what happened: during a pause, and if nothing did, thereafter."""
 
 
-class Asker(Protocol):
+class JobClient(Protocol):
     """One that asks questions about single robots."""
 
     def is_of(self, run: str, epoch: int) -> bool:
@@ -102,16 +102,16 @@ class Fleet:
         self.shards = ShardDispatch(self._numbers, allows_drift=allows_drift)
         self._agents = agents
         self._shard_numbers = count()
-        self._askers: dict[int, Asker] = {}
+        self._job_clients: dict[int, JobClient] = {}
         self._owners: dict[int, Owner] = {}
         self._credits: dict[str, int] = {}
-        self._news: dict[Asker | Owner, None] = {}
+        self._news: dict[JobClient | Owner, None] = {}
         self._advancing: set[int] = set()
 
     @property
     def open(self) -> int:
         """How many jobs and advances are asked for and not done."""
-        return len(self._askers) + len(self._advancing)
+        return len(self._job_clients) + len(self._advancing)
 
     @property
     def credits(self) -> int:
@@ -122,9 +122,9 @@ class Fleet:
         """Return a number for a job."""
         return next(self._numbers)
 
-    def ask(self, job: Job, asker: Asker) -> None:
+    def ask(self, job: Job, asker: JobClient) -> None:
         """Have a job done."""
-        self._askers[job.number] = asker
+        self._job_clients[job.number] = asker
         self._obey(self.dispatch.handle(Requested(job)))
 
     def new_shard(self, owner: Owner) -> int:
@@ -148,13 +148,13 @@ class Fleet:
         self._advancing.discard(shard)
         self._move(Released(shard))
 
-    def leave(self, asker: Asker) -> None:
+    def leave(self, asker: JobClient) -> None:
         """Let nobody work for one that asks no more."""
-        for number in [n for n, each in self._askers.items() if each is asker]:
-            del self._askers[number]
+        for number in [n for n, each in self._job_clients.items() if each is asker]:
+            del self._job_clients[number]
             self._obey(self.dispatch.handle(Withdrawn(number)))
 
-    def listen(self, timeout_s: float, now_s: float) -> list[Asker | Owner]:
+    def listen(self, timeout_s: float, now_s: float) -> list[JobClient | Owner]:
         """Return who has news, after waiting for some.
 
         Args:
@@ -189,7 +189,11 @@ class Fleet:
     def _is_shards(self, event: Died) -> bool:
         """Pass on whom an advance killed; True also for another coordinator's job."""
         shard = self.shards.shard_that_lost(event.number)
-        asker = self._askers.get(event.number) if shard is None else self._owners[shard]
+        asker = (
+            self._job_clients.get(event.number)
+            if shard is None
+            else self._owners[shard]
+        )
         if asker is None or not asker.is_of(event.run, event.epoch):
             return True
         if shard is not None:
@@ -201,7 +205,7 @@ class Fleet:
             owner = self._owners[self.shards.shard_of(event.number)]
             self._move(owner.understood(event))
             return
-        asker = self._askers.get(event.number)
+        asker = self._job_clients.get(event.number)
         checked = event if asker is None else asker.checked(event)
         self._obey(self.dispatch.handle(checked))
 
@@ -211,7 +215,7 @@ class Fleet:
                 job = command.job
                 self._agents.send(job.number, command.agent, job.payload)
             elif isinstance(command, Deliver):
-                asker = self._askers.pop(command.job.number, None)
+                asker = self._job_clients.pop(command.job.number, None)
                 if asker is not None:
                     asker.deliver(command)
                     self._news[asker] = None

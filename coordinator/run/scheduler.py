@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from coordinator.dispatch.fleet import Asker, Fleet, Owner
+from coordinator.dispatch.fleet import Fleet, JobClient, Owner
 from coordinator.run.rate import RateMeter
 from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
@@ -79,7 +79,7 @@ class RunScheduler:
             if one.status.state != "finished"
         )
         self._places: dict[RunSession, int] = {}
-        self._run_of: dict[Asker | Owner, RunSession] = {}
+        self._run_of: dict[JobClient | Owner, RunSession] = {}
         self._rate = RateMeter()
         self._is_stopped = False
 
@@ -108,7 +108,7 @@ class RunScheduler:
             timeout_s = min(timeout_s, max(0.0, run.loop.wake_s - now_s))
         news = [
             *self.fleet.listen(timeout_s, now_s),
-            *(r.loop.askers[0] for r in throttled),
+            *(r.loop.clients[0] for r in throttled),
         ]
         acting = {self._run_of[each]: None for each in news if each in self._run_of}
         now_s = clock()
@@ -129,7 +129,7 @@ class RunScheduler:
             return
         self.active.append(run)
         self._places[run] = place
-        self._run_of.update(dict.fromkeys(run.loop.askers, run))
+        self._run_of.update(dict.fromkeys(run.loop.clients, run))
         self.guard(run, run.start)
 
     def guard(self, run: RunSession, act: Callable[[], None]) -> None:
@@ -156,7 +156,7 @@ class RunScheduler:
         run.close()
         self.active.remove(run)
         del self._places[run]
-        for asker in run.loop.askers:
+        for asker in run.loop.clients:
             del self._run_of[asker]
 
     def do_chores(self, now_s: float) -> None:

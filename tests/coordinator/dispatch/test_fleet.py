@@ -19,7 +19,7 @@ from coordinator.dispatch.fleet import Fleet
 from schema.robot.names import BirthId
 
 
-class Asker:
+class JobClient:
     """Keeps what it is told."""
 
     def __init__(self, run: str = "run") -> None:
@@ -93,14 +93,14 @@ def fleet(agents: Agents) -> Fleet:
     return made
 
 
-def ask(fleet: Fleet, asker: Asker) -> int:
+def ask(fleet: Fleet, asker: JobClient) -> int:
     number = fleet.new_number()
     fleet.ask(Job(number, "evaluate", BirthId(0, number), 0, b""), asker)
     return number
 
 
 def test_an_answer_goes_to_who_asked(fleet: Fleet, agents: Agents) -> None:
-    first, second = Asker(), Asker()
+    first, second = JobClient(), JobClient()
     numbers = [ask(fleet, asker) for asker in (first, second, first)]
     assert fleet.open == 3
     agents.news = [Returned(n, agent, "ok", b"x") for n, agent, _ in agents.sent[:2]]
@@ -118,7 +118,7 @@ def test_credits_are_those_of_the_workers_that_are_there(fleet: Fleet) -> None:
 
 
 def test_nobody_hears_of_jobs_of_one_that_left(fleet: Fleet, agents: Agents) -> None:
-    asker = Asker()
+    asker = JobClient()
     ask(fleet, asker)
     fleet.leave(asker)
     assert fleet.open == 0
@@ -128,7 +128,7 @@ def test_nobody_hears_of_jobs_of_one_that_left(fleet: Fleet, agents: Agents) -> 
     assert fleet.listen(0.0, 1.0) == []
     assert asker.ends == []
     # And its worker is free for others.
-    others = Asker()
+    others = JobClient()
     for _ in range(5):
         ask(fleet, others)
     assert len(agents.sent) == 6
@@ -137,7 +137,7 @@ def test_nobody_hears_of_jobs_of_one_that_left(fleet: Fleet, agents: Agents) -> 
 def test_a_deadly_job_of_one_that_left_kills_nobody_more(
     fleet: Fleet, agents: Agents
 ) -> None:
-    asker, others = Asker(), Asker()
+    asker, others = JobClient(), JobClient()
     ask(fleet, asker)
     waiting = [ask(fleet, each) for each in (asker, others, others, others, asker)][-1]
     assert waiting not in [number for number, _, _ in agents.sent]
@@ -155,7 +155,7 @@ def test_a_deadly_job_of_one_that_left_kills_nobody_more(
 def test_deaths_by_jobs_of_other_coordinators_are_not_ours(
     fleet: Fleet, agents: Agents
 ) -> None:
-    asker = Asker()
+    asker = JobClient()
     number = ask(fleet, asker)
     for name in ("x", "y", "z"):
         fleet.tell(Died("another run", 1, number, name, "SIGSEGV"))
@@ -199,7 +199,7 @@ def test_a_released_arena_leaves_room_for_another(fleet: Fleet, agents: Agents) 
 def test_it_pauses_while_all_workers_have_more_than_enough(
     fleet: Fleet, agents: Agents
 ) -> None:
-    asker = Asker()
+    asker = JobClient()
     numbers = [ask(fleet, asker) for _ in range(200)]
     fleet.listen(0.2, 0.0)
     assert agents.pauses_s[-1] == 0.0  # how long a job takes is not known yet

@@ -36,7 +36,7 @@ def insertion(number: int, robot: Robot = CORE) -> Changes:
     return Changes(insertions=(Insertion(BirthId(0, number), robot, (0.5, 0.25)),))
 
 
-class Asker:
+class JobClient:
     """A coordinator of one shard: knows what came of each advance."""
 
     def __init__(self, run: str = "r", shard: int = 0) -> None:
@@ -87,15 +87,17 @@ class Asker:
         return Rebuild(self.snapshot, tuple(self.history))
 
 
-def lived(shards: Shards) -> Asker:
+def lived(shards: Shards) -> JobClient:
     """Return an asker whose shard has had two robots for a while."""
-    asker = Asker()
+    asker = JobClient()
     asker.ask(shards, 100, insertion(0), EMPTY)
     asker.ask(shards, 100, insertion(1))
     return asker
 
 
-def following(asker: Asker, shards: Shards, rebuild: Rebuild | None) -> Advance | None:
+def following(
+    asker: JobClient, shards: Shards, rebuild: Rebuild | None
+) -> Advance | None:
     request = asker.request(50, insertion(2), rebuild)
     return decode_advance_answer(shards.answer(request)).advance
 
@@ -186,22 +188,22 @@ def test_a_robot_that_breaks_the_rules_changes_nothing() -> None:
 
 def test_runs_and_shards_do_not_meet() -> None:
     shards = Shards(FakeWorld)
-    askers = [Asker("a", 0), Asker("a", 1), Asker("b", 0)]
-    for asker in askers:
+    clients = [JobClient("a", 0), JobClient("a", 1), JobClient("b", 0)]
+    for asker in clients:
         asker.ask(shards, 100, insertion(0), EMPTY)
-    for asker in askers:
+    for asker in clients:
         assert asker.ask(shards).advance is not None
 
 
 def test_the_one_that_rested_longest_goes_first() -> None:
     shards = Shards(FakeWorld)
-    askers = [Asker(shard=number) for number in range(MOST_HELD + 1)]
-    for asker in askers[:-1]:
+    clients = [JobClient(shard=number) for number in range(MOST_HELD + 1)]
+    for asker in clients[:-1]:
         asker.ask(shards, rebuild=EMPTY)
-    askers[0].ask(shards)
-    askers[-1].ask(shards, rebuild=EMPTY)
-    assert askers[0].ask(shards).advance is not None
-    assert askers[1].ask(shards).advance is None
+    clients[0].ask(shards)
+    clients[-1].ask(shards, rebuild=EMPTY)
+    assert clients[0].ask(shards).advance is not None
+    assert clients[1].ask(shards).advance is None
     assert len(shards.held) == MOST_HELD
 
 
