@@ -122,9 +122,9 @@ class Fleet:
         """Return a number for a job."""
         return next(self._numbers)
 
-    def ask(self, job: Job, asker: JobClient) -> None:
+    def ask(self, job: Job, requester: JobClient) -> None:
         """Have a job done."""
-        self._job_clients[job.number] = asker
+        self._job_clients[job.number] = requester
         self._obey(self.dispatch.handle(Requested(job)))
 
     def new_shard(self, owner: Owner) -> int:
@@ -148,9 +148,9 @@ class Fleet:
         self._advancing.discard(shard)
         self._move(Released(shard))
 
-    def leave(self, asker: JobClient) -> None:
+    def leave(self, requester: JobClient) -> None:
         """Let nobody work for one that asks no more."""
-        for number in [n for n, each in self._job_clients.items() if each is asker]:
+        for number in [n for n, each in self._job_clients.items() if each is requester]:
             del self._job_clients[number]
             self._obey(self.dispatch.handle(Withdrawn(number)))
 
@@ -189,12 +189,12 @@ class Fleet:
     def _is_shards(self, event: Died) -> bool:
         """Pass on whom an advance killed; True also for another coordinator's job."""
         shard = self.shards.shard_that_lost(event.number)
-        asker = (
+        requester = (
             self._job_clients.get(event.number)
             if shard is None
             else self._owners[shard]
         )
-        if asker is None or not asker.is_of(event.run, event.epoch):
+        if requester is None or not requester.is_of(event.run, event.epoch):
             return True
         if shard is not None:
             self._move(Killed(event.number, event.agent, event.cause))
@@ -205,8 +205,8 @@ class Fleet:
             owner = self._owners[self.shards.shard_of(event.number)]
             self._move(owner.understood(event))
             return
-        asker = self._job_clients.get(event.number)
-        checked = event if asker is None else asker.checked(event)
+        requester = self._job_clients.get(event.number)
+        checked = event if requester is None else requester.checked(event)
         self._obey(self.dispatch.handle(checked))
 
     def _obey(self, commands: Sequence[DispatchCommand]) -> None:
@@ -215,10 +215,10 @@ class Fleet:
                 job = command.job
                 self._agents.send(job.number, command.agent, job.payload)
             elif isinstance(command, Deliver):
-                asker = self._job_clients.pop(command.job.number, None)
-                if asker is not None:
-                    asker.deliver(command)
-                    self._news[asker] = None
+                requester = self._job_clients.pop(command.job.number, None)
+                if requester is not None:
+                    requester.deliver(command)
+                    self._news[requester] = None
             elif isinstance(command, Cancel):
                 self._agents.cancel(command.agent, command.job.payload)
 

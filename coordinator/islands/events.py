@@ -50,14 +50,14 @@ class Evaluated:
         evaluation: what it came to.
         provenance: who did it.
         trial: which evaluation of the robot it is; 0 is the one at its birth.
-        asker: the island that wanted it; None is the one of its birth.
+        requester: the island that wanted it; None is the one of its birth.
     """
 
     birth: BirthId
     evaluation: Evaluation
     provenance: Provenance
     trial: int = 0
-    asker: int | None = None
+    requester: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class EvaluationFailed:
     reason: str
     provenance: Provenance
     trial: int = 0
-    asker: int | None = None
+    requester: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -243,14 +243,14 @@ class Evaluate:
         robot: itself.
         trial: which evaluation of the robot it is, from 0.
         steps: of physics to simulate; 0: as the experiment says for all.
-        asker: as of ``Evaluated``.
+        requester: as of ``Evaluated``.
     """
 
     birth: BirthId
     robot: Robot
     trial: int = 0
     steps: int = 0
-    asker: int | None = None
+    requester: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -326,8 +326,8 @@ IslandCommand = Vet | Evaluate | Record | Emigrate | Finish
 ArenaCommand = Vet | AdvanceShard | Record | Append | Emigrate | Finish
 
 
-def asker_of(about: Vet | Evaluate | Answered) -> int:
+def requester_of(about: Vet | Evaluate | Answered) -> int:
     """Return which island asks, or is answered."""
-    if isinstance(about, Vet | Vetted | VettingFailed) or about.asker is None:
+    if isinstance(about, Vet | Vetted | VettingFailed) or about.requester is None:
         return about.birth.island
-    return about.asker
+    return about.requester

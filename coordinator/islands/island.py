@@ -254,7 +254,7 @@ class Island:
 
         For neighbours and immigrants nobody waits at the end.
         """
-        if isinstance(event, Evaluated | EvaluationFailed) and event.asker is None:
+        if isinstance(event, Evaluated | EvaluationFailed) and event.requester is None:
             self._reevaluations.take(event)
             return
         if self._migrant_buffer is None:

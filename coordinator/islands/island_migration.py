@@ -80,7 +80,7 @@ class MigrantBuffer:
             return
         epoch = self._epochs.epoch
         is_known = event.trial < epoch or event.birth in self._awaited
-        if event.asker != self._number or event.trial > epoch or not is_known:
+        if event.requester != self._number or event.trial > epoch or not is_known:
             raise UnexpectedEvent(
                 f"island {self._number} awaits judgements {epoch} of "
                 f"{list(self._awaited)}, got {event}"
@@ -120,7 +120,7 @@ class MigrantBuffer:
                 birth,
                 develop(self._guests[birth].genome, self._space),
                 trial,
-                asker=self._number,
+                requester=self._number,
             )
             for birth in self._awaited
         ]

@@ -65,7 +65,7 @@ def evaluation_record(outcome: Evaluated | EvaluationFailed) -> Record:
     """Return the evaluations row of an outcome; a failure has no numbers."""
     provenance = outcome.provenance
     judged = outcome.evaluation if isinstance(outcome, Evaluated) else None
-    island = outcome.birth.island if outcome.asker is None else outcome.asker
+    island = outcome.birth.island if outcome.requester is None else outcome.requester
     row = {
         **named(outcome.birth, island),
         "trial": outcome.trial,

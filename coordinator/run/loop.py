@@ -36,7 +36,7 @@ from coordinator.islands.events import (
     Vet,
     Vetted,
     VettingFailed,
-    asker_of,
+    requester_of,
 )
 from coordinator.islands.island import Island
 from coordinator.run.advances import Advances, Terms, Vault
@@ -314,7 +314,7 @@ def _island(event: Heard) -> int:
     """Return whose event it is."""
     if isinstance(event, Advanced | Commanded):
         return event.island
-    return asker_of(event)
+    return requester_of(event)
 
 
 def _key(
@@ -323,4 +323,4 @@ def _key(
     """Return what a question and its answer have in common."""
     if isinstance(about, Vet | Vetted | VettingFailed):
         return ("vet", about.birth.island, about.birth, about.attempt)
-    return ("evaluate", asker_of(about), about.birth, about.trial)
+    return ("evaluate", requester_of(about), about.birth, about.trial)

@@ -18,7 +18,7 @@ from coordinator.islands.events import (
     Vet,
     Vetted,
     VettingFailed,
-    asker_of,
+    requester_of,
 )
 from coordinator.run.audits import Audits
 from schema.errors import JobRefused, MalformedMessage
@@ -122,9 +122,9 @@ class Requests:
             identity = NOBODY
         else:
             attempt, steps = command.trial, command.steps
-            asker = asker_of(command)
-            settings = asks.evaluation[asker]
-            origin = structs.replace(asks.origin, island=asker)
+            requester = requester_of(command)
+            settings = asks.evaluation[requester]
+            origin = structs.replace(asks.origin, island=requester)
             identity = Identity(origin, birth, attempt)
             robot = self._robot(command)
         kind: JobKind = "vet" if isinstance(command, Vet) else "evaluate"
@@ -175,13 +175,15 @@ class Requests:
         """Keep the end of a job until ``take``."""
         job = command.job
         asked = self._open.pop(job.number)
-        asker = asked.asker if isinstance(asked, Evaluate) else None
+        requester = asked.requester if isinstance(asked, Evaluate) else None
         if command.is_deadly:
-            self._came += self._audits.settle(job.number, _quarantined(command, asker))
+            self._came += self._audits.settle(
+                job.number, _quarantined(command, requester)
+            )
             return
         if not command.reason:
             self._came += self._audits.settle(
-                job.number, self._answered(command, asker)
+                job.number, self._answered(command, requester)
             )
             return
         self._refusal = JobRefused(
@@ -227,7 +229,7 @@ class Requests:
         self.malformed += 1
         return dataclasses.replace(event, outcome="error", answer=b"", reason=reason)
 
-    def _answered(self, command: Deliver, asker: int | None) -> Answered:
+    def _answered(self, command: Deliver, requester: int | None) -> Answered:
         """Return the island's event that a finished job comes to."""
         job = command.job
         answer = self._answers.pop(job.number)
@@ -239,9 +241,9 @@ class Requests:
         platform = self._fleet.dispatch.platform(command.agent)
         provenance = Provenance(command.agent, platform, answer.wall_s)
         if isinstance(result, Evaluation):
-            return Evaluated(job.birth, result, provenance, job.attempt, asker)
+            return Evaluated(job.birth, result, provenance, job.attempt, requester)
         reason = str(result)
-        return EvaluationFailed(job.birth, reason, provenance, job.attempt, asker)
+        return EvaluationFailed(job.birth, reason, provenance, job.attempt, requester)
 
 
 def is_quarantined(event: EvaluationFailed) -> bool:
@@ -250,7 +252,7 @@ def is_quarantined(event: EvaluationFailed) -> bool:
 
 
 def _quarantined(
-    command: Deliver, asker: int | None
+    command: Deliver, requester: int | None
 ) -> VettingFailed | EvaluationFailed:
     """Return what it comes to that a job ends whoever does it."""
     job = command.job
@@ -258,4 +260,4 @@ def _quarantined(
         return VettingFailed(job.birth, job.attempt, f"the analyzer {command.reason}")
     why = f"{QUARANTINED}{command.reason}"
     signed = Provenance(command.agent)
-    return EvaluationFailed(job.birth, why, signed, job.attempt, asker)
+    return EvaluationFailed(job.birth, why, signed, job.attempt, requester)

@@ -156,8 +156,8 @@ class RunScheduler:
         run.close()
         self.active.remove(run)
         del self._places[run]
-        for asker in run.loop.clients:
-            del self._run_of[asker]
+        for requester in run.loop.clients:
+            del self._run_of[requester]
 
     def do_chores(self, now_s: float) -> None:
         """Bring all rows to disk; find out which runs went on without us.

@@ -88,12 +88,12 @@ def _write_answer(
             entry.vetting_failed = event.reason
         case Evaluated():
             entry.trial = event.trial
-            _address(entry, event.asker)
+            _address(entry, event.requester)
             entry.evaluated.CopyFrom(evaluation_to_message(event.evaluation))
             _sign(entry, event.provenance)
         case EvaluationFailed():
             entry.trial = event.trial
-            _address(entry, event.asker)
+            _address(entry, event.requester)
             entry.evaluation_failed = event.reason
             _sign(entry, event.provenance)
 
@@ -128,7 +128,7 @@ def _event(entry: pb.Entry) -> Heard:
     signed = Provenance(
         entry.provenance.agent, entry.provenance.platform, entry.provenance.wall_s
     )
-    asker = entry.asker if entry.HasField("asker") else None
+    requester = entry.requester if entry.HasField("asker") else None
     match entry.WhichOneof("event"):
         case "vetted":
             return Vetted(birth, entry.attempt, report_from_message(entry.vetted))
@@ -136,10 +136,10 @@ def _event(entry: pb.Entry) -> Heard:
             return VettingFailed(birth, entry.attempt, entry.vetting_failed)
         case "evaluated":
             evaluation = evaluation_from_message(entry.evaluated)
-            return Evaluated(birth, evaluation, signed, entry.trial, asker)
+            return Evaluated(birth, evaluation, signed, entry.trial, requester)
         case "evaluation_failed":
             reason = entry.evaluation_failed
-            return EvaluationFailed(birth, reason, signed, entry.trial, asker)
+            return EvaluationFailed(birth, reason, signed, entry.trial, requester)
         case "advanced":
             told = entry.advanced
             advance = advance_from_message(told.advance)
@@ -180,9 +180,9 @@ def _order(command: pb.Command) -> Order:
     raise MalformedMessage("command: holds no order")
 
 
-def _address(entry: pb.Entry, asker: int | None) -> None:
-    if asker is not None:
-        entry.asker = asker
+def _address(entry: pb.Entry, requester: int | None) -> None:
+    if requester is not None:
+        entry.requester = requester
 
 
 def _sign(entry: pb.Entry, provenance: Provenance) -> None:

@@ -453,7 +453,7 @@ class AdvanceEntry(_message.Message):
     def __init__(self, number: _Optional[int] = ..., advance: _Optional[_Union[Advance, _Mapping]] = ..., pose_rows: _Optional[int] = ...) -> None: ...
 
 class Entry(_message.Message):
-    __slots__ = ("island", "birth", "attempt", "provenance", "vetted", "vetting_failed", "evaluated", "evaluation_failed", "advanced", "commanded", "audited", "trial", "asker")
+    __slots__ = ("island", "birth", "attempt", "provenance", "vetted", "vetting_failed", "evaluated", "evaluation_failed", "advanced", "commanded", "audited", "trial", "requester")
     ISLAND_FIELD_NUMBER: _ClassVar[int]
     BIRTH_FIELD_NUMBER: _ClassVar[int]
     ATTEMPT_FIELD_NUMBER: _ClassVar[int]
@@ -466,7 +466,7 @@ class Entry(_message.Message):
     COMMANDED_FIELD_NUMBER: _ClassVar[int]
     AUDITED_FIELD_NUMBER: _ClassVar[int]
     TRIAL_FIELD_NUMBER: _ClassVar[int]
-    ASKER_FIELD_NUMBER: _ClassVar[int]
+    REQUESTER_FIELD_NUMBER: _ClassVar[int]
     island: int
     birth: int
     attempt: int
@@ -479,8 +479,8 @@ class Entry(_message.Message):
     commanded: Command
     audited: AuditEntry
     trial: int
-    asker: int
-    def __init__(self, island: _Optional[int] = ..., birth: _Optional[int] = ..., attempt: _Optional[int] = ..., provenance: _Optional[_Union[Provenance, _Mapping]] = ..., vetted: _Optional[_Union[Report, _Mapping]] = ..., vetting_failed: _Optional[str] = ..., evaluated: _Optional[_Union[Evaluation, _Mapping]] = ..., evaluation_failed: _Optional[str] = ..., advanced: _Optional[_Union[AdvanceEntry, _Mapping]] = ..., commanded: _Optional[_Union[Command, _Mapping]] = ..., audited: _Optional[_Union[AuditEntry, _Mapping]] = ..., trial: _Optional[int] = ..., asker: _Optional[int] = ...) -> None: ...
+    requester: int
+    def __init__(self, island: _Optional[int] = ..., birth: _Optional[int] = ..., attempt: _Optional[int] = ..., provenance: _Optional[_Union[Provenance, _Mapping]] = ..., vetted: _Optional[_Union[Report, _Mapping]] = ..., vetting_failed: _Optional[str] = ..., evaluated: _Optional[_Union[Evaluation, _Mapping]] = ..., evaluation_failed: _Optional[str] = ..., advanced: _Optional[_Union[AdvanceEntry, _Mapping]] = ..., commanded: _Optional[_Union[Command, _Mapping]] = ..., audited: _Optional[_Union[AuditEntry, _Mapping]] = ..., trial: _Optional[int] = ..., requester: _Optional[int] = ...) -> None: ...
 
 class AuditEntry(_message.Message):
     __slots__ = ("first", "second")

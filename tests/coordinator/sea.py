@@ -96,7 +96,7 @@ class Sea:
             case Evaluate():
                 found = Evaluation(self.fit(asked.birth, number), 0.1, 0.0, 12.0)
                 answer = Evaluated(
-                    asked.birth, found, SOMEBODY, asked.trial, asked.asker
+                    asked.birth, found, SOMEBODY, asked.trial, asked.requester
                 )
                 self.tell(number, answer)
             case AdvanceShard():

@@ -93,15 +93,15 @@ def fleet(agents: Agents) -> Fleet:
     return made
 
 
-def ask(fleet: Fleet, asker: JobClient) -> int:
+def ask(fleet: Fleet, requester: JobClient) -> int:
     number = fleet.new_number()
-    fleet.ask(Job(number, "evaluate", BirthId(0, number), 0, b""), asker)
+    fleet.ask(Job(number, "evaluate", BirthId(0, number), 0, b""), requester)
     return number
 
 
 def test_an_answer_goes_to_who_asked(fleet: Fleet, agents: Agents) -> None:
     first, second = JobClient(), JobClient()
-    numbers = [ask(fleet, asker) for asker in (first, second, first)]
+    numbers = [ask(fleet, requester) for requester in (first, second, first)]
     assert fleet.open == 3
     agents.news = [Returned(n, agent, "ok", b"x") for n, agent, _ in agents.sent[:2]]
     assert fleet.listen(0.0, 1.0) == [first, second]
@@ -118,15 +118,15 @@ def test_credits_are_those_of_the_workers_that_are_there(fleet: Fleet) -> None:
 
 
 def test_nobody_hears_of_jobs_of_one_that_left(fleet: Fleet, agents: Agents) -> None:
-    asker = JobClient()
-    ask(fleet, asker)
-    fleet.leave(asker)
+    requester = JobClient()
+    ask(fleet, requester)
+    fleet.leave(requester)
     assert fleet.open == 0
     number, agent, payload = agents.sent[0]
     assert agents.cancelled == [(agent, payload)]
     agents.news = [Returned(number, agent, "ok", b"x")]
     assert fleet.listen(0.0, 1.0) == []
-    assert asker.ends == []
+    assert requester.ends == []
     # And its worker is free for others.
     others = JobClient()
     for _ in range(5):
@@ -137,11 +137,13 @@ def test_nobody_hears_of_jobs_of_one_that_left(fleet: Fleet, agents: Agents) -> 
 def test_a_deadly_job_of_one_that_left_kills_nobody_more(
     fleet: Fleet, agents: Agents
 ) -> None:
-    asker, others = JobClient(), JobClient()
-    ask(fleet, asker)
-    waiting = [ask(fleet, each) for each in (asker, others, others, others, asker)][-1]
+    requester, others = JobClient(), JobClient()
+    ask(fleet, requester)
+    waiting = [
+        ask(fleet, each) for each in (requester, others, others, others, requester)
+    ][-1]
     assert waiting not in [number for number, _, _ in agents.sent]
-    fleet.leave(asker)
+    fleet.leave(requester)
     (number, agent, _), *rest = agents.sent
     fleet.tell(Left(agent))
     fleet.tell(Died("run", 1, number, agent, "SIGSEGV"))
@@ -155,15 +157,15 @@ def test_a_deadly_job_of_one_that_left_kills_nobody_more(
 def test_deaths_by_jobs_of_other_coordinators_are_not_ours(
     fleet: Fleet, agents: Agents
 ) -> None:
-    asker = JobClient()
-    number = ask(fleet, asker)
+    requester = JobClient()
+    number = ask(fleet, requester)
     for name in ("x", "y", "z"):
         fleet.tell(Died("another run", 1, number, name, "SIGSEGV"))
-    assert asker.ends == []
+    assert requester.ends == []
     for name in ("x", "y", "z"):
         fleet.tell(Died("run", 1, number, name, "SIGSEGV"))
-    assert [end.is_deadly for end in asker.ends] == [True]
-    assert fleet.listen(0.0, 1.0) == [asker]
+    assert [end.is_deadly for end in requester.ends] == [True]
+    assert fleet.listen(0.0, 1.0) == [requester]
     assert agents.sent
 
 
@@ -199,8 +201,8 @@ def test_a_released_arena_leaves_room_for_another(fleet: Fleet, agents: Agents) 
 def test_it_pauses_while_all_workers_have_more_than_enough(
     fleet: Fleet, agents: Agents
 ) -> None:
-    asker = JobClient()
-    numbers = [ask(fleet, asker) for _ in range(200)]
+    requester = JobClient()
+    numbers = [ask(fleet, requester) for _ in range(200)]
     fleet.listen(0.2, 0.0)
     assert agents.pauses_s[-1] == 0.0  # how long a job takes is not known yet
     agents.news = [

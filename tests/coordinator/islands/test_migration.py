@@ -124,8 +124,8 @@ def test_an_immigrant_is_judged_anew_where_the_island_says_so() -> None:
     lived.fit = lambda birth, island: 0.5 + 0.1 * (birth.island == island)
     lived.live()
     asked = [one for one in lived.commands[0] if isinstance(one, Evaluate)]
-    (again,) = [one for one in asked if one.asker is not None]
-    assert (again.birth, again.asker, again.trial) == (BirthId(1, 0), 0, 1)
+    (again,) = [one for one in asked if one.requester is not None]
+    assert (again.birth, again.requester, again.trial) == (BirthId(1, 0), 0, 1)
     (row,) = [row for row in lived.rows("evaluations") if row["birth_island"] == 1]
     assert (row["island"], row["birth"], row["trial"]) == (0, 0, 1)
     (fitness,) = [

@@ -170,7 +170,7 @@ def test_between_off_line_and_on_line_all_are_judged_anew() -> None:
     anew = [
         one
         for one in lived.commands[0]
-        if isinstance(one, Evaluate) and one.asker is not None
+        if isinstance(one, Evaluate) and one.requester is not None
     ]
     assert anew
     assert {one.birth.island for one in anew} == {1}

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordinator.arena.arena import Arena
-from coordinator.islands.events import Evaluated, EvaluationFailed, asker_of
+from coordinator.islands.events import Evaluated, EvaluationFailed, requester_of
 from coordinator.storage.entries import decode_entry, encode_entry
 from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
@@ -115,10 +115,12 @@ def test_the_seed_says_who_is_drawn() -> None:
 
 
 @pytest.mark.parametrize("asker", [None, 0, 3])
-def test_a_journal_keeps_who_asked(asker: int | None) -> None:
+def test_a_journal_keeps_who_asked(requester: int | None) -> None:
     signed = Provenance("worker-1", "x86", 0.5)
-    done = Evaluated(BirthId(2, 7), Evaluation(0.5, 0.1, 0.2, 12.0), signed, 4, asker)
-    failed = EvaluationFailed(BirthId(2, 7), "diverged", signed, 4, asker)
+    done = Evaluated(
+        BirthId(2, 7), Evaluation(0.5, 0.1, 0.2, 12.0), signed, 4, requester
+    )
+    failed = EvaluationFailed(BirthId(2, 7), "diverged", signed, 4, requester)
     for event in (done, failed):
         assert decode_entry(encode_entry(event)) == event
-        assert asker_of(event) == (2 if asker is None else asker)
+        assert requester_of(event) == (2 if requester is None else requester)

@@ -148,7 +148,7 @@ def test_noise_is_drawn_by_who_is_judged_for_whom_and_how_often(desk: Desk) -> N
     guest = BirthId(3, 9)
     for context in (
         Evaluate(BIRTH, ROBOT),
-        Evaluate(guest, ROBOT, trial=4, asker=2),
+        Evaluate(guest, ROBOT, trial=4, requester=2),
         Vet(BIRTH, 1, ROBOT),
     ):
         desk.requests.ask(context)

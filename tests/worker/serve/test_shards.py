@@ -89,16 +89,16 @@ class JobClient:
 
 def lived(shards: Shards) -> JobClient:
     """Return an asker whose shard has had two robots for a while."""
-    asker = JobClient()
-    asker.ask(shards, 100, insertion(0), EMPTY)
-    asker.ask(shards, 100, insertion(1))
-    return asker
+    requester = JobClient()
+    requester.ask(shards, 100, insertion(0), EMPTY)
+    requester.ask(shards, 100, insertion(1))
+    return requester
 
 
 def following(
-    asker: JobClient, shards: Shards, rebuild: Rebuild | None
+    requester: JobClient, shards: Shards, rebuild: Rebuild | None
 ) -> Advance | None:
-    request = asker.request(50, insertion(2), rebuild)
+    request = requester.request(50, insertion(2), rebuild)
     return decode_advance_answer(shards.answer(request)).advance
 
 
@@ -113,93 +113,95 @@ def test_goes_on_from_the_state_that_it_holds() -> None:
 @pytest.mark.parametrize("keep", [False, True])
 def test_another_worker_comes_to_the_same(keep: bool) -> None:  # noqa: FBT001 - a case
     first = Shards(FakeWorld)
-    asker = lived(first)
-    asker.ask(first, 300, keep=keep)
-    asker.ask(first, 10, Changes(removals=(BirthId(0, 0),)))
-    assert bool(asker.snapshot) == keep
-    rebuilt = following(asker, Shards(FakeWorld), asker.whole())
+    requester = lived(first)
+    requester.ask(first, 300, keep=keep)
+    requester.ask(first, 10, Changes(removals=(BirthId(0, 0),)))
+    assert bool(requester.snapshot) == keep
+    rebuilt = following(requester, Shards(FakeWorld), requester.whole())
     assert rebuilt is not None
-    assert rebuilt == following(asker, first, None)
+    assert rebuilt == following(requester, first, None)
 
 
 def test_a_snapshot_without_history_is_enough() -> None:
     first = Shards(FakeWorld)
-    asker = lived(first)
-    asker.ask(first, 300, keep=True)
-    assert asker.history == []
+    requester = lived(first)
+    requester.ask(first, 300, keep=True)
+    assert requester.history == []
     second = Shards(FakeWorld)
-    assert following(asker, second, asker.whole()) == following(asker, first, None)
+    assert following(requester, second, requester.whole()) == following(
+        requester, first, None
+    )
 
 
 def test_without_the_state_it_asks_for_it() -> None:
-    asker = lived(Shards(FakeWorld))
-    assert following(asker, Shards(FakeWorld), None) is None
+    requester = lived(Shards(FakeWorld))
+    assert following(requester, Shards(FakeWorld), None) is None
 
 
 def test_a_state_that_went_on_is_not_the_one_to_start_from() -> None:
     # Its answer was lost: the coordinator stands where the worker stood.
     shards = Shards(FakeWorld)
-    asker = lived(shards)
-    first = following(asker, shards, None)
-    assert following(asker, shards, None) is None
+    requester = lived(shards)
+    first = following(requester, shards, None)
+    assert following(requester, shards, None) is None
     assert shards.held == []
-    assert following(asker, shards, asker.whole()) == first
+    assert following(requester, shards, requester.whole()) == first
 
 
 def test_other_digest_same_step_is_another_state() -> None:
     shards = Shards(FakeWorld)
-    asker = lived(shards)
-    asker.digest = bytes(32)
-    assert following(asker, shards, None) is None
+    requester = lived(shards)
+    requester.digest = bytes(32)
+    assert following(requester, shards, None) is None
 
 
 def test_a_machine_that_computes_otherwise_is_found_out() -> None:
-    asker = lived(Shards(FakeWorld))
+    requester = lived(Shards(FakeWorld))
     odd = Shards(OddWorld)
     with pytest.raises(StateDiffers, match=r"at step 100 .* computes otherwise"):
-        odd.answer(asker.request(50, None, asker.whole()))
+        odd.answer(requester.request(50, None, requester.whole()))
     assert odd.held == []
 
 
 def test_a_snapshot_of_another_state_is_found_out() -> None:
     first = Shards(FakeWorld)
-    asker = lived(first)
-    asker.ask(first, 300, keep=True)
-    asker.snapshot = asker.snapshot.replace(b"[0, 1,", b"[0, 2,")
+    requester = lived(first)
+    requester.ask(first, 300, keep=True)
+    requester.snapshot = requester.snapshot.replace(b"[0, 1,", b"[0, 2,")
     with pytest.raises(StateDiffers, match="at step 500"):
-        Shards(FakeWorld).answer(asker.request(50, None, asker.whole()))
+        Shards(FakeWorld).answer(requester.request(50, None, requester.whole()))
 
 
 def test_a_history_that_ends_elsewhere_is_found_out() -> None:
-    asker = lived(Shards(FakeWorld))
-    rebuild = Rebuild(b"", tuple(asker.history[:1]))
+    requester = lived(Shards(FakeWorld))
+    rebuild = Rebuild(b"", tuple(requester.history[:1]))
     with pytest.raises(StateDiffers, match="rebuilt to step 100, must be 200"):
-        Shards(FakeWorld).answer(asker.request(50, None, rebuild))
+        Shards(FakeWorld).answer(requester.request(50, None, rebuild))
 
 
 def test_a_robot_that_breaks_the_rules_changes_nothing() -> None:
     shards = Shards(FakeWorld)
-    asker = lived(shards)
+    requester = lived(shards)
     strange = Robot((Part("Wheelbarrow", -1, -1, -1, 0, ()),))
     with pytest.raises(InvalidRobot, match="Wheelbarrow"):
-        shards.answer(asker.request(50, insertion(2, strange)))
-    assert following(asker, shards, None) is not None
+        shards.answer(requester.request(50, insertion(2, strange)))
+    assert following(requester, shards, None) is not None
 
 
 def test_runs_and_shards_do_not_meet() -> None:
     shards = Shards(FakeWorld)
     clients = [JobClient("a", 0), JobClient("a", 1), JobClient("b", 0)]
-    for asker in clients:
-        asker.ask(shards, 100, insertion(0), EMPTY)
-    for asker in clients:
-        assert asker.ask(shards).advance is not None
+    for requester in clients:
+        requester.ask(shards, 100, insertion(0), EMPTY)
+    for requester in clients:
+        assert requester.ask(shards).advance is not None
 
 
 def test_the_one_that_rested_longest_goes_first() -> None:
     shards = Shards(FakeWorld)
     clients = [JobClient(shard=number) for number in range(MOST_HELD + 1)]
-    for asker in clients[:-1]:
-        asker.ask(shards, rebuild=EMPTY)
+    for requester in clients[:-1]:
+        requester.ask(shards, rebuild=EMPTY)
     clients[0].ask(shards)
     clients[-1].ask(shards, rebuild=EMPTY)
     assert clients[0].ask(shards).advance is not None
@@ -209,12 +211,12 @@ def test_the_one_that_rested_longest_goes_first() -> None:
 
 def test_those_who_watch_see_each_advance() -> None:
     seen: list[Live] = []
-    asker = lived(Shards(FakeWorld, publish=seen.append))
+    requester = lived(Shards(FakeWorld, publish=seen.append))
     assert [(live.run, live.shard, live.advance.step) for live in seen] == [
         ("r", 0, 100),
         ("r", 0, 200),
     ]
-    assert seen[1].advance.digest == asker.digest
+    assert seen[1].advance.digest == requester.digest
     assert decode_live(encode_live(seen[1])) == seen[1]
 
 
@@ -225,15 +227,15 @@ def test_other_bytes_are_refused() -> None:
 
 def test_what_was_elsewhere_is_done_again_as_nearly_as_it_goes() -> None:
     """Who fell only here is not asked for, who fell only there does not stay."""
-    asker = lived(Shards(FakeWorld))
+    requester = lived(Shards(FakeWorld))
     fallen = Changes(removals=(BirthId(0, 9),), insertions=insertion(2).insertions)
-    asker.history.append(PastAdvance(fallen, 300, b"\0" * 32))
-    asker.step, asker.digest = 300, b"\1" * 32
+    requester.history.append(PastAdvance(fallen, 300, b"\0" * 32))
+    requester.step, requester.digest = 300, b"\1" * 32
     with pytest.raises(KeyError):
-        asker.ask(Shards(FakeWorld), 10, None, asker.whole())
-    rebuild = replace(asker.whole(), living=(BirthId(0, 0), BirthId(0, 7)))
+        requester.ask(Shards(FakeWorld), 10, None, requester.whole())
+    rebuild = replace(requester.whole(), living=(BirthId(0, 0), BirthId(0, 7)))
     gone = Changes(removals=(BirthId(0, 7),))
-    advance = asker.ask(Shards(FakeWorld), 10, gone, rebuild).advance
+    advance = requester.ask(Shards(FakeWorld), 10, gone, rebuild).advance
     assert advance is not None
     told = {one.birth for one in advance.judgements}
     assert told | {one.birth for one in advance.casualties} == {BirthId(0, 0)}
