@@ -31,7 +31,7 @@ from schema.wire.arena_codec import (
 )
 
 
-class Vault(Protocol):
+class SnapshotStore(Protocol):
     """Where snapshots of shards are kept."""
 
     def has(self, shard: int, step: int, digest: bytes) -> bool:
@@ -137,17 +137,19 @@ class Advances:
         malformed: answers that did not decode or did not fit their question.
     """
 
-    def __init__(self, terms: Terms, vault: Vault, fleet: Fleet) -> None:
+    def __init__(
+        self, terms: Terms, snapshot_store: SnapshotStore, fleet: Fleet
+    ) -> None:
         """Know of no shard yet.
 
         Args:
             terms: of the run.
-            vault: keeps the snapshots.
+            snapshot_store: keeps the snapshots.
             fleet: whose workers hold the shards.
         """
         self.malformed = 0
         self._terms = terms
-        self._vault = vault
+        self._snapshot_store = snapshot_store
         self._fleet = fleet
         self._pasts: dict[int, _Past] = {}
         # A shard has its island's number here and another one in the fleet.
@@ -181,7 +183,7 @@ class Advances:
     def past(self, shard: int) -> Rebuild:
         """Return how a shard came to be what it is."""
         past = self._past(shard)
-        base = self._vault.read(shard, past.base) if past.base else b""
+        base = self._snapshot_store.read(shard, past.base) if past.base else b""
         return Rebuild(base, tuple(past.history))
 
     def note(self, command: AdvanceShard) -> None:
@@ -220,9 +222,9 @@ class Advances:
         past.platform = platform
         past.history.append(PastAdvance(asked.changes, asked.until, advance.digest))
         past.places = {one.birth: one.place for one in advance.judgements}
-        if self._vault.has(event.island, past.step, past.digest):
+        if self._snapshot_store.has(event.island, past.step, past.digest):
             past.base, past.history = past.step, []
-            self._vault.drop_before(event.island, past.step)
+            self._snapshot_store.drop_before(event.island, past.step)
         self._fleet.place(self._number(event.island), platform)
         return drift
 
@@ -278,7 +280,7 @@ class Advances:
         past.asked = replace(past.asked, wants_snapshot=wants_snapshot)
         rebuild: Rebuild | None = None
         if command.is_whole:
-            base = past.base and self._vault.read(shard, past.base)
+            base = past.base and self._snapshot_store.read(shard, past.base)
             living = tuple(past.places) if is_drift else None
             rebuild = Rebuild(base or b"", tuple(past.history), living)
         return encode_advance_request(
@@ -347,7 +349,7 @@ class Advances:
         assert asked is not None
         assert advance is not None
         if answer.snapshot:
-            self._vault.write(shard, advance.step, answer.snapshot)
+            self._snapshot_store.write(shard, advance.step, answer.snapshot)
         platform = self._fleet.shards.platform(agent)
         if self._past(shard).drifts_to(platform):
             advance = self._past(shard).completed(advance)

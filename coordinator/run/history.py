@@ -41,14 +41,16 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
     context = RunContext.of(str(folder), 0, experiment, details.origin)
     if island not in context.arena:
         raise RunFolderError(f"{folder}: island {island} has no arena")
-    vault = _Vault(Snapshots(folder), steps_of(from_s, experiment.simulation))
+    snapshot_store = _SnapshotStore(
+        Snapshots(folder), steps_of(from_s, experiment.simulation)
+    )
     loop = Loop(
         archipelago(experiment, details.seed, details.run),
         context=context,
         fleet=Fleet(_Nobody()),
         log=_Nothing(),
         rows=_Nothing(),
-        vault=vault,
+        snapshot_store=snapshot_store,
     )
     with tempfile.TemporaryDirectory() as place:
         # A copy: opening a journal mends it, and its run may be alive.
@@ -59,7 +61,7 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
 
 
 @dataclass(frozen=True, slots=True)
-class _Vault:
+class _SnapshotStore:
     """The snapshots of a run up to a step; none is made or removed."""
 
     kept: Snapshots

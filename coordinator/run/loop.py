@@ -39,7 +39,7 @@ from coordinator.islands.events import (
     requester_of,
 )
 from coordinator.islands.island import Island
-from coordinator.run.advances import Advances, Terms, Vault
+from coordinator.run.advances import Advances, SnapshotStore, Terms
 from coordinator.run.audits import CARELESS, Caution, audit_records, describe
 from coordinator.run.requests import Requests, RunContext, is_quarantined
 from coordinator.run.throttle import RealTimeThrottle
@@ -94,7 +94,7 @@ class Loop:
         fleet: Fleet,
         log: Log,
         rows: Rows,
-        vault: Vault,
+        snapshot_store: SnapshotStore,
         throttle: RealTimeThrottle | None = None,
         caution: Caution = CARELESS,
         confirm: Callable[[], None] = lambda: None,
@@ -106,7 +106,7 @@ class Loop:
         self.islands = dict(islands)
         self.advances = Advances(
             Terms(context.run, context.epoch, context.arena),
-            vault,
+            snapshot_store,
             fleet,
         )
         self._requests = Requests(context, fleet, caution.audit)

@@ -93,7 +93,7 @@ class RunSession:
                 fleet=fleet,
                 log=self._journal,
                 rows=rows,
-                vault=Snapshots(held.path),
+                snapshot_store=Snapshots(held.path),
                 throttle=_throttle(self.experiment, speed),
                 caution=caution,
                 confirm=held.confirm,

@@ -155,7 +155,7 @@ def started(
             fleet=fleet,
             log=journal,
             rows=recorder,
-            vault=Snapshots(folder),
+            snapshot_store=Snapshots(folder),
         )
         loop.start([])
         bench = Bench(fleet, loop, journal)

@@ -124,7 +124,7 @@ class Run:
             fleet=self.fleet,
             log=Frail(journal, point, "append"),
             rows=Frail(self.rows, point, "store"),
-            vault=Frail(Snapshots(path), point, "write", "drop_before"),
+            snapshot_store=Frail(Snapshots(path), point, "write", "drop_before"),
             **other,
         )
         self.loop.start(journal.replay())

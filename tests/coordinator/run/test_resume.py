@@ -74,7 +74,7 @@ def run(path: Path, *, answers: int = 10**9) -> int:
             fleet=fleet,
             log=journal,
             rows=rows,
-            vault=Snapshots(path),
+            snapshot_store=Snapshots(path),
         )
         try:
             loop.start(journal.replay())
