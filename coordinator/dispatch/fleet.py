@@ -66,7 +66,7 @@ class JobClient(Protocol):
         """Take the end of a job."""
 
 
-class Owner(Protocol):
+class ShardClient(Protocol):
     """One that has arenas advanced."""
 
     def is_of(self, run: str, epoch: int) -> bool:
@@ -103,9 +103,9 @@ class Fleet:
         self._agents = agents
         self._shard_numbers = count()
         self._job_clients: dict[int, JobClient] = {}
-        self._owners: dict[int, Owner] = {}
+        self._shard_clients: dict[int, ShardClient] = {}
         self._credits: dict[str, int] = {}
-        self._news: dict[JobClient | Owner, None] = {}
+        self._news: dict[JobClient | ShardClient, None] = {}
         self._advancing: set[int] = set()
 
     @property
@@ -127,10 +127,10 @@ class Fleet:
         self._job_clients[job.number] = requester
         self._obey(self.dispatch.handle(Requested(job)))
 
-    def new_shard(self, owner: Owner) -> int:
+    def new_shard(self, owner: ShardClient) -> int:
         """Return a number for an arena's shard."""
         shard = next(self._shard_numbers)
-        self._owners[shard] = owner
+        self._shard_clients[shard] = owner
         return shard
 
     def place(self, shard: int, platform: str) -> None:
@@ -144,7 +144,7 @@ class Fleet:
 
     def release(self, shard: int) -> None:
         """Forget a shard that needs nothing more."""
-        self._owners.pop(shard, None)
+        self._shard_clients.pop(shard, None)
         self._advancing.discard(shard)
         self._move(Released(shard))
 
@@ -154,7 +154,7 @@ class Fleet:
             del self._job_clients[number]
             self._obey(self.dispatch.handle(Withdrawn(number)))
 
-    def listen(self, timeout_s: float, now_s: float) -> list[JobClient | Owner]:
+    def listen(self, timeout_s: float, now_s: float) -> list[JobClient | ShardClient]:
         """Return who has news, after waiting for some.
 
         Args:
@@ -192,7 +192,7 @@ class Fleet:
         requester = (
             self._job_clients.get(event.number)
             if shard is None
-            else self._owners[shard]
+            else self._shard_clients[shard]
         )
         if requester is None or not requester.is_of(event.run, event.epoch):
             return True
@@ -202,7 +202,7 @@ class Fleet:
 
     def _returned(self, event: Returned) -> None:
         if self.shards.has_out(event.number):
-            owner = self._owners[self.shards.shard_of(event.number)]
+            owner = self._shard_clients[self.shards.shard_of(event.number)]
             self._move(owner.understood(event))
             return
         requester = self._job_clients.get(event.number)
@@ -226,7 +226,7 @@ class Fleet:
         """Tell the machine that has the shards, and do what it says."""
         commands: list[ShardCommand] = self.shards.handle(event)
         for command in commands:
-            owner = self._owners[command.shard]
+            owner = self._shard_clients[command.shard]
             if isinstance(command, Hand):
                 payload = owner.payload(command)
                 self._agents.send(command.number, command.agent, payload)

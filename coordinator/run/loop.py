@@ -12,7 +12,7 @@ from math import inf
 from typing import Protocol
 
 from coordinator.arena.arena import Arena
-from coordinator.dispatch.fleet import Fleet, JobClient, Owner
+from coordinator.dispatch.fleet import Fleet, JobClient, ShardClient
 from coordinator.islands.events import (
     Advanced,
     AdvanceShard,
@@ -130,7 +130,7 @@ class Loop:
         return self._throttle is not None
 
     @property
-    def clients(self) -> tuple[JobClient, Owner]:
+    def clients(self) -> tuple[JobClient, ShardClient]:
         """Whom the fleet names if there is news for this run."""
         return self._requests, self.advances
 

@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from coordinator.dispatch.fleet import Fleet, JobClient, Owner
+from coordinator.dispatch.fleet import Fleet, JobClient, ShardClient
 from coordinator.run.rate import RateMeter
 from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
@@ -79,7 +79,7 @@ class RunScheduler:
             if one.status.state != "finished"
         )
         self._places: dict[RunSession, int] = {}
-        self._run_of: dict[JobClient | Owner, RunSession] = {}
+        self._run_of: dict[JobClient | ShardClient, RunSession] = {}
         self._rate = RateMeter()
         self._is_stopped = False
 

@@ -36,7 +36,7 @@ class JobClient:
         self.ends.append(command)
 
 
-class Owner:
+class ShardClient:
     """Has one arena."""
 
     def __init__(self) -> None:
@@ -170,7 +170,7 @@ def test_deaths_by_jobs_of_other_coordinators_are_not_ours(
 
 
 def test_arenas_of_all_runs_share_the_workers(fleet: Fleet, agents: Agents) -> None:
-    owners = [Owner(), Owner()]
+    owners = [ShardClient(), ShardClient()]
     shards = [fleet.new_shard(owner) for owner in owners]
     for shard in shards:
         fleet.advance(shard)
@@ -185,13 +185,13 @@ def test_arenas_of_all_runs_share_the_workers(fleet: Fleet, agents: Agents) -> N
 
 
 def test_a_released_arena_leaves_room_for_another(fleet: Fleet, agents: Agents) -> None:
-    busy, gone = fleet.new_shard(Owner()), fleet.new_shard(Owner())
+    busy, gone = fleet.new_shard(ShardClient()), fleet.new_shard(ShardClient())
     fleet.advance(busy)
     fleet.advance(gone)
     freed = agents.sent[1][1]
     fleet.release(gone)
     assert fleet.open == 1
-    fleet.advance(fleet.new_shard(Owner()))
+    fleet.advance(fleet.new_shard(ShardClient()))
     assert agents.sent[2][1] == freed
     # What the released one had out comes back to nobody.
     agents.news = [Returned(agents.sent[1][0], freed, "ok", b"")]
@@ -216,6 +216,6 @@ def test_it_pauses_while_all_workers_have_more_than_enough(
     assert agents.pauses_s[-1] == pytest.approx(0.08)
     fleet.listen(0.01, 0.04)
     assert agents.pauses_s[-1] == 0.01  # no longer than whoever asked wants to wait
-    fleet.advance(fleet.new_shard(Owner()))
+    fleet.advance(fleet.new_shard(ShardClient()))
     fleet.listen(0.2, 0.05)
     assert agents.pauses_s[-1] == 0.0  # an arena waits for each answer
