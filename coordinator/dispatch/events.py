@@ -179,7 +179,7 @@ class Came:
     """What became of an advance that was handed out.
 
     Attributes:
-        number: of the ``Hand``.
+        number: of the ``AssignShard``.
         outcome: "done"; "stateless" (the worker does not have the state); "error"
             with a reason; "lost" (no word).
         reason: empty unless error.
@@ -202,7 +202,7 @@ class Killed:
     """An advance that was handed out ended its worker, by its own doing.
 
     Attributes:
-        number: of the ``Hand``.
+        number: of the ``AssignShard``.
         agent: who died, once.
         cause: of what.
     """
@@ -216,7 +216,7 @@ ShardEvent = Joined | Left | Ticked | Placed | Wanted | Came | Killed | Released
 
 
 @dataclass(frozen=True, slots=True)
-class Hand:
+class AssignShard:
     """Send a shard's advance to a worker.
 
     Attributes:
@@ -249,4 +249,4 @@ class GiveUp:
     reason: str
 
 
-ShardCommand = Hand | Accept | GiveUp
+ShardCommand = AssignShard | Accept | GiveUp

@@ -13,6 +13,7 @@ from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
     Accept,
     Assign,
+    AssignShard,
     Came,
     Cancel,
     Deliver,
@@ -20,7 +21,6 @@ from coordinator.dispatch.events import (
     DispatchCommand,
     DispatchEvent,
     GiveUp,
-    Hand,
     Job,
     Joined,
     Killed,
@@ -72,7 +72,7 @@ class ShardClient(Protocol):
     def is_of(self, run: str, epoch: int) -> bool:
         """Return whether the arenas are those of a run's incarnation."""
 
-    def payload(self, command: Hand) -> bytes:
+    def payload(self, command: AssignShard) -> bytes:
         """Return the request that a worker is handed."""
 
     def understood(self, event: Returned) -> Came:
@@ -227,7 +227,7 @@ class Fleet:
         commands: list[ShardCommand] = self.shards.handle(event)
         for command in commands:
             owner = self._shard_clients[command.shard]
-            if isinstance(command, Hand):
+            if isinstance(command, AssignShard):
                 payload = owner.payload(command)
                 self._agents.send(command.number, command.agent, payload)
             else:

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 
 from coordinator.dispatch.events import (
     Accept,
+    AssignShard,
     Came,
     GiveUp,
-    Hand,
     Joined,
     Killed,
     Left,
@@ -142,13 +142,13 @@ class ShardDispatch:
             case Wanted():
                 self._want(event.shard)
             case Came():
-                return [*self._came(event), *self._hands()]
+                return [*self._came(event), *self._assignments()]
             case Killed():
-                return [*self._killed(event), *self._hands()]
+                return [*self._killed(event), *self._assignments()]
             case Released():
                 self._unbind(self._shard(event.shard))
                 del self._shards[event.shard]
-        return list(self._hands())
+        return list(self._assignments())
 
     def _shard(self, number: int) -> _Shard:
         return self._shards.setdefault(number, _Shard())
@@ -239,7 +239,7 @@ class ShardDispatch:
         """Forget who failed at an advance that is over."""
         shard.errors, shard.avoid, shard.lost, shard.killed = 0, (), (), {}
 
-    def _hands(self) -> Iterator[ShardCommand]:
+    def _assignments(self) -> Iterator[ShardCommand]:
         """Hand out what waits and may go to somebody."""
         for number, shard in sorted(self._shards.items()):
             is_ready = shard.is_wanted and shard.number < 0
@@ -252,7 +252,7 @@ class ShardDispatch:
                 shard.number = next(self._numbers)
                 shard.is_whole = not shard.has_state
                 self._out[shard.number] = number
-                yield Hand(shard.number, number, shard.holder, shard.is_whole)
+                yield AssignShard(shard.number, number, shard.holder, shard.is_whole)
 
     def _fit(self, shard: _Shard) -> list[str]:
         """Return the workers that may hold a shard, by name."""

@@ -11,7 +11,7 @@ from typing import Protocol
 import pyarrow as pa
 import pyarrow.compute
 
-from coordinator.dispatch.events import Accept, Came, GiveUp, Hand, Returned
+from coordinator.dispatch.events import Accept, AssignShard, Came, GiveUp, Returned
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Advanced, AdvanceShard, Record
 from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
@@ -268,7 +268,7 @@ class Advances:
             f"{command.agent}: {command.reason}; mend that and resume"
         )
 
-    def payload(self, command: Hand) -> bytes:
+    def payload(self, command: AssignShard) -> bytes:
         """Return the request that a worker is handed."""
         shard = self._islands[command.shard]
         past = self._past(shard)

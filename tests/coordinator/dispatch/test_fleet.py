@@ -4,12 +4,12 @@ import pytest
 
 from coordinator.dispatch.events import (
     Accept,
+    AssignShard,
     Came,
     Deliver,
     Died,
     DispatchEvent,
     GiveUp,
-    Hand,
     Job,
     Joined,
     Left,
@@ -45,7 +45,7 @@ class ShardClient:
     def is_of(self, run: str, epoch: int) -> bool:
         return (run, epoch) == ("arena", 1)
 
-    def payload(self, command: Hand) -> bytes:
+    def payload(self, command: AssignShard) -> bytes:
         return f"whole {command.is_whole}".encode()
 
     def understood(self, event: Returned) -> Came:

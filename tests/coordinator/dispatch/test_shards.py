@@ -6,9 +6,9 @@ import pytest
 
 from coordinator.dispatch.events import (
     Accept,
+    AssignShard,
     Came,
     GiveUp,
-    Hand,
     Joined,
     Killed,
     Left,
@@ -33,9 +33,9 @@ def fleet(*names: str) -> ShardDispatch:
 
 def test_first_advance_is_whole_and_the_next_goes_on() -> None:
     dispatch = fleet("b", "a")
-    assert dispatch.handle(Wanted(0)) == [Hand(1, 0, "a", is_whole=True)]
+    assert dispatch.handle(Wanted(0)) == [AssignShard(1, 0, "a", is_whole=True)]
     assert dispatch.handle(Came(1, "done")) == [Accept(0, "a")]
-    assert dispatch.handle(Wanted(0)) == [Hand(2, 0, "a", is_whole=False)]
+    assert dispatch.handle(Wanted(0)) == [AssignShard(2, 0, "a", is_whole=False)]
 
 
 def test_waits_for_a_worker() -> None:
@@ -43,21 +43,23 @@ def test_waits_for_a_worker() -> None:
     assert dispatch.handle(Wanted(0)) == []
     assert dispatch.waiting == {0: ""}
     assert dispatch.handle(joined("x", kind="analyzer")) == []
-    assert dispatch.handle(joined("a")) == [Hand(1, 0, "a", is_whole=True)]
+    assert dispatch.handle(joined("a")) == [AssignShard(1, 0, "a", is_whole=True)]
     assert dispatch.waiting == {}
 
 
 def test_shards_spread_over_workers() -> None:
     dispatch = fleet("a", "b")
     agents = [dispatch.handle(Wanted(number))[0] for number in range(4)]
-    assert [hand.agent for hand in agents if isinstance(hand, Hand)] == list("abab")
+    assert [hand.agent for hand in agents if isinstance(hand, AssignShard)] == list(
+        "abab"
+    )
     assert dispatch.holder(2) == "a"
 
 
 def test_dead_holder_is_replaced_at_once_with_the_whole_state() -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(Wanted(0))
-    assert dispatch.handle(Left("a")) == [Hand(2, 0, "b", is_whole=True)]
+    assert dispatch.handle(Left("a")) == [AssignShard(2, 0, "b", is_whole=True)]
     # Its own end as a job comes late and says nothing new.
     assert dispatch.handle(Came(1, "lost")) == []
     assert dispatch.handle(Came(1, "done")) == []
@@ -69,7 +71,7 @@ def test_holder_that_dies_between_advances() -> None:
     dispatch.handle(Wanted(0))
     dispatch.handle(Came(1, "done"))
     assert dispatch.handle(Left("a")) == []
-    assert dispatch.handle(Wanted(0)) == [Hand(2, 0, "b", is_whole=True)]
+    assert dispatch.handle(Wanted(0)) == [AssignShard(2, 0, "b", is_whole=True)]
 
 
 def test_one_that_has_not_the_state_is_given_it() -> None:
@@ -77,12 +79,14 @@ def test_one_that_has_not_the_state_is_given_it() -> None:
     dispatch.handle(Wanted(0))
     dispatch.handle(Came(1, "done"))
     dispatch.handle(Wanted(0))
-    assert dispatch.handle(Came(2, "stateless")) == [Hand(3, 0, "a", is_whole=True)]
+    assert dispatch.handle(Came(2, "stateless")) == [
+        AssignShard(3, 0, "a", is_whole=True)
+    ]
     # Asking again is an error.
     assert dispatch.handle(Came(3, "stateless")) == []
     assert dispatch.wake_s is not None
     hands = dispatch.handle(Ticked(dispatch.wake_s))
-    assert hands == [Hand(4, 0, "b", is_whole=True)]
+    assert hands == [AssignShard(4, 0, "b", is_whole=True)]
 
 
 @pytest.mark.parametrize("outcome", ["error", "lost"])
@@ -92,14 +96,14 @@ def test_after_a_failure_another_one_has_its_turn(outcome: str) -> None:
     dispatch.handle(Wanted(0))
     assert dispatch.handle(Came(1, outcome, "why")) == []  # type: ignore[arg-type]
     assert dispatch.handle(Ticked(10.01)) == []
-    assert dispatch.handle(Ticked(10.05)) == [Hand(2, 0, "b", is_whole=True)]
+    assert dispatch.handle(Ticked(10.05)) == [AssignShard(2, 0, "b", is_whole=True)]
 
 
 def test_an_advance_that_kills_three_is_given_up() -> None:
     dispatch = fleet("a", "b", "c")
     dispatch.handle(Wanted(0))
     for number, name, following in ((1, "a", "b"), (2, "b", "c")):
-        hand = Hand(number + 1, 0, following, is_whole=True)
+        hand = AssignShard(number + 1, 0, following, is_whole=True)
         assert dispatch.handle(Left(name)) == [hand]
         assert dispatch.shard_that_lost(number) == 0
         assert dispatch.handle(Killed(number, name, "SIGSEGV")) == []
@@ -133,7 +137,7 @@ def test_errors_of_several_end_it_and_losses_never_do() -> None:
         now_s += 10.0
         (hand,) = dispatch.handle(Ticked(now_s))
         number += 1
-    assert isinstance(hand, Hand)
+    assert isinstance(hand, AssignShard)
     given_up = dispatch.handle(Came(number, "error", "no"))
     assert given_up == [GiveUp(0, hand.agent, "no")]
 
@@ -143,10 +147,12 @@ def test_only_an_equal_platform_may_go_on() -> None:
     dispatch.handle(joined("a", "arm"))
     dispatch.handle(joined("b", "x86"))
     dispatch.handle(Placed(0, "x86"))
-    assert dispatch.handle(Wanted(0)) == [Hand(1, 0, "b", is_whole=True)]
+    assert dispatch.handle(Wanted(0)) == [AssignShard(1, 0, "b", is_whole=True)]
     assert dispatch.handle(Left("b")) == []
     assert dispatch.waiting == {0: "x86"}
-    assert dispatch.handle(joined("c", "x86")) == [Hand(2, 0, "c", is_whole=True)]
+    assert dispatch.handle(joined("c", "x86")) == [
+        AssignShard(2, 0, "c", is_whole=True)
+    ]
 
 
 def test_whoever_made_the_first_advance_settles_the_platform() -> None:
@@ -183,12 +189,12 @@ def test_another_platform_gets_a_shard_after_a_while_if_that_is_allowed() -> Non
     dispatch = drifting(allows_drift=True)
     assert dispatch.wake_s == 100.0 + DRIFT_S
     assert dispatch.handle(Ticked(99.9 + DRIFT_S)) == []
-    whole = Hand(1, 0, "a", is_whole=True)
+    whole = AssignShard(1, 0, "a", is_whole=True)
     assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == [whole]
     dispatch.handle(Came(1, "done"))
     # It is at home there now.
     dispatch.handle(joined("c", "theirs"))
-    assert dispatch.handle(Wanted(0)) == [Hand(2, 0, "a", is_whole=False)]
+    assert dispatch.handle(Wanted(0)) == [AssignShard(2, 0, "a", is_whole=False)]
 
 
 def test_one_that_may_drift_waits_for_whoever_comes_and_not_for_a_time() -> None:
@@ -198,12 +204,16 @@ def test_one_that_may_drift_waits_for_whoever_comes_and_not_for_a_time() -> None
     dispatch.handle(Ticked(100.0))
     assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == []
     assert dispatch.wake_s is None
-    assert dispatch.handle(joined("a", "ours")) == [Hand(1, 0, "a", is_whole=True)]
+    assert dispatch.handle(joined("a", "ours")) == [
+        AssignShard(1, 0, "a", is_whole=True)
+    ]
 
 
 def test_its_own_platform_comes_back_in_time() -> None:
     dispatch = drifting(allows_drift=True)
-    assert dispatch.handle(joined("z", "theirs")) == [Hand(1, 0, "z", is_whole=True)]
+    assert dispatch.handle(joined("z", "theirs")) == [
+        AssignShard(1, 0, "z", is_whole=True)
+    ]
     dispatch.handle(Left("z"))
     # The while begins anew.
     dispatch.handle(Ticked(110.0))
