@@ -175,7 +175,7 @@ class Wanted:
 
 
 @dataclass(frozen=True, slots=True)
-class Came:
+class ShardReturned:
     """What became of an advance that was handed out.
 
     Attributes:
@@ -212,7 +212,9 @@ class Killed:
     cause: str
 
 
-ShardEvent = Joined | Left | Ticked | Placed | Wanted | Came | Killed | Released
+ShardEvent = (
+    Joined | Left | Ticked | Placed | Wanted | ShardReturned | Killed | Released
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,6 @@ from coordinator.dispatch.events import (
     Accept,
     Assign,
     AssignShard,
-    Came,
     Cancel,
     Deliver,
     Died,
@@ -31,6 +30,7 @@ from coordinator.dispatch.events import (
     Returned,
     ShardCommand,
     ShardEvent,
+    ShardReturned,
     Ticked,
     Wanted,
     Withdrawn,
@@ -75,7 +75,7 @@ class ShardClient(Protocol):
     def payload(self, command: AssignShard) -> bytes:
         """Return the request that a worker is handed."""
 
-    def understood(self, event: Returned) -> Came:
+    def understood(self, event: Returned) -> ShardReturned:
         """Return what a worker's word means."""
 
     def settle(self, command: Accept | GiveUp) -> None:

@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from coordinator.dispatch.events import (
     Accept,
     AssignShard,
-    Came,
     GiveUp,
     Joined,
     Killed,
@@ -22,6 +21,7 @@ from coordinator.dispatch.events import (
     Released,
     ShardCommand,
     ShardEvent,
+    ShardReturned,
     Ticked,
     Wanted,
 )
@@ -141,7 +141,7 @@ class ShardDispatch:
                 self._shard(event.shard).platform = event.platform
             case Wanted():
                 self._want(event.shard)
-            case Came():
+            case ShardReturned():
                 return [*self._came(event), *self._assignments()]
             case Killed():
                 return [*self._killed(event), *self._assignments()]
@@ -186,7 +186,7 @@ class ShardDispatch:
         elif shard.drifts_at_s is None:
             shard.drifts_at_s = self._now_s + DRIFT_S
 
-    def _came(self, event: Came) -> list[ShardCommand]:
+    def _came(self, event: ShardReturned) -> list[ShardCommand]:
         number = self._out.pop(event.number, None)
         if number is None:
             return []

@@ -11,7 +11,13 @@ from typing import Protocol
 import pyarrow as pa
 import pyarrow.compute
 
-from coordinator.dispatch.events import Accept, AssignShard, Came, GiveUp, Returned
+from coordinator.dispatch.events import (
+    Accept,
+    AssignShard,
+    GiveUp,
+    Returned,
+    ShardReturned,
+)
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Advanced, AdvanceShard, Record
 from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
@@ -300,24 +306,24 @@ class Advances:
             plugins_of(self._terms.settings[shard]),
         )
 
-    def understood(self, event: Returned) -> Came:
+    def understood(self, event: Returned) -> ShardReturned:
         """Return what a worker's word means; one of no use is its error."""
         if event.outcome != "ok":
-            return Came(event.number, event.outcome, event.reason)
+            return ShardReturned(event.number, event.outcome, event.reason)
         try:
             answer = decode_advance_answer(event.answer)
             self._check(answer, event)
             advance = answer.advance
             if advance is None:
-                return Came(event.number, "stateless")
+                return ShardReturned(event.number, "stateless")
             island = self._island(event)
             poses, rows = place_poses(advance.poses, island)
             answer = replace(answer, advance=replace(advance, poses=poses))
         except MalformedMessage as error:
             self.malformed += 1
-            return Came(event.number, "error", str(error))
+            return ShardReturned(event.number, "error", str(error))
         self._answers[island] = (answer, rows)
-        return Came(event.number, "done")
+        return ShardReturned(event.number, "done")
 
     def _check(self, answer: AdvanceAnswer, event: Returned) -> None:
         """Raise unless an answer is to its question."""

@@ -5,7 +5,6 @@ import pytest
 from coordinator.dispatch.events import (
     Accept,
     AssignShard,
-    Came,
     Deliver,
     Died,
     DispatchEvent,
@@ -14,6 +13,7 @@ from coordinator.dispatch.events import (
     Joined,
     Left,
     Returned,
+    ShardReturned,
 )
 from coordinator.dispatch.fleet import Fleet
 from schema.robot.names import BirthId
@@ -48,8 +48,8 @@ class ShardClient:
     def payload(self, command: AssignShard) -> bytes:
         return f"whole {command.is_whole}".encode()
 
-    def understood(self, event: Returned) -> Came:
-        return Came(event.number, "done" if event.outcome == "ok" else "lost")
+    def understood(self, event: Returned) -> ShardReturned:
+        return ShardReturned(event.number, "done" if event.outcome == "ok" else "lost")
 
     def settle(self, command: Accept | GiveUp) -> None:
         self.ends.append(command)

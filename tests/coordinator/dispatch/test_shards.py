@@ -7,12 +7,12 @@ import pytest
 from coordinator.dispatch.events import (
     Accept,
     AssignShard,
-    Came,
     GiveUp,
     Joined,
     Killed,
     Left,
     Placed,
+    ShardReturned,
     Ticked,
     Wanted,
 )
@@ -34,7 +34,7 @@ def fleet(*names: str) -> ShardDispatch:
 def test_first_advance_is_whole_and_the_next_goes_on() -> None:
     dispatch = fleet("b", "a")
     assert dispatch.handle(Wanted(0)) == [AssignShard(1, 0, "a", is_whole=True)]
-    assert dispatch.handle(Came(1, "done")) == [Accept(0, "a")]
+    assert dispatch.handle(ShardReturned(1, "done")) == [Accept(0, "a")]
     assert dispatch.handle(Wanted(0)) == [AssignShard(2, 0, "a", is_whole=False)]
 
 
@@ -61,15 +61,15 @@ def test_dead_holder_is_replaced_at_once_with_the_whole_state() -> None:
     dispatch.handle(Wanted(0))
     assert dispatch.handle(Left("a")) == [AssignShard(2, 0, "b", is_whole=True)]
     # Its own end as a job comes late and says nothing new.
-    assert dispatch.handle(Came(1, "lost")) == []
-    assert dispatch.handle(Came(1, "done")) == []
-    assert dispatch.handle(Came(2, "done")) == [Accept(0, "b")]
+    assert dispatch.handle(ShardReturned(1, "lost")) == []
+    assert dispatch.handle(ShardReturned(1, "done")) == []
+    assert dispatch.handle(ShardReturned(2, "done")) == [Accept(0, "b")]
 
 
 def test_holder_that_dies_between_advances() -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(Wanted(0))
-    dispatch.handle(Came(1, "done"))
+    dispatch.handle(ShardReturned(1, "done"))
     assert dispatch.handle(Left("a")) == []
     assert dispatch.handle(Wanted(0)) == [AssignShard(2, 0, "b", is_whole=True)]
 
@@ -77,13 +77,13 @@ def test_holder_that_dies_between_advances() -> None:
 def test_one_that_has_not_the_state_is_given_it() -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(Wanted(0))
-    dispatch.handle(Came(1, "done"))
+    dispatch.handle(ShardReturned(1, "done"))
     dispatch.handle(Wanted(0))
-    assert dispatch.handle(Came(2, "stateless")) == [
+    assert dispatch.handle(ShardReturned(2, "stateless")) == [
         AssignShard(3, 0, "a", is_whole=True)
     ]
     # Asking again is an error.
-    assert dispatch.handle(Came(3, "stateless")) == []
+    assert dispatch.handle(ShardReturned(3, "stateless")) == []
     assert dispatch.wake_s is not None
     hands = dispatch.handle(Ticked(dispatch.wake_s))
     assert hands == [AssignShard(4, 0, "b", is_whole=True)]
@@ -94,7 +94,7 @@ def test_after_a_failure_another_one_has_its_turn(outcome: str) -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(Ticked(10.0))
     dispatch.handle(Wanted(0))
-    assert dispatch.handle(Came(1, outcome, "why")) == []  # type: ignore[arg-type]
+    assert dispatch.handle(ShardReturned(1, outcome, "why")) == []  # type: ignore[arg-type]
     assert dispatch.handle(Ticked(10.01)) == []
     assert dispatch.handle(Ticked(10.05)) == [AssignShard(2, 0, "b", is_whole=True)]
 
@@ -118,7 +118,7 @@ def test_deaths_of_an_advance_that_is_done_are_forgotten() -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(Wanted(0))
     dispatch.handle(Left("a"))
-    assert dispatch.handle(Came(2, "done")) == [Accept(0, "b")]
+    assert dispatch.handle(ShardReturned(2, "done")) == [Accept(0, "b")]
     assert dispatch.shard_that_lost(1) is None
     assert dispatch.handle(Killed(1, "a", "SIGSEGV")) == []
 
@@ -128,17 +128,17 @@ def test_errors_of_several_end_it_and_losses_never_do() -> None:
     dispatch.handle(Wanted(0))
     now_s, number = 0.0, 1
     for _ in range(10):
-        assert dispatch.handle(Came(number, "lost")) == []
+        assert dispatch.handle(ShardReturned(number, "lost")) == []
         now_s += 10.0
         assert len(dispatch.handle(Ticked(now_s))) == 1
         number += 1
     for _ in range(MAX_ERRORS - 1):
-        assert dispatch.handle(Came(number, "error", "no")) == []
+        assert dispatch.handle(ShardReturned(number, "error", "no")) == []
         now_s += 10.0
         (hand,) = dispatch.handle(Ticked(now_s))
         number += 1
     assert isinstance(hand, AssignShard)
-    given_up = dispatch.handle(Came(number, "error", "no"))
+    given_up = dispatch.handle(ShardReturned(number, "error", "no"))
     assert given_up == [GiveUp(0, hand.agent, "no")]
 
 
@@ -159,7 +159,7 @@ def test_whoever_made_the_first_advance_settles_the_platform() -> None:
     dispatch = ShardDispatch(count(1))
     dispatch.handle(joined("a", "arm"))
     dispatch.handle(Wanted(0))
-    dispatch.handle(Came(1, "done"))
+    dispatch.handle(ShardReturned(1, "done"))
     dispatch.handle(Left("a"))
     dispatch.handle(joined("b", "x86"))
     assert dispatch.handle(Wanted(0)) == []
@@ -191,7 +191,7 @@ def test_another_platform_gets_a_shard_after_a_while_if_that_is_allowed() -> Non
     assert dispatch.handle(Ticked(99.9 + DRIFT_S)) == []
     whole = AssignShard(1, 0, "a", is_whole=True)
     assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == [whole]
-    dispatch.handle(Came(1, "done"))
+    dispatch.handle(ShardReturned(1, "done"))
     # It is at home there now.
     dispatch.handle(joined("c", "theirs"))
     assert dispatch.handle(Wanted(0)) == [AssignShard(2, 0, "a", is_whole=False)]
