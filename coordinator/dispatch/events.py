@@ -169,7 +169,7 @@ class Placed:
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """A shard is to be advanced; comes again only after ``Accept``."""
+    """A shard is to be advanced; comes again only after ``ShardDone``."""
 
     shard: int
 
@@ -235,7 +235,7 @@ class AssignShard:
 
 
 @dataclass(frozen=True, slots=True)
-class Accept:
+class ShardDone:
     """The advance of a shard is done, by this worker."""
 
     shard: int
@@ -243,7 +243,7 @@ class Accept:
 
 
 @dataclass(frozen=True, slots=True)
-class GiveUp:
+class ShardFailed:
     """Several workers cannot advance a shard, the last of them this one."""
 
     shard: int
@@ -251,4 +251,4 @@ class GiveUp:
     reason: str
 
 
-ShardCommand = AssignShard | Accept | GiveUp
+ShardCommand = AssignShard | ShardDone | ShardFailed

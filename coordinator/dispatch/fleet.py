@@ -11,7 +11,6 @@ from typing import Protocol
 
 from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
-    Accept,
     Assign,
     AssignShard,
     Cancel,
@@ -19,7 +18,6 @@ from coordinator.dispatch.events import (
     Died,
     DispatchCommand,
     DispatchEvent,
-    GiveUp,
     Job,
     Joined,
     Killed,
@@ -29,7 +27,9 @@ from coordinator.dispatch.events import (
     Requested,
     Returned,
     ShardCommand,
+    ShardDone,
     ShardEvent,
+    ShardFailed,
     ShardReturned,
     Ticked,
     Wanted,
@@ -78,7 +78,7 @@ class ShardClient(Protocol):
     def understood(self, event: Returned) -> ShardReturned:
         """Return what a worker's word means."""
 
-    def settle(self, command: Accept | GiveUp) -> None:
+    def settle(self, command: ShardDone | ShardFailed) -> None:
         """Take the end of an advance."""
 
 

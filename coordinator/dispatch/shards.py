@@ -11,16 +11,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from coordinator.dispatch.events import (
-    Accept,
     AssignShard,
-    GiveUp,
     Joined,
     Killed,
     Left,
     Placed,
     Released,
     ShardCommand,
+    ShardDone,
     ShardEvent,
+    ShardFailed,
     ShardReturned,
     Ticked,
     Wanted,
@@ -197,7 +197,7 @@ class ShardDispatch:
             shard.has_state, shard.is_wanted = True, False
             self._forgive(shard)
             shard.failures = 0
-            return [Accept(number, agent)]
+            return [ShardDone(number, agent)]
         if event.outcome == "stateless" and not shard.is_whole:
             shard.has_state = False
             return []
@@ -233,7 +233,7 @@ class ShardDispatch:
         shard = self._shards[number]
         shard.is_wanted = False
         self._forgive(shard)
-        return [GiveUp(number, agent, reason)]
+        return [ShardFailed(number, agent, reason)]
 
     def _forgive(self, shard: _Shard) -> None:
         """Forget who failed at an advance that is over."""

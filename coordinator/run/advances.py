@@ -12,10 +12,10 @@ import pyarrow as pa
 import pyarrow.compute
 
 from coordinator.dispatch.events import (
-    Accept,
     AssignShard,
-    GiveUp,
     Returned,
+    ShardDone,
+    ShardFailed,
     ShardReturned,
 )
 from coordinator.dispatch.fleet import Fleet
@@ -263,10 +263,10 @@ class Advances:
             self._numbers[shard], self._islands[number] = number, shard
         return self._numbers[shard]
 
-    def settle(self, command: Accept | GiveUp) -> None:
+    def settle(self, command: ShardDone | ShardFailed) -> None:
         """Keep the end of an advance until ``come``."""
         shard = self._islands[command.shard]
-        if isinstance(command, Accept):
+        if isinstance(command, ShardDone):
             self._came.append(self._accepted(shard, command.agent))
             return
         self._refusal = JobRefused(

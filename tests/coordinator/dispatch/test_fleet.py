@@ -3,16 +3,16 @@
 import pytest
 
 from coordinator.dispatch.events import (
-    Accept,
     AssignShard,
     Deliver,
     Died,
     DispatchEvent,
-    GiveUp,
     Job,
     Joined,
     Left,
     Returned,
+    ShardDone,
+    ShardFailed,
     ShardReturned,
 )
 from coordinator.dispatch.fleet import Fleet
@@ -40,7 +40,7 @@ class ShardClient:
     """Has one arena."""
 
     def __init__(self) -> None:
-        self.ends: list[Accept | GiveUp] = []
+        self.ends: list[ShardDone | ShardFailed] = []
 
     def is_of(self, run: str, epoch: int) -> bool:
         return (run, epoch) == ("arena", 1)
@@ -51,7 +51,7 @@ class ShardClient:
     def understood(self, event: Returned) -> ShardReturned:
         return ShardReturned(event.number, "done" if event.outcome == "ok" else "lost")
 
-    def settle(self, command: Accept | GiveUp) -> None:
+    def settle(self, command: ShardDone | ShardFailed) -> None:
         self.ends.append(command)
 
 
@@ -180,7 +180,7 @@ def test_arenas_of_all_runs_share_the_workers(fleet: Fleet, agents: Agents) -> N
     assert payload == b"whole True"
     agents.news = [Returned(number, agent, "ok", b"")]
     assert fleet.listen(0.0, 1.0) == [owners[1]]
-    assert owners[1].ends == [Accept(shards[1], agent)]
+    assert owners[1].ends == [ShardDone(shards[1], agent)]
     assert fleet.open == 1
 
 

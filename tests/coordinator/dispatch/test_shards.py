@@ -5,13 +5,13 @@ from itertools import count
 import pytest
 
 from coordinator.dispatch.events import (
-    Accept,
     AssignShard,
-    GiveUp,
     Joined,
     Killed,
     Left,
     Placed,
+    ShardDone,
+    ShardFailed,
     ShardReturned,
     Ticked,
     Wanted,
@@ -34,7 +34,7 @@ def fleet(*names: str) -> ShardDispatch:
 def test_first_advance_is_whole_and_the_next_goes_on() -> None:
     dispatch = fleet("b", "a")
     assert dispatch.handle(Wanted(0)) == [AssignShard(1, 0, "a", is_whole=True)]
-    assert dispatch.handle(ShardReturned(1, "done")) == [Accept(0, "a")]
+    assert dispatch.handle(ShardReturned(1, "done")) == [ShardDone(0, "a")]
     assert dispatch.handle(Wanted(0)) == [AssignShard(2, 0, "a", is_whole=False)]
 
 
@@ -63,7 +63,7 @@ def test_dead_holder_is_replaced_at_once_with_the_whole_state() -> None:
     # Its own end as a job comes late and says nothing new.
     assert dispatch.handle(ShardReturned(1, "lost")) == []
     assert dispatch.handle(ShardReturned(1, "done")) == []
-    assert dispatch.handle(ShardReturned(2, "done")) == [Accept(0, "b")]
+    assert dispatch.handle(ShardReturned(2, "done")) == [ShardDone(0, "b")]
 
 
 def test_holder_that_dies_between_advances() -> None:
@@ -110,7 +110,7 @@ def test_an_advance_that_kills_three_is_given_up() -> None:
     assert dispatch.handle(Left("c")) == []
     reason = f"ended its own process {MAX_ERRORS} times, by SIGSEGV"
     ended = dispatch.handle(Killed(3, "c", "SIGSEGV"))
-    assert ended == [GiveUp(0, "c", reason)]
+    assert ended == [ShardFailed(0, "c", reason)]
     assert dispatch.handle(joined("d")) == []
 
 
@@ -118,7 +118,7 @@ def test_deaths_of_an_advance_that_is_done_are_forgotten() -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(Wanted(0))
     dispatch.handle(Left("a"))
-    assert dispatch.handle(ShardReturned(2, "done")) == [Accept(0, "b")]
+    assert dispatch.handle(ShardReturned(2, "done")) == [ShardDone(0, "b")]
     assert dispatch.shard_that_lost(1) is None
     assert dispatch.handle(Killed(1, "a", "SIGSEGV")) == []
 
@@ -139,7 +139,7 @@ def test_errors_of_several_end_it_and_losses_never_do() -> None:
         number += 1
     assert isinstance(hand, AssignShard)
     given_up = dispatch.handle(ShardReturned(number, "error", "no"))
-    assert given_up == [GiveUp(0, hand.agent, "no")]
+    assert given_up == [ShardFailed(0, hand.agent, "no")]
 
 
 def test_only_an_equal_platform_may_go_on() -> None:
