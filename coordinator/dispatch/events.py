@@ -160,7 +160,7 @@ DispatchCommand = Assign | Deliver | Cancel
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class ShardSeen:
     """A journal tells on what platform a shard has been advanced."""
 
     shard: int
@@ -168,7 +168,7 @@ class Placed:
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class ShardRequested:
     """A shard is to be advanced; comes again only after ``ShardDone``."""
 
     shard: int
@@ -213,7 +213,14 @@ class Killed:
 
 
 ShardEvent = (
-    Joined | Left | Ticked | Placed | Wanted | ShardReturned | Killed | Released
+    Joined
+    | Left
+    | Ticked
+    | ShardSeen
+    | ShardRequested
+    | ShardReturned
+    | Killed
+    | Released
 )
 
 

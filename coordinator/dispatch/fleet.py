@@ -22,7 +22,6 @@ from coordinator.dispatch.events import (
     Joined,
     Killed,
     Left,
-    Placed,
     Released,
     Requested,
     Returned,
@@ -30,9 +29,10 @@ from coordinator.dispatch.events import (
     ShardDone,
     ShardEvent,
     ShardFailed,
+    ShardRequested,
     ShardReturned,
+    ShardSeen,
     Ticked,
-    Wanted,
     Withdrawn,
 )
 from coordinator.dispatch.shards import ShardDispatch
@@ -135,12 +135,12 @@ class Fleet:
 
     def place(self, shard: int, platform: str) -> None:
         """Note on what platform a shard has been advanced."""
-        self._move(Placed(shard, platform))
+        self._move(ShardSeen(shard, platform))
 
     def advance(self, shard: int) -> None:
         """Have a shard advanced; its owner knows how far."""
         self._advancing.add(shard)
-        self._move(Wanted(shard))
+        self._move(ShardRequested(shard))
 
     def release(self, shard: int) -> None:
         """Forget a shard that needs nothing more."""

@@ -15,15 +15,15 @@ from coordinator.dispatch.events import (
     Joined,
     Killed,
     Left,
-    Placed,
     Released,
     ShardCommand,
     ShardDone,
     ShardEvent,
     ShardFailed,
+    ShardRequested,
     ShardReturned,
+    ShardSeen,
     Ticked,
-    Wanted,
 )
 from schema.errors import UnexpectedEvent
 
@@ -137,9 +137,9 @@ class ShardDispatch:
                 self._leave(event.agent)
             case Ticked():
                 self._tick(event.now_s)
-            case Placed():
+            case ShardSeen():
                 self._shard(event.shard).platform = event.platform
-            case Wanted():
+            case ShardRequested():
                 self._want(event.shard)
             case ShardReturned():
                 return [*self._came(event), *self._assignments()]

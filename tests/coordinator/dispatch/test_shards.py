@@ -9,12 +9,12 @@ from coordinator.dispatch.events import (
     Joined,
     Killed,
     Left,
-    Placed,
     ShardDone,
     ShardFailed,
+    ShardRequested,
     ShardReturned,
+    ShardSeen,
     Ticked,
-    Wanted,
 )
 from coordinator.dispatch.shards import DRIFT_S, MAX_ERRORS, ShardDispatch
 from schema.errors import UnexpectedEvent
@@ -33,14 +33,16 @@ def fleet(*names: str) -> ShardDispatch:
 
 def test_first_advance_is_whole_and_the_next_goes_on() -> None:
     dispatch = fleet("b", "a")
-    assert dispatch.handle(Wanted(0)) == [AssignShard(1, 0, "a", is_whole=True)]
+    assert dispatch.handle(ShardRequested(0)) == [AssignShard(1, 0, "a", is_whole=True)]
     assert dispatch.handle(ShardReturned(1, "done")) == [ShardDone(0, "a")]
-    assert dispatch.handle(Wanted(0)) == [AssignShard(2, 0, "a", is_whole=False)]
+    assert dispatch.handle(ShardRequested(0)) == [
+        AssignShard(2, 0, "a", is_whole=False)
+    ]
 
 
 def test_waits_for_a_worker() -> None:
     dispatch = fleet()
-    assert dispatch.handle(Wanted(0)) == []
+    assert dispatch.handle(ShardRequested(0)) == []
     assert dispatch.waiting == {0: ""}
     assert dispatch.handle(joined("x", kind="analyzer")) == []
     assert dispatch.handle(joined("a")) == [AssignShard(1, 0, "a", is_whole=True)]
@@ -49,7 +51,7 @@ def test_waits_for_a_worker() -> None:
 
 def test_shards_spread_over_workers() -> None:
     dispatch = fleet("a", "b")
-    agents = [dispatch.handle(Wanted(number))[0] for number in range(4)]
+    agents = [dispatch.handle(ShardRequested(number))[0] for number in range(4)]
     assert [hand.agent for hand in agents if isinstance(hand, AssignShard)] == list(
         "abab"
     )
@@ -58,7 +60,7 @@ def test_shards_spread_over_workers() -> None:
 
 def test_dead_holder_is_replaced_at_once_with_the_whole_state() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(Wanted(0))
+    dispatch.handle(ShardRequested(0))
     assert dispatch.handle(Left("a")) == [AssignShard(2, 0, "b", is_whole=True)]
     # Its own end as a job comes late and says nothing new.
     assert dispatch.handle(ShardReturned(1, "lost")) == []
@@ -68,17 +70,17 @@ def test_dead_holder_is_replaced_at_once_with_the_whole_state() -> None:
 
 def test_holder_that_dies_between_advances() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(Wanted(0))
+    dispatch.handle(ShardRequested(0))
     dispatch.handle(ShardReturned(1, "done"))
     assert dispatch.handle(Left("a")) == []
-    assert dispatch.handle(Wanted(0)) == [AssignShard(2, 0, "b", is_whole=True)]
+    assert dispatch.handle(ShardRequested(0)) == [AssignShard(2, 0, "b", is_whole=True)]
 
 
 def test_one_that_has_not_the_state_is_given_it() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(Wanted(0))
+    dispatch.handle(ShardRequested(0))
     dispatch.handle(ShardReturned(1, "done"))
-    dispatch.handle(Wanted(0))
+    dispatch.handle(ShardRequested(0))
     assert dispatch.handle(ShardReturned(2, "stateless")) == [
         AssignShard(3, 0, "a", is_whole=True)
     ]
@@ -93,7 +95,7 @@ def test_one_that_has_not_the_state_is_given_it() -> None:
 def test_after_a_failure_another_one_has_its_turn(outcome: str) -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(Ticked(10.0))
-    dispatch.handle(Wanted(0))
+    dispatch.handle(ShardRequested(0))
     assert dispatch.handle(ShardReturned(1, outcome, "why")) == []  # type: ignore[arg-type]
     assert dispatch.handle(Ticked(10.01)) == []
     assert dispatch.handle(Ticked(10.05)) == [AssignShard(2, 0, "b", is_whole=True)]
@@ -101,7 +103,7 @@ def test_after_a_failure_another_one_has_its_turn(outcome: str) -> None:
 
 def test_an_advance_that_kills_three_is_given_up() -> None:
     dispatch = fleet("a", "b", "c")
-    dispatch.handle(Wanted(0))
+    dispatch.handle(ShardRequested(0))
     for number, name, following in ((1, "a", "b"), (2, "b", "c")):
         hand = AssignShard(number + 1, 0, following, is_whole=True)
         assert dispatch.handle(Left(name)) == [hand]
@@ -116,7 +118,7 @@ def test_an_advance_that_kills_three_is_given_up() -> None:
 
 def test_deaths_of_an_advance_that_is_done_are_forgotten() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(Wanted(0))
+    dispatch.handle(ShardRequested(0))
     dispatch.handle(Left("a"))
     assert dispatch.handle(ShardReturned(2, "done")) == [ShardDone(0, "b")]
     assert dispatch.shard_that_lost(1) is None
@@ -125,7 +127,7 @@ def test_deaths_of_an_advance_that_is_done_are_forgotten() -> None:
 
 def test_errors_of_several_end_it_and_losses_never_do() -> None:
     dispatch = fleet("a", "b")
-    dispatch.handle(Wanted(0))
+    dispatch.handle(ShardRequested(0))
     now_s, number = 0.0, 1
     for _ in range(10):
         assert dispatch.handle(ShardReturned(number, "lost")) == []
@@ -146,8 +148,8 @@ def test_only_an_equal_platform_may_go_on() -> None:
     dispatch = ShardDispatch(count(1))
     dispatch.handle(joined("a", "arm"))
     dispatch.handle(joined("b", "x86"))
-    dispatch.handle(Placed(0, "x86"))
-    assert dispatch.handle(Wanted(0)) == [AssignShard(1, 0, "b", is_whole=True)]
+    dispatch.handle(ShardSeen(0, "x86"))
+    assert dispatch.handle(ShardRequested(0)) == [AssignShard(1, 0, "b", is_whole=True)]
     assert dispatch.handle(Left("b")) == []
     assert dispatch.waiting == {0: "x86"}
     assert dispatch.handle(joined("c", "x86")) == [
@@ -158,28 +160,28 @@ def test_only_an_equal_platform_may_go_on() -> None:
 def test_whoever_made_the_first_advance_settles_the_platform() -> None:
     dispatch = ShardDispatch(count(1))
     dispatch.handle(joined("a", "arm"))
-    dispatch.handle(Wanted(0))
+    dispatch.handle(ShardRequested(0))
     dispatch.handle(ShardReturned(1, "done"))
     dispatch.handle(Left("a"))
     dispatch.handle(joined("b", "x86"))
-    assert dispatch.handle(Wanted(0)) == []
+    assert dispatch.handle(ShardRequested(0)) == []
     assert dispatch.waiting == {0: "arm"}
 
 
 def test_wanted_twice_is_our_own_fault() -> None:
     dispatch = fleet("a")
-    dispatch.handle(Wanted(0))
+    dispatch.handle(ShardRequested(0))
     with pytest.raises(UnexpectedEvent, match="wanted already"):
-        dispatch.handle(Wanted(0))
+        dispatch.handle(ShardRequested(0))
 
 
 def drifting(*, allows_drift: bool) -> ShardDispatch:
     """Return one whose shard was advanced on a platform that is gone."""
     dispatch = ShardDispatch(count(1), allows_drift=allows_drift)
-    dispatch.handle(Placed(0, "theirs"))
+    dispatch.handle(ShardSeen(0, "theirs"))
     dispatch.handle(joined("b", "ours"))
     dispatch.handle(joined("a", "ours"))
-    assert dispatch.handle(Wanted(0)) == []
+    assert dispatch.handle(ShardRequested(0)) == []
     assert dispatch.handle(Ticked(100.0)) == []
     assert dispatch.waiting == {0: "theirs"}
     return dispatch
@@ -194,13 +196,15 @@ def test_another_platform_gets_a_shard_after_a_while_if_that_is_allowed() -> Non
     dispatch.handle(ShardReturned(1, "done"))
     # It is at home there now.
     dispatch.handle(joined("c", "theirs"))
-    assert dispatch.handle(Wanted(0)) == [AssignShard(2, 0, "a", is_whole=False)]
+    assert dispatch.handle(ShardRequested(0)) == [
+        AssignShard(2, 0, "a", is_whole=False)
+    ]
 
 
 def test_one_that_may_drift_waits_for_whoever_comes_and_not_for_a_time() -> None:
     dispatch = ShardDispatch(count(1), allows_drift=True)
-    dispatch.handle(Placed(0, "theirs"))
-    dispatch.handle(Wanted(0))
+    dispatch.handle(ShardSeen(0, "theirs"))
+    dispatch.handle(ShardRequested(0))
     dispatch.handle(Ticked(100.0))
     assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == []
     assert dispatch.wake_s is None
