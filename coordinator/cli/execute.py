@@ -16,8 +16,8 @@ from coordinator.dispatch.events import AgentKind
 from coordinator.dispatch.fleet import Agents, Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.network.service import Network
-from coordinator.run.audience import Audience, open_viewer
 from coordinator.run.audits import CARELESS, Caution
+from coordinator.run.live_server import LiveServer, open_viewer
 from coordinator.run.operators import Reception
 from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
@@ -345,20 +345,20 @@ def _servant(scheduler: RunScheduler, agents: Agents) -> Callable[[], None]:
     if not isinstance(agents, Network):
         return lambda: None
     reception = Reception(scheduler)
-    audience: list[tuple[RunSession, Audience]] = []
+    live_server: list[tuple[RunSession, LiveServer]] = []
 
     def serve() -> None:
         now_s = time.monotonic()
         for order in agents.orders():
             order.reply(reception.answer(order.data, now_s))
         run = scheduler.watched
-        if audience and audience[0][0] is not run:
-            audience.pop()[1].close()
+        if live_server and live_server[0][0] is not run:
+            live_server.pop()[1].close()
         if run is not None and run.feed is not None:
-            if not audience:
-                shown = Audience(run.feed, run.loop, scheduler.fleet, agents)
-                audience.append((run, shown))
-            audience[0][1].serve(now_s)
+            if not live_server:
+                shown = LiveServer(run.feed, run.loop, scheduler.fleet, agents)
+                live_server.append((run, shown))
+            live_server[0][1].serve(now_s)
 
     return serve
 

@@ -258,7 +258,7 @@ class Network:
         return onlookers
 
     @property
-    def has_audience(self) -> bool:
+    def has_viewers(self) -> bool:
         """Somebody listens to the news."""
         return self._outlet.has_listeners(self._me.events)
 

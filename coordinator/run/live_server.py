@@ -23,7 +23,7 @@ _NEWS_S = 0.25
 _WHOLE_S = 1.0
 
 
-class Audience:
+class LiveServer:
     """All who watch one run."""
 
     def __init__(self, feed: Feed, loop: Loop, fleet: Fleet, network: Network) -> None:
@@ -56,7 +56,7 @@ class Audience:
             return
         self._told_s = now_s
         news = self._feed.news(self._workers())
-        if news is not None and self._network.has_audience:
+        if news is not None and self._network.has_viewers:
             self._network.tell(encode_news(news))
         if is_whole_due:
             self._whole_s = now_s
