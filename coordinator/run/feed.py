@@ -39,7 +39,7 @@ class Rows(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Overheard:
+class TeeRows:
     """Passes rows on, and lets a feed hear of those that come one by one."""
 
     rows: Rows

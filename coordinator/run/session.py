@@ -12,7 +12,7 @@ from coordinator.islands.events import Record
 from coordinator.islands.island import Island
 from coordinator.run.archipelago import archipelago
 from coordinator.run.audits import CARELESS, Caution
-from coordinator.run.feed import Feed, Overheard
+from coordinator.run.feed import Feed, TeeRows
 from coordinator.run.loop import Loop
 from coordinator.run.rate import RateMeter
 from coordinator.run.requests import RunContext
@@ -84,7 +84,7 @@ class RunSession:
             stack.callback(self._recorder.close)
             self.experiment = experiment_from_text(details.document)
             self.feed = Feed(held.name, held.epoch, details) if is_watched else None
-            rows = Overheard(self._recorder, self.feed) if self.feed else self._recorder
+            rows = TeeRows(self._recorder, self.feed) if self.feed else self._recorder
             self.loop = Loop(
                 archipelago(self.experiment, details.seed, details.run),
                 context=RunContext.of(
