@@ -16,7 +16,7 @@ from typing import Self
 import zenoh
 
 from coordinator.dispatch.events import AgentKind, DispatchEvent, Left, Returned
-from coordinator.network.roster import Roster
+from coordinator.network.membership import Membership
 from schema.agent.network import (
     ASK_TIMEOUT_S,
     DEFAULT_FLEET,
@@ -119,7 +119,7 @@ class Network:
         )
         self._is_hub = not connect
         self._inbox: SimpleQueue[_News] = SimpleQueue()
-        self._roster = Roster(wire_version())
+        self._membership = Membership(wire_version())
         self._ask_again: list[tuple[float, str]] = []
         self._orders: list[Order] = []
         self._onlookers: list[Order] = []
@@ -128,7 +128,7 @@ class Network:
     @property
     def refused(self) -> Mapping[str, str]:
         """Agents that may not take part, and why."""
-        return self._roster.refused
+        return self._membership.refused
 
     def __enter__(self) -> Self:
         """Open the session and begin to look for agents.
@@ -194,7 +194,7 @@ class Network:
             payload: an encoded request.
         """
         asked = _Asked(agent, number, self._inbox)
-        if member := self._roster.find(agent):
+        if member := self._membership.find(agent):
             self._ask(asked, member.jobs, payload, JOB_TIMEOUT_S)
         else:
             asked.end()
@@ -206,7 +206,7 @@ class Network:
             agent: that was given the job, and may have left.
             payload: an encoded request that need name only the job.
         """
-        if member := self._roster.find(agent):
+        if member := self._membership.find(agent):
             self._session.put(member.cancelled, payload)
 
     def _ask(
@@ -289,27 +289,27 @@ class Network:
     def _token_changed(self, sample: zenoh.Sample) -> list[DispatchEvent]:
         key = str(sample.key_expr)
         if sample.kind != zenoh.SampleKind.PUT:
-            left = self._roster.vanish(key)
+            left = self._membership.vanish(key)
             return [left] if left else []
-        if member := self._roster.appear(key):
+        if member := self._membership.appear(key):
             self._ask_info(member.name)
         return []
 
     def _ask_info(self, agent: str) -> None:
-        if member := self._roster.find(agent):
+        if member := self._membership.find(agent):
             asked = _Asked(agent, -1, self._inbox)
             self._ask(asked, member.info, None, ASK_TIMEOUT_S)
 
     def _introduced(self, asked: _Asked) -> Sequence[DispatchEvent]:
         """Let an agent take part that says what it is and is of our version."""
         agent, reply = asked.agent, asked.reply
-        if not self._roster.is_stranger(agent):
+        if not self._membership.is_stranger(agent):
             return []
         if reply is None or reply.ok is None:
             # It lives but does not answer (yet).
             self._ask_again.append((time.monotonic() + _ASK_AGAIN_S, agent))
             return []
-        events = self._roster.introduce(agent, reply.ok.payload.to_bytes())
+        events = self._membership.introduce(agent, reply.ok.payload.to_bytes())
         if agent in self.refused:
             self._say_refused(agent)
         return events
@@ -331,7 +331,7 @@ class Network:
         if reason.startswith(FENCED):
             raise NetworkError(f"this coordinator stops: {reason[len(FENCED) :]}")
         if reason.startswith(UNFIT):
-            if left := self._roster.refuse(agent, reason[len(UNFIT) :]):
+            if left := self._membership.refuse(agent, reason[len(UNFIT) :]):
                 self._say_refused(agent)
                 return left
             return Returned(number, agent, "lost")

@@ -11,7 +11,7 @@ from schema.errors import MalformedMessage
 from schema.wire import revolve_pb2 as pb
 
 
-class Roster:
+class Membership:
     """All agents of a fleet whose token stands.
 
     Attributes:

@@ -1,0 +1,111 @@
+"""Who is there: tokens and introductions in, news out."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coordinator.dispatch.events import Died, Joined, Left
+from coordinator.network.membership import Membership
+from schema.agent.topics import Member
+from schema.errors import MalformedMessage
+from schema.wire import revolve_pb2 as pb
+
+WORKER = Member("f", "worker", "w")
+
+
+def info(
+    agent: str = "w", kind: str = "worker", slots: int = 2, version: str = "1"
+) -> bytes:
+    message = pb.AgentInfo(
+        agent=agent, kind=kind, slots=slots, platform="p", version=version
+    )
+    return message.SerializeToString()
+
+
+@pytest.fixture
+def membership() -> Membership:
+    membership = Membership("1")
+    assert membership.appear(WORKER.alive) == WORKER
+    return membership
+
+
+def test_an_agent_joins_by_saying_what_it_is_and_leaves(membership: Membership) -> None:
+    assert membership.is_stranger("w")
+    assert membership.introduce("w", info()) == [Joined("w", "worker", 2, "p")]
+    assert not membership.is_stranger("w")
+    assert membership.appear(WORKER.alive) is None
+    assert membership.vanish(WORKER.alive) == Left("w")
+    assert membership.find("w") is None
+
+
+def test_who_vanishes_unknown_is_no_news(membership: Membership) -> None:
+    assert membership.vanish(WORKER.alive) is None
+    assert not membership.is_stranger("w")
+    # A thawed one stands there again under the same token.
+    assert membership.appear(WORKER.alive) == WORKER
+    assert membership.introduce("w", info()) != []
+
+
+def test_another_version_is_refused_until_it_goes(membership: Membership) -> None:
+    assert membership.introduce("w", info(version="2")) == []
+    assert membership.refused == {"w": "is of version '2', the coordinator of '1'"}
+    assert not membership.is_stranger("w")
+    assert membership.vanish(WORKER.alive) is None
+    assert membership.refused == {}
+
+
+def test_who_is_refused_takes_no_more_part_until_it_comes_again(
+    membership: Membership,
+) -> None:
+    assert membership.refuse("w", "too early") is None
+    membership.introduce("w", info())
+    assert membership.refuse("w", "has no plug-in") == Left("w")
+    assert membership.refused == {"w": "has no plug-in"}
+    assert membership.refuse("w", "told twice") is None
+    assert not membership.is_stranger("w")
+    assert membership.vanish(WORKER.alive) is None
+    assert (membership.refused, membership.find("w")) == ({}, None)
+
+
+def test_each_death_is_told_once_and_before_who_took_the_place(
+    membership: Membership,
+) -> None:
+    message = pb.AgentInfo.FromString(info())
+    message.deaths.add(agent="v", run="r", epoch=3, number=7, cause="SIGSEGV")
+    joined = Joined("w", "worker", 2, "p")
+    told = membership.introduce("w", message.SerializeToString())
+    assert told == [Died("r", 3, 7, "v", "SIGSEGV"), joined]
+    membership.vanish(WORKER.alive)
+    membership.appear(WORKER.alive)
+    message.deaths.add(agent="u", run="r", epoch=3, number=7, cause="x" * 999)
+    told = membership.introduce("w", message.SerializeToString())
+    assert told == [Died("r", 3, 7, "u", "x" * 100), joined]
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"\xff", info(agent="x"), info(kind="analyzer"), info(slots=0)]
+)
+def test_a_lie_is_malformed_and_changes_nothing(
+    membership: Membership, data: bytes
+) -> None:
+    with pytest.raises(MalformedMessage):
+        membership.introduce("w", data)
+    assert membership.is_stranger("w")
+
+
+@settings(derandomize=True)
+@given(st.binary(max_size=64))
+def test_any_bytes_introduce_or_are_malformed(data: bytes) -> None:
+    membership = Membership("1")
+    membership.appear(WORKER.alive)
+    try:
+        membership.introduce("w", data)
+    except MalformedMessage:
+        assert membership.is_stranger("w")
+
+
+@pytest.mark.parametrize("key", ["", "revolve/f/w/alive", "revolve/f/x/w/alive"])
+def test_no_token(membership: Membership, key: str) -> None:
+    for take in (membership.appear, membership.vanish):
+        with pytest.raises(MalformedMessage):
+            take(key)
