@@ -11,7 +11,7 @@ from schema.experiment.document import Simulation
 from schema.parts import Vector
 from schema.robot.results import Floats
 from worker.clusters.bounds import Indices
-from worker.clusters.columns import Layout, Roster
+from worker.clusters.columns import Layout, RobotRows
 from worker.clusters.slot import Seat
 from worker.robot.controller import Widths
 from worker.robot.sensors import HIGHEST_OUTPUT, LOWEST_OUTPUT, into_frame
@@ -36,9 +36,9 @@ class Nerves:
         self._tick_s = simulation.brain_steps * simulation.timestep_s
         self._gravity = np.array(gravity)
         self.readings = np.zeros((0, width.inputs))
-        self._layout = Layout((), Roster(()))
+        self._layout = Layout((), RobotRows(()))
         self._seats: list[Seat] = []
-        self._gather(self._layout.roster)
+        self._gather(self._layout.robot_rows)
 
     def settle(self, layout: Layout) -> None:
         """Go on with robots that may sit elsewhere, or be others, since last time.
@@ -48,10 +48,10 @@ class Nerves:
         """
         if layout is self._layout:
             return
-        if layout.roster is not self._layout.roster:
-            self._gather(layout.roster)
+        if layout.robot_rows is not self._layout.robot_rows:
+            self._gather(layout.robot_rows)
         self._layout = layout
-        seats = [one.seat for one in layout.roster.everybody]
+        seats = [one.seat for one in layout.robot_rows.everybody]
         for row, seat in enumerate(seats):
             if seat is not self._seats[row]:
                 seat.senses.show(self.readings[row : row + 1])
@@ -102,9 +102,9 @@ class Nerves:
             controls[:] = command[start:end]
             start = end
 
-    def _gather(self, roster: Roster) -> None:
+    def _gather(self, robot_rows: RobotRows) -> None:
         """Take over robots, some of whom may be new."""
-        seats = [one.seat for one in roster.everybody]
+        seats = [one.seat for one in robot_rows.everybody]
         readings = [seat.senses.readings for seat in seats]
         self.readings = np.concatenate([np.zeros((0, self._width.inputs)), *readings])
         for row, seat in enumerate(seats):

@@ -19,7 +19,7 @@ _PARTS = 4
 """Parts of a cluster's state."""
 
 
-class Roster:
+class RobotRows:
     """What stays of R robots until somebody is born or dies, wherever they are.
 
     Attributes:
@@ -74,7 +74,7 @@ class Layout:
     The row has W numbers: of each cluster all of ``Cluster.live``.
 
     Attributes:
-        roster: the robots; its ``islands``, ``numbers`` and ``joint_counts``.
+        robot_rows: the robots; its ``islands``, ``numbers`` and ``joint_counts``.
         clusters: in the order of the row.
         homes: (R,) which of the clusters each one lives in.
         starts, dofs: (R,) where each one's position and velocity begin.
@@ -84,18 +84,20 @@ class Layout:
         velocities: where the velocities stand, robot by robot.
     """
 
-    def __init__(self, clusters: Sequence[Cluster], roster: Roster) -> None:
+    def __init__(self, clusters: Sequence[Cluster], robot_rows: RobotRows) -> None:
         """Find everybody.
 
         Args:
             clusters: all of an arena, in any order that lasts.
-            roster: all robots.
+            robot_rows: all robots.
         """
-        self.roster = roster
-        self.islands, self.numbers = roster.islands, roster.numbers
-        self.joint_counts = roster.joint_counts
+        self.robot_rows = robot_rows
+        self.islands, self.numbers = robot_rows.islands, robot_rows.numbers
+        self.joint_counts = robot_rows.joint_counts
         self.clusters = tuple(clusters)
-        rows = [roster.rows[birth] for cluster in clusters for birth in cluster.members]
+        rows = [
+            robot_rows.rows[birth] for cluster in clusters for birth in cluster.members
+        ]
         own = [seat.offsets for cluster in clusters for seat in cluster.seats]
         sizes = np.array([c.sizes for c in clusters], dtype=np.intp).reshape(-1)
         # Where each cluster's four parts begin, for each of its seats.
@@ -108,12 +110,12 @@ class Layout:
         self.homes: Indices = np.repeat(np.arange(len(counts)), counts)[order]
         self.roots = self.starts[:, None] + np.arange(_FREE)
         self.motions = self.dofs[:, None] + np.arange(_FREE_DOFS)
-        self.joints = runs(self.starts + _FREE, roster.sizes - _FREE)
-        degrees = roster.sizes - (_FREE - _FREE_DOFS)
+        self.joints = runs(self.starts + _FREE, robot_rows.sizes - _FREE)
+        degrees = robot_rows.sizes - (_FREE - _FREE_DOFS)
         self.velocities = runs(self.dofs, degrees)
         self._first_velocities = np.cumsum(degrees) - degrees
-        self._places = runs(first_places, roster.body_counts, 3)
-        self._turns = runs(first_turns, roster.body_counts, 9)
+        self._places = runs(first_places, robot_rows.body_counts, 3)
+        self._turns = runs(first_turns, robot_rows.body_counts, 9)
         # Of x and y: the origin, and the row of the rotation.
         self._origins = self._places + np.arange(2)[:, None]
         self._rows = self._turns + np.arange(6).reshape(2, 3, 1)
@@ -138,7 +140,7 @@ class Layout:
         if not len(self._first_velocities):
             return np.zeros((len(states), 0))
         terms = np.abs(states.take(self.velocities, axis=1))
-        terms *= self.roster.weights
+        terms *= self.robot_rows.weights
         return np.asarray(np.add.reduceat(terms, self._first_velocities, axis=1))
 
     def hulls(self, states: Floats) -> Floats:
@@ -148,7 +150,7 @@ class Layout:
             states: (L, W).
         """
         terms = states.take(self._rows, axis=1)
-        terms *= self.roster.hulls[:3]
+        terms *= self.robot_rows.hulls[:3]
         centres = terms[:, :, 0] + terms[:, :, 1]
         centres += terms[:, :, 2]
         centres += states.take(self._origins, axis=1)
@@ -159,12 +161,12 @@ class Layout:
 
         Args:
             states: (L, W).
-            wanted: (B,) which of all spheres, as ``Roster`` numbers them.
+            wanted: (B,) which of all spheres, as ``RobotRows`` numbers them.
         """
-        bodies = self.roster.balls[wanted]
+        bodies = self.robot_rows.balls[wanted]
         turns = self._turns[bodies][:, None] + np.arange(9)
         turned = states.take(turns, axis=1)
-        turned *= self.roster.centres[wanted]
+        turned *= self.robot_rows.centres[wanted]
         moved: Floats = turned[..., 0::3] + turned[..., 1::3]
         moved += turned[..., 2::3]
         moved += states.take(self._places[bodies][:, None] + np.arange(3), axis=1)
@@ -173,7 +175,7 @@ class Layout:
     def part(self, row: int) -> slice:
         """Return where a robot's configuration stands."""
         start = int(self.starts[row])
-        return slice(start, start + int(self.roster.sizes[row]))
+        return slice(start, start + int(self.robot_rows.sizes[row]))
 
 
 def runs(starts: Indices, counts: Indices, stride: int = 1) -> Indices:

@@ -14,7 +14,7 @@ from schema.experiment.settings import ArenaSettings
 from schema.robot.names import BirthId
 from schema.robot.results import Floats
 from worker.clusters.cluster import Cluster
-from worker.clusters.columns import Layout, Roster
+from worker.clusters.columns import Layout, RobotRows
 from worker.clusters.groups import Group, across, components
 from worker.clusters.interval import Stride
 from worker.clusters.models import Shop
@@ -37,10 +37,10 @@ class Company:
         """Start with nobody."""
         self.shop = Shop(settings)
         self.proximity = Proximity(settings)
-        self.roster = Roster(())
+        self.robot_rows = RobotRows(())
         self.clusters: tuple[Cluster, ...] = ()
         self.by_cost: list[Cluster] = []
-        self.layout = Layout((), self.roster)
+        self.layout = Layout((), self.robot_rows)
         self.stride: Stride | None = None
         self.merges = self.splits = 0
         self._cluster_of: dict[BirthId, Cluster] = {}
@@ -49,14 +49,14 @@ class Company:
     @property
     def everybody(self) -> tuple[Inhabitant, ...]:
         """All inhabitants, by birth."""
-        return self.roster.everybody
+        return self.robot_rows.everybody
 
     def __contains__(self, birth: BirthId) -> bool:
-        return birth in self.roster.rows
+        return birth in self.robot_rows.rows
 
     def find(self, birth: BirthId) -> Inhabitant:
         """Return who has a name."""
-        return self.roster.everybody[self.roster.rows[birth]]
+        return self.robot_rows.everybody[self.robot_rows.rows[birth]]
 
     def cluster_of(self, birth: BirthId) -> Cluster:
         """Return where somebody lives."""
@@ -66,7 +66,7 @@ class Company:
         """Take robots in, each in its own home."""
         added = sorted(newcomers, key=lambda one: one.birth)
         everybody = sorted((*self.everybody, *added), key=lambda one: one.birth)
-        self.roster = Roster(everybody)
+        self.robot_rows = RobotRows(everybody)
         homes = [one.body.home for one in added]
         self._settle([*self.clusters, *homes])
 
@@ -81,7 +81,7 @@ class Company:
             homes[cluster.members] = cluster
         left = [one for one in self.everybody if one.birth not in gone]
         kept = [cluster for cluster in self.clusters if cluster.members not in homes]
-        self.roster = Roster(left)
+        self.robot_rows = RobotRows(left)
         for members in homes:
             rest = tuple(birth for birth in members if birth not in gone)
             if rest:
@@ -140,7 +140,7 @@ class Company:
             parts = cluster.parts()
             groups += parts
             if len(parts) > 1:
-                rows = self.roster.rows
+                rows = self.robot_rows.rows
                 pairs += across([[rows[birth] for birth in part] for part in parts])
         if pairs:
             scene = Scene(self.layout, state[np.newaxis])
@@ -185,12 +185,12 @@ class Company:
 
     def _settle(self, clusters: Sequence[Cluster]) -> None:
         known = {id(cluster) for cluster in self.clusters}
-        rows = self.roster.rows
+        rows = self.robot_rows.rows
         self.clusters = tuple(sorted(clusters, key=lambda c: rows[c.members[0]]))
         self._cluster_of = {
             birth: cluster for cluster in self.clusters for birth in cluster.members
         }
-        self.layout = Layout(self.clusters, self.roster)
+        self.layout = Layout(self.clusters, self.robot_rows)
         self.by_cost = sorted(self.clusters, key=lambda cluster: -cluster.cost)
         if self.stride is None:
             return

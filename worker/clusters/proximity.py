@@ -52,11 +52,14 @@ class Scene:
 
         Each sphere of the one is measured against each of the other.
         """
-        roster = self._layout.roster
+        robot_rows = self._layout.robot_rows
         rows = sorted({row for pair in pairs for row in pair})
-        counts = roster.ball_counts[rows]
-        wanted = runs(roster.first_balls[rows], counts)
-        balls, radii = self._layout.balls(self._states, wanted), roster.radii[wanted]
+        counts = robot_rows.ball_counts[rows]
+        wanted = runs(robot_rows.first_balls[rows], counts)
+        balls, radii = (
+            self._layout.balls(self._states, wanted),
+            robot_rows.radii[wanted],
+        )
         ends = np.cumsum(counts).tolist()
         spans = dict(zip(rows, map(slice, [0, *ends], ends), strict=False))
         found = np.empty((len(balls), len(pairs)))
@@ -78,11 +81,11 @@ class Scene:
         At one of the moments, and as far as the hulls of their bodies tell from
         above.
         """
-        roster = self._layout.roster
-        first, second = roster.spans[here], roster.spans[there]
+        robot_rows = self._layout.robot_rows
+        first, second = robot_rows.spans[here], robot_rows.spans[there]
         gaps = self._hulls[:, :, first, None] - self._hulls[:, :, None, second]
         gaps *= gaps
-        radii = roster.hulls[3]
+        radii = robot_rows.hulls[3]
         reach = (radii[first, None] + within_m) + radii[second]
         return bool((gaps[:, 0] + gaps[:, 1] <= reach * reach).any())
 
@@ -96,13 +99,13 @@ class Scene:
         Returns:
             Rows of the first and of the second, ascending by both.
         """
-        homes, roster = self._layout.homes, self._layout.roster
+        homes, robot_rows = self._layout.homes, self._layout.robot_rows
         if not len(homes):
             return [], []
-        low = self._hulls.min(axis=0) - roster.hulls[3]
-        high = self._hulls.max(axis=0) + roster.hulls[3]
-        low = np.minimum.reduceat(low, roster.first_bodies, axis=1)
-        high = np.maximum.reduceat(high, roster.first_bodies, axis=1)
+        low = self._hulls.min(axis=0) - robot_rows.hulls[3]
+        high = self._hulls.max(axis=0) + robot_rows.hulls[3]
+        low = np.minimum.reduceat(low, robot_rows.first_bodies, axis=1)
+        high = np.maximum.reduceat(high, robot_rows.first_bodies, axis=1)
         low -= margins
         high += margins
         is_near = low[0][:, None] <= high[0]
