@@ -33,7 +33,7 @@ from coordinator.dispatch.events import (
     Ticked,
     Withdrawn,
 )
-from coordinator.dispatch.pool import AgentState, Pending, Pool, Rests, Twins
+from coordinator.dispatch.pool import AgentState, Backoff, Pending, Pool, Twins
 from coordinator.dispatch.stragglers import Stragglers
 from schema.errors import UnexpectedEvent
 
@@ -54,7 +54,7 @@ class Dispatch:
             "analyzer": Pool(VETS_AT_HAND),
         }
         self._kind_of: dict[str, AgentKind] = {}
-        self._rests = Rests()
+        self._backoff = Backoff()
         self._stamps = count(1)
         self._stragglers = Stragglers()
         self._twins = Twins()
@@ -100,7 +100,7 @@ class Dispatch:
     @property
     def wake_s(self) -> float | None:
         """When the next ``Ticked`` can change something [s]; None: no need."""
-        return self._rests.wake_s
+        return self._backoff.wake_s
 
     def handle(self, event: DispatchEvent) -> list[DispatchCommand]:
         """Take an event and return what is to be done, in this order.
@@ -183,7 +183,7 @@ class Dispatch:
             if event.outcome == "ok":
                 agent.failures = 0
             else:
-                self._rests.begin(agent, self._now_s or 0.0)
+                self._backoff.begin(agent, self._now_s or 0.0)
         pool.offer(event.agent, next(self._stamps))
         yield from self._assign(pool)
 
@@ -232,7 +232,7 @@ class Dispatch:
         if self._now_s is not None and event.now_s < self._now_s:
             raise UnexpectedEvent(f"{event.now_s} s comes after {self._now_s} s")
         self._now_s = event.now_s
-        for name in self._rests.over(event.now_s):
+        for name in self._backoff.over(event.now_s):
             if kind := self._kind_of.get(name):
                 pool = self._pools[kind]
                 pool.agents[name].rests = False

@@ -209,7 +209,7 @@ REST_S = 0.05
 LONGEST_REST_S = 3.2
 
 
-class Rests:
+class Backoff:
     """Who rests, and until when."""
 
     def __init__(self) -> None:
