@@ -8,7 +8,7 @@ from pathlib import Path
 from coordinator.cli.execute import Deployment, resume, start, start_campaign
 from coordinator.cli.flags import LISTEN, parser
 from coordinator.dispatch.events import AgentKind
-from coordinator.run.audits import Caution
+from coordinator.run.cross_checks import Caution
 from coordinator.storage.campaign import (
     Campaign,
     is_campaign,

@@ -16,7 +16,7 @@ from coordinator.dispatch.events import AgentKind
 from coordinator.dispatch.fleet import Agents, Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.network.service import Network
-from coordinator.run.audits import CARELESS, Caution
+from coordinator.run.cross_checks import CARELESS, Caution
 from coordinator.run.live_server import LiveServer, open_viewer
 from coordinator.run.operators import Reception
 from coordinator.run.scheduler import Planned, RunScheduler

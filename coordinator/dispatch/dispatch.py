@@ -33,7 +33,7 @@ from coordinator.dispatch.events import (
     Ticked,
     Withdrawn,
 )
-from coordinator.dispatch.pool import AgentState, Backoff, Pending, Pool, Twins
+from coordinator.dispatch.pool import AgentState, Backoff, PairedJobs, Pending, Pool
 from coordinator.dispatch.stragglers import Stragglers
 from schema.errors import UnexpectedEvent
 
@@ -57,7 +57,7 @@ class Dispatch:
         self._backoff = Backoff()
         self._stamps = count(1)
         self._stragglers = Stragglers()
-        self._twins = Twins()
+        self._pairs = PairedJobs()
         self._highest = -1
         self._now_s: float | None = None
         self._doors: dict[type, Callable[..., Iterator[DispatchCommand]]] = {
@@ -209,7 +209,7 @@ class Dispatch:
         job = pending.job
         del self._jobs[job.number]
         if job.twin not in self._jobs:
-            self._twins.forget(job)
+            self._pairs.forget(job)
         for agent in pending.holders:
             yield Cancel(job, agent)
 
@@ -255,7 +255,7 @@ class Dispatch:
                 continue
             if self._pools[AGENT_OF[kind]] is not pool:
                 continue
-            avoid = {*self._twins.avoided(pending), *pending.holders}
+            avoid = {*self._pairs.avoided(pending), *pending.holders}
             name = next((each for each in idle if each not in avoid), "")
             if name:
                 idle.remove(name)
@@ -264,7 +264,7 @@ class Dispatch:
     def _give(self, pending: Pending, pool: Pool, name: str) -> Assign:
         """Have an agent do a job."""
         job = pending.job
-        self._twins.note(job, name)
+        self._pairs.note(job, name)
         agent = pool.agents[name]
         agent.held[job.number] = None
         place = max(1.0, len(agent.held) / agent.joined.slots)
@@ -276,7 +276,7 @@ class Dispatch:
         """Give out what can be given out."""
         passed: list[str] = []
         while pool.waiting and (name := pool.best()):
-            pending = pool.take(name, self._jobs, self._twins.avoided)
+            pending = pool.take(name, self._jobs, self._pairs.avoided)
             if pending is None:
                 passed.append(name)
                 heappop(pool.free)

@@ -237,7 +237,7 @@ class Backoff:
             yield heappop(self._until)[2]
 
 
-class Twins:
+class PairedJobs:
     """Who was given a job whose twin somebody else is to do."""
 
     def __init__(self) -> None:

@@ -40,7 +40,7 @@ from coordinator.islands.events import (
 )
 from coordinator.islands.island import Island
 from coordinator.run.advances import Advances, SnapshotStore, Terms
-from coordinator.run.audits import CARELESS, Caution, audit_records, describe
+from coordinator.run.cross_checks import CARELESS, Caution, audit_records, describe
 from coordinator.run.requests import Requests, RunContext, is_quarantined
 from coordinator.run.throttle import RealTimeThrottle
 from schema.errors import RunPaused, UnexpectedEvent

@@ -20,7 +20,7 @@ from coordinator.islands.events import (
     VettingFailed,
     requester_of,
 )
-from coordinator.run.audits import Audits
+from coordinator.run.cross_checks import CrossChecks
 from schema.errors import JobRefused, MalformedMessage
 from schema.experiment.document import Experiment, island_count, island_experiment
 from schema.experiment.identity import NOBODY, Identity, Origin
@@ -103,7 +103,7 @@ class Requests:
             audit: share of evaluations that are done twice.
         """
         self.malformed = 0
-        self._audits = Audits(audit)
+        self._cross_checks = CrossChecks(audit)
         self._context = context
         self._fleet = fleet
         self._open: dict[int, Vet | Evaluate] = {}
@@ -161,10 +161,10 @@ class Requests:
     def _numbers(self, command: Vet | Evaluate) -> list[tuple[int, int]]:
         """Return the number of each job for a question, and of its twin or -1."""
         first = self._fleet.new_number()
-        if isinstance(command, Vet) or not self._audits.chooses(command):
+        if isinstance(command, Vet) or not self._cross_checks.chooses(command):
             return [(first, -1)]
         second = self._fleet.new_number()
-        self._audits.pair(first, second)
+        self._cross_checks.pair(first, second)
         return [(first, second), (second, first)]
 
     def is_of(self, run: str, epoch: int) -> bool:
@@ -177,12 +177,12 @@ class Requests:
         asked = self._open.pop(job.number)
         requester = asked.requester if isinstance(asked, Evaluate) else None
         if command.is_deadly:
-            self._came += self._audits.settle(
+            self._came += self._cross_checks.settle(
                 job.number, _quarantined(command, requester)
             )
             return
         if not command.reason:
-            self._came += self._audits.settle(
+            self._came += self._cross_checks.settle(
                 job.number, self._answered(command, requester)
             )
             return

@@ -11,7 +11,7 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Record
 from coordinator.islands.island import Island
 from coordinator.run.archipelago import archipelago
-from coordinator.run.audits import CARELESS, Caution
+from coordinator.run.cross_checks import CARELESS, Caution
 from coordinator.run.feed import Feed, TeeRows
 from coordinator.run.loop import Loop
 from coordinator.run.rate import RateMeter

@@ -395,7 +395,7 @@ def test_twins_go_to_two_workers_if_there_are_two() -> None:
     # c did neither of them yet.
     assert given_out(dispatch.handle(lost(2, "b"))) == [(2, "c")]
     dispatch.handle(ok(2, "c"))
-    assert len(dispatch._twins) == 0
+    assert len(dispatch._pairs) == 0
 
 
 class World:

@@ -37,7 +37,7 @@ CARELESS = Caution()
 """No audits, and no pause."""
 
 
-class Audits:
+class CrossChecks:
     """The evaluations of a run that are done twice."""
 
     def __init__(self, share: float) -> None:

@@ -11,7 +11,7 @@ from coordinator.islands.events import (
     EvaluationFailed,
     VettingFailed,
 )
-from coordinator.run.audits import Audits, audit_records, describe
+from coordinator.run.cross_checks import CrossChecks, audit_records, describe
 from coordinator.storage.entries import decode_entry, encode_entry
 from schema.robot.names import BirthId
 from schema.robot.results import Evaluation, Provenance
@@ -27,7 +27,7 @@ FAILED = EvaluationFailed(BIRTH, "flew away", Provenance("c", "p", 0.1))
 
 
 def chosen(share: float) -> list[int]:
-    audits = Audits(share)
+    audits = CrossChecks(share)
     births = (Evaluate(BirthId(0, number), ROBOT) for number in range(4000))
     return [each.birth.number for each in births if audits.chooses(each)]
 
@@ -44,7 +44,7 @@ def test_a_share_is_chosen_by_who_is_evaluated() -> None:
 
 def test_the_first_of_equal_answers_is_the_answer_whoever_comes_first() -> None:
     for order in ((4, 5), (5, 4)):
-        audits = Audits(1.0)
+        audits = CrossChecks(1.0)
         audits.pair(4, 5)
         outcomes = {4: ONE, 5: OTHER}
         first, second = order
@@ -55,7 +55,7 @@ def test_the_first_of_equal_answers_is_the_answer_whoever_comes_first() -> None:
 
 @pytest.mark.parametrize("other", [FAILED, replace(DIFFERENT)])
 def test_unequal_answers_are_no_answer(other: Evaluated | EvaluationFailed) -> None:
-    audits = Audits(1.0)
+    audits = CrossChecks(1.0)
     audits.pair(4, 5)
     audits.settle(5, other)
     (audited,) = audits.settle(4, replace(ONE, evaluation=_far()))
@@ -77,7 +77,7 @@ def test_equal_failures_agree() -> None:
 
 
 def test_what_is_no_pair_passes() -> None:
-    audits = Audits(1.0)
+    audits = CrossChecks(1.0)
     vetted = VettingFailed(BIRTH, 0, "why")
     assert audits.settle(1, ONE) == [ONE]
     assert audits.settle(2, vetted) == [vetted]
