@@ -18,7 +18,7 @@ from zlib import crc32
 
 from coordinator.islands.events import Journalled
 from coordinator.storage.disk import AppendedFile
-from coordinator.storage.entries import decode_entry, encode_entry
+from coordinator.storage.journal_codec import decode_entry, encode_entry
 from schema.errors import MalformedMessage, RunFolderError
 
 NAME = "journal.bin"

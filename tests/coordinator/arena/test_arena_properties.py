@@ -21,7 +21,7 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.storage.entries import decode_entry, encode_entry
+from coordinator.storage.journal_codec import decode_entry, encode_entry
 from schema.robot.names import BirthId
 from tests.coordinator.arena_world import DT, Life, World, experiment, golden, picky
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from coordinator.arena.arena import Arena
 from coordinator.islands.events import Evaluated, EvaluationFailed, requester_of
-from coordinator.storage.entries import decode_entry, encode_entry
+from coordinator.storage.journal_codec import decode_entry, encode_entry
 from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Arena as Rules

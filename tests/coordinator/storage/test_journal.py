@@ -28,8 +28,8 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.storage.entries import decode_entry, encode_entry
 from coordinator.storage.journal import MAGIC, NAME, Journal
+from coordinator.storage.journal_codec import decode_entry, encode_entry
 from schema.errors import MalformedMessage, RunFolderError
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.genome import Node

@@ -3,7 +3,7 @@
 import pytest
 
 from coordinator.islands.events import Evaluated, EvaluationFailed
-from coordinator.storage.entries import decode_entry, encode_entry
+from coordinator.storage.journal_codec import decode_entry, encode_entry
 from schema.robot.names import BirthId
 from schema.robot.results import Evaluation, Provenance
 
