@@ -20,11 +20,17 @@ from coordinator.evolution.growth import (
     wire,
 )
 from coordinator.evolution.limits import Tally, greatest, tallies, tally
-from coordinator.evolution.tree import Branch, copied, free_places, lineage, preorder
+from coordinator.evolution.mutable_genome import (
+    MutableGenome,
+    copied,
+    free_places,
+    lineage,
+    preorder,
+)
 from schema.experiment.document import Experiment, Space, body_space
 
 
-def deletable(sizes: dict[Branch, Tally], space: Space) -> list[Branch]:
+def deletable(sizes: dict[MutableGenome, Tally], space: Space) -> list[MutableGenome]:
     """Return the subtrees without which a tree keeps the least number of parts."""
     total = next(iter(sizes.values()))
     return [
@@ -34,7 +40,7 @@ def deletable(sizes: dict[Branch, Tally], space: Space) -> list[Branch]:
     ]
 
 
-def duplicable(sizes: dict[Branch, Tally], space: Space) -> list[Branch]:
+def duplicable(sizes: dict[MutableGenome, Tally], space: Space) -> list[MutableGenome]:
     """Return the subtrees of which a tree may hold one more."""
     room = greatest(space).plus(next(iter(sizes.values())), -1)
     return [
@@ -42,7 +48,7 @@ def duplicable(sizes: dict[Branch, Tally], space: Space) -> list[Branch]:
     ]
 
 
-def delete_subtree(draws: Draws, root: Branch, experiment: Experiment) -> None:
+def delete_subtree(draws: Draws, root: MutableGenome, experiment: Experiment) -> None:
     """Delete a random subtree, with the experiment's probability."""
     if not draws.chance(experiment.variation.p_delete_subtree):
         return
@@ -50,7 +56,9 @@ def delete_subtree(draws: Draws, root: Branch, experiment: Experiment) -> None:
         draws.pick(candidates).cut()
 
 
-def duplicate_subtree(draws: Draws, root: Branch, experiment: Experiment) -> None:
+def duplicate_subtree(
+    draws: Draws, root: MutableGenome, experiment: Experiment
+) -> None:
     """Put a copy of a random subtree on a free slot, with a probability."""
     if not draws.chance(experiment.variation.p_duplicate_subtree):
         return
@@ -63,7 +71,7 @@ def duplicate_subtree(draws: Draws, root: Branch, experiment: Experiment) -> Non
         parent.graft(twin, slot)
 
 
-def swap_subtrees(draws: Draws, root: Branch, experiment: Experiment) -> None:
+def swap_subtrees(draws: Draws, root: MutableGenome, experiment: Experiment) -> None:
     """Let two subtrees, neither within the other, change places, by chance."""
     if not draws.chance(experiment.variation.p_swap_subtree):
         return
@@ -80,12 +88,12 @@ def swap_subtrees(draws: Draws, root: Branch, experiment: Experiment) -> None:
         other.graft(first, there)
 
 
-def _seat(branch: Branch) -> tuple[Branch, int]:
+def _seat(branch: MutableGenome) -> tuple[MutableGenome, int]:
     assert branch.parent is not None
     return branch.parent, branch.parent_slot
 
 
-def vary_parts(draws: Draws, branches: Iterable[Branch], epsilon: float) -> None:
+def vary_parts(draws: Draws, branches: Iterable[MutableGenome], epsilon: float) -> None:
     """Move every part's parameters, but for its colour, towards random values."""
     for branch in branches:
         if branch.kind.own_parameters:
@@ -94,7 +102,7 @@ def vary_parts(draws: Draws, branches: Iterable[Branch], epsilon: float) -> None
             )
 
 
-def expected_parts(root: Branch, experiment: Experiment) -> float:
+def expected_parts(root: MutableGenome, experiment: Experiment) -> float:
     """Return how many parts to add on average; 0 or less is none.
 
     What deletion takes on average, less what duplication gives, but no more than
@@ -115,7 +123,7 @@ def expected_parts(root: Branch, experiment: Experiment) -> float:
 
 
 def add_parts(
-    draws: Draws, root: Branch, genes: Iterator[int], experiment: Experiment
+    draws: Draws, root: MutableGenome, genes: Iterator[int], experiment: Experiment
 ) -> None:
     """Add random parts, `expected_parts` on average, each with its share of brain."""
     expected = expected_parts(root, experiment)
@@ -130,7 +138,7 @@ def add_parts(
 
 
 def _add_part(
-    draws: Draws, root: Branch, genes: Iterator[int], experiment: Experiment
+    draws: Draws, root: MutableGenome, genes: Iterator[int], experiment: Experiment
 ) -> None:
     space = experiment.space
     branches = preorder(root)

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 
 from coordinator.evolution.draws import Draws
 from coordinator.evolution.growth import connect, endings, random_neuron
-from coordinator.evolution.tree import Branch, follow
+from coordinator.evolution.mutable_genome import MutableGenome, follow
 from schema.experiment.document import Experiment
 from schema.robot.brain import NEURON_TYPES
 from schema.robot.genome import ConnectionGene, NeuronGene
@@ -21,13 +21,13 @@ _HALF = Decimal("0.5")
 
 
 def delete_hidden_neurons(
-    draws: Draws, branches: Sequence[Branch], probability: float
+    draws: Draws, branches: Sequence[MutableGenome], probability: float
 ) -> None:
     """Delete each hidden neuron with a probability, and what led to or from it.
 
     Connections to and from the neurons that stay lead where they led before.
     """
-    moved: dict[Branch, list[int | None]] = {}
+    moved: dict[MutableGenome, list[int | None]] = {}
     for branch in branches:
         if not branch.hidden:
             continue
@@ -50,7 +50,9 @@ def delete_hidden_neurons(
 
 
 def _renamed(
-    gene: ConnectionGene, owner: Branch, moved: dict[Branch, list[int | None]]
+    gene: ConnectionGene,
+    owner: MutableGenome,
+    moved: dict[MutableGenome, list[int | None]],
 ) -> ConnectionGene | None:
     """Return a connection under its neurons' new offsets; None if one is gone."""
     if "hidden" not in (gene.source[0], gene.target[0]):
@@ -80,7 +82,7 @@ def _renamed(
 
 
 def delete_connections(
-    draws: Draws, branches: Sequence[Branch], probability: float
+    draws: Draws, branches: Sequence[MutableGenome], probability: float
 ) -> None:
     """Delete each connection with a probability."""
     for branch in branches:
@@ -90,7 +92,9 @@ def delete_connections(
             )
 
 
-def vary_neurons(draws: Draws, branches: Sequence[Branch], epsilon: float) -> None:
+def vary_neurons(
+    draws: Draws, branches: Sequence[MutableGenome], epsilon: float
+) -> None:
     """Move every neuron's parameters towards random values."""
     for branch in branches:
         if branch.outputs:
@@ -114,7 +118,7 @@ def _varied(
 
 
 def add_hidden_neurons(
-    draws: Draws, branches: Sequence[Branch], before: int, experiment: Experiment
+    draws: Draws, branches: Sequence[MutableGenome], before: int, experiment: Experiment
 ) -> None:
     """Add as many hidden neurons as deletion takes on average.
 
@@ -135,7 +139,7 @@ def add_hidden_neurons(
 
 
 def add_connections(
-    draws: Draws, branches: Sequence[Branch], before: int, experiment: Experiment
+    draws: Draws, branches: Sequence[MutableGenome], before: int, experiment: Experiment
 ) -> None:
     """Add as many connections as deletion takes on average, rounded half up.
 

@@ -20,7 +20,13 @@ from coordinator.evolution.growth import (
     wire,
 )
 from coordinator.evolution.limits import Tally, tally
-from coordinator.evolution.tree import Branch, freeze, gene_ids, level, preorder
+from coordinator.evolution.mutable_genome import (
+    MutableGenome,
+    gene_ids,
+    level,
+    preorder,
+    to_genome,
+)
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, body_space
 from schema.parts import COLOURS
@@ -57,7 +63,7 @@ def generate(
             _add_brain(draws, branches, experiment)
             if experiment.space.planar:
                 level(branches)
-            return freeze(branches)
+            return to_genome(branches)
     raise ExperimentError(
         f"space: {MAX_TREES} random trees had no motor or fewer than "
         f"space.min_parts = {least} parts: the restrictions and "
@@ -65,7 +71,9 @@ def generate(
     )
 
 
-def _random_body(draws: Draws, experiment: Experiment, genes: Iterator[int]) -> Branch:
+def _random_body(
+    draws: Draws, experiment: Experiment, genes: Iterator[int]
+) -> MutableGenome:
     """Return a random tree without hidden neurons; it may lack a motor."""
     space, shape = experiment.space, experiment.generation
     types = body_space(space)
@@ -89,7 +97,7 @@ def _random_body(draws: Draws, experiment: Experiment, genes: Iterator[int]) -> 
 
 
 def _add_brain(
-    draws: Draws, branches: Sequence[Branch], experiment: Experiment
+    draws: Draws, branches: Sequence[MutableGenome], experiment: Experiment
 ) -> None:
     """Give a tree its hidden neurons, and connections among all neurons."""
     hosts = branches

@@ -8,15 +8,15 @@ from fractions import Fraction
 
 from coordinator.evolution.draws import Draws
 from coordinator.evolution.limits import Tally
-from coordinator.evolution.tree import Branch, path_between
+from coordinator.evolution.mutable_genome import MutableGenome, path_between
 from schema.experiment.document import Space
 from schema.parts import COLOURS, BodySpace, PartType
 from schema.robot.brain import NEURON_TYPES, Layer
 from schema.robot.genome import ConnectionGene, NeuronGene
 from schema.robot.robot import ORIENTATIONS
 
-Place = tuple[Branch, int]
-Ending = tuple[Branch, tuple[Layer, int]]
+Place = tuple[MutableGenome, int]
+Ending = tuple[MutableGenome, tuple[Layer, int]]
 """One end of a connection: a branch and a neuron of it."""
 
 _NEURONS = tuple(NEURON_TYPES.items())
@@ -35,7 +35,7 @@ def random_neuron(draws: Draws) -> NeuronGene:
 
 def random_part(
     draws: Draws, kind: PartType, genes: Iterator[int], colour: tuple[float, ...] = ()
-) -> Branch:
+) -> MutableGenome:
     """Return a part that hangs nowhere yet, without hidden neurons.
 
     Args:
@@ -44,7 +44,7 @@ def random_part(
         genes: the next of them becomes its identity.
         colour: red, green, blue; empty for random ones.
     """
-    return Branch(
+    return MutableGenome(
         kind,
         -1 if kind.is_root else draws.below(kind.arity),
         0 if kind.is_root else draws.pick(ORIENTATIONS),
@@ -83,7 +83,7 @@ def pick_growth(
     return None
 
 
-def endings(branches: Iterable[Branch], *layers: Layer) -> list[Ending]:
+def endings(branches: Iterable[MutableGenome], *layers: Layer) -> list[Ending]:
     """Return the neurons of some layers that connections may end or begin at."""
     return [(branch, end) for branch in branches for end in branch.neurons(*layers)]
 

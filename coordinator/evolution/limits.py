@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from coordinator.evolution.tree import Branch
+from coordinator.evolution.mutable_genome import MutableGenome
 from schema.experiment.document import Space
 
 
@@ -39,7 +39,7 @@ def greatest(space: Space) -> Tally:
     return Tally(space.max_parts, space.max_inputs, space.max_outputs, space.max_hidden)
 
 
-def tally(branches: Iterable[Branch]) -> Tally:
+def tally(branches: Iterable[MutableGenome]) -> Tally:
     """Return the tally of some branches, without what hangs on them."""
     parts = inputs = outputs = hidden = 0
     for branch in branches:
@@ -50,12 +50,12 @@ def tally(branches: Iterable[Branch]) -> Tally:
     return Tally(parts, inputs, outputs, hidden)
 
 
-def tallies(branches: Sequence[Branch]) -> dict[Branch, Tally]:
+def tallies(branches: Sequence[MutableGenome]) -> dict[MutableGenome, Tally]:
     """Return the tally of every subtree of a tree that is given depth first.
 
     They come in the order of their tops.
     """
-    sums: dict[Branch, Tally] = {}
+    sums: dict[MutableGenome, Tally] = {}
     for branch in reversed(branches):
         parts, inputs = 1, branch.kind.inputs
         outputs, hidden = len(branch.outputs), len(branch.hidden)

@@ -24,7 +24,14 @@ from coordinator.evolution.brain_mutation import (
 )
 from coordinator.evolution.draws import Draws
 from coordinator.evolution.limits import greatest, tallies, tally
-from coordinator.evolution.tree import Branch, freeze, gene_ids, level, preorder, thaw
+from coordinator.evolution.mutable_genome import (
+    MutableGenome,
+    gene_ids,
+    level,
+    preorder,
+    to_genome,
+    to_mutable,
+)
 from schema.experiment.document import Experiment, body_space
 from schema.robot.genome import Genome
 from schema.robot.names import BirthId
@@ -52,7 +59,7 @@ def mate(
     """
     draws = Draws(rng)
     types = body_space(experiment.space)
-    root, donor = thaw(first, types), thaw(second, types)
+    root, donor = to_mutable(first, types), to_mutable(second, types)
     thawed = [*preorder(root), *preorder(donor)]
     child: Genome | None = None
     if crossover(draws, root, donor, experiment):
@@ -61,13 +68,13 @@ def mate(
         if any(branch.outputs for branch in branches):
             if experiment.space.planar:
                 level(branches)
-            child = freeze(branches)
+            child = to_genome(branches)
         _let_go(branches)
     _let_go(thawed)
     return child
 
 
-def _let_go(branches: Iterable[Branch]) -> None:
+def _let_go(branches: Iterable[MutableGenome]) -> None:
     """Free branches at once, with whatever was cut off them.
 
     Parents and children name each other: they would wait for the garbage collector,
@@ -78,7 +85,7 @@ def _let_go(branches: Iterable[Branch]) -> None:
 
 
 def crossover(
-    draws: Draws, root: Branch, donor: Branch, experiment: Experiment
+    draws: Draws, root: MutableGenome, donor: MutableGenome, experiment: Experiment
 ) -> bool:
     """Put a subtree of a donor in the place of one of a tree, neither a root.
 
@@ -117,7 +124,7 @@ def crossover(
 
 
 def mutate(
-    draws: Draws, root: Branch, genes: Iterator[int], experiment: Experiment
+    draws: Draws, root: MutableGenome, genes: Iterator[int], experiment: Experiment
 ) -> None:
     """Change a tree in place, step by step in the order of the thesis.
 

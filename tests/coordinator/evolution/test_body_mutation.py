@@ -18,7 +18,12 @@ from coordinator.evolution.body_mutation import (
 from coordinator.evolution.draws import Draws
 from coordinator.evolution.generation import generate
 from coordinator.evolution.limits import greatest, tally
-from coordinator.evolution.tree import freeze, gene_ids, preorder, thaw
+from coordinator.evolution.mutable_genome import (
+    gene_ids,
+    preorder,
+    to_genome,
+    to_mutable,
+)
 from schema.experiment.document import (
     Experiment,
     Generation,
@@ -82,15 +87,15 @@ def test_deleting_takes_any_subtree_that_leaves_enough() -> None:
     setting = experiment({"min_parts": 3}, p_delete_subtree=1.0)
     found: Counter[str] = Counter()
     for seed in range(N):
-        root = thaw(CHAIN, TYPES)
+        root = to_mutable(CHAIN, TYPES)
         delete_subtree(draws(seed), root, setting)
-        found[shape(freeze(preorder(root)))] += 1
+        found[shape(to_genome(preorder(root)))] += 1
     # Without the brick's subtree only two parts would be left.
     assert sorted(found) == ["C(1F 2T)", "C(1F(1H(1A)))", "C(1F(1H) 2T)"]
     assert all(is_near(n, N / 3) for n in found.values())
-    nothing = thaw(CHAIN, TYPES)
+    nothing = to_mutable(CHAIN, TYPES)
     delete_subtree(draws(), nothing, experiment({"min_parts": 5}, p_delete_subtree=1.0))
-    assert freeze(preorder(nothing)) == CHAIN
+    assert to_genome(preorder(nothing)) == CHAIN
 
 
 def test_duplicating_puts_a_copy_on_any_free_slot() -> None:
@@ -98,9 +103,9 @@ def test_duplicating_puts_a_copy_on_any_free_slot() -> None:
     setting = experiment(p_duplicate_subtree=1.0)
     found: Counter[str] = Counter()
     for seed in range(N):
-        root = thaw(small, TYPES)
+        root = to_mutable(small, TYPES)
         duplicate_subtree(draws(seed), root, setting)
-        found[shape(freeze(preorder(root)))] += 1
+        found[shape(to_genome(preorder(root)))] += 1
     assert sorted(found) == sorted(
         [
             *("C(0H 1H 2T)", "C(1H 2T 3H)", "C(1H(0H) 2T)"),
@@ -114,22 +119,22 @@ def test_duplicating_keeps_within_every_limit() -> None:
     for limit in ({"max_parts": 6}, {"max_inputs": 9}, {"max_outputs": 1}):
         setting = experiment(limit, p_duplicate_subtree=1.0)
         for seed in range(200):
-            root = thaw(CHAIN, TYPES)
+            root = to_mutable(CHAIN, TYPES)
             duplicate_subtree(draws(seed), root, setting)
             assert tally(preorder(root)).fits(greatest(setting.space))
     full = experiment({"max_parts": 5}, p_duplicate_subtree=1.0)
-    root = thaw(CHAIN, TYPES)
+    root = to_mutable(CHAIN, TYPES)
     duplicate_subtree(draws(), root, full)
-    assert freeze(preorder(root)) == CHAIN
+    assert to_genome(preorder(root)) == CHAIN
 
 
 def test_swapping_exchanges_places_and_keeps_own_slots() -> None:
     setting = experiment(p_swap_subtree=1.0)
     found: Counter[str] = Counter()
     for seed in range(N):
-        root = thaw(CHAIN, TYPES)
+        root = to_mutable(CHAIN, TYPES)
         swap_subtrees(draws(seed), root, setting)
-        swapped = freeze(preorder(root))
+        swapped = to_genome(preorder(root))
         found[shape(swapped)] += 1
         assert sorted(
             str(one.slot) + one.kind for one, _, _ in walk(swapped)
@@ -146,10 +151,10 @@ def test_swapping_exchanges_places_and_keeps_own_slots() -> None:
 
 def test_swapping_skips_a_tree_of_one_line() -> None:
     line = node("Core", (0, node("Hinge", (1, node("Hinge")))))
-    root = thaw(line, TYPES)
+    root = to_mutable(line, TYPES)
     for seed in range(20):
         swap_subtrees(draws(seed), root, experiment(p_swap_subtree=1.0))
-    assert freeze(preorder(root)) == line
+    assert to_genome(preorder(root)) == line
 
 
 @pytest.mark.parametrize(
@@ -170,9 +175,9 @@ def test_each_step_happens_with_its_probability(
     setting = experiment(**chances)
     happened = 0
     for seed in range(N):
-        root = thaw(CHAIN, TYPES)
+        root = to_mutable(CHAIN, TYPES)
         step(draws(seed), root, setting)
-        happened += freeze(preorder(root)) != CHAIN
+        happened += to_genome(preorder(root)) != CHAIN
     assert is_near(happened, N * probability)
 
 
@@ -180,7 +185,7 @@ def test_parameters_of_parts_move_and_colours_stay() -> None:
     bar = node("Core", (0, node("ParametricBarJoint")), (1, node("ActiveHinge")))
     lengths = []
     for seed in range(N):
-        root = thaw(bar, TYPES)
+        root = to_mutable(bar, TYPES)
         vary_parts(draws(seed), preorder(root), 0.05)
         core, part, hinge = preorder(root)
         length, alpha, beta, *colour = part.parameters
@@ -198,7 +203,7 @@ def test_expected_parts_by_hand() -> None:
     # Deletable at least 3 parts: 2, 1, 1, mean 4/3. Duplicable at most 7 parts
     # and 10 inputs: all but the brick's, as the sensor's inputs fit once more.
     setting: dict[str, Any] = {"p_delete_subtree": 0.6, "p_duplicate_subtree": 0.3}
-    root = thaw(CHAIN, TYPES)
+    root = to_mutable(CHAIN, TYPES)
     tight = {"max_parts": 7}
     mean = expected_parts(root, experiment(tight, **setting))
     assert mean == pytest.approx(0.6 * 4 / 3 - 0.3 * 4 / 3)
@@ -212,9 +217,9 @@ def test_expected_parts_by_hand() -> None:
 
 
 def added(seed: int, setting: Experiment, genome: Genome = CHAIN) -> Genome:
-    root = thaw(genome, TYPES)
+    root = to_mutable(genome, TYPES)
     add_parts(draws(seed), root, gene_ids(BirthId(0, 7)), setting)
-    return freeze(preorder(root))
+    return to_genome(preorder(root))
 
 
 @pytest.mark.parametrize(("option", "most"), [("loop", 4), ("once", 1)])
@@ -293,7 +298,8 @@ def test_with_the_thesis_s_numbers_parts_are_rarely_added() -> None:
         setting = experiment({"max_hidden": max_hidden}, duplicable_size=option)
         positive = [
             expected_parts(
-                thaw(generate(np.random.default_rng(seed), setting), TYPES), setting
+                to_mutable(generate(np.random.default_rng(seed), setting), TYPES),
+                setting,
             )
             > 0.0
             for seed in range(2000)

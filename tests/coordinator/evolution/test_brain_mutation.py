@@ -19,7 +19,7 @@ from coordinator.evolution.brain_mutation import (
 from coordinator.evolution.draws import Draws
 from coordinator.evolution.generation import generate
 from coordinator.evolution.growth import half_up
-from coordinator.evolution.tree import freeze, preorder, thaw
+from coordinator.evolution.mutable_genome import preorder, to_genome, to_mutable
 from schema.experiment.document import Experiment, Space, Variation, body_space
 from schema.robot.brain import NEURON_TYPES, Layer
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop, walk
@@ -85,7 +85,7 @@ CORE = Node(
 
 
 def test_deleting_a_hidden_neuron_drops_its_connections_and_shifts_the_rest() -> None:
-    root = thaw(CORE, TYPES)
+    root = to_mutable(CORE, TYPES)
     # Three hidden neurons are asked in turn; only the second goes.
     delete_hidden_neurons(scripted(0.9, 0.01, 0.9), preorder(root), 0.05)
     core, hinge = preorder(root)
@@ -117,9 +117,9 @@ def wiring(genome: Genome) -> Counter[tuple[object, ...]]:
 def test_deleting_hidden_neurons_rewires_nothing(seed: int, probability: float) -> None:
     """An oracle that works on the robot: drop the lost neurons' edges, no more."""
     genome = generate(np.random.default_rng(seed), experiment())
-    root = thaw(genome, TYPES)
+    root = to_mutable(genome, TYPES)
     delete_hidden_neurons(draws(seed), preorder(root), probability)
-    after = freeze(preorder(root))
+    after = to_genome(preorder(root))
     left = {n.parameters for one, _, _ in walk(after) for n in one.hidden}
     expected = Counter(
         {
@@ -137,10 +137,10 @@ def test_neurons_and_connections_go_with_their_probabilities(
 ) -> None:
     neurons = edges = 0
     for seed in range(N):
-        root = thaw(CORE, TYPES)
+        root = to_mutable(CORE, TYPES)
         delete_hidden_neurons(draws(seed), preorder(root), probability)
         neurons += 3 - len(preorder(root)[1].hidden)
-        root = thaw(CORE, TYPES)
+        root = to_mutable(CORE, TYPES)
         delete_connections(draws(seed), preorder(root), probability)
         edges += 10 - sum(len(branch.connections) for branch in preorder(root))
     spread = 5 * (probability * (1 - probability)) ** 0.5
@@ -151,7 +151,7 @@ def test_neurons_and_connections_go_with_their_probabilities(
 def test_neuron_parameters_move_by_their_share_and_types_stay() -> None:
     moved = []
     for seed in range(N):
-        root = thaw(CORE, TYPES)
+        root = to_mutable(CORE, TYPES)
         vary_neurons(draws(seed), preorder(root), 0.1)
         hinge = preorder(root)[1]
         moved.append(hinge.outputs[0].parameters)
@@ -181,7 +181,7 @@ def test_how_many_hidden_neurons_are_added(
     found = []
     kinds: Counter[str] = Counter()
     for seed in range(N):
-        root = thaw(CORE, TYPES)
+        root = to_mutable(CORE, TYPES)
         add_hidden_neurons(draws(seed), preorder(root), before, setting)
         core, hinge = preorder(root)
         found.append(len(core.hidden) + len(hinge.hidden) - 3)
@@ -199,7 +199,7 @@ def test_hidden_neurons_are_added_up_to_the_limit() -> None:
         space=Space(max_hidden=5),
         variation=Variation(p_delete_hidden_neuron=1.0),
     )
-    root = thaw(CORE, TYPES)
+    root = to_mutable(CORE, TYPES)
     add_hidden_neurons(draws(), preorder(root), 9, setting)
     assert sum(len(branch.hidden) for branch in preorder(root)) == 5
 
@@ -208,7 +208,7 @@ def test_hidden_neurons_are_added_up_to_the_limit() -> None:
     ("before", "count"), [(0, 0), (9, 0), (10, 1), (29, 1), (30, 2), (50, 3)]
 )
 def test_how_many_connections_are_added(before: int, count: int) -> None:
-    root = thaw(CORE, TYPES)
+    root = to_mutable(CORE, TYPES)
     add_connections(draws(), preorder(root), before, experiment())
     assert sum(len(branch.connections) for branch in preorder(root)) == 10 + count
 
@@ -235,9 +235,9 @@ def test_added_connections_join_any_neuron_with_any_output_or_hidden() -> None:
     )
     found: Counter[tuple[int, int]] = Counter()
     for seed in range(N):
-        root = thaw(bare, TYPES)
+        root = to_mutable(bare, TYPES)
         add_connections(draws(seed), preorder(root), 10, experiment())
-        (made,) = develop(freeze(preorder(root)), TYPES).brain.connections
+        (made,) = develop(to_genome(preorder(root)), TYPES).brain.connections
         found[made.source, made.target] += 1
         assert 0.0 <= made.weight < 1.0
     # Inputs 0..5, output 6, hidden 7: eight sources, two targets.
@@ -247,9 +247,9 @@ def test_added_connections_join_any_neuron_with_any_output_or_hidden() -> None:
 
 def test_nothing_is_added_where_there_is_no_target() -> None:
     lone = Node("Core", -1, 0, GREY, children=((0, Node("Hinge", 0, 0, GREY)),))
-    root = thaw(lone, TYPES)
+    root = to_mutable(lone, TYPES)
     add_connections(draws(), preorder(root), 40, experiment())
-    assert freeze(preorder(root)) == lone
+    assert to_genome(preorder(root)) == lone
 
 
 def test_halves_are_rounded_up_exactly() -> None:

@@ -11,7 +11,12 @@ from hypothesis import strategies as st
 from coordinator.evolution.draws import Draws
 from coordinator.evolution.generation import generate
 from coordinator.evolution.limits import greatest, tallies
-from coordinator.evolution.tree import freeze, gene_ids, preorder, thaw
+from coordinator.evolution.mutable_genome import (
+    gene_ids,
+    preorder,
+    to_genome,
+    to_mutable,
+)
 from coordinator.evolution.variation import crossover, mate, mutate
 from schema.experiment.document import Experiment, Space, Variation, body_space
 from schema.parts import BUILT_IN
@@ -68,13 +73,13 @@ def kinds(genome: Genome) -> list[str]:
 def crossed(
     seed: int, first: Genome, second: Genome, setting: Experiment = DEFAULT
 ) -> Genome | None:
-    root = thaw(first, TYPES)
+    root = to_mutable(first, TYPES)
     draws = Draws(np.random.default_rng(seed))
-    done = crossover(draws, root, thaw(second, TYPES), setting)
+    done = crossover(draws, root, to_mutable(second, TYPES), setting)
     if not done:
-        assert freeze(preorder(root)) == first, "a failure changes nothing"
+        assert to_genome(preorder(root)) == first, "a failure changes nothing"
         return None
-    return freeze(preorder(root))
+    return to_genome(preorder(root))
 
 
 MOTHER = node(
@@ -156,11 +161,11 @@ def test_nothing_mutates_where_all_probabilities_are_zero() -> None:
     setting = experiment(**STILL)
     for seed in range(20):
         genome = founder(seed)
-        root = thaw(genome, TYPES)
+        root = to_mutable(genome, TYPES)
         mutate(Draws(np.random.default_rng(seed)), root, gene_ids(CHILD), setting)
         for one, other in zip(preorder(root), walk(genome), strict=True):
             assert one.parameters == other[0].parameters
-        assert freeze(preorder(root)) == genome
+        assert to_genome(preorder(root)) == genome
 
 
 def offspring(seed: int, setting: Experiment = DEFAULT) -> Genome | None:
@@ -225,7 +230,7 @@ def test_a_lineage_stays_within_all_restrictions() -> None:
         population = children
         for genome in population:
             check_robot(develop(genome, TYPES), TYPES)
-            size = tallies(preorder(thaw(genome, TYPES)))
+            size = tallies(preorder(to_mutable(genome, TYPES)))
             assert next(iter(size.values())).fits(greatest(DEFAULT.space)), generation
 
 

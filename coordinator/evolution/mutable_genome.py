@@ -1,6 +1,6 @@
 """A genome in the making: the tree that generation and variation cut and graft.
 
-A genome never changes; a `Branch` may. It is thawed from a genome, worked upon
+A genome never changes; a `MutableGenome` may. It is thawed from a genome, worked upon
 within one function call, and frozen into a new genome.
 """
 
@@ -15,7 +15,7 @@ from schema.robot.names import BirthId
 
 
 @dataclass(slots=True, eq=False)
-class Branch:
+class MutableGenome:
     """A node that may still change; its fields are those of `Node`.
 
     ``parent`` and ``parent_slot`` are None and -1 at the root; ``children`` stand by
@@ -30,9 +30,9 @@ class Branch:
     outputs: tuple[NeuronGene, ...] = ()
     hidden: tuple[NeuronGene, ...] = ()
     connections: tuple[ConnectionGene, ...] = ()
-    parent: "Branch | None" = None
+    parent: "MutableGenome | None" = None
     parent_slot: int = -1
-    children: "dict[int, Branch]" = field(default_factory=dict)
+    children: "dict[int, MutableGenome]" = field(default_factory=dict)
 
     def free_slots(self) -> list[int]:
         """Return the slots that nothing sits on, ascending."""
@@ -42,7 +42,7 @@ class Branch:
             if slot != self.slot and slot not in self.children
         ]
 
-    def graft(self, child: "Branch", slot: int) -> None:
+    def graft(self, child: "MutableGenome", slot: int) -> None:
         """Put a child on a slot, in the place of whatever sat there."""
         child.parent, child.parent_slot = self, slot
         self.children = dict(sorted({**self.children, slot: child}.items()))
@@ -75,11 +75,11 @@ def gene_ids(birth: BirthId) -> Iterator[int]:
     return count((birth.island << 48 | birth.number << 16) + 1)
 
 
-def thaw(genome: Genome, space: BodySpace) -> Branch:
+def to_mutable(genome: Genome, space: BodySpace) -> MutableGenome:
     """Return a genome as a tree that may change."""
-    branches: list[Branch] = []
+    branches: list[MutableGenome] = []
     for node, parent, slot in walk(genome):
-        branch = Branch(
+        branch = MutableGenome(
             space[node.kind],
             node.slot,
             node.orientation,
@@ -97,9 +97,9 @@ def thaw(genome: Genome, space: BodySpace) -> Branch:
     return branches[0]
 
 
-def freeze(branches: Sequence[Branch]) -> Genome:
+def to_genome(branches: Sequence[MutableGenome]) -> Genome:
     """Return a tree, given depth first, as a genome."""
-    frozen: dict[Branch, Node] = {}
+    frozen: dict[MutableGenome, Node] = {}
     for branch in reversed(branches):
         frozen[branch] = Node(
             branch.kind.name,
@@ -115,9 +115,9 @@ def freeze(branches: Sequence[Branch]) -> Genome:
     return frozen[branches[0]]
 
 
-def preorder(root: Branch) -> list[Branch]:
+def preorder(root: MutableGenome) -> list[MutableGenome]:
     """Return a tree's branches depth first, children by ascending slot."""
-    order: list[Branch] = []
+    order: list[MutableGenome] = []
     stack = [root]
     while stack:
         branch = stack.pop()
@@ -127,11 +127,11 @@ def preorder(root: Branch) -> list[Branch]:
     return order
 
 
-def copied(root: Branch) -> Branch:
+def copied(root: MutableGenome) -> MutableGenome:
     """Return a copy of a tree that hangs nowhere."""
-    twins: dict[Branch, Branch] = {}
+    twins: dict[MutableGenome, MutableGenome] = {}
     for branch in preorder(root):
-        twin = twins[branch] = Branch(
+        twin = twins[branch] = MutableGenome(
             branch.kind,
             branch.slot,
             branch.orientation,
@@ -147,12 +147,12 @@ def copied(root: Branch) -> Branch:
     return twins[root]
 
 
-def free_places(branches: Iterable[Branch]) -> list[tuple[Branch, int]]:
+def free_places(branches: Iterable[MutableGenome]) -> list[tuple[MutableGenome, int]]:
     """Return every (branch, free slot) of some branches, in their order."""
     return [(branch, slot) for branch in branches for slot in branch.free_slots()]
 
 
-def lineage(branch: Branch) -> list[Branch]:
+def lineage(branch: MutableGenome) -> list[MutableGenome]:
     """Return a branch and its ancestors, up to the root."""
     line = [branch]
     while (parent := line[-1].parent) is not None:
@@ -160,7 +160,7 @@ def lineage(branch: Branch) -> list[Branch]:
     return line
 
 
-def path_between(source: Branch, target: Branch) -> tuple[int, ...]:
+def path_between(source: MutableGenome, target: MutableGenome) -> tuple[int, ...]:
     """Return the slots to follow from one branch to another of its tree."""
     if source is target:
         return ()
@@ -175,9 +175,9 @@ def path_between(source: Branch, target: Branch) -> tuple[int, ...]:
     return (*path, *(branch.parent_slot for branch in reversed(descent)))
 
 
-def follow(branch: Branch, path: tuple[int, ...]) -> Branch | None:
+def follow(branch: MutableGenome, path: tuple[int, ...]) -> MutableGenome | None:
     """Return the branch that a path leads to, or None if it leads nowhere."""
-    here: Branch | None = branch
+    here: MutableGenome | None = branch
     for slot in path:
         if here is None:
             return None
@@ -185,7 +185,7 @@ def follow(branch: Branch, path: tuple[int, ...]) -> Branch | None:
     return here
 
 
-def level(branches: Iterable[Branch]) -> None:
+def level(branches: Iterable[MutableGenome]) -> None:
     """Turn the levelled parts of a tree, given depth first, to its core's plane.
 
     Walking outwards, the turns add up; every part that is levelled gets the turn
@@ -193,7 +193,7 @@ def level(branches: Iterable[Branch]) -> None:
 
     Source: facts of the original, section 2 (planarity).
     """
-    turns: dict[Branch, int] = {}
+    turns: dict[MutableGenome, int] = {}
     for branch in branches:
         if branch.parent is None:
             branch.orientation = turns[branch] = 0

@@ -9,16 +9,16 @@ from hypothesis import strategies as st
 
 from coordinator.evolution.generation import generate
 from coordinator.evolution.limits import tallies
-from coordinator.evolution.tree import (
+from coordinator.evolution.mutable_genome import (
     copied,
     follow,
     free_places,
-    freeze,
     gene_ids,
     level,
     path_between,
     preorder,
-    thaw,
+    to_genome,
+    to_mutable,
 )
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import BUILT_IN
@@ -67,21 +67,21 @@ TREE = node(
 @given(SEEDS)
 def test_thawing_and_freezing_gives_the_genome_back(seed: int) -> None:
     genome = random_genome(seed)
-    root = thaw(genome, TYPES)
-    assert freeze(preorder(root)) == genome
-    assert freeze(preorder(copied(root))) == genome
+    root = to_mutable(genome, TYPES)
+    assert to_genome(preorder(root)) == genome
+    assert to_genome(preorder(copied(root))) == genome
 
 
 @given(SEEDS)
 def test_branches_stand_in_the_order_of_the_genome(seed: int) -> None:
     genome = random_genome(seed)
-    found = [(b.kind.name, b.parent_slot) for b in preorder(thaw(genome, TYPES))]
+    found = [(b.kind.name, b.parent_slot) for b in preorder(to_mutable(genome, TYPES))]
     assert found == [(one.kind, slot) for one, _, slot in walk(genome)]
 
 
 @given(SEEDS)
 def test_a_path_leads_where_it_was_made_for(seed: int) -> None:
-    branches = preorder(thaw(random_genome(seed), TYPES))
+    branches = preorder(to_mutable(random_genome(seed), TYPES))
     for source in branches:
         for target in branches:
             path = path_between(source, target)
@@ -90,7 +90,7 @@ def test_a_path_leads_where_it_was_made_for(seed: int) -> None:
 
 
 def test_a_path_goes_up_by_own_slots_and_down_by_the_parents() -> None:
-    _, hinge, sensor, brick, _, pads = preorder(thaw(TREE, TYPES))
+    _, hinge, sensor, brick, _, pads = preorder(to_mutable(TREE, TYPES))
     assert path_between(hinge, hinge) == ()
     assert path_between(sensor, hinge) == (0,)
     assert path_between(sensor, pads) == (0, 1, 3, 2)
@@ -100,7 +100,9 @@ def test_a_path_goes_up_by_own_slots_and_down_by_the_parents() -> None:
 
 
 def test_tallies_count_every_subtree() -> None:
-    found = [tuple(size) for size in tallies(preorder(thaw(TREE, TYPES))).values()]
+    found = [
+        tuple(size) for size in tallies(preorder(to_mutable(TREE, TYPES))).values()
+    ]
     assert found == [
         (6, 10, 1, 2),
         (2, 2, 1, 2),
@@ -113,14 +115,15 @@ def test_tallies_count_every_subtree() -> None:
 
 def test_free_places_are_those_that_nothing_sits_on() -> None:
     found = [
-        (b.kind.name, slot) for b, slot in free_places(preorder(thaw(TREE, TYPES)))
+        (b.kind.name, slot)
+        for b, slot in free_places(preorder(to_mutable(TREE, TYPES)))
     ]
     core = [("Core", 0), ("Core", 2)]
     assert found == [*core, ("FixedBrick", 1), ("Hinge", 1)]
 
 
 def test_a_cut_branch_hangs_nowhere_and_leaves_its_slot_free() -> None:
-    root = thaw(TREE, TYPES)
+    root = to_mutable(TREE, TYPES)
     brick = preorder(root)[3]
     brick.cut()
     assert (brick.parent, brick.parent_slot) == (None, -1)
@@ -136,7 +139,7 @@ def test_levelling_undoes_all_turns_before_a_brick() -> None:
     brick = node("FixedBrick", (1, node("Hinge", (1, bar), orientation=270)))
     inner = node("Hinge", (1, brick), orientation=180)
     genome = node("Core", (0, node("ActiveHinge", (1, inner), orientation=270)))
-    root = thaw(genome, TYPES)
+    root = to_mutable(genome, TYPES)
     level(preorder(root))
     # 270 + 180 = 90 before the brick, so it turns by 270; 270 before the bar.
     assert [b.orientation for b in preorder(root)] == [0, 270, 180, 270, 270, 90]
