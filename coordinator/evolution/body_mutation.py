@@ -19,7 +19,6 @@ from coordinator.evolution.growth import (
     usable_types,
     wire,
 )
-from coordinator.evolution.limits import Tally, greatest, tallies, tally
 from coordinator.evolution.mutable_genome import (
     MutableGenome,
     copied,
@@ -27,10 +26,13 @@ from coordinator.evolution.mutable_genome import (
     lineage,
     preorder,
 )
+from coordinator.evolution.size_counts import SizeCounts, greatest, tallies, tally
 from schema.experiment.document import Experiment, Space, body_space
 
 
-def deletable(sizes: dict[MutableGenome, Tally], space: Space) -> list[MutableGenome]:
+def deletable(
+    sizes: dict[MutableGenome, SizeCounts], space: Space
+) -> list[MutableGenome]:
     """Return the subtrees without which a tree keeps the least number of parts."""
     total = next(iter(sizes.values()))
     return [
@@ -40,7 +42,9 @@ def deletable(sizes: dict[MutableGenome, Tally], space: Space) -> list[MutableGe
     ]
 
 
-def duplicable(sizes: dict[MutableGenome, Tally], space: Space) -> list[MutableGenome]:
+def duplicable(
+    sizes: dict[MutableGenome, SizeCounts], space: Space
+) -> list[MutableGenome]:
     """Return the subtrees of which a tree may hold one more."""
     room = greatest(space).plus(next(iter(sizes.values())), -1)
     return [

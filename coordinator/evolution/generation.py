@@ -19,7 +19,6 @@ from coordinator.evolution.growth import (
     usable_types,
     wire,
 )
-from coordinator.evolution.limits import Tally, tally
 from coordinator.evolution.mutable_genome import (
     MutableGenome,
     gene_ids,
@@ -27,6 +26,7 @@ from coordinator.evolution.mutable_genome import (
     preorder,
     to_genome,
 )
+from coordinator.evolution.size_counts import SizeCounts, tally
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, body_space
 from schema.parts import COLOURS
@@ -82,7 +82,7 @@ def _random_body(
     core = next(kind for kind in types.values() if kind.is_root)
     root = random_part(draws, core, genes)
     colour = root.parameters[-len(COLOURS) :]
-    size = Tally(1, core.inputs, core.outputs, 0)
+    size = SizeCounts(1, core.inputs, core.outputs, 0)
     places: list[Place] = [(root, slot) for slot in range(core.arity)]
     while size.parts < target:
         growth = pick_growth(draws, places, usable_types(types, size, space))
@@ -91,7 +91,7 @@ def _random_body(
         (parent, slot), kind = growth
         part = random_part(draws, kind, genes, colour)
         parent.graft(part, slot)
-        size = size.plus(Tally(1, kind.inputs, kind.outputs, 0))
+        size = size.plus(SizeCounts(1, kind.inputs, kind.outputs, 0))
         places.extend((part, free) for free in part.free_slots())
     return root
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
 from coordinator.evolution.draws import Draws
-from coordinator.evolution.limits import Tally
 from coordinator.evolution.mutable_genome import MutableGenome, path_between
+from coordinator.evolution.size_counts import SizeCounts
 from schema.experiment.document import Space
 from schema.parts import COLOURS, BodySpace, PartType
 from schema.robot.brain import NEURON_TYPES, Layer
@@ -54,7 +54,7 @@ def random_part(
     )
 
 
-def usable_types(types: BodySpace, size: Tally, space: Space) -> list[PartType]:
+def usable_types(types: BodySpace, size: SizeCounts, space: Space) -> list[PartType]:
     """Return the part types that a tree of some size may still take."""
     return [
         kind

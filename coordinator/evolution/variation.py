@@ -23,7 +23,6 @@ from coordinator.evolution.brain_mutation import (
     vary_neurons,
 )
 from coordinator.evolution.draws import Draws
-from coordinator.evolution.limits import greatest, tallies, tally
 from coordinator.evolution.mutable_genome import (
     MutableGenome,
     gene_ids,
@@ -32,6 +31,7 @@ from coordinator.evolution.mutable_genome import (
     to_genome,
     to_mutable,
 )
+from coordinator.evolution.size_counts import greatest, tallies, tally
 from schema.experiment.document import Experiment, body_space
 from schema.robot.genome import Genome
 from schema.robot.names import BirthId

@@ -17,13 +17,13 @@ from coordinator.evolution.body_mutation import (
 )
 from coordinator.evolution.draws import Draws
 from coordinator.evolution.generation import generate
-from coordinator.evolution.limits import greatest, tally
 from coordinator.evolution.mutable_genome import (
     gene_ids,
     preorder,
     to_genome,
     to_mutable,
 )
+from coordinator.evolution.size_counts import greatest, tally
 from schema.experiment.document import (
     Experiment,
     Generation,

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coordinator.evolution.generation import generate
-from coordinator.evolution.limits import tallies
 from coordinator.evolution.mutable_genome import (
     copied,
     follow,
@@ -20,6 +19,7 @@ from coordinator.evolution.mutable_genome import (
     to_genome,
     to_mutable,
 )
+from coordinator.evolution.size_counts import tallies
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import BUILT_IN
 from schema.robot.frames import place_parts, shapes_of

@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 
 from coordinator.evolution.draws import Draws
 from coordinator.evolution.generation import generate
-from coordinator.evolution.limits import greatest, tallies
 from coordinator.evolution.mutable_genome import (
     gene_ids,
     preorder,
     to_genome,
     to_mutable,
 )
+from coordinator.evolution.size_counts import greatest, tallies
 from coordinator.evolution.variation import crossover, mate, mutate
 from schema.experiment.document import Experiment, Space, Variation, body_space
 from schema.parts import BUILT_IN

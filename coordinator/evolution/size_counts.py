@@ -7,7 +7,7 @@ from coordinator.evolution.mutable_genome import MutableGenome
 from schema.experiment.document import Space
 
 
-class Tally(NamedTuple):
+class SizeCounts(NamedTuple):
     """What restrictions limit, of a tree or a part of one."""
 
     parts: int
@@ -15,16 +15,16 @@ class Tally(NamedTuple):
     outputs: int
     hidden: int
 
-    def plus(self, other: "Tally", sign: int = 1) -> "Tally":
+    def plus(self, other: "SizeCounts", sign: int = 1) -> "SizeCounts":
         """Return the sum with another tally, or the difference for sign -1."""
-        return Tally(
+        return SizeCounts(
             self.parts + sign * other.parts,
             self.inputs + sign * other.inputs,
             self.outputs + sign * other.outputs,
             self.hidden + sign * other.hidden,
         )
 
-    def fits(self, room: "Tally") -> bool:
+    def fits(self, room: "SizeCounts") -> bool:
         """Return whether it exceeds none of another tally's numbers."""
         return (
             self.parts <= room.parts
@@ -34,12 +34,14 @@ class Tally(NamedTuple):
         )
 
 
-def greatest(space: Space) -> Tally:
+def greatest(space: Space) -> SizeCounts:
     """Return what a whole tree may hold at most."""
-    return Tally(space.max_parts, space.max_inputs, space.max_outputs, space.max_hidden)
+    return SizeCounts(
+        space.max_parts, space.max_inputs, space.max_outputs, space.max_hidden
+    )
 
 
-def tally(branches: Iterable[MutableGenome]) -> Tally:
+def tally(branches: Iterable[MutableGenome]) -> SizeCounts:
     """Return the tally of some branches, without what hangs on them."""
     parts = inputs = outputs = hidden = 0
     for branch in branches:
@@ -47,15 +49,15 @@ def tally(branches: Iterable[MutableGenome]) -> Tally:
         inputs += branch.kind.inputs
         outputs += len(branch.outputs)
         hidden += len(branch.hidden)
-    return Tally(parts, inputs, outputs, hidden)
+    return SizeCounts(parts, inputs, outputs, hidden)
 
 
-def tallies(branches: Sequence[MutableGenome]) -> dict[MutableGenome, Tally]:
+def tallies(branches: Sequence[MutableGenome]) -> dict[MutableGenome, SizeCounts]:
     """Return the tally of every subtree of a tree that is given depth first.
 
     They come in the order of their tops.
     """
-    sums: dict[MutableGenome, Tally] = {}
+    sums: dict[MutableGenome, SizeCounts] = {}
     for branch in reversed(branches):
         parts, inputs = 1, branch.kind.inputs
         outputs, hidden = len(branch.outputs), len(branch.hidden)
@@ -65,5 +67,5 @@ def tallies(branches: Sequence[MutableGenome]) -> dict[MutableGenome, Tally]:
             inputs += below.inputs
             outputs += below.outputs
             hidden += below.hidden
-        sums[branch] = Tally(parts, inputs, outputs, hidden)
+        sums[branch] = SizeCounts(parts, inputs, outputs, hidden)
     return dict(reversed(sums.items()))
