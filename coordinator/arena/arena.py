@@ -24,8 +24,8 @@ from coordinator.arena.rows import (
     touch_records,
 )
 from coordinator.evolution.breeding import Breeder, Candidate
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.culling import select_doomed
-from coordinator.evolution.draws import Draws
 from coordinator.evolution.seeding import Purpose, stream
 from coordinator.evolution.selection import Couple, Individual
 from coordinator.islands.events import (
@@ -426,7 +426,7 @@ class Arena:
         """Return a place of chance, away from the living."""
         rng = stream(self._seed, self._run, name, 0, purpose)
         others = [one.last_place for one in self._residents]
-        return draw_place(Draws(rng), others, self._rules)
+        return draw_place(BufferedRng(rng), others, self._rules)
 
     def _has_room(self) -> bool:
         return len(self._residents) < self._rules.population_limit

@@ -7,14 +7,14 @@ centre; a few tries for some distance to everybody else.
 from collections.abc import Iterable
 from math import cos, dist, sin, tau
 
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from schema.experiment.document import Arena
 
 Place = tuple[float, float]
 """A point of the ground plane [m]."""
 
 
-def draw_place(draws: Draws, others: Iterable[Place], arena: Arena) -> Place:
+def draw_place(draws: BufferedRng, others: Iterable[Place], arena: Arena) -> Place:
     """Return a place away from all others, or the last that was tried.
 
     Args:

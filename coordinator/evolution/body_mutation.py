@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from math import ceil
 
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.growth import (
     endings,
     half_up,
@@ -52,7 +52,9 @@ def duplicable(
     ]
 
 
-def delete_subtree(draws: Draws, root: MutableGenome, experiment: Experiment) -> None:
+def delete_subtree(
+    draws: BufferedRng, root: MutableGenome, experiment: Experiment
+) -> None:
     """Delete a random subtree, with the experiment's probability."""
     if not draws.chance(experiment.variation.p_delete_subtree):
         return
@@ -61,7 +63,7 @@ def delete_subtree(draws: Draws, root: MutableGenome, experiment: Experiment) ->
 
 
 def duplicate_subtree(
-    draws: Draws, root: MutableGenome, experiment: Experiment
+    draws: BufferedRng, root: MutableGenome, experiment: Experiment
 ) -> None:
     """Put a copy of a random subtree on a free slot, with a probability."""
     if not draws.chance(experiment.variation.p_duplicate_subtree):
@@ -75,7 +77,9 @@ def duplicate_subtree(
         parent.graft(twin, slot)
 
 
-def swap_subtrees(draws: Draws, root: MutableGenome, experiment: Experiment) -> None:
+def swap_subtrees(
+    draws: BufferedRng, root: MutableGenome, experiment: Experiment
+) -> None:
     """Let two subtrees, neither within the other, change places, by chance."""
     if not draws.chance(experiment.variation.p_swap_subtree):
         return
@@ -97,7 +101,9 @@ def _seat(branch: MutableGenome) -> tuple[MutableGenome, int]:
     return branch.parent, branch.parent_slot
 
 
-def vary_parts(draws: Draws, branches: Iterable[MutableGenome], epsilon: float) -> None:
+def vary_parts(
+    draws: BufferedRng, branches: Iterable[MutableGenome], epsilon: float
+) -> None:
     """Move every part's parameters, but for its colour, towards random values."""
     for branch in branches:
         if branch.kind.own_parameters:
@@ -127,7 +133,10 @@ def expected_parts(root: MutableGenome, experiment: Experiment) -> float:
 
 
 def add_parts(
-    draws: Draws, root: MutableGenome, genes: Iterator[int], experiment: Experiment
+    draws: BufferedRng,
+    root: MutableGenome,
+    genes: Iterator[int],
+    experiment: Experiment,
 ) -> None:
     """Add random parts, `expected_parts` on average, each with its share of brain."""
     expected = expected_parts(root, experiment)
@@ -142,7 +151,10 @@ def add_parts(
 
 
 def _add_part(
-    draws: Draws, root: MutableGenome, genes: Iterator[int], experiment: Experiment
+    draws: BufferedRng,
+    root: MutableGenome,
+    genes: Iterator[int],
+    experiment: Experiment,
 ) -> None:
     space = experiment.space
     branches = preorder(root)

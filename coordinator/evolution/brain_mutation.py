@@ -10,7 +10,7 @@ from decimal import Decimal
 
 from msgspec.structs import replace
 
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.growth import connect, endings, random_neuron
 from coordinator.evolution.mutable_genome import MutableGenome, follow
 from schema.experiment.document import Experiment
@@ -21,7 +21,7 @@ _HALF = Decimal("0.5")
 
 
 def delete_hidden_neurons(
-    draws: Draws, branches: Sequence[MutableGenome], probability: float
+    draws: BufferedRng, branches: Sequence[MutableGenome], probability: float
 ) -> None:
     """Delete each hidden neuron with a probability, and what led to or from it.
 
@@ -82,7 +82,7 @@ def _renamed(
 
 
 def delete_connections(
-    draws: Draws, branches: Sequence[MutableGenome], probability: float
+    draws: BufferedRng, branches: Sequence[MutableGenome], probability: float
 ) -> None:
     """Delete each connection with a probability."""
     for branch in branches:
@@ -93,7 +93,7 @@ def delete_connections(
 
 
 def vary_neurons(
-    draws: Draws, branches: Sequence[MutableGenome], epsilon: float
+    draws: BufferedRng, branches: Sequence[MutableGenome], epsilon: float
 ) -> None:
     """Move every neuron's parameters towards random values."""
     for branch in branches:
@@ -104,7 +104,7 @@ def vary_neurons(
 
 
 def _varied(
-    draws: Draws, neurons: tuple[NeuronGene, ...], epsilon: float
+    draws: BufferedRng, neurons: tuple[NeuronGene, ...], epsilon: float
 ) -> tuple[NeuronGene, ...]:
     return tuple(
         [
@@ -118,7 +118,10 @@ def _varied(
 
 
 def add_hidden_neurons(
-    draws: Draws, branches: Sequence[MutableGenome], before: int, experiment: Experiment
+    draws: BufferedRng,
+    branches: Sequence[MutableGenome],
+    before: int,
+    experiment: Experiment,
 ) -> None:
     """Add as many hidden neurons as deletion takes on average.
 
@@ -139,7 +142,10 @@ def add_hidden_neurons(
 
 
 def add_connections(
-    draws: Draws, branches: Sequence[MutableGenome], before: int, experiment: Experiment
+    draws: BufferedRng,
+    branches: Sequence[MutableGenome],
+    before: int,
+    experiment: Experiment,
 ) -> None:
     """Add as many connections as deletion takes on average, rounded half up.
 

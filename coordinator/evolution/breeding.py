@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.generation import generate
 from coordinator.evolution.seeding import Purpose, stream
 from coordinator.evolution.selection import (
@@ -115,7 +115,7 @@ class Breeder:
             rng = self._stream(birth, attempt, Purpose.GENERATE)
             return None, generate(rng, self._experiment, birth)
         if couple is None or attempt % selection.max_mating_attempts == 0:
-            draws = Draws(self._stream(birth, attempt, Purpose.PARENTS))
+            draws = BufferedRng(self._stream(birth, attempt, Purpose.PARENTS))
             couple = select_parents(population, draws, selection)
         rng = self._stream(birth, attempt, Purpose.MATE)
         first, second = couple
@@ -155,7 +155,7 @@ class Breeder:
         last: BirthId,
     ) -> tuple[Individual, ...]:
         """Return the population after a brood whose last birth is ``last``."""
-        draws = Draws(self._stream(last, 0, Purpose.SURVIVORS))
+        draws = BufferedRng(self._stream(last, 0, Purpose.SURVIVORS))
         selection = self._experiment.selection
         return select_survivors(parents, children, draws, selection)
 

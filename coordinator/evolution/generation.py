@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.growth import (
     Place,
     endings,
@@ -53,7 +53,7 @@ def generate(
     Raises:
         ExperimentError: restrictions that no random tree meets.
     """
-    draws = Draws(rng)
+    draws = BufferedRng(rng)
     least = experiment.space.min_parts
     for _ in range(MAX_TREES):
         root = _random_body(draws, experiment, gene_ids(birth))
@@ -72,7 +72,7 @@ def generate(
 
 
 def _random_body(
-    draws: Draws, experiment: Experiment, genes: Iterator[int]
+    draws: BufferedRng, experiment: Experiment, genes: Iterator[int]
 ) -> MutableGenome:
     """Return a random tree without hidden neurons; it may lack a motor."""
     space, shape = experiment.space, experiment.generation
@@ -97,7 +97,7 @@ def _random_body(
 
 
 def _add_brain(
-    draws: Draws, branches: Sequence[MutableGenome], experiment: Experiment
+    draws: BufferedRng, branches: Sequence[MutableGenome], experiment: Experiment
 ) -> None:
     """Give a tree its hidden neurons, and connections among all neurons."""
     hosts = branches

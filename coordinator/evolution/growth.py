@@ -6,7 +6,7 @@ Source: facts of the original, sections 4.3 and 4.5.
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.mutable_genome import MutableGenome, path_between
 from coordinator.evolution.size_counts import SizeCounts
 from schema.experiment.document import Space
@@ -27,14 +27,17 @@ def half_up(number: Fraction) -> int:
     return int(number + Fraction(1, 2))
 
 
-def random_neuron(draws: Draws) -> NeuronGene:
+def random_neuron(draws: BufferedRng) -> NeuronGene:
     """Return an output or hidden neuron of uniform type, uniform parameters."""
     kind, parameters = draws.pick(_NEURONS)
     return NeuronGene(kind, draws.values(parameters))
 
 
 def random_part(
-    draws: Draws, kind: PartType, genes: Iterator[int], colour: tuple[float, ...] = ()
+    draws: BufferedRng,
+    kind: PartType,
+    genes: Iterator[int],
+    colour: tuple[float, ...] = (),
 ) -> MutableGenome:
     """Return a part that hangs nowhere yet, without hidden neurons.
 
@@ -67,7 +70,7 @@ def usable_types(types: BodySpace, size: SizeCounts, space: Space) -> list[PartT
 
 
 def pick_growth(
-    draws: Draws, places: list[Place], usable: list[PartType]
+    draws: BufferedRng, places: list[Place], usable: list[PartType]
 ) -> tuple[Place, PartType] | None:
     """Return a free place and a type to put there, or None if nothing fits.
 
@@ -88,14 +91,14 @@ def endings(branches: Iterable[MutableGenome], *layers: Layer) -> list[Ending]:
     return [(branch, end) for branch in branches for end in branch.neurons(*layers)]
 
 
-def connect(draws: Draws, source: Ending, target: Ending) -> ConnectionGene:
+def connect(draws: BufferedRng, source: Ending, target: Ending) -> ConnectionGene:
     """Return a connection of random weight with the path that leads there."""
     path = path_between(source[0], target[0])
     return ConnectionGene(source[1], path, target[1], draws.number())
 
 
 def wire(
-    draws: Draws, sources: list[Ending], targets: list[Ending], probability: float
+    draws: BufferedRng, sources: list[Ending], targets: list[Ending], probability: float
 ) -> None:
     """Add each connection of the full product with a probability."""
     for source in sources:

@@ -6,7 +6,7 @@ Source: Hupkes 2016, section 5.3; facts of the original, section 5.1.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from schema.experiment.document import Selection
 from schema.robot.genome import Genome
 from schema.robot.names import BirthId
@@ -45,7 +45,7 @@ def _order(individual: Individual) -> tuple[float, BirthId]:
 
 
 def select_parents(
-    population: Sequence[Individual], draws: Draws, selection: Selection
+    population: Sequence[Individual], draws: BufferedRng, selection: Selection
 ) -> Couple:
     """Return two different parents, the one that gives its root first.
 
@@ -64,14 +64,14 @@ def select_parents(
     return first, _win(rest, draws, selection.tournament_size)
 
 
-def _win(candidates: Sequence[Individual], draws: Draws, size: int) -> Individual:
+def _win(candidates: Sequence[Individual], draws: BufferedRng, size: int) -> Individual:
     return min(draws.sample(candidates, size), key=_order)
 
 
 def select_survivors(
     parents: Sequence[Individual],
     children: Sequence[Individual],
-    draws: Draws,
+    draws: BufferedRng,
     selection: Selection,
 ) -> tuple[Individual, ...]:
     """Return the next population in birth order.

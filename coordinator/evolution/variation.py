@@ -22,7 +22,7 @@ from coordinator.evolution.brain_mutation import (
     delete_hidden_neurons,
     vary_neurons,
 )
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.mutable_genome import (
     MutableGenome,
     gene_ids,
@@ -57,7 +57,7 @@ def mate(
         A genome within all restrictions, planar where bodies are, with at least
         one motor; None if crossover finds no fitting subtree or no motor is left.
     """
-    draws = Draws(rng)
+    draws = BufferedRng(rng)
     types = body_space(experiment.space)
     root, donor = to_mutable(first, types), to_mutable(second, types)
     thawed = [*preorder(root), *preorder(donor)]
@@ -85,7 +85,10 @@ def _let_go(branches: Iterable[MutableGenome]) -> None:
 
 
 def crossover(
-    draws: Draws, root: MutableGenome, donor: MutableGenome, experiment: Experiment
+    draws: BufferedRng,
+    root: MutableGenome,
+    donor: MutableGenome,
+    experiment: Experiment,
 ) -> bool:
     """Put a subtree of a donor in the place of one of a tree, neither a root.
 
@@ -124,7 +127,10 @@ def crossover(
 
 
 def mutate(
-    draws: Draws, root: MutableGenome, genes: Iterator[int], experiment: Experiment
+    draws: BufferedRng,
+    root: MutableGenome,
+    genes: Iterator[int],
+    experiment: Experiment,
 ) -> None:
     """Change a tree in place, step by step in the order of the thesis.
 

@@ -12,7 +12,7 @@ from math import inf
 
 import numpy as np
 
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.seeding import Purpose, stream
 from coordinator.evolution.selection import Individual, fittest_first
 from coordinator.islands.events import Emigrate, Immigrated, NeighbourClosed, Travelled
@@ -198,7 +198,7 @@ class MigrationEpochs:
         if self._migration.replaced == "worst":
             return fittest_first(residents)[-1]
         name = BirthId(self._number, arrival)
-        return Draws(self._stream(name, Purpose.REPLACED)).pick(residents)
+        return BufferedRng(self._stream(name, Purpose.REPLACED)).pick(residents)
 
     def _stream(self, name: BirthId, purpose: Purpose) -> np.random.Generator:
         return stream(self._seed, self._run, name, 0, purpose)
@@ -208,7 +208,7 @@ class MigrationEpochs:
         if self._migration.emigrants == "best":
             return fittest_first(candidates)[:count]
         name = BirthId(self._number, self.epoch)
-        draws = Draws(self._stream(name, Purpose.EMIGRANTS))
+        draws = BufferedRng(self._stream(name, Purpose.EMIGRANTS))
         if self._migration.emigrants == "random":
             return draws.sample(candidates, count)
         chosen: list[Individual] = []

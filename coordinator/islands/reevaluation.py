@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import fsum, isfinite
 
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.seeding import Purpose, stream
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Evaluate, Evaluated, EvaluationFailed, Record
@@ -73,7 +73,7 @@ class Reevaluations:
         shortest, longest = ends
         birth, trial = command.birth, command.trial
         rng = stream(self._seed, self._run, birth, trial, Purpose.DURATION)
-        steps = shortest + Draws(rng).below(longest - shortest + 1)
+        steps = shortest + BufferedRng(rng).below(longest - shortest + 1)
         return replace(command, steps=steps)
 
     def ask_anew(self, births: int, population: Sequence[Individual]) -> list[Evaluate]:

@@ -15,7 +15,7 @@ from coordinator.evolution.body_mutation import (
     swap_subtrees,
     vary_parts,
 )
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import (
     gene_ids,
@@ -58,8 +58,8 @@ def experiment(space: dict[str, Any] | None = None, **variation: Any) -> Experim
     )
 
 
-def draws(seed: int = 0) -> Draws:
-    return Draws(np.random.default_rng(seed))
+def draws(seed: int = 0) -> BufferedRng:
+    return BufferedRng(np.random.default_rng(seed))
 
 
 def shape(genome: Genome) -> str:

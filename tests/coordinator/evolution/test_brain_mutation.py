@@ -16,7 +16,7 @@ from coordinator.evolution.brain_mutation import (
     delete_hidden_neurons,
     vary_neurons,
 )
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.generation import generate
 from coordinator.evolution.growth import half_up
 from coordinator.evolution.mutable_genome import preorder, to_genome, to_mutable
@@ -37,11 +37,11 @@ def experiment(**variation: Any) -> Experiment:  # noqa: ANN401 - any setting
     return Experiment(name="test", variation=Variation(**variation))
 
 
-def draws(seed: int = 0) -> Draws:
-    return Draws(np.random.default_rng(seed))
+def draws(seed: int = 0) -> BufferedRng:
+    return BufferedRng(np.random.default_rng(seed))
 
 
-def scripted(*numbers: float) -> Draws:
+def scripted(*numbers: float) -> BufferedRng:
     made = draws()
     made.number = iter(numbers).__next__
     return made

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from coordinator.arena.place import draw_place
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.culling import select_doomed
-from coordinator.evolution.draws import Draws
 from coordinator.evolution.selection import Individual
 from schema.experiment.document import Arena
 from schema.robot.genome import Node
@@ -65,8 +65,8 @@ def test_the_floor_holds_in_a_cull_too() -> None:
     assert len(doomed([1.0] * 30, population_floor=12)[1]) == 18
 
 
-def draws(seed: int) -> Draws:
-    return Draws(np.random.default_rng(seed))
+def draws(seed: int) -> BufferedRng:
+    return BufferedRng(np.random.default_rng(seed))
 
 
 def test_places_are_uniform_in_radius_and_angle() -> None:

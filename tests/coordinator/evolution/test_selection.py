@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.selection import (
     Individual,
     fittest_first,
@@ -34,7 +34,7 @@ def numbers(chosen: Any) -> list[int]:  # noqa: ANN401 - any individuals
 
 def couples(population: list[Individual], **settings: Any) -> list[list[int]]:  # noqa: ANN401 - any setting
     selection = Selection(**settings)
-    draws = Draws(np.random.default_rng(2))
+    draws = BufferedRng(np.random.default_rng(2))
     return [numbers(select_parents(population, draws, selection)) for _ in range(N)]
 
 
@@ -83,7 +83,7 @@ def survivors(
     seed: int = 0,
     **settings: Any,  # noqa: ANN401 - any setting
 ) -> list[int]:
-    draws = Draws(np.random.default_rng(seed))
+    draws = BufferedRng(np.random.default_rng(seed))
     selection = Selection(**settings)
     return numbers(select_survivors(parents, children, draws, selection))
 

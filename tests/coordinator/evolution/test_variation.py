@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import (
     gene_ids,
@@ -74,7 +74,7 @@ def crossed(
     seed: int, first: Genome, second: Genome, setting: Experiment = DEFAULT
 ) -> Genome | None:
     root = to_mutable(first, TYPES)
-    draws = Draws(np.random.default_rng(seed))
+    draws = BufferedRng(np.random.default_rng(seed))
     done = crossover(draws, root, to_mutable(second, TYPES), setting)
     if not done:
         assert to_genome(preorder(root)) == first, "a failure changes nothing"
@@ -162,7 +162,7 @@ def test_nothing_mutates_where_all_probabilities_are_zero() -> None:
     for seed in range(20):
         genome = founder(seed)
         root = to_mutable(genome, TYPES)
-        mutate(Draws(np.random.default_rng(seed)), root, gene_ids(CHILD), setting)
+        mutate(BufferedRng(np.random.default_rng(seed)), root, gene_ids(CHILD), setting)
         for one, other in zip(preorder(root), walk(genome), strict=True):
             assert one.parameters == other[0].parameters
         assert to_genome(preorder(root)) == genome

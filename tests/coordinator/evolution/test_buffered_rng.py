@@ -5,28 +5,28 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from coordinator.evolution.draws import Draws
+from coordinator.evolution.buffered_rng import BufferedRng
 from schema.parts import Parameter
 
 N = 20_000
 
 
 @pytest.fixture
-def draws() -> Draws:
-    return Draws(np.random.default_rng(5))
+def draws() -> BufferedRng:
+    return BufferedRng(np.random.default_rng(5))
 
 
 def test_numbers_are_those_of_the_stream() -> None:
-    mine, theirs = Draws(np.random.default_rng(3)), np.random.default_rng(3)
+    mine, theirs = BufferedRng(np.random.default_rng(3)), np.random.default_rng(3)
     assert [mine.number() for _ in range(1000)] == theirs.random(1000).tolist()
 
 
-def test_certain_and_impossible_chances(draws: Draws) -> None:
+def test_certain_and_impossible_chances(draws: BufferedRng) -> None:
     assert all(draws.chance(1.0) for _ in range(N))
     assert not any(draws.chance(0.0) for _ in range(N))
 
 
-def test_picks_are_uniform(draws: Draws) -> None:
+def test_picks_are_uniform(draws: BufferedRng) -> None:
     found = Counter(draws.pick("abcde") for _ in range(N))
     assert sorted(found) == list("abcde")
     # Five standard deviations of a binomial.
@@ -34,7 +34,7 @@ def test_picks_are_uniform(draws: Draws) -> None:
 
 
 def test_samples_are_without_replacement_and_uniform_in_each_place(
-    draws: Draws,
+    draws: BufferedRng,
 ) -> None:
     first, last = Counter[int](), Counter[int]()
     for _ in range(N):
@@ -46,14 +46,14 @@ def test_samples_are_without_replacement_and_uniform_in_each_place(
         assert all(abs(n - N / 6) < 5 * (N * 5 / 36) ** 0.5 for n in found.values())
 
 
-def test_values_fill_their_range(draws: Draws) -> None:
+def test_values_fill_their_range(draws: BufferedRng) -> None:
     found = [draws.value(Parameter("p", 20.0, 100.0, 50.0)) for _ in range(N)]
     assert 20.0 <= min(found) < 20.1
     assert 99.9 < max(found) <= 100.0
     assert np.mean(found) == pytest.approx(60.0, abs=5 * 80 / 12**0.5 / N**0.5)
 
 
-def test_nearby_values_move_by_a_share_and_stay_in_range(draws: Draws) -> None:
+def test_nearby_values_move_by_a_share_and_stay_in_range(draws: BufferedRng) -> None:
     moving = Parameter("p", -1.0, 1.0, 0.0)
     fixed = Parameter("c", 0.0, 1.0, 0.5, is_mutable=False)
     moved = [draws.nearby((moving, fixed), (0.9, 0.3), 0.1) for _ in range(N)]
@@ -69,7 +69,7 @@ def test_nearby_values_move_by_a_share_and_stay_in_range(draws: Draws) -> None:
     assert draws.nearby((moving,), (0.25,), 0.0) == (0.25,)
 
 
-def test_normal_numbers_have_their_mean_and_deviation(draws: Draws) -> None:
+def test_normal_numbers_have_their_mean_and_deviation(draws: BufferedRng) -> None:
     found = [draws.normal(12.0, 5.0) for _ in range(N)]
     assert np.mean(found) == pytest.approx(12.0, abs=5 * 5 / N**0.5)
     assert np.std(found) == pytest.approx(5.0, rel=0.03)
@@ -77,13 +77,15 @@ def test_normal_numbers_have_their_mean_and_deviation(draws: Draws) -> None:
 
 
 @pytest.mark.parametrize("worst", [0.0, 1.0 - 2.0**-53])
-def test_normal_numbers_are_finite_at_both_ends(draws: Draws, worst: float) -> None:
+def test_normal_numbers_are_finite_at_both_ends(
+    draws: BufferedRng, worst: float
+) -> None:
     draws.number = iter([worst]).__next__
     assert abs(draws.normal(0.0, 1.0)) < 10.0
 
 
 @pytest.mark.parametrize("expected", [0.0, 0.25, 0.5, 1.0, 2.75])
-def test_rounding_keeps_the_mean(draws: Draws, expected: float) -> None:
+def test_rounding_keeps_the_mean(draws: BufferedRng, expected: float) -> None:
     found = [draws.rounded(expected) for _ in range(N)]
     assert all(abs(n - expected) < 1.0 for n in found)
     assert np.mean(found) == pytest.approx(expected, abs=5 * 0.5 / N**0.5)

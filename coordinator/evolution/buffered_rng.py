@@ -18,7 +18,7 @@ _BLOCK = 128
 _TINY = 2.0**-54
 
 
-class Draws:
+class BufferedRng:
     """Draws from one stream, in the order in which they are asked for.
 
     Attributes:
