@@ -13,7 +13,7 @@ from rich.progress import (
     TextColumn,
 )
 
-from coordinator.cli.wording import about_arenas, best_of, duration
+from coordinator.cli.format import about_arenas, best_of, duration
 from coordinator.run.rate import SPAN_S
 from coordinator.run.scheduler import RunScheduler
 from schema.wire.status import IslandStatus, RunStatus, Status

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from coordinator.cli.execute import ADDRESS
-from coordinator.cli.wording import about_arenas, best_of, duration
+from coordinator.cli.format import about_arenas, best_of, duration
 from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, read_campaign
 from coordinator.storage.folder import DETAILS, EPOCH, LOCK, RunDetails, holds_run

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from coordinator.cli.wording import about_arenas, best_of, duration
+from coordinator.cli.format import about_arenas, best_of, duration
 from coordinator.run.rate import RateMeter
 from coordinator.storage.campaign import (
     Campaign,
