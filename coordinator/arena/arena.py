@@ -11,7 +11,7 @@ from math import isfinite
 
 from coordinator.arena.arena_migration import ImmigrantQueue
 from coordinator.arena.candidates import VettingQueue
-from coordinator.arena.changes import Pending
+from coordinator.arena.changes import PendingChanges
 from coordinator.arena.clock import ArenaClock
 from coordinator.arena.orders import check_order, guest, rewired
 from coordinator.arena.place import Place, draw_place
@@ -106,7 +106,7 @@ class Arena:
             Breeder(experiment, seed, run), number, attempts
         )
         self._residents = Residents()
-        self._pending = Pending()
+        self._pending = PendingChanges()
         self._founders: list[Candidate] = []
         self._guests: list[Insert] = []
         self._orders: list[Order] = []

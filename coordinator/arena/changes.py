@@ -8,7 +8,7 @@ from schema.robot.robot import Robot
 from schema.wire.arena import BrainChange, Changes, Insertion
 
 
-class Pending:
+class PendingChanges:
     """Changes that nobody has been told of yet."""
 
     def __init__(self) -> None:
