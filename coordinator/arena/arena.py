@@ -13,9 +13,9 @@ from coordinator.arena.arena_migration import ImmigrantQueue
 from coordinator.arena.candidates import VettingQueue
 from coordinator.arena.changes import PendingChanges
 from coordinator.arena.clock import ArenaClock
+from coordinator.arena.living import LivingRobot, LivingRobots
 from coordinator.arena.orders import check_order, guest, rewired
 from coordinator.arena.place import Place, draw_place
-from coordinator.arena.residents import Resident, Residents
 from coordinator.arena.rows import (
     casualty_record,
     death_record,
@@ -105,7 +105,7 @@ class Arena:
         self._vetting_queue = VettingQueue(
             Breeder(experiment, seed, run), number, attempts
         )
-        self._residents = Residents()
+        self._living = LivingRobots()
         self._pending = PendingChanges()
         self._founders: list[Candidate] = []
         self._guests: list[Insert] = []
@@ -119,12 +119,12 @@ class Arena:
     @property
     def population(self) -> tuple[Individual, ...]:
         """The living by name, each with its last fitness."""
-        return tuple(one.individual for one in self._residents)
+        return tuple(one.individual for one in self._living)
 
     @property
     def judged(self) -> tuple[Individual, ...]:
         """Those of the living whose fitness counts: the mature."""
-        return self._residents.mature()
+        return self._living.mature()
 
     @property
     def next_step(self) -> int:
@@ -188,7 +188,7 @@ class Arena:
             )
         told = [one.birth for one in advance.judgements]
         told += [one.birth for one in advance.casualties]
-        if sorted(told) != [one.birth for one in self._residents]:
+        if sorted(told) != [one.birth for one in self._living]:
             raise self._unexpected(event, "it must tell of all living, each once")
         if not all(isfinite(one.fitness) for one in advance.judgements):
             raise self._unexpected(event, "fitness must be finite")
@@ -207,12 +207,12 @@ class Arena:
             commands.append(Append("poses", event.pose_rows, advance.poses))
         commands += touch_records(advance.touches, self._number, now_s, over_s)
         for casualty in advance.casualties:
-            self._residents.remove(casualty.birth)
+            self._living.remove(casualty.birth)
             fell_s = self._clock.seconds(casualty.step)
             commands.append(
                 casualty_record(casualty, self._number, self.births, fell_s)
             )
-        self._residents.judge(advance.judgements)
+        self._living.judge(advance.judgements)
         return commands + self._decide()
 
     def _decide(self) -> list[ArenaCommand]:
@@ -223,13 +223,11 @@ class Arena:
         commands: list[ArenaCommand] = []
         if self.step % self._clock.sample == 0:
             now_s = self._clock.seconds(self.step)
-            commands += sample_records(
-                self._residents, self._number, self.births, now_s
-            )
+            commands += sample_records(self._living, self._number, self.births, now_s)
         if self.step % self._clock.birth == 0:
             immigrant_queue = self._immigrant_queue
             is_few = not self._guests and (
-                len(self._residents) < self._experiment.selection.parents_needed
+                len(self._living) < self._experiment.selection.parents_needed
             )
             self._is_starving = (
                 is_few and immigrant_queue is not None and immigrant_queue.is_hopeful
@@ -239,16 +237,16 @@ class Arena:
                 return [*commands, self._finish()]
             commands += self._mate()
         if self.step % self._clock.cull == 0:
-            reason, doomed = select_doomed(self._residents.mature(), self._rules)
+            reason, doomed = select_doomed(self._living.mature(), self._rules)
             for one in doomed:
-                resident = self._residents.remove(one.birth)
+                resident = self._living.remove(one.birth)
                 commands.append(self._gone(resident, reason))
         return commands if self._vetting_queue.is_busy else commands + self._conclude()
 
     def _mate(self) -> list[Vet]:
         """Begin a birth, if there is room and there are parents (trap B12)."""
-        mature = self._residents.mature()
-        is_full = len(self._residents) >= self._rules.population_limit
+        mature = self._living.mature()
+        is_full = len(self._living) >= self._rules.population_limit
         if is_full or len(mature) < self._experiment.selection.parents_needed:
             return []
         return self._vetting_queue.mate(mature)
@@ -302,15 +300,15 @@ class Arena:
             and not immigrant_queue.is_waiting
             and self.births < self._experiment.births
         ):
-            mature = self._residents.mature()
+            mature = self._living.mature()
             stay = self._experiment.selection.parents_needed
-            sent, gone = immigrant_queue.depart(mature, len(self._residents), stay)
+            sent, gone = immigrant_queue.depart(mature, len(self._living), stay)
             commands += [*migration_records(sent, self.births, now_s), *sent]
             for one in gone:
-                resident = self._residents.remove(one.birth)
+                resident = self._living.remove(one.birth)
                 commands.append(self._gone(resident, "migrated"))
         if immigrant_queue.is_complete:
-            living = [one.birth for one in self._residents]
+            living = [one.birth for one in self._living]
             came = immigrant_queue.arrive(living, self.births, now_s)
             self.is_extinct = self._is_starving and not came
             self._is_starving = False
@@ -329,19 +327,19 @@ class Arena:
         """
         commands: list[ArenaCommand] = []
         while True:
-            is_few = len(self._residents) < self._rules.population_floor
-            mature = () if is_few else self._residents.mature()
+            is_few = len(self._living) < self._rules.population_floor
+            mature = () if is_few else self._living.mature()
             found = immigrant_queue.next_in(mature, has_room=self._has_room())
             if found is None:
                 return commands
             immigrant, replaced = found
             if replaced is not None:
-                resident = self._residents.remove(replaced.birth)
+                resident = self._living.remove(replaced.birth)
                 commands.append(self._gone(resident, "replaced"))
             name = BirthId(self._number, immigrant_queue.settled)
             place = self._draw_place(name, Purpose.IMMIGRANT_PLACE)
             robot = develop(immigrant.genome, self._space)
-            self._residents.add(Resident(immigrant, robot, place))
+            self._living.add(LivingRobot(immigrant, robot, place))
             self._pending.insert(immigrant.birth, robot, place)
 
     def _advance(self) -> AdvanceShard:
@@ -372,10 +370,10 @@ class Arena:
                 self.is_paused = isinstance(order, Pause)
             case Insert():
                 self._guests.append(order)
-            case Remove(birth=birth) if self._residents.get(birth):
-                return [self._gone(self._residents.remove(birth), "removed")]
+            case Remove(birth=birth) if self._living.get(birth):
+                return [self._gone(self._living.remove(birth), "removed")]
             case ReplaceBrain(birth=birth, brain=brain):
-                resident = self._residents.get(birth)
+                resident = self._living.get(birth)
                 robot = resident and rewired(resident.robot, brain, self._space)
                 if resident and robot:
                     resident.robot = robot
@@ -403,15 +401,15 @@ class Arena:
         if place is None:
             place = self._draw_place(birth, Purpose.PLACE)
         self.births += 1
-        self._residents.add(Resident(individual, robot, place))
+        self._living.add(LivingRobot(individual, robot, place))
         self._pending.insert(birth, robot, place)
         born = birth_record(
             individual, parents, attempts, robot, self._space,
             sim_time_s=self._clock.seconds(self.step), place=place,
         )  # fmt: skip
-        return [born, *living_records(self._residents, self._number, self.births)]
+        return [born, *living_records(self._living, self._number, self.births)]
 
-    def _gone(self, resident: Resident, reason: str) -> Record:
+    def _gone(self, resident: LivingRobot, reason: str) -> Record:
         """Have the world let go of somebody who has left the living."""
         self._pending.remove(resident.birth)
         return death_record(
@@ -425,15 +423,15 @@ class Arena:
     def _draw_place(self, name: BirthId, purpose: Purpose) -> Place:
         """Return a place of chance, away from the living."""
         rng = stream(self._seed, self._run, name, 0, purpose)
-        others = [one.last_place for one in self._residents]
+        others = [one.last_place for one in self._living]
         return draw_place(BufferedRng(rng), others, self._rules)
 
     def _has_room(self) -> bool:
-        return len(self._residents) < self._rules.population_limit
+        return len(self._living) < self._rules.population_limit
 
     def _unexpected(self, event: ArenaEvent, why: str) -> UnexpectedEvent:
         return UnexpectedEvent(
             f"arena {self._number} at step {self.step}, {self.births} of "
-            f"{self._experiment.births} born, {len(self._residents)} alive, "
+            f"{self._experiment.births} born, {len(self._living)} alive, "
             f"{self._advances} advances done: {why}, got {event}"
         )

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterable
 
-from coordinator.arena.residents import Resident
+from coordinator.arena.living import LivingRobot
 from coordinator.islands.events import Record
 from coordinator.islands.rows import named
 from schema.wire.arena import Casualty, Touch
 
 
 def sample_records(
-    residents: Iterable[Resident], island: int, births: int, sim_time_s: float
+    living_robots: Iterable[LivingRobot], island: int, births: int, sim_time_s: float
 ) -> list[Record]:
     """Return the fitness rows of a sample: all living who were ever judged."""
     return [
@@ -26,13 +26,13 @@ def sample_records(
                 "is_mature": one.judgement.is_mature,
             },
         )
-        for one in residents
+        for one in living_robots
         if one.judgement is not None
     ]
 
 
 def living_records(
-    residents: Iterable[Resident], island: int, births: int
+    living_robots: Iterable[LivingRobot], island: int, births: int
 ) -> list[Record]:
     """Return the population rows at a birth; the immature have no fitness yet."""
     return [
@@ -45,7 +45,7 @@ def living_records(
                 "fitness": one.individual.fitness if one.is_mature else None,
             },
         )
-        for one in residents
+        for one in living_robots
     ]
 
 
@@ -68,7 +68,7 @@ def casualty_record(
 
 
 def death_record(
-    resident: Resident, reason: str, *, island: int, births: int, sim_time_s: float
+    resident: LivingRobot, reason: str, *, island: int, births: int, sim_time_s: float
 ) -> Record:
     """Return the deaths row of a robot that is taken out where it stands."""
     x, y = resident.last_place

@@ -127,17 +127,17 @@ class MigrantBuffer:
 
     def _settle(self, population: Sequence[Individual]) -> tuple[Individual, ...]:
         """Return the population in which all guests live who found room."""
-        residents, settled = list(population), list[Individual]()
+        living_robots, settled = list(population), list[Individual]()
         for guest in self._guests.values():
-            if len(residents) + len(settled) >= self._size:
-                gone = self._epochs.place_for(residents, self._settled)
+            if len(living_robots) + len(settled) >= self._size:
+                gone = self._epochs.place_for(living_robots, self._settled)
                 if gone is None:
                     continue
-                residents.remove(gone)
+                living_robots.remove(gone)
             self._settled += 1
             settled.append(guest)
         self._guests, self._awaited = {}, {}
-        return tuple(sorted([*residents, *settled], key=lambda one: one.birth))
+        return tuple(sorted([*living_robots, *settled], key=lambda one: one.birth))
 
 
 def _judged(guest: Individual, outcome: Outcome) -> Individual:

@@ -185,20 +185,20 @@ class MigrationEpochs:
         return list(arrivals.values())
 
     def place_for(
-        self, residents: Sequence[Individual], arrival: int
+        self, living_robots: Sequence[Individual], arrival: int
     ) -> Individual | None:
         """Return who makes room for an immigrant; None if nobody does.
 
         Args:
-            residents: who may be replaced, in an order that repeats.
+            living_robots: who may be replaced, in an order that repeats.
             arrival: number of the immigrant, of all that came to the island.
         """
-        if not residents or self._migration.replaced == "none":
+        if not living_robots or self._migration.replaced == "none":
             return None
         if self._migration.replaced == "worst":
-            return fittest_first(residents)[-1]
+            return fittest_first(living_robots)[-1]
         name = BirthId(self._number, arrival)
-        return BufferedRng(self._stream(name, Purpose.REPLACED)).pick(residents)
+        return BufferedRng(self._stream(name, Purpose.REPLACED)).pick(living_robots)
 
     def _stream(self, name: BirthId, purpose: Purpose) -> np.random.Generator:
         return stream(self._seed, self._run, name, 0, purpose)

@@ -11,7 +11,7 @@ from schema.wire.arena import Judgement
 
 
 @dataclass(slots=True)
-class Resident:
+class LivingRobot:
     """One of an arena's living.
 
     Attributes:
@@ -42,28 +42,28 @@ class Resident:
         return self.place if self.judgement is None else self.judgement.place[:2]
 
 
-class Residents:
+class LivingRobots:
     """The living of an arena, always in the order of their names."""
 
     def __init__(self) -> None:
         """Begin with nobody."""
-        self._living: dict[BirthId, Resident] = {}
+        self._living: dict[BirthId, LivingRobot] = {}
 
     def __len__(self) -> int:
         return len(self._living)
 
-    def __iter__(self) -> Iterator[Resident]:
+    def __iter__(self) -> Iterator[LivingRobot]:
         return (self._living[birth] for birth in sorted(self._living))
 
-    def get(self, birth: BirthId) -> Resident | None:
+    def get(self, birth: BirthId) -> LivingRobot | None:
         """Return who has a name, None if nobody living has."""
         return self._living.get(birth)
 
-    def add(self, resident: Resident) -> None:
+    def add(self, resident: LivingRobot) -> None:
         """Let somebody in."""
         self._living[resident.birth] = resident
 
-    def remove(self, birth: BirthId) -> Resident:
+    def remove(self, birth: BirthId) -> LivingRobot:
         """Let somebody go who lives, and return who it was."""
         return self._living.pop(birth)
 
