@@ -8,7 +8,7 @@ from pathlib import Path
 from coordinator.cli.execute import Deployment, resume, start, start_campaign
 from coordinator.cli.flags import LISTEN, parser
 from coordinator.dispatch.events import AgentKind
-from coordinator.run.cross_checks import Caution
+from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
     Campaign,
     is_campaign,
@@ -143,7 +143,7 @@ def _deployment(
         speed=options.speed,
         view=options.view,
         cpu_limit_s=options.cpu_limit,
-        caution=Caution(options.audit, options.on_quarantine == "pause"),
+        checks=Checks(options.audit, options.on_quarantine == "pause"),
         allows_drift=options.allow_drift,
     )
 

@@ -16,7 +16,7 @@ from coordinator.dispatch.events import AgentKind
 from coordinator.dispatch.fleet import Agents, Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.network.service import Network
-from coordinator.run.cross_checks import CARELESS, Caution
+from coordinator.run.cross_checks import NO_CHECKS, Checks
 from coordinator.run.live_server import LiveServer, open_viewer
 from coordinator.run.operators import Reception
 from coordinator.run.scheduler import Planned, RunScheduler
@@ -84,7 +84,7 @@ class Deployment:
         speed: simulated seconds per second at most, of arenas; None: no limit.
         view: a viewer is to be opened; the run does not wait for it.
         cpu_limit_s: CPU time of a job after which its process here is ended [s].
-        caution: what to look out for.
+        checks: what to look out for.
         allows_drift: an arena may go on by another platform where its own is gone.
     """
 
@@ -101,7 +101,7 @@ class Deployment:
     speed: float | None = None
     view: bool = False
     cpu_limit_s: float = CPU_LIMIT_S
-    caution: Caution = CARELESS
+    checks: Checks = NO_CHECKS
     allows_drift: bool = False
 
 
@@ -303,7 +303,7 @@ def _conduct(
                 fsync=deployment.fsync,
                 speed=deployment.speed,
                 is_watched=is_watched and isinstance(agents, Network),
-                caution=deployment.caution,
+                checks=deployment.checks,
             ),
             most=_most_at_once(),
             conclude=conclude_run,

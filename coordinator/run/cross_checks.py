@@ -21,7 +21,7 @@ _WHOLE = 2**32
 
 
 @dataclass(frozen=True, slots=True)
-class Caution:
+class Checks:
     """What a user wants to be careful about; none of it changes a birth.
 
     Attributes:
@@ -33,7 +33,7 @@ class Caution:
     pauses: bool = False
 
 
-CARELESS = Caution()
+NO_CHECKS = Checks()
 """No audits, and no pause."""
 
 

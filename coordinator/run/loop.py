@@ -40,7 +40,7 @@ from coordinator.islands.events import (
 )
 from coordinator.islands.island import Island
 from coordinator.run.advances import Advances, SnapshotStore, Terms
-from coordinator.run.cross_checks import CARELESS, Caution, audit_records, describe
+from coordinator.run.cross_checks import NO_CHECKS, Checks, audit_records, describe
 from coordinator.run.requests import Requests, RunContext, is_quarantined
 from coordinator.run.throttle import RealTimeThrottle
 from schema.errors import RunPaused, UnexpectedEvent
@@ -96,7 +96,7 @@ class Loop:
         rows: Rows,
         snapshot_store: SnapshotStore,
         throttle: RealTimeThrottle | None = None,
-        caution: Caution = CARELESS,
+        checks: Checks = NO_CHECKS,
         confirm: Callable[[], None] = lambda: None,
     ) -> None:
         """Connect machines; nothing happens before ``start``.
@@ -109,8 +109,8 @@ class Loop:
             snapshot_store,
             fleet,
         )
-        self._requests = Requests(context, fleet, caution.audit)
-        self._caution = caution
+        self._requests = Requests(context, fleet, checks.audit)
+        self._checks = checks
         self._confirm = confirm
         self._fleet = fleet
         self._log = log
@@ -251,7 +251,7 @@ class Loop:
             if isinstance(event, EvaluationFailed) and is_quarantined(event):
                 birth = event.birth
                 line = f"birth {birth.number} of island {birth.island}: {event.reason}"
-                if self._caution.pauses:
+                if self._checks.pauses:
                     raise RunPaused(f"{line}; resume to go on without it")
                 _LOG.warning("%s", line)
 

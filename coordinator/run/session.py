@@ -11,7 +11,7 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Record
 from coordinator.islands.island import Island
 from coordinator.run.archipelago import archipelago
-from coordinator.run.cross_checks import CARELESS, Caution
+from coordinator.run.cross_checks import NO_CHECKS, Checks
 from coordinator.run.feed import Feed, TeeRows
 from coordinator.run.loop import Loop
 from coordinator.run.rate import RateMeter
@@ -52,7 +52,7 @@ class RunSession:
         fsync: bool = False,
         speed: float | None = None,
         is_watched: bool = False,
-        caution: Caution = CARELESS,
+        checks: Checks = NO_CHECKS,
     ) -> None:
         """Open all of a run; nothing happens before ``start``.
 
@@ -62,7 +62,7 @@ class RunSession:
             fsync: survive power loss, too.
             speed: simulated seconds per second at most, of arenas; None: no limit.
             is_watched: have a feed.
-            caution: what to look out for.
+            checks: what to look out for.
 
         Raises:
             RunFolderError: a damaged journal, or a disk that fails.
@@ -95,7 +95,7 @@ class RunSession:
                 rows=rows,
                 snapshot_store=Snapshots(held.path),
                 throttle=_throttle(self.experiment, speed),
-                caution=caution,
+                checks=checks,
                 confirm=held.confirm,
             )
             self._births, self._simulated = RateMeter(), RateMeter()
