@@ -65,7 +65,7 @@ def inhabited(
 
 def state_of(world: World, birth: BirthId) -> bytes:
     """Return a robot's physics, readings and mind as bytes."""
-    one = world.company.find(birth)
+    one = world.population.find(birth)
     arrays = (one.seat.qpos, one.seat.qvel, one.seat.ctrl, one.seat.senses.readings)
     return b"".join(np.asarray(a).tobytes() for a in (*arrays, one.states))
 

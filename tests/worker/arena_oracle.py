@@ -43,12 +43,12 @@ class Oracle:
         self._look(self.world.step, stride.state)
 
     def _look(self, step: int, state: Floats) -> None:
-        company = self.world.company
+        population = self.world.population
         if self.world.births != self._births:
             self._build()
         if self._model is None or self._data is None:
             return
-        data, layout = self._data, company.layout
+        data, layout = self._data, population.layout
         rows = range(len(self._births))
         data.qpos[:] = np.concatenate([state[layout.part(row)] for row in rows])
         mujoco.mj_kinematics(self._model, data)
@@ -59,21 +59,21 @@ class Oracle:
         for a, b in sorted({(a, b) for a, b in owners.tolist() if a != b}):
             self.pair_steps += 1
             first, second = self._births[a], self._births[b]
-            if company.cluster_of(first) is not company.cluster_of(second):
+            if population.cluster_of(first) is not population.cluster_of(second):
                 self.missed.append((step, first, second))
 
     def _build(self) -> None:
-        company = self.world.company
+        population = self.world.population
         self._births = self.world.births
         self._model = self._data = None
         if len(self._births) < 2:
             return
-        settings = company.shop.settings
+        settings = population.shop.settings
         types = body_space(settings.space)
         prefixes = [f"{number}/" for number in range(len(self._births))]
         specs = [
             robot_spec(one.robot, types, settings.simulation).spec
-            for one in company.everybody
+            for one in population.everybody
         ]
         self._model = shared_model(
             list(zip(prefixes, specs, strict=True)),

@@ -13,18 +13,18 @@ from schema.robot.robot import Robot, check_robot
 from schema.wire.arena import Casualty, Changes, Insertion
 from schema.wire.codec import encode_robot
 from worker.clusters.models import Body
-from worker.clusters.population import Company
+from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import Inhabitant, put
 from worker.clusters.window import Window
 from worker.robot.controller import Widths, pack
 
 
-def check_changes(changes: Changes, company: Company, step: int) -> None:
+def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> None:
     """Raise unless changes can be made to a company.
 
     Args:
         changes: removals first, then insertions, then brains.
-        company: who lives there.
+        population: who lives there.
         step: the arena's.
 
     Raises:
@@ -36,12 +36,12 @@ def check_changes(changes: Changes, company: Company, step: int) -> None:
     new = _once(tuple(insertion.birth for insertion in changes.insertions))
     _once(tuple(change.birth for change in changes.brains))
     for birth in gone:
-        if birth not in company:
+        if birth not in population:
             raise UnexpectedEvent(f"apply: {birth} does not live here")
     for birth in new:
-        if birth in company and birth not in gone:
+        if birth in population and birth not in gone:
             raise UnexpectedEvent(f"apply: {birth} lives here already")
-    tick = company.shop.settings.simulation.brain_steps
+    tick = population.shop.settings.simulation.brain_steps
     if new and step % tick:
         raise UnexpectedEvent(
             "apply: births must fall on multiples of simulation.brain_steps = "
@@ -50,13 +50,13 @@ def check_changes(changes: Changes, company: Company, step: int) -> None:
     robots = {insertion.birth: insertion.robot for insertion in changes.insertions}
     for change in changes.brains:
         birth = change.birth
-        if birth not in new and (birth in gone or birth not in company):
+        if birth not in new and (birth in gone or birth not in population):
             raise UnexpectedEvent(f"apply: {birth} does not live here")
-        body = robots[birth] if birth in new else company.find(birth).robot
+        body = robots[birth] if birth in new else population.find(birth).robot
         robots[birth] = Robot(body.parts, change.brain)
     for robot in robots.values():
-        check_robot(robot, body_space(company.shop.settings.space))
-        pack(robot.brain, company.shop.width)
+        check_robot(robot, body_space(population.shop.settings.space))
+        pack(robot.brain, population.shop.width)
 
 
 def _once(births: tuple[BirthId, ...]) -> tuple[BirthId, ...]:
@@ -84,44 +84,50 @@ def possible(changes: Changes, living: Collection[BirthId]) -> Changes:
     )
 
 
-def newborn(insertion: Insertion, company: Company, step: int) -> Inhabitant | Casualty:
+def newborn(
+    insertion: Insertion, population: ArenaPopulation, step: int
+) -> Inhabitant | Casualty:
     """Return a robot that feels for the first time, or why it never will.
 
     Args:
         insertion: who, what, where.
-        company: that it is to join.
+        population: that it is to join.
         step: the arena's.
 
     Raises:
         ExperimentError: a sensor that the arena has nothing for.
     """
     try:
-        body = company.shop.body(insertion.birth, insertion.robot)
+        body = population.shop.body(insertion.birth, insertion.robot)
     except ValueError as error:
         place = (*insertion.place, 0.0)
         reason = f"cannot be built: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, place)
     seat = body.home.seats[0]
     x, y = insertion.place
-    z = company.shop.height(body, insertion.place, insertion.heading)
+    z = population.shop.height(body, insertion.place, insertion.heading)
     put(seat, (x, y, z), insertion.heading)
     try:
         seat.start()
     except mujoco.FatalError as error:
         reason = f"physics diverged: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, (x, y, z))
-    window = Window(company.shop.settings.simulation, step)
-    one = inhabitant(insertion.birth, insertion.robot, body, window, company)
+    window = Window(population.shop.settings.simulation, step)
+    one = inhabitant(insertion.birth, insertion.robot, body, window, population)
     one.thinks_since, one.place = step, (x, y, z)
     window.add(step, one.place)
     return one
 
 
 def inhabitant(
-    birth: BirthId, robot: Robot, body: Body, window: Window, company: Company
+    birth: BirthId,
+    robot: Robot,
+    body: Body,
+    window: Window,
+    population: ArenaPopulation,
 ) -> Inhabitant:
     """Return a robot at home, its mind at rest, before anything is known of it."""
-    network = pack(robot.brain, company.shop.width)
+    network = pack(robot.brain, population.shop.width)
     return Inhabitant(
         birth=birth,
         robot=robot,
@@ -129,7 +135,7 @@ def inhabitant(
         body=body,
         seat=body.home.seats[0],
         network=network,
-        states=np.zeros(company.shop.width.states),
+        states=np.zeros(population.shop.width.states),
         thinks_since=0,
         window=window,
         place=(0.0, 0.0, 0.0),

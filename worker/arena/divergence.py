@@ -10,7 +10,7 @@ from schema.robot.results import Floats
 from schema.wire.arena import Casualty
 from worker.clusters.cluster import Cluster
 from worker.clusters.interval import PLAUSIBLE, Stride
-from worker.clusters.population import Company
+from worker.clusters.population import ArenaPopulation
 
 FASTEST_CORE = 20.0
 """A core faster than this has broken the physics [m/s]; a fall from the thesis's
@@ -18,7 +18,7 @@ FASTEST_CORE = 20.0
 
 
 def diverged(
-    company: Company, stride: Stride, step: int, *, looks_closely: bool
+    population: ArenaPopulation, stride: Stride, step: int, *, looks_closely: bool
 ) -> list[Casualty]:
     """Return those whose physics diverged, by birth.
 
@@ -26,20 +26,20 @@ def diverged(
     engine's complaint is about all of them.
 
     Args:
-        company: the living.
+        population: the living.
         stride: what they did, and which moment of it is looked at.
         step: the arena's.
         looks_closely: the engine's warnings are read in any case.
     """
     is_quiet = _is_quiet(stride.loudest)
     if not is_quiet:
-        velocities = np.abs(stride.state[company.layout.velocities])
+        velocities = np.abs(stride.state[population.layout.velocities])
         is_quiet = _is_quiet(float(velocities.max(initial=0.0)))
     if is_quiet and not looks_closely and not stride.has_failures:
         return []
     moment = stride.moment
     found: list[Casualty] = []
-    for cluster in company.clusters:
+    for cluster in population.clusters:
         reasons, complaint = {}, ""
         if cluster.failed_at <= moment:
             complaint = cluster.failure
@@ -49,7 +49,7 @@ def diverged(
         if complaint and not reasons:
             reasons = dict.fromkeys(cluster.members, f"physics diverged: {complaint}")
         found += [
-            Casualty(birth, step, reason, company.find(birth).place)
+            Casualty(birth, step, reason, population.find(birth).place)
             for birth, reason in reasons.items()
         ]
     return found

@@ -15,7 +15,7 @@ import numpy as np
 
 from schema.parts import Vector
 from worker.clusters.cluster import Cluster
-from worker.clusters.population import Company
+from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import Inhabitant
 from worker.clusters.slot import Seat
 
@@ -25,22 +25,22 @@ _OUTSIDE_M = 1e-6
 """So far before its face a sensor's ray starts."""
 
 
-def shine(company: Company, people: Sequence[Inhabitant]) -> None:
+def shine(population: ArenaPopulation, people: Sequence[Inhabitant]) -> None:
     """Fill in what the light sensors of some robots read, if there is a light.
 
     Args:
-        company: all of the arena, any of whom may stand in the way.
+        population: all of the arena, any of whom may stand in the way.
         people: whose sensors.
     """
-    source = company.shop.settings.arena.light
+    source = population.shop.settings.arena.light
     seats = [one.seat for one in people if one.seat.senses.lights]
     if source is None or not seats:
         return
-    company.kinematics()
+    population.kinematics()
     for seat in seats:
         for geom, place in seat.senses.lights:
             seat.senses.readings[0, place] = _brightness(
-                source, company.clusters, seat, geom
+                source, population.clusters, seat, geom
             )
 
 

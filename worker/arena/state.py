@@ -18,7 +18,7 @@ from worker.arena.snapshot import (
     settings_digest,
     unpack_floats,
 )
-from worker.clusters.population import Company
+from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import Inhabitant
 from worker.clusters.window import Window
 
@@ -26,7 +26,7 @@ from worker.clusters.window import Window
 def write(
     settings: ArenaSettings,
     step: int,
-    company: Company,
+    population: ArenaPopulation,
     casualties: tuple[Casualty, ...],
 ) -> bytes:
     """Return an arena's whole state.
@@ -34,17 +34,17 @@ def write(
     Args:
         settings: it goes with.
         step: the arena's.
-        company: the living.
+        population: the living.
         casualties: not yet told.
     """
-    rows = {one.birth: row for row, one in enumerate(company.everybody)}
+    rows = {one.birth: row for row, one in enumerate(population.everybody)}
     return encode_state(
         ArenaState(
             format=FORMAT,
             settings=settings_digest(settings),
             step=step,
-            robots=[_robot_state(one) for one in company.everybody],
-            clusters=[[rows[b] for b in c.members] for c in company.clusters],
+            robots=[_robot_state(one) for one in population.everybody],
+            clusters=[[rows[b] for b in c.members] for c in population.clusters],
             casualties=[
                 CasualtyState(_name(c.birth), c.step, c.reason, c.place)
                 for c in casualties
@@ -54,14 +54,14 @@ def write(
 
 
 def read(
-    settings: ArenaSettings, data: bytes, company: Company
+    settings: ArenaSettings, data: bytes, population: ArenaPopulation
 ) -> tuple[int, tuple[Casualty, ...]]:
     """Fill an empty company from a snapshot.
 
     Args:
         settings: of the arena.
         data: the snapshot.
-        company: nobody yet.
+        population: nobody yet.
 
     Returns:
         The arena's step, and the casualties not yet told.
@@ -70,10 +70,10 @@ def read(
         MalformedMessage: not a snapshot, or of other settings.
     """
     state = decode_state(data, settings)
-    company.add([_inhabitant(robot, company) for robot in state.robots])
-    births = [one.birth for one in company.everybody]
-    company.regroup([tuple(births[row] for row in g) for g in state.clusters])
-    company.merges = company.splits = 0
+    population.add([_inhabitant(robot, population) for robot in state.robots])
+    births = [one.birth for one in population.everybody]
+    population.regroup([tuple(births[row] for row in g) for g in state.clusters])
+    population.merges = population.splits = 0
     return state.step, tuple(
         Casualty(BirthId(*c.birth), c.step, c.reason, c.place) for c in state.casualties
     )
@@ -101,13 +101,13 @@ def _robot_state(one: Inhabitant) -> RobotState:
     )
 
 
-def _inhabitant(state: RobotState, company: Company) -> Inhabitant:
+def _inhabitant(state: RobotState, population: ArenaPopulation) -> Inhabitant:
     birth, robot = BirthId(*state.birth), decode_robot(state.robot)
-    body = company.shop.body(birth, robot)
-    window = Window(company.shop.settings.simulation, state.born)
+    body = population.shop.body(birth, robot)
+    window = Window(population.shop.settings.simulation, state.born)
     for x, y, z in unpack_floats(state.window, -1, 3).tolist():
         window.positions.append((x, y, z))
-    one = inhabitant(birth, robot, body, window, company)
+    one = inhabitant(birth, robot, body, window, population)
     seat = one.seat
     seat.qpos[:] = unpack_floats(state.qpos, *seat.qpos.shape)
     seat.qvel[:] = unpack_floats(state.qvel, *seat.qvel.shape)

@@ -29,7 +29,7 @@ from worker.arena.schedule import Schedule
 from worker.arena.threads import Pool
 from worker.arena.touches import Touches
 from worker.clusters.interval import Stride
-from worker.clusters.population import Company
+from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import Inhabitant
 from worker.robot.evaluation import silence_engine
 from worker.robot.noise import Source
@@ -43,7 +43,7 @@ class World:
 
     Attributes:
         step: physics steps since it began.
-        company: the living and their clusters, to look at.
+        population: the living and their clusters, to look at.
     """
 
     def __init__(self, settings: ArenaSettings, threads: int = 1) -> None:
@@ -64,8 +64,8 @@ class World:
     def reset(self) -> None:
         """Begin anew, with nobody."""
         self.step = 0
-        self.company = Company(self._settings)
-        width = self.company.shop.width
+        self.population = ArenaPopulation(self._settings)
+        width = self.population.shop.width
         self._minds = Minds(Source(self._clock, width, self._settings.origin))
         gravity = self._settings.environment.gravity_vector(self._clock.gravity)
         self._nerves = Nerves(width, self._clock, gravity)
@@ -80,12 +80,12 @@ class World:
     @property
     def births(self) -> tuple[BirthId, ...]:
         """The names of the living, ascending."""
-        return tuple(one.birth for one in self.company.everybody)
+        return tuple(one.birth for one in self.population.everybody)
 
     def poses(self) -> bytes:
         """Return where everybody is now: Arrow IPC of ``columns.POSES``."""
         now = Poses(self._clock.timestep_s)
-        now.add(self.step, self.company.layout, self.company.layout.read())
+        now.add(self.step, self.population.layout, self.population.layout.read())
         return now.columns()
 
     def apply(self, changes: Changes) -> None:
@@ -103,16 +103,16 @@ class World:
             InvalidRobot: a robot that breaks the rules, or a brain that does not
                 fit its body; nothing is changed.
         """
-        check_changes(changes, self.company, self.step)
-        self.company.remove(changes.removals)
+        check_changes(changes, self.population, self.step)
+        self.population.remove(changes.removals)
         if changes.insertions:
             self._insert(changes.insertions)
         for change in changes.brains:
-            one = self.company.find(change.birth)
+            one = self.population.find(change.birth)
             since = self._schedule.next_tick(self.step)
-            equip(one, change.brain, self.company.shop.width, since)
+            equip(one, change.brain, self.population.shop.width, since)
         if changes.removals or changes.insertions or changes.brains:
-            self._minds.gather(self.company.everybody)
+            self._minds.gather(self.population.everybody)
 
     def advance(
         self, until: int, watch: Callable[[bytes], None] | None = None
@@ -137,7 +137,7 @@ class World:
     def snapshot(self) -> bytes:
         """Return the whole state; ``restore`` goes on from it bit for bit."""
         return state.write(
-            self._settings, self.step, self.company, tuple(self._casualties)
+            self._settings, self.step, self.population, tuple(self._casualties)
         )
 
     def digest(self) -> bytes:
@@ -157,9 +157,9 @@ class World:
             MalformedMessage: not a snapshot, or of other settings.
         """
         world = cls(settings, threads)
-        world.step, casualties = state.read(settings, data, world.company)
+        world.step, casualties = state.read(settings, data, world.population)
         world._casualties = list(casualties)
-        world._minds.gather(world.company.everybody)
+        world._minds.gather(world.population.everybody)
         return world
 
     # --- time -------------------------------------------------------------------
@@ -171,17 +171,17 @@ class World:
         plan = [b - a for a, b in itertools.pairwise((self.step, *moments))]
         self._run(plan)
         looks = [self._schedule.is_look(step) for step in moments]
-        stride = self.company.begin(plan, looks)
+        stride = self.population.begin(plan, looks)
         for moment, step in enumerate(moments):
             self.step, stride.moment = step, moment
             self._arrive(stride, watch)
-            self.company.catch_up()
-        self.company.end()
+            self.population.catch_up()
+        self.population.end()
         if self._schedule.is_parting(self.step):
-            self.company.part(stride.state)
+            self.population.part(stride.state)
 
     def _run(self, plan: Sequence[int]) -> None:
-        clusters = self.company.by_cost
+        clusters = self.population.by_cost
         if len(clusters) < _FEW or self._pool.threads == 1:
             for cluster in clusters:
                 cluster.run(plan)
@@ -203,20 +203,20 @@ class World:
         if is_sample:
             self._sample(stride.state, watch)
         if is_look:
-            self._touches.count(self.company.clusters, stride.moment)
-            self.company.look()
+            self._touches.count(self.population.clusters, stride.moment)
+            self.population.look()
 
     def _tick(self, state: Floats) -> None:
         nerves = self._nerves
-        nerves.settle(self.company.layout)
+        nerves.settle(self.population.layout)
         nerves.feel(state)
-        light.shine(self.company, self.company.everybody)
+        light.shine(self.population, self.population.everybody)
         nerves.drive(state, self._minds.tick(self.step, nerves.readings))
 
     def _sample(self, state: Floats, watch: Callable[[bytes], None] | None) -> None:
-        layout = self.company.layout
+        layout = self.population.layout
         places = state[layout.roots[:, :3]].tolist()
-        for one, (x, y, z) in zip(self.company.everybody, places, strict=True):
+        for one, (x, y, z) in zip(self.population.everybody, places, strict=True):
             one.place = (x, y, z)
             one.window.add(self.step, one.place)
         self._poses.add(self.step, layout, state)
@@ -230,33 +230,33 @@ class World:
     def _insert(self, insertions: Sequence[Insertion]) -> None:
         newcomers: list[Inhabitant] = []
         for insertion in insertions:
-            one = newborn(insertion, self.company, self.step)
+            one = newborn(insertion, self.population, self.step)
             if isinstance(one, Casualty):
                 self._casualties.append(one)
             else:
                 newcomers.append(one)
-        self.company.add(newcomers)
-        light.shine(self.company, newcomers)
+        self.population.add(newcomers)
+        light.shine(self.population, newcomers)
         for one in newcomers:
             self._minds.first_tick(self.step, one)
-        self.company.kinematics()
-        self.company.look()
+        self.population.kinematics()
+        self.population.look()
 
     def _drop_diverged(self, stride: Stride) -> None:
         """Let the diverged go."""
         is_parting = self._schedule.is_parting(self.step)
-        fallen = diverged(self.company, stride, self.step, looks_closely=is_parting)
+        fallen = diverged(self.population, stride, self.step, looks_closely=is_parting)
         self._casualties += fallen
         if fallen:
             self._dismiss([casualty.birth for casualty in fallen])
 
     def _dismiss(self, births: Sequence[BirthId]) -> None:
-        self.company.remove(births)
-        self._minds.gather(self.company.everybody)
+        self.population.remove(births)
+        self._minds.gather(self.population.everybody)
 
     def _report(self) -> Advance:
         judgements, undefined = judge_all(
-            self.company.everybody, self.step, self._settings
+            self.population.everybody, self.step, self._settings
         )
         self._casualties += undefined
         if undefined:

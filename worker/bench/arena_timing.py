@@ -171,11 +171,11 @@ def time_arena(
     world.apply(Changes(insertions=tuple(newcomers)))
     if warm_s:
         world.advance(warm_s * second)
-    looking.wrap(world.company, "look")
-    coming.wrap(world.company, "regroup", "part", "remove", "catch_up")
+    looking.wrap(world.population, "look")
+    coming.wrap(world.population, "regroup", "part", "remove", "catch_up")
     coming.wrap(world, "apply")
-    company, wall, bare, steps = world.company, 0.0, 0.0, 0
-    merges, splits = company.merges, company.splits
+    population, wall, bare, steps = world.population, 0.0, 0.0, 0
+    merges, splits = population.merges, population.splits
     waiting, pool = list(spares), Pool(threads)
     while steps < seconds * second:
         stop = min(second, seconds * second - steps)
@@ -198,9 +198,9 @@ def time_arena(
         bare_s=bare,
         coming_s=coming.total_s,
         looking_s=looking.total_s,
-        merges=company.merges - merges,
-        splits=company.splits - splits,
-        largest=max((len(c.members) for c in company.clusters), default=0),
+        merges=population.merges - merges,
+        splits=population.splits - splits,
+        largest=max((len(c.members) for c in population.clusters), default=0),
     )
 
 
@@ -215,9 +215,9 @@ def bare_time(world: World, pool: Pool, steps: int, clock: Clock) -> float:
         steps: of each.
         clock: to read [s].
     """
-    tick = world.company.shop.settings.simulation.brain_steps
+    tick = world.population.shop.settings.simulation.brain_steps
     jobs = []
-    for one in world.company.everybody:
+    for one in world.population.everybody:
         model = one.body.home.model
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = one.seat.qpos, one.seat.qvel

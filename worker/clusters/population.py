@@ -22,7 +22,7 @@ from worker.clusters.proximity import Pairs, Proximity, Scene
 from worker.clusters.robot import Inhabitant
 
 
-class Company:
+class ArenaPopulation:
     """The living, by birth, and their clusters, by first member.
 
     Attributes:

@@ -14,7 +14,7 @@ def lonely(world: World) -> list[tuple[np.ndarray, list[float]]]:
     found = []
     tick_s = 25 * 0.005
     outputs = np.random.default_rng(3).uniform(-0.2, 1.2, (len(world.births), 40))
-    for one, own in zip(world.company.everybody, outputs, strict=True):
+    for one, own in zip(world.population.everybody, outputs, strict=True):
         seat, velocities = one.seat, list(one.seat.senses.velocities)
         readings, commands = seat.senses.readings.copy(), seat.ctrl.copy()
         seat.feel(tick_s)
@@ -34,8 +34,8 @@ def test_a_batch_feels_and_commands_as_each_alone_would(
     seconds(world, 2.0)
     world.advance(world.step + 23)
     expected = lonely(world)
-    nerves, layout = world._nerves, world.company.layout
-    assert any(len(cluster.members) > 1 for cluster in world.company.clusters)
+    nerves, layout = world._nerves, world.population.layout
+    assert any(len(cluster.members) > 1 for cluster in world.population.clusters)
     state = layout.read()
     nerves.settle(layout)
     nerves.feel(state)
@@ -43,7 +43,7 @@ def test_a_batch_feels_and_commands_as_each_alone_would(
     nerves.drive(state, outputs)
     pads = 0
     for row, (one, (felt, told)) in enumerate(
-        zip(world.company.everybody, expected, strict=True)
+        zip(world.population.everybody, expected, strict=True)
     ):
         assert nerves.readings[row].tobytes() == felt.tobytes()
         assert one.seat.senses.readings is not felt

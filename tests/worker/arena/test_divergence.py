@@ -89,8 +89,8 @@ def test_in_a_cluster_only_the_broken_one_falls(turtle: Robot) -> None:
     near = [Insertion(BirthId(0, n), turtle, (0.262 * n, 0.0)) for n in range(3)]
     world = inhabited(SETTINGS, near)
     seconds(world, 1.0)
-    middle = world.company.find(BirthId(0, 1))
-    assert len(world.company.clusters) == 1
+    middle = world.population.find(BirthId(0, 1))
+    assert len(world.population.clusters) == 1
     middle.seat.qvel[0] = float("nan")
     fallen = seconds(world, 1.0).casualties
     assert [casualty.birth for casualty in fallen] == [middle.birth]
@@ -103,7 +103,7 @@ def test_in_a_cluster_only_the_broken_one_falls(turtle: Robot) -> None:
 def test_a_core_that_flies_off_has_broken_the_physics(turtle: Robot) -> None:
     world = inhabited(SETTINGS, [Insertion(BAD, turtle, (0.0, 0.0))])
     seconds(world, 1.0)
-    world.company.find(BAD).seat.qvel[:3] = (30.0, 0.0, 30.0)
+    world.population.find(BAD).seat.qvel[:3] = (30.0, 0.0, 30.0)
     [casualty] = seconds(world, 1.0).casualties
     assert "m/s, more than 20 m/s" in casualty.reason
     assert world.births == ()

@@ -61,7 +61,7 @@ def test_a_box_at_rest_on_a_slope_feels_that_it_leans(slope_deg: float) -> None:
         [Insertion(A, BOX, (0.5, 0.0))],
     )
     seconds(world, 2.0)
-    readings = world.company.find(A).seat.senses.readings[0, :6].tolist()
+    readings = world.population.find(A).seat.senses.readings[0, :6].tolist()
     slope = math.radians(slope_deg)
     expected = [G * math.sin(slope), 0.0, G * math.cos(slope), 0.0, 0.0, 0.0]
     assert readings == pytest.approx(expected, abs=0.01)
@@ -86,7 +86,7 @@ def test_a_wall_stops_what_slides_and_pads_feel_it() -> None:
     settings = arena(Environment(slope_deg=20.0, scenery=WALL), drop_m=0.0)
     slippery = replace(settings, simulation=replace(settings.simulation, friction=0.0))
     world = inhabited(slippery, [Insertion(A, FEELER, (0.0, 0.0))])
-    seat = world.company.find(A).seat
+    seat = world.population.find(A).seat
     seconds(world, 0.5)
     assert seat.senses.readings[0, 6:8].tolist() == [0.0, 0.0]
     assert -1.0 < seat.qpos[0] < -0.3
@@ -99,7 +99,7 @@ def test_a_wall_stops_what_slides_and_pads_feel_it() -> None:
         [Insertion(A, FEELER, (0.0, 0.0))],
     )
     seconds(free, 3.5)
-    assert free.company.find(A).seat.qpos[0] < -10.0
+    assert free.population.find(A).seat.qpos[0] < -10.0
 
 
 def test_robots_stay_above_rough_ground(robot_of: Robots) -> None:
@@ -130,7 +130,7 @@ def test_a_robot_alone_in_an_arena_moves_as_it_does_off_line(robot_of: Robots) -
         settings.simulation, drop_m=settings.arena.drop_m, window_steps=800
     )
     track = simulate(robot, settings.space, simulation, WILD)
-    own = world.company.find(A).window.track()
+    own = world.population.find(A).window.track()
     positions = np.asarray(own.core_position)[-len(track.core_position) :]
     assert positions.tobytes() == track.core_position.tobytes()
 
@@ -149,7 +149,7 @@ def test_a_wild_arena_repeats_with_any_threads_and_after_a_restore(
         changes = Changes(removals=world.births[:2], insertions=newcomers)
         world.apply(changes)
         found.append((middle, seconds(world, 1.5)))
-        assert world.company.merges > 0
+        assert world.population.merges > 0
         world.close()
     assert found[0] == found[1]
     middle, advance = found[0]
@@ -165,15 +165,15 @@ def test_two_robots_on_one_rock_do_not_touch_each_other() -> None:
     apart = [Insertion(A, BOX, (-0.3, 0.0)), Insertion(B, BOX, (0.3, 0.0))]
     world = inhabited(settings, apart)
     assert seconds(world, 1.0).touches == ()
-    assert world.company.merges == 0
+    assert world.population.merges == 0
     near = [Insertion(A, BOX, (0.0, 0.0)), Insertion(B, BOX, (0.095, 0.0))]
     world = inhabited(settings, near)
     assert seconds(world, 1.0).touches == ()
-    assert world.company.merges == 1
-    (cluster,) = world.company.clusters
+    assert world.population.merges == 1
+    (cluster,) = world.population.clusters
     assert cluster.data.ncon >= 8
     for birth in (A, B):
-        core = world.company.find(birth).seat
+        core = world.population.find(birth).seat
         assert core.qpos[2] == pytest.approx(0.2 + 0.0225, abs=1e-3)
         assert core.geoms[1] - core.geoms[0] == 1
 
@@ -190,7 +190,7 @@ def test_robots_are_born_on_top_of_what_stands_at_their_place() -> None:
         ((0.15, 0.0), 0.25 * math.pi, 0.2),
     ):
         world = inhabited(settings, [Insertion(A, BOX, place, heading)])
-        one = world.company.find(A)
+        one = world.population.find(A)
         assert one.place == tuple(one.seat.qpos[:3])
         assert one.place[2] == pytest.approx(expected + 0.05 + 0.0225, abs=3e-5)
 
@@ -206,5 +206,5 @@ def test_scenery_hides_the_light() -> None:
         settings = replace(settings, space=Space(part_types=types))
         world = inhabited(settings, [Insertion(A, robot, (0.0, 0.0))])
         world.advance(SECOND)
-        found.append(float(world.company.find(A).seat.senses.readings[0, 6]))
+        found.append(float(world.population.find(A).seat.senses.readings[0, 6]))
     assert found == [pytest.approx((1.0 / 1.95) ** 2, abs=0.02), 0.0]

@@ -36,9 +36,9 @@ def test_thirty_robots_go_on_after_a_snapshot_in_contact_and_merge(
     merges = 0
     while len(taken) < 3:
         world.advance(world.step + 8)
-        touching = sum(len(c.touching()) for c in world.company.clusters)
-        if world.company.merges > merges and touching:
-            merges = world.company.merges
+        touching = sum(len(c.touching()) for c in world.population.clusters)
+        if world.population.merges > merges and touching:
+            merges = world.population.merges
             began = time.perf_counter()
             taken.append((world.step, world.snapshot()))
             write_s = time.perf_counter() - began

@@ -45,7 +45,7 @@ def test_any_number_of_threads_comes_to_the_same(robot_of: Robots) -> None:
             Changes(world.births[:3], crowd(robot_of, 4, 0.3, seed=2, first=20))
         )
         advances.append(seconds(world, 2.0))
-        assert world.company.merges > 0
+        assert world.population.merges > 0
         world.close()
         found.append(advances)
     assert found[0] == found[1] == found[2]
@@ -67,7 +67,7 @@ def test_a_robot_alone_moves_as_it_does_off_line(turtle: Robot) -> None:
     advance = world.advance(600 + 2400)
     simulation = replace(SETTINGS.simulation, drop_m=SETTINGS.arena.drop_m)
     track = simulate(turtle, SETTINGS.space, simulation, FLAT)
-    own = world.company.find(A).window.track()
+    own = world.population.find(A).window.track()
     assert np.array_equal(own.core_position, track.core_position)
     assert own.interval_s == track.interval_s
     assert advance.judgements[0].is_mature
@@ -151,10 +151,10 @@ def test_another_brain_starts_at_rest_with_its_own_clock(turtle: Robot) -> None:
         )
     )
     world.apply(Changes(brains=(BrainChange(A, still),)))
-    assert not world.company.find(A).states.any()
+    assert not world.population.find(A).states.any()
     copy = World.restore(SETTINGS, world.snapshot())
     seconds(world, 8.0)
-    assert np.abs(world.company.find(A).seat.qpos[7:]).max() < 0.02
+    assert np.abs(world.population.find(A).seat.qpos[7:]).max() < 0.02
     seconds(copy, 8.0)
     assert copy.digest() == world.digest()
 
@@ -168,9 +168,9 @@ def test_a_ring_wall_holds_robots_in(turtle: Robot) -> None:
         )
         seconds(world, 0.5)
         for _ in range(40):
-            world.company.find(A).seat.qvel[0] = 1.0
+            world.population.find(A).seat.qvel[0] = 1.0
             seconds(world, 0.1)
-        assert (world.company.find(A).place[0] < 0.5) is is_in
+        assert (world.population.find(A).place[0] < 0.5) is is_in
 
 
 def test_robots_feel_each_other_and_it_is_counted(turtle: Robot) -> None:
@@ -184,7 +184,7 @@ def test_robots_feel_each_other_and_it_is_counted(turtle: Robot) -> None:
     [touch] = together.touches
     assert (touch.first, touch.second) == (A, B)
     assert 0.5 < touch.duration_s < 2.0
-    assert world.company.cluster_of(A) is world.company.cluster_of(B)
+    assert world.population.cluster_of(A) is world.population.cluster_of(B)
 
 
 def lamp_bearer() -> Robot:
@@ -224,9 +224,9 @@ def test_light_falls_off_and_can_be_hidden(
     if hider:
         newcomers.append(Insertion(B, turtle, (0.25, 0.0), 0.5 * math.pi))
     world = inhabited(settings, newcomers)
-    reading = world.company.find(A).seat.senses.readings[0, 6]
+    reading = world.population.find(A).seat.senses.readings[0, 6]
     assert reading == pytest.approx(expected, abs=0.02)
     world.advance(SECOND)
-    reading = world.company.find(A).seat.senses.readings[0, 6]
+    reading = world.population.find(A).seat.senses.readings[0, 6]
     assert reading == pytest.approx(expected, abs=0.1)
     assert World.restore(settings, world.snapshot()).digest() == world.digest()

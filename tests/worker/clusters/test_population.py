@@ -45,7 +45,7 @@ def test_no_contact_comes_late(
     world, oracle = live(robot_of, radius_m=radius_m, drop_m=drop_m, lives=6, seed=1)
     assert oracle.missed == []
     assert oracle.pair_steps > 200
-    assert world.company.merges > 10
+    assert world.population.merges > 10
 
 
 @pytest.mark.slow
@@ -59,12 +59,12 @@ def test_no_contact_comes_late_in_long_lives(robot_of: Robots) -> None:
         )
         sys.stdout.write(
             f"\nradius {radius_m} m, drop {drop_m} m: {oracle.pair_steps} pair-steps "
-            f"in contact, {len(oracle.missed)} missed, {world.company.merges} merges, "
-            f"{world.company.splits} partings"
+            f"in contact, {len(oracle.missed)} missed, {world.population.merges} merges, "
+            f"{world.population.splits} partings"
         )
         assert oracle.missed == []
         pair_steps += oracle.pair_steps
-        merges += world.company.merges
+        merges += world.population.merges
     assert pair_steps >= 10_000
     assert merges >= 200
 
@@ -82,7 +82,7 @@ def test_a_pile_of_thirty_stays_finite(robot_of: Robots) -> None:
     advance = seconds(world, 2.0)
     assert not fallen
     assert not advance.casualties
-    largest = max(len(cluster.members) for cluster in world.company.clusters)
+    largest = max(len(cluster.members) for cluster in world.population.clusters)
     assert largest == 30
     for judgement in advance.judgements:
         assert np.isfinite(judgement.place).all()
@@ -98,14 +98,14 @@ def test_those_who_part_live_alone_again(turtle: Robot) -> None:
     ]
     world = inhabited(SETTINGS, near)
     seconds(world, 1.0)
-    first, second = (world.company.find(i.birth) for i in near)
+    first, second = (world.population.find(i.birth) for i in near)
     sizes = []
     for gap in (0.3, 0.2, 0.3, 0.6):
         for one, x in ((first, 0.0), (second, gap)):
             one.seat.qpos[:2] = (x, 0.0)
         seconds(world, 1.0)
-        sizes.append(len(world.company.clusters))
+        sizes.append(len(world.population.clusters))
     assert sizes[1] == 1
     assert sizes[-1] == 2
     assert first.seat is first.body.home.seats[0]
-    assert (world.company.merges, world.company.splits) == (1, 1)
+    assert (world.population.merges, world.population.splits) == (1, 1)

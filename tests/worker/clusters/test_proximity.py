@@ -15,16 +15,16 @@ Robots = Callable[[int], Robot]
 
 def measured(world: World, scene: Scene, gap_m: float) -> Pairs:
     """Return who is to meet below a gap, every pair that lives apart measured."""
-    company, settings = world.company, world.company.shop.settings
+    population, settings = world.population, world.population.shop.settings
     steps = settings.arena.proximity_steps + 1
     moves = np.minimum(scene.speeds[0], FASTEST) * steps * 0.005
-    births = [one.birth for one in company.everybody]
+    births = [one.birth for one in population.everybody]
     return [
         (first, second)
         for first, here in enumerate(births)
         for second, there in enumerate(births)
         if first < second
-        and company.cluster_of(here) is not company.cluster_of(there)
+        and population.cluster_of(here) is not population.cluster_of(there)
         and scene.apart([(first, second)])[0, 0] < moves[first] + moves[second] + gap_m
     ]
 
@@ -37,7 +37,7 @@ def test_nobody_is_spared_who_is_to_meet(robot_of: Robots, gap_m: float) -> None
     pairs = 0
     for _ in range(12):
         seconds(world, 0.125)
-        layout = world.company.layout
+        layout = world.population.layout
         scene = Scene(layout, layout.read()[np.newaxis])
         found = proximity.meetings(scene)[0]
         assert found == measured(world, scene, gap_m)

@@ -98,14 +98,16 @@ def test_another_name_draws_something_else(other: Identity) -> None:
 def test_neither_company_nor_the_order_of_ticks_matters() -> None:
     births = [BirthId(2, 5), BirthId(0, 1), BirthId(2, 4)]
     readings = np.linspace(-1.0, 1.0, 3 * WIDTH.inputs).reshape(3, -1)
-    company, own = noise_of(*births), [noise_of(birth) for birth in births]
+    population, own = noise_of(*births), [noise_of(birth) for birth in births]
     ticks = [0, BLOCK_TICKS - 1, BLOCK_TICKS, 5 * BLOCK_TICKS + 3, 1, 0]
     for tick in ticks:
-        whole = company.blur(tick, readings)
+        whole = population.blur(tick, readings)
         for row, noise in enumerate(own):
             single = noise.blur(tick, readings[row : row + 1])
             assert np.array_equal(whole[row : row + 1], single)
-    assert not np.array_equal(company.blur(0, readings), company.blur(64, readings))
+    assert not np.array_equal(
+        population.blur(0, readings), population.blur(64, readings)
+    )
 
 
 def test_one_kind_of_noise_is_the_same_without_the_other() -> None:
@@ -231,7 +233,7 @@ def test_a_robot_alone_moves_as_it_does_off_line(robot_of: Robots) -> None:
         simulation = replace(NOISY.simulation, drop_m=NOISY.arena.drop_m)
         identity = Identity(ORIGIN, A, 0)
         track = simulate(robot_of(seed), Space(), simulation, FLAT, identity=identity)
-        own = world.company.find(A).window.track()
+        own = world.population.find(A).window.track()
         assert np.array_equal(own.core_position, track.core_position)
         calm = simulate(robot_of(seed), Space(), SETTINGS.simulation, FLAT)
         assert not np.array_equal(
@@ -260,7 +262,7 @@ def test_a_newborn_feels_the_noise_of_its_name_at_once(turtle: Robot) -> None:
         inhabited(settings, [Insertion(A, wired(turtle, []), (0.0, 0.0))])
         for settings in (NOISY, NOISY, replace(NOISY, origin=Origin(seed=8)))
     ]
-    first, same, other = (world.company.find(A).seat.ctrl.copy() for world in held)
+    first, same, other = (world.population.find(A).seat.ctrl.copy() for world in held)
     assert np.array_equal(first, same)
     assert not np.array_equal(first, other)
 
@@ -276,7 +278,7 @@ def test_neither_threads_nor_advances_nor_restoring_matter(robot_of: Robots) -> 
     newcomers = crowd(robot_of, 8, 0.4)
     plain = inhabited(NOISY, newcomers)
     expected = lived(plain, robot_of)
-    assert plain.company.merges > 0
+    assert plain.population.merges > 0
     threaded = inhabited(NOISY, newcomers, threads=2)
     assert lived(threaded, robot_of) == expected
     threaded.close()
