@@ -54,7 +54,7 @@ def crowd(
     return tuple(found)
 
 
-def inhabited(
+def populated(
     settings: ArenaSettings, newcomers: Sequence[Insertion], threads: int = 1
 ) -> World:
     """Return a world into which robots have just been dropped."""

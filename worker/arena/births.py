@@ -14,7 +14,7 @@ from schema.wire.arena import Casualty, Changes, Insertion
 from schema.wire.codec import encode_robot
 from worker.clusters.models import Body
 from worker.clusters.population import ArenaPopulation
-from worker.clusters.robot import Inhabitant, put
+from worker.clusters.robot import ArenaRobot, put
 from worker.clusters.window import Window
 from worker.robot.controller import Widths, pack
 
@@ -86,7 +86,7 @@ def possible(changes: Changes, living: Collection[BirthId]) -> Changes:
 
 def newborn(
     insertion: Insertion, population: ArenaPopulation, step: int
-) -> Inhabitant | Casualty:
+) -> ArenaRobot | Casualty:
     """Return a robot that feels for the first time, or why it never will.
 
     Args:
@@ -113,22 +113,22 @@ def newborn(
         reason = f"physics diverged: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, (x, y, z))
     window = Window(population.shop.settings.simulation, step)
-    one = inhabitant(insertion.birth, insertion.robot, body, window, population)
+    one = arena_robot(insertion.birth, insertion.robot, body, window, population)
     one.thinks_since, one.place = step, (x, y, z)
     window.add(step, one.place)
     return one
 
 
-def inhabitant(
+def arena_robot(
     birth: BirthId,
     robot: Robot,
     body: Body,
     window: Window,
     population: ArenaPopulation,
-) -> Inhabitant:
+) -> ArenaRobot:
     """Return a robot at home, its mind at rest, before anything is known of it."""
     network = pack(robot.brain, population.shop.width)
-    return Inhabitant(
+    return ArenaRobot(
         birth=birth,
         robot=robot,
         encoded=encode_robot(robot),
@@ -142,7 +142,7 @@ def inhabitant(
     )
 
 
-def equip(one: Inhabitant, brain: Brain, width: Widths, since: int) -> None:
+def equip(one: ArenaRobot, brain: Brain, width: Widths, since: int) -> None:
     """Give a robot another brain, at rest.
 
     Args:

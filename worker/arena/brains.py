@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from schema.robot.results import Floats
-from worker.clusters.robot import Inhabitant
+from worker.clusters.robot import ArenaRobot
 from worker.robot.controller import Bank
 from worker.robot.noise import Noise, Source
 
@@ -32,17 +32,17 @@ class Minds:
         self._ages = np.zeros((0, 1))
         self._bank: Bank | None = None
 
-    def gather(self, everybody: Sequence[Inhabitant]) -> None:
+    def gather(self, everybody: Sequence[ArenaRobot]) -> None:
         """Make the bank anew; each keeps its states, now a row of the bank."""
         if not everybody:
             self._bank = None
             return
-        networks = [inhabitant.network for inhabitant in everybody]
+        networks = [arena_robot.network for arena_robot in everybody]
         self._bank = Bank(networks, self._width, self._tick_s)
-        for row, inhabitant in enumerate(everybody):
-            self._bank.states[row] = inhabitant.states
-            inhabitant.states = self._bank.states[row]
-        since = [inhabitant.thinks_since for inhabitant in everybody]
+        for row, arena_robot in enumerate(everybody):
+            self._bank.states[row] = arena_robot.states
+            arena_robot.states = self._bank.states[row]
+        since = [arena_robot.thinks_since for arena_robot in everybody]
         self._ages = np.array(since, dtype=np.float64)[:, None]
         self._noise = Noise(self._source, [one.birth for one in everybody])
 
@@ -64,17 +64,17 @@ class Minds:
         outputs = self._bank.step(self._noise.blur(tick, readings), ages)
         return self._noise.shake(tick, outputs)
 
-    def first_tick(self, step: int, inhabitant: Inhabitant) -> None:
+    def first_tick(self, step: int, arena_robot: ArenaRobot) -> None:
         """Let a newborn think alone, before it joins the bank.
 
         Args:
             step: the arena's.
-            inhabitant: who.
+            arena_robot: who.
         """
-        bank = Bank([inhabitant.network], self._width, self._tick_s)
-        noise = Noise(self._source, (inhabitant.birth,))
+        bank = Bank([arena_robot.network], self._width, self._tick_s)
+        noise = Noise(self._source, (arena_robot.birth,))
         tick = step // self._tick_steps
-        readings = noise.blur(tick, inhabitant.seat.senses.readings)
+        readings = noise.blur(tick, arena_robot.seat.senses.readings)
         outputs = noise.shake(tick, bank.step(readings, 0.0))
-        inhabitant.states = bank.states[0]
-        inhabitant.seat.drive(outputs[0])
+        arena_robot.states = bank.states[0]
+        arena_robot.seat.drive(outputs[0])

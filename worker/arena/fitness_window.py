@@ -5,13 +5,13 @@ from collections.abc import Iterable
 from schema.errors import FitnessUndefined
 from schema.experiment.settings import ArenaSettings
 from schema.wire.arena import Casualty, Judgement
-from worker.clusters.robot import Inhabitant
+from worker.clusters.robot import ArenaRobot
 from worker.fitness import path_velocity, straight_velocity
 from worker.robot.evaluation import judge
 
 
 def judge_all(
-    everybody: Iterable[Inhabitant], step: int, settings: ArenaSettings
+    everybody: Iterable[ArenaRobot], step: int, settings: ArenaSettings
 ) -> tuple[list[Judgement], list[Casualty]]:
     """Return how all do, and those of whom it cannot be told, in their order."""
     judgements, undefined = [], []
@@ -25,7 +25,7 @@ def judge_all(
 
 
 def judgement(
-    one: Inhabitant, step: int, settings: ArenaSettings
+    one: ArenaRobot, step: int, settings: ArenaSettings
 ) -> Judgement | Casualty:
     """Return how a robot does now; a casualty if its fitness cannot be told.
 

@@ -16,7 +16,7 @@ import numpy as np
 from schema.parts import Vector
 from worker.clusters.cluster import Cluster
 from worker.clusters.population import ArenaPopulation
-from worker.clusters.robot import Inhabitant
+from worker.clusters.robot import ArenaRobot
 from worker.clusters.slot import Seat
 
 FULL_WITHIN_M = 1.0
@@ -25,7 +25,7 @@ _OUTSIDE_M = 1e-6
 """So far before its face a sensor's ray starts."""
 
 
-def shine(population: ArenaPopulation, people: Sequence[Inhabitant]) -> None:
+def shine(population: ArenaPopulation, people: Sequence[ArenaRobot]) -> None:
     """Fill in what the light sensors of some robots read, if there is a light.
 
     Args:

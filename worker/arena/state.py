@@ -6,7 +6,7 @@ from schema.experiment.settings import ArenaSettings
 from schema.robot.names import BirthId
 from schema.wire.arena import Casualty
 from schema.wire.codec import decode_robot
-from worker.arena.births import inhabitant
+from worker.arena.births import arena_robot
 from worker.arena.snapshot import (
     FORMAT,
     ArenaState,
@@ -19,7 +19,7 @@ from worker.arena.snapshot import (
     unpack_floats,
 )
 from worker.clusters.population import ArenaPopulation
-from worker.clusters.robot import Inhabitant
+from worker.clusters.robot import ArenaRobot
 from worker.clusters.window import Window
 
 
@@ -70,7 +70,7 @@ def read(
         MalformedMessage: not a snapshot, or of other settings.
     """
     state = decode_state(data, settings)
-    population.add([_inhabitant(robot, population) for robot in state.robots])
+    population.add([_arena_robot(robot, population) for robot in state.robots])
     births = [one.birth for one in population.everybody]
     population.regroup([tuple(births[row] for row in g) for g in state.clusters])
     population.merges = population.splits = 0
@@ -83,7 +83,7 @@ def _name(birth: BirthId) -> tuple[int, int]:
     return birth.island, birth.number
 
 
-def _robot_state(one: Inhabitant) -> RobotState:
+def _robot_state(one: ArenaRobot) -> RobotState:
     seat = one.seat
     return RobotState(
         birth=_name(one.birth),
@@ -101,13 +101,13 @@ def _robot_state(one: Inhabitant) -> RobotState:
     )
 
 
-def _inhabitant(state: RobotState, population: ArenaPopulation) -> Inhabitant:
+def _arena_robot(state: RobotState, population: ArenaPopulation) -> ArenaRobot:
     birth, robot = BirthId(*state.birth), decode_robot(state.robot)
     body = population.shop.body(birth, robot)
     window = Window(population.shop.settings.simulation, state.born)
     for x, y, z in unpack_floats(state.window, -1, 3).tolist():
         window.positions.append((x, y, z))
-    one = inhabitant(birth, robot, body, window, population)
+    one = arena_robot(birth, robot, body, window, population)
     seat = one.seat
     seat.qpos[:] = unpack_floats(state.qpos, *seat.qpos.shape)
     seat.qvel[:] = unpack_floats(state.qvel, *seat.qvel.shape)

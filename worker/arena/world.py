@@ -30,7 +30,7 @@ from worker.arena.threads import Pool
 from worker.arena.touches import Touches
 from worker.clusters.interval import Stride
 from worker.clusters.population import ArenaPopulation
-from worker.clusters.robot import Inhabitant
+from worker.clusters.robot import ArenaRobot
 from worker.robot.evaluation import silence_engine
 from worker.robot.noise import Source
 
@@ -228,7 +228,7 @@ class World:
     # --- births and deaths ------------------------------------------------------
 
     def _insert(self, insertions: Sequence[Insertion]) -> None:
-        newcomers: list[Inhabitant] = []
+        newcomers: list[ArenaRobot] = []
         for insertion in insertions:
             one = newborn(insertion, self.population, self.step)
             if isinstance(one, Casualty):

@@ -11,7 +11,7 @@ import numpy as np
 from schema.robot.results import Floats
 from worker.clusters.bounds import Indices
 from worker.clusters.cluster import Cluster
-from worker.clusters.robot import Inhabitant
+from worker.clusters.robot import ArenaRobot
 
 _FREE, _FREE_DOFS = 7, 6
 """Numbers of a free joint's position, place and quaternion; and of its velocity."""
@@ -39,7 +39,7 @@ class RobotRows:
         weights: of the absolute velocities of all, as ``Reach.weights``.
     """
 
-    def __init__(self, everybody: Sequence[Inhabitant]) -> None:
+    def __init__(self, everybody: Sequence[ArenaRobot]) -> None:
         """Number robots that are ordered by birth."""
         self.everybody = tuple(everybody)
         births = [one.birth for one in everybody]

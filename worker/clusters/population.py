@@ -19,7 +19,7 @@ from worker.clusters.groups import Group, across, components
 from worker.clusters.interval import Stride
 from worker.clusters.models import Shop
 from worker.clusters.proximity import Pairs, Proximity, Scene
-from worker.clusters.robot import Inhabitant
+from worker.clusters.robot import ArenaRobot
 
 
 class ArenaPopulation:
@@ -47,14 +47,14 @@ class ArenaPopulation:
         self._new: list[Cluster] = []
 
     @property
-    def everybody(self) -> tuple[Inhabitant, ...]:
+    def everybody(self) -> tuple[ArenaRobot, ...]:
         """All inhabitants, by birth."""
         return self.robot_rows.everybody
 
     def __contains__(self, birth: BirthId) -> bool:
         return birth in self.robot_rows.rows
 
-    def find(self, birth: BirthId) -> Inhabitant:
+    def find(self, birth: BirthId) -> ArenaRobot:
         """Return who has a name."""
         return self.robot_rows.everybody[self.robot_rows.rows[birth]]
 
@@ -62,7 +62,7 @@ class ArenaPopulation:
         """Return where somebody lives."""
         return self._cluster_of[birth]
 
-    def add(self, newcomers: Iterable[Inhabitant]) -> None:
+    def add(self, newcomers: Iterable[ArenaRobot]) -> None:
         """Take robots in, each in its own home."""
         added = sorted(newcomers, key=lambda one: one.birth)
         everybody = sorted((*self.everybody, *added), key=lambda one: one.birth)

@@ -15,7 +15,7 @@ from worker.robot.controller import Network
 
 
 @dataclass(slots=True)
-class Inhabitant:
+class ArenaRobot:
     """A living robot; all that an arena knows of it.
 
     Attributes:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from schema.robot.robot import Robot
-from tests.worker.arena_cases import SETTINGS, crowd, inhabited, seconds
+from tests.worker.arena_cases import SETTINGS, crowd, populated, seconds
 from worker.arena.world import World
 
 
@@ -30,7 +30,7 @@ def lonely(world: World) -> list[tuple[np.ndarray, list[float]]]:
 def test_a_batch_feels_and_commands_as_each_alone_would(
     robot_of: Callable[[int], Robot],
 ) -> None:
-    world = inhabited(SETTINGS, crowd(robot_of, 16, 0.6))
+    world = populated(SETTINGS, crowd(robot_of, 16, 0.6))
     seconds(world, 2.0)
     world.advance(world.step + 23)
     expected = lonely(world)

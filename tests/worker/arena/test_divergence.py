@@ -15,7 +15,7 @@ from schema.wire.arena import Casualty, Changes, Insertion
 from tests.worker.arena_cases import (
     SETTINGS,
     crowd,
-    inhabited,
+    populated,
     seconds,
     settings_of,
     state_of,
@@ -63,7 +63,7 @@ def test_absurd_weights_break_nothing(turtle: Robot) -> None:
         for target in range(8, len(neurons))
     )
     wild = Robot(turtle.parts, Brain(neurons, edges))
-    world = inhabited(SETTINGS, [Insertion(BAD, wild, (0.0, 0.0))])
+    world = populated(SETTINGS, [Insertion(BAD, wild, (0.0, 0.0))])
     assert seconds(world, 5.0).casualties == ()
 
 
@@ -72,7 +72,7 @@ def test_absurd_masses_end_their_robot_and_nobody_else(
     turtle: Robot, robot_of: Robots, kind: str
 ) -> None:
     others = crowd(robot_of, 4, 0.5)
-    calm, struck = inhabited(ABSURD, others), inhabited(ABSURD, others)
+    calm, struck = populated(ABSURD, others), populated(ABSURD, others)
     guest = Insertion(BAD, with_brick(turtle, kind), (1.5, 0.0))
     struck.apply(Changes(insertions=(guest,)))
     seconds(calm, 3.0)
@@ -87,7 +87,7 @@ def test_absurd_masses_end_their_robot_and_nobody_else(
 
 def test_in_a_cluster_only_the_broken_one_falls(turtle: Robot) -> None:
     near = [Insertion(BirthId(0, n), turtle, (0.262 * n, 0.0)) for n in range(3)]
-    world = inhabited(SETTINGS, near)
+    world = populated(SETTINGS, near)
     seconds(world, 1.0)
     middle = world.population.find(BirthId(0, 1))
     assert len(world.population.clusters) == 1
@@ -101,7 +101,7 @@ def test_in_a_cluster_only_the_broken_one_falls(turtle: Robot) -> None:
 
 
 def test_a_core_that_flies_off_has_broken_the_physics(turtle: Robot) -> None:
-    world = inhabited(SETTINGS, [Insertion(BAD, turtle, (0.0, 0.0))])
+    world = populated(SETTINGS, [Insertion(BAD, turtle, (0.0, 0.0))])
     seconds(world, 1.0)
     world.population.find(BAD).seat.qvel[:3] = (30.0, 0.0, 30.0)
     [casualty] = seconds(world, 1.0).casualties
@@ -136,7 +136,7 @@ def test_an_engine_that_gives_up_on_a_robot_ends_it_and_nobody_else(
     told: str,
 ) -> None:
     """When it is built, in the air, or at birth; the world goes on."""
-    world = inhabited(
+    world = populated(
         settings_of(drop_m=drop_m), [Insertion(BirthId(0, 1), turtle, (0.0, 0.0))]
     )
     with monkeypatch.context() as patch:
@@ -163,7 +163,7 @@ def test_a_fitness_that_cannot_be_told_is_a_death_with_its_reason(
         SETTINGS.fitness, function="tests.worker.arena.test_divergence:never"
     )
     settings = replace(SETTINGS, fitness=fitness)
-    world = inhabited(settings, [Insertion(BAD, turtle, (0.0, 0.0))])
+    world = populated(settings, [Insertion(BAD, turtle, (0.0, 0.0))])
     assert seconds(world, 5.0).casualties == ()
     [casualty] = seconds(world, 2.0).casualties
     assert "ZeroDivisionError" in casualty.reason

@@ -15,7 +15,7 @@ from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.names import BirthId
 from schema.robot.robot import Part, Robot
 from schema.wire.arena import Changes, Insertion
-from tests.worker.arena_cases import SECOND, crowd, inhabited, seconds, settings_of
+from tests.worker.arena_cases import SECOND, crowd, populated, seconds, settings_of
 from worker.arena.world import World
 from worker.robot.evaluation import simulate
 
@@ -56,7 +56,7 @@ def arena(environment: Environment, **keys: object) -> ArenaSettings:
 @pytest.mark.parametrize("slope_deg", [0.0, 20.0, 35.0])
 def test_a_box_at_rest_on_a_slope_feels_that_it_leans(slope_deg: float) -> None:
     """It is g sin a along x, towards uphill, and g cos a along z; nothing else."""
-    world = inhabited(
+    world = populated(
         arena(Environment(slope_deg=slope_deg), drop_m=0.01),
         [Insertion(A, BOX, (0.5, 0.0))],
     )
@@ -85,7 +85,7 @@ def test_a_wall_stops_what_slides_and_pads_feel_it() -> None:
     """Pads reach 5.5 cm from the core's centre; the wall's face is at x = -1 m."""
     settings = arena(Environment(slope_deg=20.0, scenery=WALL), drop_m=0.0)
     slippery = replace(settings, simulation=replace(settings.simulation, friction=0.0))
-    world = inhabited(slippery, [Insertion(A, FEELER, (0.0, 0.0))])
+    world = populated(slippery, [Insertion(A, FEELER, (0.0, 0.0))])
     seat = world.population.find(A).seat
     seconds(world, 0.5)
     assert seat.senses.readings[0, 6:8].tolist() == [0.0, 0.0]
@@ -94,7 +94,7 @@ def test_a_wall_stops_what_slides_and_pads_feel_it() -> None:
     assert seat.senses.readings[0, 6:8].tolist() == [1.0, 1.0]
     assert seat.qpos[0] == pytest.approx(-1.0 + 0.0555, abs=2e-3)
     assert np.abs(seat.qvel[:3]).max() < 1e-3
-    free = inhabited(
+    free = populated(
         replace(slippery, environment=Environment(slope_deg=20.0)),
         [Insertion(A, FEELER, (0.0, 0.0))],
     )
@@ -124,7 +124,7 @@ def test_robots_stay_above_rough_ground(robot_of: Robots) -> None:
 def test_a_robot_alone_in_an_arena_moves_as_it_does_off_line(robot_of: Robots) -> None:
     """On a slope, on rough ground, beside scenery: the same to the last bit."""
     robot, settings = robot_of(3), arena(WILD)
-    world = inhabited(settings, [Insertion(A, robot, (0.0, 0.0))])
+    world = populated(settings, [Insertion(A, robot, (0.0, 0.0))])
     world.advance(600 + 800)
     simulation = replace(
         settings.simulation, drop_m=settings.arena.drop_m, window_steps=800
@@ -142,7 +142,7 @@ def test_a_wild_arena_repeats_with_any_threads_and_after_a_restore(
     """Births on top of obstacles, merges on rough ground, deaths, all in there."""
     settings, found = arena(WILD), []
     for threads in (1, 2):
-        world = inhabited(settings, crowd(robot_of, 10, 0.5), threads)
+        world = populated(settings, crowd(robot_of, 10, 0.5), threads)
         seconds(world, 1.5)
         middle = world.snapshot()
         newcomers = crowd(robot_of, 3, 0.3, seed=2, first=20)
@@ -163,11 +163,11 @@ def test_two_robots_on_one_rock_do_not_touch_each_other() -> None:
     slab = scene('<geom type="box" size="2 2 0.1" pos="0 0 0.1"/>')
     settings = arena(Environment(scenery=slab), record_touches=True, drop_m=0.0)
     apart = [Insertion(A, BOX, (-0.3, 0.0)), Insertion(B, BOX, (0.3, 0.0))]
-    world = inhabited(settings, apart)
+    world = populated(settings, apart)
     assert seconds(world, 1.0).touches == ()
     assert world.population.merges == 0
     near = [Insertion(A, BOX, (0.0, 0.0)), Insertion(B, BOX, (0.095, 0.0))]
-    world = inhabited(settings, near)
+    world = populated(settings, near)
     assert seconds(world, 1.0).touches == ()
     assert world.population.merges == 1
     (cluster,) = world.population.clusters
@@ -189,7 +189,7 @@ def test_robots_are_born_on_top_of_what_stands_at_their_place() -> None:
         ((0.15, 0.0), 0.0, 0.0),
         ((0.15, 0.0), 0.25 * math.pi, 0.2),
     ):
-        world = inhabited(settings, [Insertion(A, BOX, place, heading)])
+        world = populated(settings, [Insertion(A, BOX, place, heading)])
         one = world.population.find(A)
         assert one.place == tuple(one.seat.qpos[:3])
         assert one.place[2] == pytest.approx(expected + 0.05 + 0.0225, abs=3e-5)
@@ -204,7 +204,7 @@ def test_scenery_hides_the_light() -> None:
     for environment in (Environment(), Environment(scenery=WALL)):
         settings = arena(environment, light=(-2.0, 0.0, 0.02), drop_m=0.0)
         settings = replace(settings, space=Space(part_types=types))
-        world = inhabited(settings, [Insertion(A, robot, (0.0, 0.0))])
+        world = populated(settings, [Insertion(A, robot, (0.0, 0.0))])
         world.advance(SECOND)
         found.append(float(world.population.find(A).seat.senses.readings[0, 6]))
     assert found == [pytest.approx((1.0 / 1.95) ** 2, abs=0.02), 0.0]

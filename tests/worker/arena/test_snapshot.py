@@ -16,7 +16,7 @@ from tests.worker.arena_cases import (
     SECOND,
     SETTINGS,
     crowd,
-    inhabited,
+    populated,
     seconds,
     settings_of,
 )
@@ -31,7 +31,7 @@ def test_thirty_robots_go_on_after_a_snapshot_in_contact_and_merge(
     robot_of: Robots,
 ) -> None:
     """Taken within a step of merges and in contacts; size and time are told."""
-    world = inhabited(RECORDING, crowd(robot_of, 30, 0.8))
+    world = populated(RECORDING, crowd(robot_of, 30, 0.8))
     taken: list[tuple[int, bytes]] = []
     merges = 0
     while len(taken) < 3:
@@ -69,7 +69,7 @@ def _continued(world: World) -> list[object]:
 
 def test_an_advance_tells_the_digest_of_its_snapshot(robot_of: Robots) -> None:
     """By which a coordinator knows whose state a file holds."""
-    world = inhabited(RECORDING, crowd(robot_of, 14, 0.5))
+    world = populated(RECORDING, crowd(robot_of, 14, 0.5))
     advance = seconds(world, 2.0)
     assert advance.touches
     assert sha256(world.snapshot()).digest() == advance.digest
@@ -77,7 +77,7 @@ def test_an_advance_tells_the_digest_of_its_snapshot(robot_of: Robots) -> None:
 
 def test_a_snapshot_right_after_changes_goes_on_as_well(robot_of: Robots) -> None:
     """Newborns in the air, a robot that could not be built still untold."""
-    world = inhabited(SETTINGS, crowd(robot_of, 3, 0.3))
+    world = populated(SETTINGS, crowd(robot_of, 3, 0.3))
     seconds(world, 1.0)
     newcomers = crowd(robot_of, 3, 0.3, seed=5, first=10)
     world.apply(Changes(removals=(BirthId(0, 1),), insertions=newcomers))
@@ -87,8 +87,8 @@ def test_a_snapshot_right_after_changes_goes_on_as_well(robot_of: Robots) -> Non
 
 def test_snapshots_are_equal_whatever_the_cache_has_seen(robot_of: Robots) -> None:
     """A world restored again and again is one that never was."""
-    steady = inhabited(SETTINGS, crowd(robot_of, 5, 0.3))
-    passed = inhabited(SETTINGS, crowd(robot_of, 5, 0.3))
+    steady = populated(SETTINGS, crowd(robot_of, 5, 0.3))
+    passed = populated(SETTINGS, crowd(robot_of, 5, 0.3))
     for until in range(50, 1001, 50):
         passed.advance(until)
         passed = World.restore(SETTINGS, passed.snapshot())
@@ -97,7 +97,7 @@ def test_snapshots_are_equal_whatever_the_cache_has_seen(robot_of: Robots) -> No
 
 
 def test_no_other_bytes_are_a_snapshot(turtle: Robot) -> None:
-    world = inhabited(SETTINGS, [Insertion(BirthId(0, 0), turtle, (0.0, 0.0))])
+    world = populated(SETTINGS, [Insertion(BirthId(0, 0), turtle, (0.0, 0.0))])
     data = world.snapshot()
     rng = np.random.default_rng(1)
     with pytest.raises(MalformedMessage, match="other settings"):

@@ -22,7 +22,7 @@ from tests.worker.arena_cases import (
     SECOND,
     SETTINGS,
     crowd,
-    inhabited,
+    populated,
     seconds,
     settings_of,
     state_of,
@@ -39,7 +39,7 @@ def test_any_number_of_threads_comes_to_the_same(robot_of: Robots) -> None:
     """Births, deaths, merges and falls included; then the whole advance is equal."""
     found = []
     for threads in (1, 2, 4):
-        world = inhabited(SETTINGS, crowd(robot_of, 14, 0.7), threads)
+        world = populated(SETTINGS, crowd(robot_of, 14, 0.7), threads)
         advances = [seconds(world, 2.0)]
         world.apply(
             Changes(world.births[:3], crowd(robot_of, 4, 0.3, seed=2, first=20))
@@ -53,7 +53,7 @@ def test_any_number_of_threads_comes_to_the_same(robot_of: Robots) -> None:
 
 def test_how_many_advances_it_takes_does_not_matter(robot_of: Robots) -> None:
     newcomers = crowd(robot_of, 6, 0.4)
-    whole, pieces = inhabited(SETTINGS, newcomers), inhabited(SETTINGS, newcomers)
+    whole, pieces = populated(SETTINGS, newcomers), populated(SETTINGS, newcomers)
     once = whole.advance(700)
     for until in (1, 13, 64, 200, 333, 698, 700):
         last = pieces.advance(until)
@@ -63,7 +63,7 @@ def test_how_many_advances_it_takes_does_not_matter(robot_of: Robots) -> None:
 
 def test_a_robot_alone_moves_as_it_does_off_line(turtle: Robot) -> None:
     """Same drop, same warm-up, at the origin: the same track to the last bit."""
-    world = inhabited(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
+    world = populated(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
     advance = world.advance(600 + 2400)
     simulation = replace(SETTINGS.simulation, drop_m=SETTINGS.arena.drop_m)
     track = simulate(turtle, SETTINGS.space, simulation, FLAT)
@@ -75,7 +75,7 @@ def test_a_robot_alone_moves_as_it_does_off_line(turtle: Robot) -> None:
 
 def test_those_far_away_do_not_feel_births_and_deaths(robot_of: Robots) -> None:
     far = crowd(robot_of, 4, 0.4)
-    calm, busy = inhabited(SETTINGS, far), inhabited(SETTINGS, far)
+    calm, busy = populated(SETTINGS, far), populated(SETTINGS, far)
     seconds(calm, 3.0)
     for turn in range(3):
         others = [
@@ -91,7 +91,7 @@ def test_those_far_away_do_not_feel_births_and_deaths(robot_of: Robots) -> None:
 
 
 def test_changes_that_cannot_be_made_change_nothing(robot_of: Robots) -> None:
-    world = inhabited(SETTINGS, crowd(robot_of, 2, 1.0))
+    world = populated(SETTINGS, crowd(robot_of, 2, 1.0))
     before = world.digest()
     guest = Insertion(BirthId(0, 9), robot_of(9), (0.0, 0.0))
     wrong = [
@@ -113,7 +113,7 @@ def test_changes_that_cannot_be_made_change_nothing(robot_of: Robots) -> None:
 
 
 def test_a_reset_world_is_a_new_one(robot_of: Robots) -> None:
-    world = inhabited(SETTINGS, crowd(robot_of, 3, 0.4))
+    world = populated(SETTINGS, crowd(robot_of, 3, 0.4))
     seconds(world, 1.0)
     world.reset()
     assert world.digest() == World(SETTINGS).digest()
@@ -121,7 +121,7 @@ def test_a_reset_world_is_a_new_one(robot_of: Robots) -> None:
 
 
 def test_poses_tell_where_all_were(turtle: Robot) -> None:
-    world = inhabited(
+    world = populated(
         SETTINGS,
         [Insertion(A, turtle, (1.0, 2.0), 0.5), Insertion(B, turtle, (9.0, 2.0))],
     )
@@ -140,7 +140,7 @@ def test_poses_tell_where_all_were(turtle: Robot) -> None:
 
 def test_another_brain_starts_at_rest_with_its_own_clock(turtle: Robot) -> None:
     """A turtle whose outputs become constant goes where these tell it."""
-    world = inhabited(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
+    world = populated(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
     seconds(world, 4.0)
     still = Brain(
         tuple(
@@ -162,7 +162,7 @@ def test_another_brain_starts_at_rest_with_its_own_clock(turtle: Robot) -> None:
 def test_a_ring_wall_holds_robots_in(turtle: Robot) -> None:
     """Pushed against it at 1 m/s a robot stays inside; without it, it slides out."""
     for diameter, is_in in ((1.0, True), (0.0, False)):
-        world = inhabited(
+        world = populated(
             settings_of(wall_diameter_m=diameter, drop_m=0.0),
             [Insertion(A, turtle, (0.0, 0.0))],
         )
@@ -176,7 +176,7 @@ def test_a_ring_wall_holds_robots_in(turtle: Robot) -> None:
 def test_robots_feel_each_other_and_it_is_counted(turtle: Robot) -> None:
     """One dropped onto another touches it; their pads and tallies say so."""
     settings = settings_of(record_touches=True, drop_m=0.3)
-    world = inhabited(settings, [Insertion(A, turtle, (0.0, 0.0))])
+    world = populated(settings, [Insertion(A, turtle, (0.0, 0.0))])
     alone = seconds(world, 1.0)
     world.apply(Changes(insertions=(Insertion(B, turtle, (0.02, 0.01)),)))
     together = seconds(world, 2.0)
@@ -223,7 +223,7 @@ def test_light_falls_off_and_can_be_hidden(
     newcomers = [Insertion(A, lamp_bearer(), (0.0, 0.0))]
     if hider:
         newcomers.append(Insertion(B, turtle, (0.25, 0.0), 0.5 * math.pi))
-    world = inhabited(settings, newcomers)
+    world = populated(settings, newcomers)
     reading = world.population.find(A).seat.senses.readings[0, 6]
     assert reading == pytest.approx(expected, abs=0.02)
     world.advance(SECOND)

@@ -9,7 +9,7 @@ import pytest
 from schema.robot.names import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import Casualty, Changes, Insertion
-from tests.worker.arena_cases import SETTINGS, crowd, inhabited, seconds, settings_of
+from tests.worker.arena_cases import SETTINGS, crowd, populated, seconds, settings_of
 from tests.worker.arena_oracle import Oracle
 from worker.arena.world import World
 
@@ -96,7 +96,7 @@ def test_those_who_part_live_alone_again(turtle: Robot) -> None:
     near = [
         Insertion(BirthId(0, number), turtle, (0.3 * number, 0.0)) for number in (0, 1)
     ]
-    world = inhabited(SETTINGS, near)
+    world = populated(SETTINGS, near)
     seconds(world, 1.0)
     first, second = (world.population.find(i.birth) for i in near)
     sizes = []

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from schema.robot.robot import Robot
-from tests.worker.arena_cases import crowd, inhabited, seconds, settings_of
+from tests.worker.arena_cases import crowd, populated, seconds, settings_of
 from worker.arena.world import World
 from worker.clusters.proximity import FASTEST, Pairs, Proximity, Scene
 
@@ -32,7 +32,7 @@ def measured(world: World, scene: Scene, gap_m: float) -> Pairs:
 @pytest.mark.parametrize("gap_m", [0.02, 0.1, 0.5])
 def test_nobody_is_spared_who_is_to_meet(robot_of: Robots, gap_m: float) -> None:
     """In a falling crowd, by merge distances beyond those that it lives by."""
-    world = inhabited(settings_of(drop_m=0.5), crowd(robot_of, 20, 1.2))
+    world = populated(settings_of(drop_m=0.5), crowd(robot_of, 20, 1.2))
     proximity = Proximity(settings_of(merge_distance_m=gap_m))
     pairs = 0
     for _ in range(12):

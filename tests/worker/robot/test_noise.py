@@ -20,7 +20,7 @@ from schema.wire.arena import Changes, Insertion
 from tests.worker.arena_cases import (
     SETTINGS,
     crowd,
-    inhabited,
+    populated,
     seconds,
     settings_of,
     state_of,
@@ -228,7 +228,7 @@ def test_the_loudest_noise_is_survived(robot_of: Robots) -> None:
 def test_a_robot_alone_moves_as_it_does_off_line(robot_of: Robots) -> None:
     """Of one name, from step 0 on: two ways to the same noise, to the last bit."""
     for seed in (3, 4):
-        world = inhabited(NOISY, [Insertion(A, robot_of(seed), (0.0, 0.0))])
+        world = populated(NOISY, [Insertion(A, robot_of(seed), (0.0, 0.0))])
         world.advance(600 + 800)
         simulation = replace(NOISY.simulation, drop_m=NOISY.arena.drop_m)
         identity = Identity(ORIGIN, A, 0)
@@ -244,7 +244,7 @@ def test_a_robot_alone_moves_as_it_does_off_line(robot_of: Robots) -> None:
 def test_those_far_away_change_nothing(robot_of: Robots) -> None:
     """Whoever lives, is born and dies there, before us and behind us by name."""
     own = Insertion(BirthId(0, 5), robot_of(3), (0.0, 0.0))
-    lonely, busy = inhabited(NOISY, [own]), inhabited(NOISY, [own])
+    lonely, busy = populated(NOISY, [own]), populated(NOISY, [own])
     seconds(lonely, 3.0)
     for turn in range(3):
         others = [
@@ -259,7 +259,7 @@ def test_those_far_away_change_nothing(robot_of: Robots) -> None:
 
 def test_a_newborn_feels_the_noise_of_its_name_at_once(turtle: Robot) -> None:
     held = [
-        inhabited(settings, [Insertion(A, wired(turtle, []), (0.0, 0.0))])
+        populated(settings, [Insertion(A, wired(turtle, []), (0.0, 0.0))])
         for settings in (NOISY, NOISY, replace(NOISY, origin=Origin(seed=8)))
     ]
     first, same, other = (world.population.find(A).seat.ctrl.copy() for world in held)
@@ -276,13 +276,13 @@ def lived(world: World, robot_of: Robots) -> list[bytes]:
 
 def test_neither_threads_nor_advances_nor_restoring_matter(robot_of: Robots) -> None:
     newcomers = crowd(robot_of, 8, 0.4)
-    plain = inhabited(NOISY, newcomers)
+    plain = populated(NOISY, newcomers)
     expected = lived(plain, robot_of)
     assert plain.population.merges > 0
-    threaded = inhabited(NOISY, newcomers, threads=2)
+    threaded = populated(NOISY, newcomers, threads=2)
     assert lived(threaded, robot_of) == expected
     threaded.close()
-    pieces = inhabited(NOISY, newcomers)
+    pieces = populated(NOISY, newcomers)
     for until in (1, 13, 77, 130, 199):
         pieces.advance(until)
         pieces = World.restore(NOISY, pieces.snapshot(), threads=2)
@@ -292,7 +292,7 @@ def test_neither_threads_nor_advances_nor_restoring_matter(robot_of: Robots) -> 
 
 
 def test_a_snapshot_is_of_one_run_only(turtle: Robot) -> None:
-    world = inhabited(NOISY, [Insertion(A, turtle, (0.0, 0.0))])
+    world = populated(NOISY, [Insertion(A, turtle, (0.0, 0.0))])
     other: ArenaSettings = replace(NOISY, origin=replace(ORIGIN, seed=8))
     with pytest.raises(MalformedMessage, match="other settings"):
         World.restore(other, world.snapshot())
@@ -301,7 +301,7 @@ def test_a_snapshot_is_of_one_run_only(turtle: Robot) -> None:
 def test_a_silent_arena_is_the_same_in_every_run(robot_of: Robots) -> None:
     newcomers = crowd(robot_of, 3, 0.4)
     worlds = [
-        inhabited(replace(SETTINGS, origin=origin), newcomers)
+        populated(replace(SETTINGS, origin=origin), newcomers)
         for origin in (Origin(), ORIGIN)
     ]
     found = []
