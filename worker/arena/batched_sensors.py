@@ -12,7 +12,7 @@ from schema.parts import Vector
 from schema.robot.results import Floats
 from worker.clusters.bounds import Indices
 from worker.clusters.columns import Layout, RobotRows
-from worker.clusters.slot import Seat
+from worker.clusters.engine_view import EngineView
 from worker.robot.controller import Widths
 from worker.robot.sensors import HIGHEST_OUTPUT, LOWEST_OUTPUT, into_frame
 
@@ -37,7 +37,7 @@ class Nerves:
         self._gravity = np.array(gravity)
         self.readings = np.zeros((0, width.inputs))
         self._layout = Layout((), RobotRows(()))
-        self._seats: list[Seat] = []
+        self._views: list[EngineView] = []
         self._gather(self._layout.robot_rows)
 
     def settle(self, layout: Layout) -> None:
@@ -51,20 +51,20 @@ class Nerves:
         if layout.robot_rows is not self._layout.robot_rows:
             self._gather(layout.robot_rows)
         self._layout = layout
-        seats = [one.seat for one in layout.robot_rows.everybody]
-        for row, seat in enumerate(seats):
-            if seat is not self._seats[row]:
-                seat.senses.show(self.readings[row : row + 1])
-        self._seats = seats
-        self._controls = [seat.ctrl for seat in seats]
-        self._alone = [seats[row] for row in self._others]
-        self._cores = [seats[row].senses for row in self._simple.tolist()]
+        views = [one.view for one in layout.robot_rows.everybody]
+        for row, view in enumerate(views):
+            if view is not self._views[row]:
+                view.senses.show(self.readings[row : row + 1])
+        self._views = views
+        self._controls = [view.ctrl for view in views]
+        self._alone = [views[row] for row in self._others]
+        self._cores = [views[row].senses for row in self._simple.tolist()]
         self._turns = layout.roots[self._simple, 3:]
         self._motions = layout.motions[self._simple]
         self._angles = layout.starts[self._motor_rows] + self._motor_offsets
         homes = layout.homes.tolist()
         self._pads = [
-            (row, seats[row].senses.pads, layout.clusters[homes[row]])
+            (row, views[row].senses.pads, layout.clusters[homes[row]])
             for row in self._padded
         ]
 
@@ -75,8 +75,8 @@ class Nerves:
             state: of all clusters in a row, as the engine has it just now.
         """
         self._feel_cores(state)
-        for seat in self._alone:
-            seat.feel(self._tick_s)
+        for view in self._alone:
+            view.feel(self._tick_s)
         for row, pads, cluster in self._pads:
             for geom, place in pads:
                 self.readings[row, place] = geom in cluster.touched
@@ -104,26 +104,26 @@ class Nerves:
 
     def _gather(self, robot_rows: RobotRows) -> None:
         """Take over robots, some of whom may be new."""
-        seats = [one.seat for one in robot_rows.everybody]
-        readings = [seat.senses.readings for seat in seats]
+        views = [one.view for one in robot_rows.everybody]
+        readings = [view.senses.readings for view in views]
         self.readings = np.concatenate([np.zeros((0, self._width.inputs)), *readings])
-        for row, seat in enumerate(seats):
-            seat.senses.show(self.readings[row : row + 1])
-        self._seats = seats
-        simple = [row for row, seat in enumerate(seats) if seat.senses.is_simple]
-        self._others = sorted(set(range(len(seats))).difference(simple))
-        self._padded = [row for row in simple if seats[row].senses.pads]
+        for row, view in enumerate(views):
+            view.senses.show(self.readings[row : row + 1])
+        self._views = views
+        simple = [row for row, view in enumerate(views) if view.senses.is_simple]
+        self._others = sorted(set(range(len(views))).difference(simple))
+        self._padded = [row for row in simple if views[row].senses.pads]
         self._simple = np.array(simple, dtype=np.intp)
-        before = [seats[row].senses.velocities[0] for row in simple]
+        before = [views[row].senses.velocities[0] for row in simple]
         self._velocities: Floats = np.array(before).reshape(-1, 3)
-        cores = [seats[row].senses.core_imu for row in simple]
+        cores = [views[row].senses.core_imu for row in simple]
         self._places = self._simple * self._width.inputs + np.array(cores, np.intp)
-        counts = np.array([len(seat.ctrl) for seat in seats], dtype=np.intp)
-        self._motor_rows = np.repeat(np.arange(len(seats)), counts)
+        counts = np.array([len(view.ctrl) for view in views], dtype=np.intp)
+        self._motor_rows = np.repeat(np.arange(len(views)), counts)
         ends = np.cumsum(counts)
         first = np.repeat(ends - counts, counts)
         self._motor_outputs: Indices = np.arange(len(first)) - first
-        motors = np.concatenate([np.zeros((0, 5)), *(seat.motors for seat in seats)])
+        motors = np.concatenate([np.zeros((0, 5)), *(view.motors for view in views)])
         self._motor_offsets = motors[:, 0].astype(np.intp)
         self._motors = motors.T[1:]
 

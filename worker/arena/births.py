@@ -103,12 +103,12 @@ def newborn(
         place = (*insertion.place, 0.0)
         reason = f"cannot be built: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, place)
-    seat = body.home.seats[0]
+    view = body.home.views[0]
     x, y = insertion.place
     z = population.shop.height(body, insertion.place, insertion.heading)
-    put(seat, (x, y, z), insertion.heading)
+    put(view, (x, y, z), insertion.heading)
     try:
-        seat.start()
+        view.start()
     except mujoco.FatalError as error:
         reason = f"physics diverged: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, (x, y, z))
@@ -133,7 +133,7 @@ def arena_robot(
         robot=robot,
         encoded=encode_robot(robot),
         body=body,
-        seat=body.home.seats[0],
+        view=body.home.views[0],
         network=network,
         states=np.zeros(population.shop.width.states),
         thinks_since=0,

@@ -74,7 +74,7 @@ class Minds:
         bank = Bank([arena_robot.network], self._width, self._tick_s)
         noise = Noise(self._source, (arena_robot.birth,))
         tick = step // self._tick_steps
-        readings = noise.blur(tick, arena_robot.seat.senses.readings)
+        readings = noise.blur(tick, arena_robot.view.senses.readings)
         outputs = noise.shake(tick, bank.step(readings, 0.0))
         arena_robot.states = bank.states[0]
-        arena_robot.seat.drive(outputs[0])
+        arena_robot.view.drive(outputs[0])

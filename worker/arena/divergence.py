@@ -63,9 +63,9 @@ def _is_quiet(loudest: float) -> bool:
 def _reasons(cluster: Cluster, moment: int) -> dict[BirthId, str]:
     reasons = {}
     track = cluster.track
-    for birth, seat in zip(cluster.members, cluster.seats, strict=True):
-        positions = track.qpos[moment, seat.joints : seat.joints + len(seat.qpos)]
-        velocities = track.qvel[moment, seat.dofs : seat.dofs + len(seat.qvel)]
+    for birth, view in zip(cluster.members, cluster.views, strict=True):
+        positions = track.qpos[moment, view.joints : view.joints + len(view.qpos)]
+        velocities = track.qvel[moment, view.dofs : view.dofs + len(view.qvel)]
         if reason := _reason(positions, velocities):
             reasons[birth] = f"physics diverged: {reason}"
     return reasons

@@ -37,7 +37,7 @@ def judgement(
         settings: the arena's.
     """
     age_s = (step - one.window.born) * settings.simulation.timestep_s
-    x, y, z = one.seat.qpos[:3].tolist()
+    x, y, z = one.view.qpos[:3].tolist()
     if not one.window.is_judged:
         return Judgement(
             one.birth,

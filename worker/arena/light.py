@@ -15,9 +15,9 @@ import numpy as np
 
 from schema.parts import Vector
 from worker.clusters.cluster import Cluster
+from worker.clusters.engine_view import EngineView
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
-from worker.clusters.slot import Seat
 
 FULL_WITHIN_M = 1.0
 """Within this distance the light is as bright as it gets."""
@@ -33,21 +33,21 @@ def shine(population: ArenaPopulation, people: Sequence[ArenaRobot]) -> None:
         people: whose sensors.
     """
     source = population.shop.settings.arena.light
-    seats = [one.seat for one in people if one.seat.senses.lights]
-    if source is None or not seats:
+    views = [one.view for one in people if one.view.senses.lights]
+    if source is None or not views:
         return
     population.kinematics()
-    for seat in seats:
-        for geom, place in seat.senses.lights:
-            seat.senses.readings[0, place] = _brightness(
-                source, population.clusters, seat, geom
+    for view in views:
+        for geom, place in view.senses.lights:
+            view.senses.readings[0, place] = _brightness(
+                source, population.clusters, view, geom
             )
 
 
 def _brightness(
-    light: Vector, clusters: Sequence[Cluster], seat: Seat, geom: int
+    light: Vector, clusters: Sequence[Cluster], view: EngineView, geom: int
 ) -> float:
-    model, data = seat.model, seat.data
+    model, data = view.model, view.data
     outward = data.geom_xmat[geom].reshape(3, 3)[:, 0]
     face = float(model.geom_size[geom][0]) + _OUTSIDE_M
     eye = data.geom_xpos[geom] + face * outward

@@ -94,8 +94,8 @@ def decode_state(data: bytes, settings: ArenaSettings) -> ArenaState:
         raise MalformedMessage(f"snapshot: format must be {FORMAT}, got {state.format}")
     if state.settings != settings_digest(settings):
         raise MalformedMessage("snapshot: of an arena with other settings")
-    seated = sorted(row for group in state.clusters for row in group)
-    if seated != list(range(len(state.robots))):
+    viewed = sorted(row for group in state.clusters for row in group)
+    if viewed != list(range(len(state.robots))):
         raise MalformedMessage("snapshot: every robot must be in one cluster")
     return state
 

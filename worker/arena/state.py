@@ -84,17 +84,17 @@ def _name(birth: BirthId) -> tuple[int, int]:
 
 
 def _robot_state(one: ArenaRobot) -> RobotState:
-    seat = one.seat
+    view = one.view
     return RobotState(
         birth=_name(one.birth),
         robot=one.encoded,
         born=one.window.born,
         thinks_since=one.thinks_since,
-        qpos=pack_floats(seat.qpos),
-        qvel=pack_floats(seat.qvel),
-        ctrl=pack_floats(seat.ctrl),
-        readings=pack_floats(seat.senses.readings),
-        velocities=pack_floats(np.array(seat.senses.velocities)),
+        qpos=pack_floats(view.qpos),
+        qvel=pack_floats(view.qvel),
+        ctrl=pack_floats(view.ctrl),
+        readings=pack_floats(view.senses.readings),
+        velocities=pack_floats(np.array(view.senses.velocities)),
         states=pack_floats(one.states),
         window=pack_floats(np.array(one.window.positions)),
         place=one.place,
@@ -108,13 +108,13 @@ def _arena_robot(state: RobotState, population: ArenaPopulation) -> ArenaRobot:
     for x, y, z in unpack_floats(state.window, -1, 3).tolist():
         window.positions.append((x, y, z))
     one = arena_robot(birth, robot, body, window, population)
-    seat = one.seat
-    seat.qpos[:] = unpack_floats(state.qpos, *seat.qpos.shape)
-    seat.qvel[:] = unpack_floats(state.qvel, *seat.qvel.shape)
-    seat.ctrl[:] = unpack_floats(state.ctrl, *seat.ctrl.shape)
-    readings = seat.senses.readings
+    view = one.view
+    view.qpos[:] = unpack_floats(state.qpos, *view.qpos.shape)
+    view.qvel[:] = unpack_floats(state.qvel, *view.qvel.shape)
+    view.ctrl[:] = unpack_floats(state.ctrl, *view.ctrl.shape)
+    readings = view.senses.readings
     readings[:] = unpack_floats(state.readings, *readings.shape)
-    seat.senses.velocities = [
+    view.senses.velocities = [
         (x, y, z) for x, y, z in unpack_floats(state.velocities, -1, 3).tolist()
     ]
     one.states = unpack_floats(state.states, *one.states.shape)

@@ -220,8 +220,8 @@ def bare_time(world: World, pool: Pool, steps: int, clock: Clock) -> float:
     for one in world.population.everybody:
         model = one.body.home.model
         data = mujoco.MjData(model)
-        data.qpos[:], data.qvel[:] = one.seat.qpos, one.seat.qvel
-        data.ctrl[:] = one.seat.ctrl
+        data.qpos[:], data.qvel[:] = one.view.qpos, one.view.qvel
+        data.ctrl[:] = one.view.ctrl
         jobs.append(partial(_step, model, data, steps, tick))
     began = clock()
     pool.run(jobs)

@@ -16,8 +16,8 @@ from schema.robot.names import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.clusters.bounds import Indices
+from worker.clusters.engine_view import EngineView, Rules
 from worker.clusters.groups import Group, components
-from worker.clusters.slot import Rules, Seat
 
 NEVER = 1 << 62
 """A moment that does not come."""
@@ -61,7 +61,7 @@ class Cluster:
 
     Attributes:
         members: whose seats they are, ascending.
-        seats: in that order.
+        views: in that order.
         live: its state just now, views: positions, velocities, places of all
             bodies and their rotations, as of the last step, each in one row.
         sizes: of these four.
@@ -91,7 +91,7 @@ class Cluster:
         """
         self.members, self.prefixes = members, prefixes
         self.model, self.data = model, mujoco.MjData(model)
-        self.seats: tuple[Seat, ...] = ()
+        self.views: tuple[EngineView, ...] = ()
         self._owners = [-1] * model.ngeom
         self.qpos: Floats = self.data.qpos
         self.qvel: Floats = self.data.qvel
@@ -106,14 +106,14 @@ class Cluster:
         self.is_shared = len(members) > 1
         self._tells_touches = tells_touches and self.is_shared
 
-    def seat(self, robot: Robot, solo: mujoco.MjModel, rules: Rules) -> None:
+    def view(self, robot: Robot, solo: mujoco.MjModel, rules: Rules) -> None:
         """Find the next member's place."""
-        prefix = self.prefixes[len(self.seats)]
-        seat = Seat(robot, solo, rules, (self.model, self.data, prefix))
-        for geom in range(*seat.geoms):
-            self._owners[geom] = len(self.seats)
-        self.seats = (*self.seats, seat)
-        self._has_pads |= bool(seat.senses.pads)
+        prefix = self.prefixes[len(self.views)]
+        view = EngineView(robot, solo, rules, (self.model, self.data, prefix))
+        for geom in range(*view.geoms):
+            self._owners[geom] = len(self.views)
+        self.views = (*self.views, view)
+        self._has_pads |= bool(view.senses.pads)
 
     def run(self, plan: Sequence[int], first: int = 0) -> None:
         """Let physics go on from moment to moment; the commands are held.

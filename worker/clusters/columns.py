@@ -98,7 +98,7 @@ class Layout:
         rows = [
             robot_rows.rows[birth] for cluster in clusters for birth in cluster.members
         ]
-        own = [seat.offsets for cluster in clusters for seat in cluster.seats]
+        own = [view.offsets for cluster in clusters for view in cluster.views]
         sizes = np.array([c.sizes for c in clusters], dtype=np.intp).reshape(-1)
         # Where each cluster's four parts begin, for each of its seats.
         blocks = (np.cumsum(sizes) - sizes).reshape(-1, _PARTS)

@@ -16,7 +16,7 @@ from schema.robot.names import BirthId
 from schema.robot.robot import Robot
 from worker.clusters.bounds import Reach, reach_of
 from worker.clusters.cluster import Cluster
-from worker.clusters.slot import Rules
+from worker.clusters.engine_view import Rules
 from worker.robot.controller import widths
 
 CACHE_SIZE = 64
@@ -74,7 +74,7 @@ class Shop:
             furnish=self._furnish,
         )
         home = Cluster((birth,), ("",), model)
-        home.seat(robot, model, self._rules)
+        home.view(robot, model, self._rules)
         return Body(robot, reach_of(model), home)
 
     def height(self, body: Body, place: tuple[float, float], heading: float) -> float:
@@ -135,7 +135,7 @@ class Shop:
         tells = self.settings.arena.record_touches
         made = Cluster(members, prefixes, model, tells_touches=tells)
         for body in bodies:
-            made.seat(body.robot, body.home.model, self._rules)
+            made.view(body.robot, body.home.model, self._rules)
         return made
 
     def _spec(self, birth: BirthId, robot: Robot) -> mujoco.MjSpec:

@@ -178,9 +178,9 @@ class ArenaPopulation:
             for birth in members:
                 self._cluster_of[birth].rewind(self.stride.moment)
         cluster = self.shop.cluster(members, [one.body for one in people])
-        for one, seat in zip(people, cluster.seats, strict=True):
-            seat.take(one.seat)
-            one.seat = seat
+        for one, view in zip(people, cluster.views, strict=True):
+            view.take(one.view)
+            one.view = view
         return cluster
 
     def _settle(self, clusters: Sequence[Cluster]) -> None:

@@ -8,8 +8,8 @@ from schema.parts import Vector
 from schema.robot.names import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from worker.clusters.engine_view import EngineView
 from worker.clusters.models import Body
-from worker.clusters.slot import Seat
 from worker.clusters.window import Window
 from worker.robot.controller import Network
 
@@ -23,7 +23,7 @@ class ArenaRobot:
         robot: its body and its present brain.
         encoded: the robot's bytes, for snapshots.
         body: it as the engine knows it.
-        seat: where its state is now.
+        view: where its state is now.
         network: its brain as arrays.
         states: (S,) of its neurons after the last tick; a row of the bank.
         thinks_since: step from which its brain's clock counts.
@@ -35,7 +35,7 @@ class ArenaRobot:
     robot: Robot
     encoded: bytes
     body: Body
-    seat: Seat
+    view: EngineView
     network: Network
     states: Floats
     thinks_since: int
@@ -43,14 +43,14 @@ class ArenaRobot:
     place: Vector
 
 
-def put(seat: Seat, place: Vector, heading: float) -> None:
+def put(view: EngineView, place: Vector, heading: float) -> None:
     """Move a robot at neutral pose to a place.
 
     Args:
-        seat: where its state is.
+        view: where its state is.
         place: for the core's centre, world frame [m].
         heading: turn about z [rad].
     """
-    seat.qpos[:3] = place
+    view.qpos[:3] = place
     if heading:
-        seat.qpos[3:7] = np.cos(0.5 * heading), 0.0, 0.0, np.sin(0.5 * heading)
+        view.qpos[3:7] = np.cos(0.5 * heading), 0.0, 0.0, np.sin(0.5 * heading)

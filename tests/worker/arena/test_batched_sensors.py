@@ -15,14 +15,14 @@ def lonely(world: World) -> list[tuple[np.ndarray, list[float]]]:
     tick_s = 25 * 0.005
     outputs = np.random.default_rng(3).uniform(-0.2, 1.2, (len(world.births), 40))
     for one, own in zip(world.population.everybody, outputs, strict=True):
-        seat, velocities = one.seat, list(one.seat.senses.velocities)
-        readings, commands = seat.senses.readings.copy(), seat.ctrl.copy()
-        seat.feel(tick_s)
-        felt = seat.senses.readings.copy()
-        seat.senses.readings[:], seat.senses.velocities = readings, velocities
-        seat.drive(own)
-        told = seat.ctrl.tolist()
-        seat.ctrl[:] = commands
+        view, velocities = one.view, list(one.view.senses.velocities)
+        readings, commands = view.senses.readings.copy(), view.ctrl.copy()
+        view.feel(tick_s)
+        felt = view.senses.readings.copy()
+        view.senses.readings[:], view.senses.velocities = readings, velocities
+        view.drive(own)
+        told = view.ctrl.tolist()
+        view.ctrl[:] = commands
         found.append((felt, told))
     return found
 
@@ -46,7 +46,7 @@ def test_a_batch_feels_and_commands_as_each_alone_would(
         zip(world.population.everybody, expected, strict=True)
     ):
         assert nerves.readings[row].tobytes() == felt.tobytes()
-        assert one.seat.senses.readings is not felt
-        assert one.seat.ctrl.tolist() == told
-        pads += len(one.seat.senses.pads)
+        assert one.view.senses.readings is not felt
+        assert one.view.ctrl.tolist() == told
+        pads += len(one.view.senses.pads)
     assert pads > 0

@@ -91,7 +91,7 @@ def test_in_a_cluster_only_the_broken_one_falls(turtle: Robot) -> None:
     seconds(world, 1.0)
     middle = world.population.find(BirthId(0, 1))
     assert len(world.population.clusters) == 1
-    middle.seat.qvel[0] = float("nan")
+    middle.view.qvel[0] = float("nan")
     fallen = seconds(world, 1.0).casualties
     assert [casualty.birth for casualty in fallen] == [middle.birth]
     assert fallen[0].reason == "physics diverged: state not finite"
@@ -103,7 +103,7 @@ def test_in_a_cluster_only_the_broken_one_falls(turtle: Robot) -> None:
 def test_a_core_that_flies_off_has_broken_the_physics(turtle: Robot) -> None:
     world = populated(SETTINGS, [Insertion(BAD, turtle, (0.0, 0.0))])
     seconds(world, 1.0)
-    world.population.find(BAD).seat.qvel[:3] = (30.0, 0.0, 30.0)
+    world.population.find(BAD).view.qvel[:3] = (30.0, 0.0, 30.0)
     [casualty] = seconds(world, 1.0).casualties
     assert "m/s, more than 20 m/s" in casualty.reason
     assert world.births == ()

@@ -61,7 +61,7 @@ def test_a_box_at_rest_on_a_slope_feels_that_it_leans(slope_deg: float) -> None:
         [Insertion(A, BOX, (0.5, 0.0))],
     )
     seconds(world, 2.0)
-    readings = world.population.find(A).seat.senses.readings[0, :6].tolist()
+    readings = world.population.find(A).view.senses.readings[0, :6].tolist()
     slope = math.radians(slope_deg)
     expected = [G * math.sin(slope), 0.0, G * math.cos(slope), 0.0, 0.0, 0.0]
     assert readings == pytest.approx(expected, abs=0.01)
@@ -86,20 +86,20 @@ def test_a_wall_stops_what_slides_and_pads_feel_it() -> None:
     settings = arena(Environment(slope_deg=20.0, scenery=WALL), drop_m=0.0)
     slippery = replace(settings, simulation=replace(settings.simulation, friction=0.0))
     world = populated(slippery, [Insertion(A, FEELER, (0.0, 0.0))])
-    seat = world.population.find(A).seat
+    view = world.population.find(A).view
     seconds(world, 0.5)
-    assert seat.senses.readings[0, 6:8].tolist() == [0.0, 0.0]
-    assert -1.0 < seat.qpos[0] < -0.3
+    assert view.senses.readings[0, 6:8].tolist() == [0.0, 0.0]
+    assert -1.0 < view.qpos[0] < -0.3
     seconds(world, 3.0)
-    assert seat.senses.readings[0, 6:8].tolist() == [1.0, 1.0]
-    assert seat.qpos[0] == pytest.approx(-1.0 + 0.0555, abs=2e-3)
-    assert np.abs(seat.qvel[:3]).max() < 1e-3
+    assert view.senses.readings[0, 6:8].tolist() == [1.0, 1.0]
+    assert view.qpos[0] == pytest.approx(-1.0 + 0.0555, abs=2e-3)
+    assert np.abs(view.qvel[:3]).max() < 1e-3
     free = populated(
         replace(slippery, environment=Environment(slope_deg=20.0)),
         [Insertion(A, FEELER, (0.0, 0.0))],
     )
     seconds(free, 3.5)
-    assert free.population.find(A).seat.qpos[0] < -10.0
+    assert free.population.find(A).view.qpos[0] < -10.0
 
 
 def test_robots_stay_above_rough_ground(robot_of: Robots) -> None:
@@ -173,7 +173,7 @@ def test_two_robots_on_one_rock_do_not_touch_each_other() -> None:
     (cluster,) = world.population.clusters
     assert cluster.data.ncon >= 8
     for birth in (A, B):
-        core = world.population.find(birth).seat
+        core = world.population.find(birth).view
         assert core.qpos[2] == pytest.approx(0.2 + 0.0225, abs=1e-3)
         assert core.geoms[1] - core.geoms[0] == 1
 
@@ -191,7 +191,7 @@ def test_robots_are_born_on_top_of_what_stands_at_their_place() -> None:
     ):
         world = populated(settings, [Insertion(A, BOX, place, heading)])
         one = world.population.find(A)
-        assert one.place == tuple(one.seat.qpos[:3])
+        assert one.place == tuple(one.view.qpos[:3])
         assert one.place[2] == pytest.approx(expected + 0.05 + 0.0225, abs=3e-5)
 
 
@@ -206,5 +206,5 @@ def test_scenery_hides_the_light() -> None:
         settings = replace(settings, space=Space(part_types=types))
         world = populated(settings, [Insertion(A, robot, (0.0, 0.0))])
         world.advance(SECOND)
-        found.append(float(world.population.find(A).seat.senses.readings[0, 6]))
+        found.append(float(world.population.find(A).view.senses.readings[0, 6]))
     assert found == [pytest.approx((1.0 / 1.95) ** 2, abs=0.02), 0.0]

@@ -154,7 +154,7 @@ def test_another_brain_starts_at_rest_with_its_own_clock(turtle: Robot) -> None:
     assert not world.population.find(A).states.any()
     copy = World.restore(SETTINGS, world.snapshot())
     seconds(world, 8.0)
-    assert np.abs(world.population.find(A).seat.qpos[7:]).max() < 0.02
+    assert np.abs(world.population.find(A).view.qpos[7:]).max() < 0.02
     seconds(copy, 8.0)
     assert copy.digest() == world.digest()
 
@@ -168,7 +168,7 @@ def test_a_ring_wall_holds_robots_in(turtle: Robot) -> None:
         )
         seconds(world, 0.5)
         for _ in range(40):
-            world.population.find(A).seat.qvel[0] = 1.0
+            world.population.find(A).view.qvel[0] = 1.0
             seconds(world, 0.1)
         assert (world.population.find(A).place[0] < 0.5) is is_in
 
@@ -224,9 +224,9 @@ def test_light_falls_off_and_can_be_hidden(
     if hider:
         newcomers.append(Insertion(B, turtle, (0.25, 0.0), 0.5 * math.pi))
     world = populated(settings, newcomers)
-    reading = world.population.find(A).seat.senses.readings[0, 6]
+    reading = world.population.find(A).view.senses.readings[0, 6]
     assert reading == pytest.approx(expected, abs=0.02)
     world.advance(SECOND)
-    reading = world.population.find(A).seat.senses.readings[0, 6]
+    reading = world.population.find(A).view.senses.readings[0, 6]
     assert reading == pytest.approx(expected, abs=0.1)
     assert World.restore(settings, world.snapshot()).digest() == world.digest()

@@ -102,10 +102,10 @@ def test_those_who_part_live_alone_again(turtle: Robot) -> None:
     sizes = []
     for gap in (0.3, 0.2, 0.3, 0.6):
         for one, x in ((first, 0.0), (second, gap)):
-            one.seat.qpos[:2] = (x, 0.0)
+            one.view.qpos[:2] = (x, 0.0)
         seconds(world, 1.0)
         sizes.append(len(world.population.clusters))
     assert sizes[1] == 1
     assert sizes[-1] == 2
-    assert first.seat is first.body.home.seats[0]
+    assert first.view is first.body.home.views[0]
     assert (world.population.merges, world.population.splits) == (1, 1)

@@ -262,7 +262,7 @@ def test_a_newborn_feels_the_noise_of_its_name_at_once(turtle: Robot) -> None:
         populated(settings, [Insertion(A, wired(turtle, []), (0.0, 0.0))])
         for settings in (NOISY, NOISY, replace(NOISY, origin=Origin(seed=8)))
     ]
-    first, same, other = (world.population.find(A).seat.ctrl.copy() for world in held)
+    first, same, other = (world.population.find(A).view.ctrl.copy() for world in held)
     assert np.array_equal(first, same)
     assert not np.array_equal(first, other)
 

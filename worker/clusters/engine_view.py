@@ -27,7 +27,7 @@ class Rules:
     has_light: bool
 
 
-class Seat:
+class EngineView:
     """One robot's place in a cluster: live views, its senses and its motors.
 
     Attributes:
@@ -96,7 +96,7 @@ class Seat:
         """Command the motors; (O,) outputs of the network."""
         self.servos.drive(self.data, outputs)
 
-    def take(self, other: "Seat") -> None:
+    def take(self, other: "EngineView") -> None:
         """Take over a robot's whole state from the seat that it leaves."""
         self.qpos[:], self.qvel[:] = other.qpos, other.qvel
         self.ctrl[:] = other.ctrl
