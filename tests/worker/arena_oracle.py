@@ -68,7 +68,7 @@ class Oracle:
         self._model = self._data = None
         if len(self._births) < 2:
             return
-        settings = population.shop.settings
+        settings = population.model_cache.settings
         types = body_space(settings.space)
         prefixes = [f"{number}/" for number in range(len(self._births))]
         specs = [

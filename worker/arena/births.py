@@ -41,7 +41,7 @@ def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> N
     for birth in new:
         if birth in population and birth not in gone:
             raise UnexpectedEvent(f"apply: {birth} lives here already")
-    tick = population.shop.settings.simulation.brain_steps
+    tick = population.model_cache.settings.simulation.brain_steps
     if new and step % tick:
         raise UnexpectedEvent(
             "apply: births must fall on multiples of simulation.brain_steps = "
@@ -55,8 +55,8 @@ def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> N
         body = robots[birth] if birth in new else population.find(birth).robot
         robots[birth] = Robot(body.parts, change.brain)
     for robot in robots.values():
-        check_robot(robot, body_space(population.shop.settings.space))
-        pack(robot.brain, population.shop.width)
+        check_robot(robot, body_space(population.model_cache.settings.space))
+        pack(robot.brain, population.model_cache.width)
 
 
 def _once(births: tuple[BirthId, ...]) -> tuple[BirthId, ...]:
@@ -98,21 +98,21 @@ def newborn(
         ExperimentError: a sensor that the arena has nothing for.
     """
     try:
-        body = population.shop.body(insertion.birth, insertion.robot)
+        body = population.model_cache.body(insertion.birth, insertion.robot)
     except ValueError as error:
         place = (*insertion.place, 0.0)
         reason = f"cannot be built: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, place)
     view = body.home.views[0]
     x, y = insertion.place
-    z = population.shop.height(body, insertion.place, insertion.heading)
+    z = population.model_cache.height(body, insertion.place, insertion.heading)
     put(view, (x, y, z), insertion.heading)
     try:
         view.start()
     except mujoco.FatalError as error:
         reason = f"physics diverged: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, (x, y, z))
-    window = Window(population.shop.settings.simulation, step)
+    window = Window(population.model_cache.settings.simulation, step)
     one = arena_robot(insertion.birth, insertion.robot, body, window, population)
     one.thinks_since, one.place = step, (x, y, z)
     window.add(step, one.place)
@@ -127,7 +127,7 @@ def arena_robot(
     population: ArenaPopulation,
 ) -> ArenaRobot:
     """Return a robot at home, its mind at rest, before anything is known of it."""
-    network = pack(robot.brain, population.shop.width)
+    network = pack(robot.brain, population.model_cache.width)
     return ArenaRobot(
         birth=birth,
         robot=robot,
@@ -135,7 +135,7 @@ def arena_robot(
         body=body,
         view=body.home.views[0],
         network=network,
-        states=np.zeros(population.shop.width.states),
+        states=np.zeros(population.model_cache.width.states),
         thinks_since=0,
         window=window,
         place=(0.0, 0.0, 0.0),

@@ -32,7 +32,7 @@ def shine(population: ArenaPopulation, people: Sequence[ArenaRobot]) -> None:
         population: all of the arena, any of whom may stand in the way.
         people: whose sensors.
     """
-    source = population.shop.settings.arena.light
+    source = population.model_cache.settings.arena.light
     views = [one.view for one in people if one.view.senses.lights]
     if source is None or not views:
         return

@@ -103,8 +103,8 @@ def _robot_state(one: ArenaRobot) -> RobotState:
 
 def _arena_robot(state: RobotState, population: ArenaPopulation) -> ArenaRobot:
     birth, robot = BirthId(*state.birth), decode_robot(state.robot)
-    body = population.shop.body(birth, robot)
-    window = Window(population.shop.settings.simulation, state.born)
+    body = population.model_cache.body(birth, robot)
+    window = Window(population.model_cache.settings.simulation, state.born)
     for x, y, z in unpack_floats(state.window, -1, 3).tolist():
         window.positions.append((x, y, z))
     one = arena_robot(birth, robot, body, window, population)

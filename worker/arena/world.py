@@ -65,7 +65,7 @@ class World:
         """Begin anew, with nobody."""
         self.step = 0
         self.population = ArenaPopulation(self._settings)
-        width = self.population.shop.width
+        width = self.population.model_cache.width
         self._minds = Minds(Source(self._clock, width, self._settings.origin))
         gravity = self._settings.environment.gravity_vector(self._clock.gravity)
         self._nerves = Nerves(width, self._clock, gravity)
@@ -110,7 +110,7 @@ class World:
         for change in changes.brains:
             one = self.population.find(change.birth)
             since = self._schedule.next_tick(self.step)
-            equip(one, change.brain, self.population.shop.width, since)
+            equip(one, change.brain, self.population.model_cache.width, since)
         if changes.removals or changes.insertions or changes.brains:
             self._minds.gather(self.population.everybody)
 

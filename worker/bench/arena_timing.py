@@ -215,7 +215,7 @@ def bare_time(world: World, pool: Pool, steps: int, clock: Clock) -> float:
         steps: of each.
         clock: to read [s].
     """
-    tick = world.population.shop.settings.simulation.brain_steps
+    tick = world.population.model_cache.settings.simulation.brain_steps
     jobs = []
     for one in world.population.everybody:
         model = one.body.home.model

@@ -38,7 +38,7 @@ class Body:
     home: Cluster
 
 
-class Shop:
+class ModelCache:
     """Makes models of one arena, and keeps a few that may be wanted again."""
 
     def __init__(self, settings: ArenaSettings) -> None:

@@ -17,7 +17,7 @@ from worker.clusters.cluster import Cluster
 from worker.clusters.columns import Layout, RobotRows
 from worker.clusters.groups import Group, across, components
 from worker.clusters.interval import Stride
-from worker.clusters.models import Shop
+from worker.clusters.models import ModelCache
 from worker.clusters.proximity import Pairs, Proximity, Scene
 from worker.clusters.robot import ArenaRobot
 
@@ -35,7 +35,7 @@ class ArenaPopulation:
 
     def __init__(self, settings: ArenaSettings) -> None:
         """Start with nobody."""
-        self.shop = Shop(settings)
+        self.model_cache = ModelCache(settings)
         self.proximity = Proximity(settings)
         self.robot_rows = RobotRows(())
         self.clusters: tuple[Cluster, ...] = ()
@@ -89,7 +89,7 @@ class ArenaPopulation:
                 mujoco.mj_kinematics(home.model, home.data)
                 kept.append(home)
         for birth in gone:
-            self.shop.forget(birth)
+            self.model_cache.forget(birth)
         self._settle(kept)
 
     def begin(self, plan: Sequence[int], looks: Sequence[bool]) -> Stride:
@@ -177,7 +177,7 @@ class ArenaPopulation:
         if self.stride is not None:
             for birth in members:
                 self._cluster_of[birth].rewind(self.stride.moment)
-        cluster = self.shop.cluster(members, [one.body for one in people])
+        cluster = self.model_cache.cluster(members, [one.body for one in people])
         for one, view in zip(people, cluster.views, strict=True):
             view.take(one.view)
             one.view = view

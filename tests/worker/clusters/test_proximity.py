@@ -15,7 +15,7 @@ Robots = Callable[[int], Robot]
 
 def measured(world: World, scene: Scene, gap_m: float) -> Pairs:
     """Return who is to meet below a gap, every pair that lives apart measured."""
-    population, settings = world.population, world.population.shop.settings
+    population, settings = world.population, world.population.model_cache.settings
     steps = settings.arena.proximity_steps + 1
     moves = np.minimum(scene.speeds[0], FASTEST) * steps * 0.005
     births = [one.birth for one in population.everybody]
