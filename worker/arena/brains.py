@@ -14,7 +14,7 @@ from worker.robot.controller import Bank
 from worker.robot.noise import Noise, Source
 
 
-class Minds:
+class BatchedControllers:
     """One bank of networks, a row for each inhabitant, by birth."""
 
     def __init__(self, source: Source) -> None:

@@ -21,7 +21,7 @@ from schema.wire.arena import Advance, Casualty, Changes, Insertion
 from worker.arena import light, state
 from worker.arena.batched_sensors import Nerves
 from worker.arena.births import check_changes, equip, newborn
-from worker.arena.brains import Minds
+from worker.arena.brains import BatchedControllers
 from worker.arena.divergence import diverged
 from worker.arena.fitness_window import judge_all
 from worker.arena.poses import Poses
@@ -66,7 +66,9 @@ class World:
         self.step = 0
         self.population = ArenaPopulation(self._settings)
         width = self.population.model_cache.width
-        self._minds = Minds(Source(self._clock, width, self._settings.origin))
+        self._controllers = BatchedControllers(
+            Source(self._clock, width, self._settings.origin)
+        )
         gravity = self._settings.environment.gravity_vector(self._clock.gravity)
         self._nerves = Nerves(width, self._clock, gravity)
         self._casualties: list[Casualty] = []
@@ -112,7 +114,7 @@ class World:
             since = self._schedule.next_tick(self.step)
             equip(one, change.brain, self.population.model_cache.width, since)
         if changes.removals or changes.insertions or changes.brains:
-            self._minds.gather(self.population.everybody)
+            self._controllers.gather(self.population.everybody)
 
     def advance(
         self, until: int, watch: Callable[[bytes], None] | None = None
@@ -159,7 +161,7 @@ class World:
         world = cls(settings, threads)
         world.step, casualties = state.read(settings, data, world.population)
         world._casualties = list(casualties)
-        world._minds.gather(world.population.everybody)
+        world._controllers.gather(world.population.everybody)
         return world
 
     # --- time -------------------------------------------------------------------
@@ -211,7 +213,7 @@ class World:
         nerves.settle(self.population.layout)
         nerves.feel(state)
         light.shine(self.population, self.population.everybody)
-        nerves.drive(state, self._minds.tick(self.step, nerves.readings))
+        nerves.drive(state, self._controllers.tick(self.step, nerves.readings))
 
     def _sample(self, state: Floats, watch: Callable[[bytes], None] | None) -> None:
         layout = self.population.layout
@@ -238,7 +240,7 @@ class World:
         self.population.add(newcomers)
         light.shine(self.population, newcomers)
         for one in newcomers:
-            self._minds.first_tick(self.step, one)
+            self._controllers.first_tick(self.step, one)
         self.population.kinematics()
         self.population.look()
 
@@ -252,7 +254,7 @@ class World:
 
     def _dismiss(self, births: Sequence[BirthId]) -> None:
         self.population.remove(births)
-        self._minds.gather(self.population.everybody)
+        self._controllers.gather(self.population.everybody)
 
     def _report(self) -> Advance:
         judgements, undefined = judge_all(

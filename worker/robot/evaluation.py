@@ -179,15 +179,15 @@ class _Life:
         self._senses = Senses(robot, types, model, width=width.inputs)
         self._servos = Servos(robot, types, model)
         ends = simulation.warmup_steps + simulation.window_steps
-        self._mind = Solo(
+        self._controller = Solo(
             pack(robot.brain, width), width, self._tick_s, ends // self._brain_steps + 1
         )
-        self._senses.show(self._mind.readings)
+        self._senses.show(self._controller.readings)
         source = Source(simulation, width, identity.origin)
         self._is_noisy = not source.is_silent
         self._noise = Noise(source, (identity.birth,), identity.trial)
         inputs = sum(neuron.layer == "input" for neuron in robot.brain.neurons)
-        self._felt = self._mind.readings[:, :inputs]
+        self._felt = self._controller.readings[:, :inputs]
 
     def tick(self, step: int) -> None:
         """Read, think and command; ``step`` counts from birth."""
@@ -201,10 +201,10 @@ class _Life:
             self._senses.start(self._model, self.data)
         tick = step // self._brain_steps
         if not self._is_noisy:
-            self._servos.drive(self.data, self._mind.step(tick))
+            self._servos.drive(self.data, self._controller.step(tick))
             return
         self._felt[:] = self._noise.blur(tick, self._felt)
-        outputs = self._mind.step(tick)[np.newaxis]
+        outputs = self._controller.step(tick)[np.newaxis]
         self._servos.drive(self.data, self._noise.shake(tick, outputs)[0])
 
 
