@@ -17,7 +17,7 @@ from worker.robot.controller import Widths
 from worker.robot.sensors import HIGHEST_OUTPUT, LOWEST_OUTPUT, into_frame
 
 
-class Nerves:
+class BatchedIO:
     """Readings of all robots, by birth, and the way to their motors.
 
     Attributes:

@@ -19,7 +19,7 @@ from schema.robot.names import BirthId
 from schema.robot.results import Floats
 from schema.wire.arena import Advance, Casualty, Changes, Insertion
 from worker.arena import light, state
-from worker.arena.batched_sensors import Nerves
+from worker.arena.batched_sensors import BatchedIO
 from worker.arena.births import check_changes, equip, newborn
 from worker.arena.brains import BatchedControllers
 from worker.arena.divergence import diverged
@@ -70,7 +70,7 @@ class World:
             Source(self._clock, width, self._settings.origin)
         )
         gravity = self._settings.environment.gravity_vector(self._clock.gravity)
-        self._nerves = Nerves(width, self._clock, gravity)
+        self._io = BatchedIO(width, self._clock, gravity)
         self._casualties: list[Casualty] = []
         self._touches = Touches(self._settings)
         self._poses = Poses(self._clock.timestep_s)
@@ -209,11 +209,11 @@ class World:
             self.population.look()
 
     def _tick(self, state: Floats) -> None:
-        nerves = self._nerves
-        nerves.settle(self.population.layout)
-        nerves.feel(state)
+        batched_io = self._io
+        batched_io.settle(self.population.layout)
+        batched_io.feel(state)
         light.shine(self.population, self.population.everybody)
-        nerves.drive(state, self._controllers.tick(self.step, nerves.readings))
+        batched_io.drive(state, self._controllers.tick(self.step, batched_io.readings))
 
     def _sample(self, state: Floats, watch: Callable[[bytes], None] | None) -> None:
         layout = self.population.layout

@@ -34,18 +34,18 @@ def test_a_batch_feels_and_commands_as_each_alone_would(
     seconds(world, 2.0)
     world.advance(world.step + 23)
     expected = lonely(world)
-    nerves, layout = world._nerves, world.population.layout
+    batched_io, layout = world._io, world.population.layout
     assert any(len(cluster.members) > 1 for cluster in world.population.clusters)
     state = layout.read()
-    nerves.settle(layout)
-    nerves.feel(state)
+    batched_io.settle(layout)
+    batched_io.feel(state)
     outputs = np.random.default_rng(3).uniform(-0.2, 1.2, (len(world.births), 40))
-    nerves.drive(state, outputs)
+    batched_io.drive(state, outputs)
     pads = 0
     for row, (one, (felt, told)) in enumerate(
         zip(world.population.everybody, expected, strict=True)
     ):
-        assert nerves.readings[row].tobytes() == felt.tobytes()
+        assert batched_io.readings[row].tobytes() == felt.tobytes()
         assert one.view.senses.readings is not felt
         assert one.view.ctrl.tolist() == told
         pads += len(one.view.senses.pads)
