@@ -10,7 +10,7 @@ from schema.mjcf.model import robot_spec, shared_model
 from schema.robot.names import BirthId
 from schema.robot.results import Floats
 from worker.arena.world import World
-from worker.clusters.interval import Stride
+from worker.clusters.rollout import Rollout
 
 
 class Oracle:
@@ -37,10 +37,10 @@ class Oracle:
         return tuple(range(step + 1, self._moments(step, until)[-1] + 1))
 
     def _watched_arrival(
-        self, stride: Stride, watch: Callable[[bytes], None] | None
+        self, rollout: Rollout, watch: Callable[[bytes], None] | None
     ) -> None:
-        self._arrive(stride, watch)
-        self._look(self.world.step, stride.state)
+        self._arrive(rollout, watch)
+        self._look(self.world.step, rollout.state)
 
     def _look(self, step: int, state: Floats) -> None:
         population = self.world.population

@@ -9,8 +9,8 @@ from schema.robot.names import BirthId
 from schema.robot.results import Floats
 from schema.wire.arena import Casualty
 from worker.clusters.cluster import Cluster
-from worker.clusters.interval import PLAUSIBLE, Stride
 from worker.clusters.population import ArenaPopulation
+from worker.clusters.rollout import PLAUSIBLE, Rollout
 
 FASTEST_CORE = 20.0
 """A core faster than this has broken the physics [m/s]; a fall from the thesis's
@@ -18,7 +18,7 @@ FASTEST_CORE = 20.0
 
 
 def diverged(
-    population: ArenaPopulation, stride: Stride, step: int, *, looks_closely: bool
+    population: ArenaPopulation, rollout: Rollout, step: int, *, looks_closely: bool
 ) -> list[Casualty]:
     """Return those whose physics diverged, by birth.
 
@@ -27,17 +27,17 @@ def diverged(
 
     Args:
         population: the living.
-        stride: what they did, and which moment of it is looked at.
+        rollout: what they did, and which moment of it is looked at.
         step: the arena's.
         looks_closely: the engine's warnings are read in any case.
     """
-    is_quiet = _is_quiet(stride.loudest)
+    is_quiet = _is_quiet(rollout.loudest)
     if not is_quiet:
-        velocities = np.abs(stride.state[population.layout.velocities])
+        velocities = np.abs(rollout.state[population.layout.velocities])
         is_quiet = _is_quiet(float(velocities.max(initial=0.0)))
-    if is_quiet and not looks_closely and not stride.has_failures:
+    if is_quiet and not looks_closely and not rollout.has_failures:
         return []
-    moment = stride.moment
+    moment = rollout.moment
     found: list[Casualty] = []
     for cluster in population.clusters:
         reasons, complaint = {}, ""

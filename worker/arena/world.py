@@ -28,9 +28,9 @@ from worker.arena.poses import Poses
 from worker.arena.schedule import Schedule
 from worker.arena.threads import Pool
 from worker.arena.touches import Touches
-from worker.clusters.interval import Stride
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
+from worker.clusters.rollout import Rollout
 from worker.robot.evaluation import silence_engine
 from worker.robot.noise import Source
 
@@ -173,14 +173,14 @@ class World:
         plan = [b - a for a, b in itertools.pairwise((self.step, *moments))]
         self._run(plan)
         looks = [self._schedule.is_look(step) for step in moments]
-        stride = self.population.begin(plan, looks)
+        rollout = self.population.begin(plan, looks)
         for moment, step in enumerate(moments):
-            self.step, stride.moment = step, moment
-            self._arrive(stride, watch)
+            self.step, rollout.moment = step, moment
+            self._arrive(rollout, watch)
             self.population.catch_up()
         self.population.end()
         if self._schedule.is_parting(self.step):
-            self.population.part(stride.state)
+            self.population.part(rollout.state)
 
     def _run(self, plan: Sequence[int]) -> None:
         clusters = self.population.by_cost
@@ -190,7 +190,7 @@ class World:
             return
         self._pool.run([partial(cluster.run, plan) for cluster in clusters])
 
-    def _arrive(self, stride: Stride, watch: Callable[[bytes], None] | None) -> None:
+    def _arrive(self, rollout: Rollout, watch: Callable[[bytes], None] | None) -> None:
         step, on = self.step, self._schedule
         is_tick, is_sample, is_look = (
             on.is_tick(step),
@@ -199,13 +199,13 @@ class World:
         )
         if not (is_tick or is_sample or is_look):
             return
-        self._drop_diverged(stride)
+        self._drop_diverged(rollout)
         if is_tick:
-            self._tick(stride.state)
+            self._tick(rollout.state)
         if is_sample:
-            self._sample(stride.state, watch)
+            self._sample(rollout.state, watch)
         if is_look:
-            self._touches.count(self.population.clusters, stride.moment)
+            self._touches.count(self.population.clusters, rollout.moment)
             self.population.look()
 
     def _tick(self, state: Floats) -> None:
@@ -244,10 +244,10 @@ class World:
         self.population.kinematics()
         self.population.look()
 
-    def _drop_diverged(self, stride: Stride) -> None:
+    def _drop_diverged(self, rollout: Rollout) -> None:
         """Let the diverged go."""
         is_parting = self._schedule.is_parting(self.step)
-        fallen = diverged(self.population, stride, self.step, looks_closely=is_parting)
+        fallen = diverged(self.population, rollout, self.step, looks_closely=is_parting)
         self._casualties += fallen
         if fallen:
             self._dismiss([casualty.birth for casualty in fallen])

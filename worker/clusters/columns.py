@@ -178,16 +178,16 @@ class Layout:
         return slice(start, start + int(self.robot_rows.sizes[row]))
 
 
-def runs(starts: Indices, counts: Indices, stride: int = 1) -> Indices:
+def runs(starts: Indices, counts: Indices, rollout: int = 1) -> Indices:
     """Return the numbers of some runs, each from its start on, one after another.
 
     Args:
         starts: (R,) of the runs.
         counts: (R,) how many numbers each has.
-        stride: from one number of a run to the next.
+        rollout: from one number of a run to the next.
     """
-    first: Indices = np.repeat(starts - stride * (np.cumsum(counts) - counts), counts)
-    return first + stride * np.arange(len(first))
+    first: Indices = np.repeat(starts - rollout * (np.cumsum(counts) - counts), counts)
+    return first + rollout * np.arange(len(first))
 
 
 def _joined(parts: Sequence[Floats]) -> Floats:

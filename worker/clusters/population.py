@@ -16,10 +16,10 @@ from schema.robot.results import Floats
 from worker.clusters.cluster import Cluster
 from worker.clusters.columns import Layout, RobotRows
 from worker.clusters.groups import Group, across, components
-from worker.clusters.interval import Stride
 from worker.clusters.models import ModelCache
 from worker.clusters.proximity import Pairs, Proximity, Scene
 from worker.clusters.robot import ArenaRobot
+from worker.clusters.rollout import Rollout
 
 
 class ArenaPopulation:
@@ -29,7 +29,7 @@ class ArenaPopulation:
         clusters: of all of them.
         by_cost: the same clusters, dearest first.
         layout: where their numbers stand.
-        stride: the stretch of time that is being looked at; nothing between two.
+        rollout: the stretch of time that is being looked at; nothing between two.
         merges, splits: how often clusters were joined and parted.
     """
 
@@ -41,7 +41,7 @@ class ArenaPopulation:
         self.clusters: tuple[Cluster, ...] = ()
         self.by_cost: list[Cluster] = []
         self.layout = Layout((), self.robot_rows)
-        self.stride: Stride | None = None
+        self.rollout: Rollout | None = None
         self.merges = self.splits = 0
         self._cluster_of: dict[BirthId, Cluster] = {}
         self._new: list[Cluster] = []
@@ -92,38 +92,38 @@ class ArenaPopulation:
             self.model_cache.forget(birth)
         self._settle(kept)
 
-    def begin(self, plan: Sequence[int], looks: Sequence[bool]) -> Stride:
+    def begin(self, plan: Sequence[int], looks: Sequence[bool]) -> Rollout:
         """Look, from now on, at a stretch that all clusters have gone through.
 
         Args:
             plan: steps to each moment from the one before.
             looks: whether it is looked then who may touch whom.
         """
-        self.stride = Stride(tuple(plan), tuple(looks))
-        self.stride.read(self.layout)
-        return self.stride
+        self.rollout = Rollout(tuple(plan), tuple(looks))
+        self.rollout.read(self.layout)
+        return self.rollout
 
     def catch_up(self) -> None:
         """Let clusters that are new at this moment go through the rest, too."""
-        stride = self.stride
-        if stride is None or not self._new:
+        rollout = self.rollout
+        if rollout is None or not self._new:
             return
         for cluster in self._new:
-            cluster.run(stride.plan, stride.moment + 1)
+            cluster.run(rollout.plan, rollout.moment + 1)
         self._new = []
-        stride.read(self.layout)
+        rollout.read(self.layout)
 
     def end(self) -> None:
         """Have looked at all of the stretch: now is its last moment."""
-        self.stride, self._new = None, []
+        self.rollout, self._new = None, []
 
     def look(self) -> None:
         """Join those who may touch before the next look."""
-        if self.stride is None:
+        if self.rollout is None:
             scene = Scene(self.layout, self.layout.read()[np.newaxis])
             pairs = self.proximity.meetings(scene)[0]
         else:
-            pairs = self._meetings(self.stride)
+            pairs = self._meetings(self.rollout)
         if pairs:
             old = [cluster.members for cluster in self.clusters]
             self.regroup(components(old, self._links(pairs)))
@@ -174,9 +174,9 @@ class ArenaPopulation:
     def _move(self, members: Group) -> Cluster:
         """Return a cluster into which robots have moved with their states."""
         people = [self.find(birth) for birth in members]
-        if self.stride is not None:
+        if self.rollout is not None:
             for birth in members:
-                self._cluster_of[birth].rewind(self.stride.moment)
+                self._cluster_of[birth].rewind(self.rollout.moment)
         cluster = self.model_cache.cluster(members, [one.body for one in people])
         for one, view in zip(people, cluster.views, strict=True):
             view.take(one.view)
@@ -192,23 +192,23 @@ class ArenaPopulation:
         }
         self.layout = Layout(self.clusters, self.robot_rows)
         self.by_cost = sorted(self.clusters, key=lambda cluster: -cluster.cost)
-        if self.stride is None:
+        if self.rollout is None:
             return
-        moment, count = self.stride.moment, len(self.stride.plan)
+        moment, count = self.rollout.moment, len(self.rollout.plan)
         for cluster in self.clusters:
             if id(cluster) not in known:
                 cluster.keep(range(moment, count))
                 self._new.append(cluster)
-        self.stride.read(self.layout)
+        self.rollout.read(self.layout)
 
-    def _meetings(self, stride: Stride) -> Pairs:
+    def _meetings(self, rollout: Rollout) -> Pairs:
         """Return who is to meet at this look; find it out for all that follow."""
-        if stride.moment not in stride.meetings:
-            looks = stride.looks_ahead()
-            scene = Scene(self.layout, stride.states[looks])
+        if rollout.moment not in rollout.meetings:
+            looks = rollout.looks_ahead()
+            scene = Scene(self.layout, rollout.states[looks])
             found = self.proximity.meetings(scene)
-            stride.meetings = dict(zip(looks, found, strict=True))
-        return stride.meetings[stride.moment]
+            rollout.meetings = dict(zip(looks, found, strict=True))
+        return rollout.meetings[rollout.moment]
 
     def _links(self, pairs: Pairs) -> list[tuple[BirthId, BirthId]]:
         """Return the names of pairs of rows."""

@@ -14,7 +14,7 @@ PLAUSIBLE = 1e6
 """Beyond this a coordinate or a velocity is none."""
 
 
-class Stride:
+class Rollout:
     """States of all clusters at K moments.
 
     Attributes:
