@@ -26,7 +26,7 @@ _Ball = tuple[Floats, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Reach:
+class BoundingSpheres:
     """What bounds one robot, whatever its joints do.
 
     Attributes:
@@ -47,7 +47,7 @@ class Reach:
     weights: Floats
 
 
-def reach_of(model: mujoco.MjModel) -> Reach:
+def bounding_spheres(model: mujoco.MjModel) -> BoundingSpheres:
     """Return what bounds the one robot of a model.
 
     Args:
@@ -74,7 +74,7 @@ def reach_of(model: mujoco.MjModel) -> Reach:
         weights[int(model.jnt_dofadr[joint])] = far[body]
     counts = [len(cover) for cover in covers]
     balls = [ball for cover in covers for ball in cover]
-    return Reach(
+    return BoundingSpheres(
         np.repeat(np.arange(len(covers)), counts),
         np.tile([centre for centre, _ in balls], 3),
         np.array([radius for _, radius in balls]),

@@ -31,12 +31,12 @@ class RobotRows:
         body_counts: (R,) how many bodies each has.
         first_bodies: (R,) the first of each among the N of all.
         spans: of each robot, which of the N are its own.
-        hulls: (4, N) as ``Reach.hulls``.
+        hulls: (4, N) as ``BoundingSpheres.hulls``.
         ball_counts: (R,) how many spheres cover each.
         first_balls: (R,) the first of each among all spheres.
         balls: which of the N each sphere is fixed to.
-        centres, radii: of all spheres, as in ``Reach``.
-        weights: of the absolute velocities of all, as ``Reach.weights``.
+        centres, radii: of all spheres, as in ``BoundingSpheres``.
+        weights: of the absolute velocities of all, as ``BoundingSpheres.weights``.
     """
 
     def __init__(self, everybody: Sequence[ArenaRobot]) -> None:

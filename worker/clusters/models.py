@@ -14,7 +14,7 @@ from schema.mjcf.model import Furnish, robot_spec, shared_model, solo_model
 from schema.mjcf.world import add_ring_wall
 from schema.robot.names import BirthId
 from schema.robot.robot import Robot
-from worker.clusters.bounds import Reach, reach_of
+from worker.clusters.bounds import BoundingSpheres, bounding_spheres
 from worker.clusters.cluster import Cluster
 from worker.clusters.engine_view import Rules
 from worker.robot.controller import widths
@@ -34,7 +34,7 @@ class Body:
     """
 
     robot: Robot
-    reach: Reach
+    reach: BoundingSpheres
     home: Cluster
 
 
@@ -75,7 +75,7 @@ class ModelCache:
         )
         home = Cluster((birth,), ("",), model)
         home.view(robot, model, self._rules)
-        return Body(robot, reach_of(model), home)
+        return Body(robot, bounding_spheres(model), home)
 
     def height(self, body: Body, place: tuple[float, float], heading: float) -> float:
         """Return how high a robot's core is when the arena drops it [m].
