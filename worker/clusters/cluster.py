@@ -16,8 +16,8 @@ from schema.robot.names import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.clusters.bounds import Indices
+from worker.clusters.connected_components import Group, connected_components
 from worker.clusters.engine_view import EngineView, Rules
-from worker.clusters.groups import Group, components
 
 NEVER = 1 << 62
 """A moment that does not come."""
@@ -165,7 +165,7 @@ class Cluster:
         if not self.is_shared:
             return [self.members]
         links = [(self.members[a], self.members[b]) for a, b in self.touching()]
-        return components([(birth,) for birth in self.members], links)
+        return connected_components([(birth,) for birth in self.members], links)
 
     def _feel(self) -> None:
         """Note what pads may feel while the engine's contacts are at hand."""

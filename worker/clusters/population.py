@@ -15,7 +15,7 @@ from schema.robot.names import BirthId
 from schema.robot.results import Floats
 from worker.clusters.cluster import Cluster
 from worker.clusters.columns import Layout, RobotRows
-from worker.clusters.groups import Group, across, components
+from worker.clusters.connected_components import Group, across, connected_components
 from worker.clusters.models import ModelCache
 from worker.clusters.proximity import Pairs, Proximity, Scene
 from worker.clusters.robot import ArenaRobot
@@ -126,7 +126,7 @@ class ArenaPopulation:
             pairs = self._meetings(self.rollout)
         if pairs:
             old = [cluster.members for cluster in self.clusters]
-            self.regroup(components(old, self._links(pairs)))
+            self.regroup(connected_components(old, self._links(pairs)))
 
     def part(self, state: Floats) -> None:
         """Let clusters fall into those parts that have drifted apart.
@@ -145,7 +145,7 @@ class ArenaPopulation:
         if pairs:
             scene = Scene(self.layout, state[np.newaxis])
             near = self.proximity.near(scene, pairs)
-            self.regroup(components(groups, self._links(near)))
+            self.regroup(connected_components(groups, self._links(near)))
 
     def regroup(self, groups: Iterable[Group]) -> None:
         """Have exactly these groups live together, each ascending by birth."""

@@ -19,7 +19,7 @@ def across(groups: Sequence[Sequence[int]]) -> list[tuple[int, int]]:
     )
 
 
-def components(
+def connected_components(
     groups: Iterable[Group], links: Iterable[tuple[BirthId, BirthId]]
 ) -> list[Group]:
     """Return groups joined along links, each and all ascending."""
