@@ -22,12 +22,12 @@ from worker.arena import light, state
 from worker.arena.batched_sensors import BatchedIO
 from worker.arena.births import check_changes, equip, newborn
 from worker.arena.brains import BatchedControllers
+from worker.arena.contacts import Contacts
 from worker.arena.divergence import diverged
 from worker.arena.fitness_window import judge_all
 from worker.arena.poses import Poses
 from worker.arena.schedule import Schedule
 from worker.arena.threads import Pool
-from worker.arena.touches import Touches
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.rollout import Rollout
@@ -72,7 +72,7 @@ class World:
         gravity = self._settings.environment.gravity_vector(self._clock.gravity)
         self._io = BatchedIO(width, self._clock, gravity)
         self._casualties: list[Casualty] = []
-        self._touches = Touches(self._settings)
+        self._touches = Contacts(self._settings)
         self._poses = Poses(self._clock.timestep_s)
 
     def close(self) -> None:

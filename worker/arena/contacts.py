@@ -8,7 +8,7 @@ from schema.wire.arena import Touch
 from worker.clusters.cluster import Cluster
 
 
-class Touches:
+class Contacts:
     """Tallies of an advance: each look at which two robots touch counts whole."""
 
     def __init__(self, settings: ArenaSettings) -> None:
