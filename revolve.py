@@ -90,7 +90,7 @@ def _obey(words: list[str]) -> int:
         )
         return 2
     # Before NumPy is first imported: a robot's arithmetic must not depend on cores.
-    import_module("schema.agent.crew").prepare_process()
+    import_module("schema.agent.supervisor").prepare_process()
     error_type = import_module("schema.errors").RevolveError
     try:
         room = import_module(COMMANDS[words[0]][0])

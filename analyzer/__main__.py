@@ -2,7 +2,7 @@
 
 import sys
 
-from schema.agent.crew import prepare_process
+from schema.agent.supervisor import prepare_process
 
 
 def main(arguments: list[str]) -> int:
@@ -16,9 +16,9 @@ def main(arguments: list[str]) -> int:
     """
     prepare_process()  # before anything imports numpy
     from analyzer.service import process
-    from schema.agent.command import run_crew
+    from schema.agent.command import run_pool
 
-    return run_crew("analyzer", process, arguments[1:], processes=1)
+    return run_pool("analyzer", process, arguments[1:], processes=1)
 
 
 if __name__ == "__main__":

@@ -20,8 +20,8 @@ from coordinator.storage.compare import compare
 from coordinator.storage.folder import holds_run, read_details
 from coordinator.storage.hints import stopped
 from schema.agent.command import tls_of
-from schema.agent.crew import cores
 from schema.agent.service import tell_user
+from schema.agent.supervisor import cores
 from schema.errors import NetworkError, RunFolderError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import (

@@ -2,7 +2,7 @@
 
 import sys
 
-from schema.agent.crew import cores, prepare_process
+from schema.agent.supervisor import cores, prepare_process
 
 
 def main(arguments: list[str]) -> int:
@@ -15,10 +15,10 @@ def main(arguments: list[str]) -> int:
         0 after Ctrl-C or SIGTERM; 130 after a second Ctrl-C.
     """
     prepare_process()  # before anything imports numpy
-    from schema.agent.command import run_crew
+    from schema.agent.command import run_pool
     from worker.serve.service import process
 
-    return run_crew("worker", process, arguments[1:], processes=cores())
+    return run_pool("worker", process, arguments[1:], processes=cores())
 
 
 if __name__ == "__main__":

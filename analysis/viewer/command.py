@@ -26,8 +26,8 @@ from analysis.viewer.show import Show
 from analysis.viewer.stage import stage
 from analysis.viewer.watch import watch
 from schema.agent.command import add_network_flags, tls_of
-from schema.agent.crew import stop_on_signals
 from schema.agent.service import tell_user
+from schema.agent.supervisor import stop_on_signals
 from schema.flags import Flags, number
 from schema.robot.names import BirthId
 

@@ -246,7 +246,7 @@ class Recording:
         arrows = rr.GraphEdges(edges, graph_type="directed")
         self._stream.log("ancestry", nodes, arrows)
 
-    def crew(self, text: str) -> None:
+    def process_pool(self, text: str) -> None:
         """Tell who works, as Markdown."""
         document = rr.TextDocument(text, media_type="text/markdown")
         self._stream.log("workers", document, static=True)

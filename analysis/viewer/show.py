@@ -97,7 +97,7 @@ class Show:
         self._lineage.draw()
         if news.workers != self._workers:
             self._workers = news.workers
-            self._recording.crew(_crew(news.workers))
+            self._recording.process_pool(_process_pool(news.workers))
 
     def move(
         self, arena: int, poses: pa.Table, *, has_all: bool = True
@@ -239,7 +239,7 @@ def _in_order(news: News) -> list[Newborn | Level | Departed]:
     return [*came, *sorted(news.deaths, key=lambda gone: gone.births)]
 
 
-def _crew(workers: tuple[Crewman, ...]) -> str:
+def _process_pool(workers: tuple[Crewman, ...]) -> str:
     """Return a table of who works, as Markdown."""
     lines = ["| worker | platform | arenas |", "|---|---|---|"]
     for man in workers:

@@ -30,9 +30,9 @@ from coordinator.evolution.generation import generate
 from coordinator.network.service import Network
 from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
-from schema.agent.crew import Crew
 from schema.agent.network import Agent
 from schema.agent.supervision import Post
+from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name
 from schema.experiment.document import body_space
 from schema.experiment.file import experiment_text, read_experiment
@@ -129,12 +129,12 @@ def real_fleet(bodies: dict[AgentKind, tuple[Body, int]]) -> Iterator[Fleet]:
     """
     with Network(name=unique_name("bench")) as network:
         fleet = Fleet(network)
-        crews = []
+        process_pools = []
         try:
             for kind, (body, size) in bodies.items():
                 agent = Agent(kind, kind, network.address)
-                crews.append(Crew(body, (agent,), size=size))
-                crews[-1].look_after()
+                process_pools.append(ProcessPool(body, (agent,), size=size))
+                process_pools[-1].look_after()
             until_s = time.monotonic() + _PATIENCE_S
             while any(
                 fleet.dispatch.agents(kind) < size for kind, (_, size) in bodies.items()
@@ -144,8 +144,8 @@ def real_fleet(bodies: dict[AgentKind, tuple[Body, int]]) -> Iterator[Fleet]:
                     raise RuntimeError("not all processes of the fleet came up")
             yield fleet
         finally:
-            for crew in crews:
-                crew.end()
+            for process_pool in process_pools:
+                process_pool.end()
 
 
 def measure(fleet: Fleet, done: Callable[[], int], seconds: float) -> Rate:

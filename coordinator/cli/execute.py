@@ -45,11 +45,11 @@ from coordinator.storage.folder_status import (
     unbegun_status,
 )
 from coordinator.storage.hints import command, stopped
-from schema.agent.crew import Crew, stop_on_signals
 from schema.agent.network import THIS_MACHINE, Agent, Tls
 from schema.agent.platform_tag import platform_tag
 from schema.agent.service import tell_user
 from schema.agent.supervision import CPU_LIMIT_S, Post
+from schema.agent.supervisor import ProcessPool, stop_on_signals
 from schema.agent.topics import unique_name
 from schema.errors import NetworkError, RevolveError
 from schema.experiment.document import Experiment
@@ -293,7 +293,7 @@ def _conduct(
     """
     stop = stop_on_signals()
     with ExitStack() as stack:
-        agents, crews = stack.enter_context(_agents(place, deployment))
+        agents, process_pools = stack.enter_context(_agents(place, deployment))
         scheduler = RunScheduler(
             planned,
             Fleet(agents, allows_drift=deployment.allows_drift),
@@ -323,7 +323,7 @@ def _conduct(
                 if now_s - done_s >= _CHORES_S:
                     done_s = now_s
                     scheduler.do_chores(now_s)
-                    for look_after in crews:
+                    for look_after in process_pools:
                         look_after()
         scheduler.stop()
     return scheduler
@@ -388,7 +388,7 @@ def _agents(
         stack.callback(_take_away, note, text)
         if deployment.view:
             open_viewer(network.address, deployment.fleet, deployment.tls)
-        crews: list[Callable[[], None]] = []
+        process_pools: list[Callable[[], None]] = []
         sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
         for kind, size in sizes.items() if deployment.workers else ():
             agent = Agent(
@@ -396,11 +396,11 @@ def _agents(
                 tls=deployment.tls, threads=deployment.threads,
                 cpu_limit_s=deployment.cpu_limit_s,
             )  # fmt: skip
-            crew = Crew(deployment.bodies[kind], (agent,), size=size)
-            crews.append(stack.enter_context(crew).look_after)
+            process_pool = ProcessPool(deployment.bodies[kind], (agent,), size=size)
+            process_pools.append(stack.enter_context(process_pool).look_after)
         if deployment.listen is not None:
             tell_user(f"listening on {network.address}")
-        yield network, crews
+        yield network, process_pools
 
 
 def _take_away(note: Path, text: str) -> None:

@@ -75,7 +75,7 @@ class Display:
 
     def _draw(self, status: Status) -> None:
         rows: dict[str, tuple[IslandStatus | RunStatus | Status, str]] = {}
-        about = f"{_pace(status)}, {_crew(status)}"
+        about = f"{_pace(status)}, {_process_pool(status)}"
         if len(status.runs) > 1:
             done = sum(run.state == "finished" for run in status.runs)
             name = f"{done} of {len(status.runs)} runs"
@@ -139,12 +139,12 @@ def _line(status: Status) -> str:
     else:
         done = sum(run.state == "finished" for run in status.runs)
         about = f"{done} of {len(status.runs)} runs, {about}"
-    return f"{about}, {_crew(status)}"
+    return f"{about}, {_process_pool(status)}"
 
 
 def _pace(status: Status) -> str:
     return f"{status.births_per_s:.1f}/s, {duration(status.left_s)} left"
 
 
-def _crew(status: Status) -> str:
+def _process_pool(status: Status) -> str:
     return f"{status.workers} workers"

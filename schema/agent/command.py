@@ -12,9 +12,9 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from schema.agent.crew import Crew, stop_on_signals, stop_with_input
 from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config
 from schema.agent.supervision import CPU_LIMIT_S, Death, Post
+from schema.agent.supervisor import ProcessPool, stop_on_signals, stop_with_input
 from schema.agent.topics import Role, check_name
 from schema.errors import NetworkError, RevolveError
 from schema.flags import Flags, positive_number, whole_number
@@ -72,7 +72,7 @@ def host_name() -> str:
     return re.sub(r"[^A-Za-z0-9-]", "-", socket.gethostname()).strip("-")[:40] or "host"
 
 
-def run_crew(
+def run_pool(
     role: Role,
     body: Callable[[Agent, Post], None],
     arguments: list[str],
@@ -106,17 +106,17 @@ def run_crew(
         stop_with_input(stop)
     restarts = deaths = 0
     try:
-        with Crew(body, (agent,), size=options.processes) as crew:
+        with ProcessPool(body, (agent,), size=options.processes) as process_pool:
             while not stop.is_set():
-                crew.look_after()
-                crew.wait(_POLL_S)
-                for death in crew.deaths[deaths:]:
+                process_pool.look_after()
+                process_pool.wait(_POLL_S)
+                for death in process_pool.deaths[deaths:]:
                     sys.stderr.write(f"{tell_death(death)}\n")
-                if crew.restarts > restarts:
+                if process_pool.restarts > restarts:
                     sys.stderr.write(f"a {role} is gone; another takes its place\n")
-                restarts, deaths = crew.restarts, len(crew.deaths)
-                if len(crew.exit_codes) == options.processes:
-                    return max(crew.exit_codes)
+                restarts, deaths = process_pool.restarts, len(process_pool.deaths)
+                if len(process_pool.exit_codes) == options.processes:
+                    return max(process_pool.exit_codes)
     except KeyboardInterrupt:
         return 130
     return 0

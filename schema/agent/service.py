@@ -15,11 +15,11 @@ from typing import Any
 
 import zenoh
 
-from schema.agent.crew import stop_on_signals, stop_with_parent
 from schema.agent.network import Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.serving import Server, Tally
 from schema.agent.supervision import Post
+from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
 from schema.agent.turns import Turns
 

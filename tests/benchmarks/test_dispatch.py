@@ -35,8 +35,8 @@ from coordinator.run.session import RunSession
 from coordinator.storage.campaign import Campaign
 from coordinator.storage.folder import RunFolder
 from coordinator.storage.folder_status import unbegun_status
-from schema.agent.crew import Crew, prepare_process
 from schema.agent.network import Agent
+from schema.agent.supervisor import ProcessPool, prepare_process
 from schema.agent.topics import unique_name
 from schema.experiment.file import read_experiment
 from schema.wire.codec import decode_answer
@@ -84,9 +84,9 @@ def campaign(folder: Path) -> Iterator[tuple[RunScheduler, Watched]]:
     with ExitStack() as stack:
         network = stack.enter_context(Network(name=unique_name("bench")))
         judge = Agent("analyzer", "analyzer", network.address)
-        stack.enter_context(Crew(analyzer.service.process, (judge,), size=1))
+        stack.enter_context(ProcessPool(analyzer.service.process, (judge,), size=1))
         hand = Agent("worker", "worker", network.address)
-        stack.enter_context(Crew(worker.serve.service.process, (hand,), size=2))
+        stack.enter_context(ProcessPool(worker.serve.service.process, (hand,), size=2))
         watched = Watched(network)
         fleet = Fleet(watched)
         scheduler = RunScheduler(

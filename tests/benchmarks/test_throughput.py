@@ -34,9 +34,9 @@ from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.journal import Journal
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
-from schema.agent.crew import Crew, prepare_process
 from schema.agent.network import Agent
 from schema.agent.supervision import Post
+from schema.agent.supervisor import ProcessPool, prepare_process
 from schema.agent.topics import unique_name
 from schema.experiment.document import Experiment, body_space
 from schema.experiment.file import experiment_text, read_experiment
@@ -144,9 +144,9 @@ def started(
         stack.callback(recorder.close)
         network = stack.enter_context(Network(name=unique_name("bench")))
         vetters = Agent("analyzer", "analyzer", network.address)
-        stack.enter_context(Crew(analyzer.service.process, (vetters,), size=1))
+        stack.enter_context(ProcessPool(analyzer.service.process, (vetters,), size=1))
         agent = Agent("worker", "worker", network.address)
-        stack.enter_context(Crew(body, (agent,), size=workers))
+        stack.enter_context(ProcessPool(body, (agent,), size=workers))
         journal = Counted(stack.enter_context(Journal.open(folder)))
         fleet = Fleet(network)
         loop = Loop(

@@ -145,7 +145,7 @@ def run(folder: Path, out: str, *, is_watched: bool) -> float:
     cores = sorted(os.sched_getaffinity(0))
     words = ("watched.toml", "--seed", "2", "--quiet", "--out", out)
     listen = ("--listen", "tcp/127.0.0.1:0")
-    crew = [start(folder, cores[0], "coordinator", *words, *listen)]
+    process_pool = [start(folder, cores[0], "coordinator", *words, *listen)]
     address = folder / out / "address"
     wait_for(address.exists)
     connect = ("--connect", address.read_text().strip())
@@ -154,16 +154,16 @@ def run(folder: Path, out: str, *, is_watched: bool) -> float:
     if is_watched:
         viewer = start(folder, cores[-1], "view", *connect, "--save", recording.name)
         wait_for(recording.exists)
-    crew += [
+    process_pool += [
         start(folder, cores[0], role, *connect, "--processes", "1")
         for role in ("worker", "analyzer")
     ]
     journal = folder / out / "journal.bin"
     wait_for(lambda: journal.stat().st_size > 10_000)
     began = time.perf_counter()
-    assert crew[0].wait(300) == 0
+    assert process_pool[0].wait(300) == 0
     took_s = time.perf_counter() - began
-    for process in crew[1:]:
+    for process in process_pool[1:]:
         process.send_signal(signal.SIGINT)
         process.wait(60)
     if viewer is not None:

@@ -77,11 +77,11 @@ class Fleet:
 
     def kill(self, name: str) -> None:
         """Kill an agent, and whoever would revive it."""
-        crew = self.agents.pop(name)
-        crew.send_signal(signal.SIGSTOP)
-        for child in agent_processes(crew.pid):
+        process_pool = self.agents.pop(name)
+        process_pool.send_signal(signal.SIGSTOP)
+        for child in agent_processes(process_pool.pid):
             os.kill(child, signal.SIGKILL)
-        crew.send_signal(signal.SIGKILL)
+        process_pool.send_signal(signal.SIGKILL)
 
     def wait_for(self, position: float) -> None:
         """Wait until the journal is so long [bytes] or the run has ended."""

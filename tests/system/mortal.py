@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from schema.agent.crew import prepare_process
+from schema.agent.supervisor import prepare_process
 
 prepare_process()
 

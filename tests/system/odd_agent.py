@@ -12,9 +12,9 @@ from queue import Empty, SimpleQueue
 
 import zenoh
 
-from schema.agent.crew import prepare_process
 from schema.agent.network import Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
+from schema.agent.supervisor import prepare_process
 from schema.agent.topics import Member, unique_name
 from schema.wire import revolve_pb2 as pb
 

@@ -119,11 +119,11 @@ class Fleet:
         """Kill the worker that made the last advance, and whoever would revive it."""
         agent = advances(self.folder)[-1].provenance.agent
         name = agent.partition("-")[0]
-        crew = self.workers.pop(name)
-        crew.send_signal(signal.SIGSTOP)
-        for child in children(crew.pid):
+        process_pool = self.workers.pop(name)
+        process_pool.send_signal(signal.SIGSTOP)
+        for child in children(process_pool.pid):
             subprocess.run(["kill", "-KILL", str(child)], check=False)
-        crew.send_signal(signal.SIGKILL)
+        process_pool.send_signal(signal.SIGKILL)
         return name
 
 

@@ -116,11 +116,11 @@ class Play:
         self.until((folder / "address").exists, "the coordinator listens")
         address = (folder / "address").read_text().strip()
         self.stage.start("analyzer", "--connect", address)
-        crew = [
+        process_pool = [
             self.stage.start("worker", "--connect", address, "--processes", "1")
             for _ in range(workers)
         ]
-        for one, share in zip(crew[1:], shares, strict=False):
+        for one, share in zip(process_pool[1:], shares, strict=False):
             self.until(
                 lambda share=share: (  # type: ignore[misc]
                     size(folder) > share * size(self.calm)

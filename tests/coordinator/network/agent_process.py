@@ -8,10 +8,10 @@ is of another version.
 import sys
 import threading
 
-from schema.agent.crew import stop_on_signals
 from schema.agent.network import Agent
 from schema.agent.platform_tag import wire_version
 from schema.agent.service import serve
+from schema.agent.supervisor import stop_on_signals
 from schema.agent.topics import Role
 from schema.errors import MalformedMessage
 from schema.wire import revolve_pb2 as pb

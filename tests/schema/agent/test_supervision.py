@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from schema.agent.crew import Crew
 from schema.agent.supervision import Death, JobNote, Post, Task, own_doing
+from schema.agent.supervisor import ProcessPool
 
 TASK = Task("worker-0.ab", "host:some/folder", 3, 2**40)
 PATIENCE_S = 30.0
@@ -102,22 +102,22 @@ def _kill(signal_number: int) -> bytes:
     return b""
 
 
-def until(crew: Crew, is_enough: Callable[[], bool]) -> None:
+def until(process_pool: ProcessPool, is_enough: Callable[[], bool]) -> None:
     end_s = time.monotonic() + PATIENCE_S
     while not is_enough():
         assert time.monotonic() < end_s
-        crew.look_after()
-        crew.wait(0.1)
+        process_pool.look_after()
+        process_pool.wait(0.1)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_who_takes_a_dead_ones_place_is_told_what_it_died_of(tmp_path: Path) -> None:
     log = tmp_path / "log"
-    with Crew(die, (signal.SIGSEGV, str(log)), size=1) as crew:
-        until(crew, lambda: crew.exit_codes == [0])
-        assert crew.deaths == [Death(TASK, "SIGSEGV")] * 2
-        assert crew.restarts == 2
+    with ProcessPool(die, (signal.SIGSEGV, str(log)), size=1) as process_pool:
+        until(process_pool, lambda: process_pool.exit_codes == [0])
+        assert process_pool.deaths == [Death(TASK, "SIGSEGV")] * 2
+        assert process_pool.restarts == 2
     lines = log.read_text().splitlines()
     assert lines == ["[]", "['SIGSEGV']", "['SIGSEGV', 'SIGSEGV']"]
 
@@ -134,10 +134,10 @@ def leave(how: str, post: Post) -> None:
 def test_who_ends_by_itself_is_replaced_later_each_time(how: str, code: int) -> None:
     """After 1 s, then 2 s: whatever befell it may befall it again."""
     began_s = time.monotonic()
-    with Crew(leave, (how,), size=1) as crew:
-        until(crew, lambda: crew.exit_codes == [code])
-        assert crew.restarts == 0
-        until(crew, lambda: crew.restarts == 2)
-        assert crew.exit_codes == []
+    with ProcessPool(leave, (how,), size=1) as process_pool:
+        until(process_pool, lambda: process_pool.exit_codes == [code])
+        assert process_pool.restarts == 0
+        until(process_pool, lambda: process_pool.restarts == 2)
+        assert process_pool.exit_codes == []
         assert time.monotonic() - began_s > 3.0
-    assert crew.deaths == []
+    assert process_pool.deaths == []

@@ -78,7 +78,7 @@ def cores() -> int:
     return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
-class Crew:
+class ProcessPool:
     """Processes that all run ``body(*arguments, post)``; use it in a ``with``.
 
     Attributes:

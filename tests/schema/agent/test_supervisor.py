@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from schema.agent.crew import stop_on_signals
+from schema.agent.supervisor import stop_on_signals
 
 _ASK = "import os; print(os.sched_getscheduler(0) == os.SCHED_{policy})"
 _START = (
     "import subprocess, sys\n"
-    "from schema.agent.crew import prepare_process\n"
+    "from schema.agent.supervisor import prepare_process\n"
     "{before}\n"
     "prepare_process()\n"
     "{ask}\n"
@@ -70,7 +70,7 @@ def test_a_child_gives_back_what_it_leaves() -> None:
     """Of 50 MiB of models whose robots died, with what lives on between them."""
     start = (
         "import subprocess, sys\n"
-        "from schema.agent.crew import prepare_process\n"
+        "from schema.agent.supervisor import prepare_process\n"
         "prepare_process()\n"
         f"subprocess.run([sys.executable, '-c', {_FORGET!r}], check=True)\n"
     )
@@ -85,7 +85,7 @@ def test_a_child_gives_back_what_it_leaves() -> None:
 
 _SHIELDED = """
 import pathlib, signal, sys
-from schema.agent.crew import Crew
+from schema.agent.supervisor import Crew
 
 def body(folder, post):
     masked = signal.pthread_sigmask(signal.SIG_BLOCK, [])
@@ -125,11 +125,11 @@ def _own_signals() -> Iterator[None]:
 def test_ctrl_c_pressed_twice_at_once_is_one_wish(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("schema.agent.crew._ONE_WISH_S", 60.0)
+    monkeypatch.setattr("schema.agent.supervisor._ONE_WISH_S", 60.0)
     stop = stop_on_signals()
     for _ in range(2):
         signal.raise_signal(signal.SIGINT)
         assert stop.is_set()
-    monkeypatch.setattr("schema.agent.crew._ONE_WISH_S", 0.0)
+    monkeypatch.setattr("schema.agent.supervisor._ONE_WISH_S", 0.0)
     with pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGINT)
