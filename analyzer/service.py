@@ -3,9 +3,9 @@
 from analyzer.jobs import answer
 from schema.agent.network import Agent
 from schema.agent.service import serve_as_process
-from schema.agent.supervision import Post
+from schema.agent.supervision import ProcessSlot
 
 
-def process(agent: Agent, post: Post) -> None:
+def process(agent: Agent, slot: ProcessSlot) -> None:
     """Be one process of a crew of analyzers; returns when asked to end."""
-    serve_as_process(answer, agent, post)
+    serve_as_process(answer, agent, slot)

@@ -118,11 +118,11 @@ def _postorder(
     )
     leaf = np.where(size == 1, at, len(at))
     leftmost = np.minimum.accumulate(leaf[::-1])[::-1]
-    post = index - depth + size - 1
-    target = starts[tree] + post
+    slot = index - depth + size - 1
+    target = starts[tree] + slot
     ordered = np.empty((4, len(at)), np.int64)
     is_key = is_core | (above != at - 1)
-    ordered[:, target] = np.stack([kinds, labels, post[leftmost], is_key])
+    ordered[:, target] = np.stack([kinds, labels, slot[leftmost], is_key])
     return Trees(
         tree_of, starts, ordered[0], ordered[1], ordered[2], ordered[3].astype(bool)
     )

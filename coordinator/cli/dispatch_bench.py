@@ -31,7 +31,7 @@ from coordinator.network.service import Network
 from coordinator.run.session import RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
 from schema.agent.network import Agent
-from schema.agent.supervision import Post
+from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name
 from schema.experiment.document import body_space
@@ -41,7 +41,7 @@ from schema.robot.genome import develop
 from schema.robot.names import BirthId
 from schema.wire.codec import encode_request, encode_robot
 
-Body = Callable[[Agent, Post], None]
+Body = Callable[[Agent, ProcessSlot], None]
 """What a process of a crew does."""
 
 LEAST_NULL_PER_S = 2000

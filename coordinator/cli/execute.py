@@ -48,7 +48,7 @@ from coordinator.storage.hints import command, stopped
 from schema.agent.network import THIS_MACHINE, Agent, Tls
 from schema.agent.platform_tag import platform_tag
 from schema.agent.service import tell_user
-from schema.agent.supervision import CPU_LIMIT_S, Post
+from schema.agent.supervision import CPU_LIMIT_S, ProcessSlot
 from schema.agent.supervisor import ProcessPool, stop_on_signals
 from schema.agent.topics import unique_name
 from schema.errors import NetworkError, RevolveError
@@ -89,7 +89,7 @@ class Deployment:
     """
 
     workers: int
-    bodies: Mapping[AgentKind, Callable[[Agent, Post], None]]
+    bodies: Mapping[AgentKind, Callable[[Agent, ProcessSlot], None]]
     answers: Mapping[AgentKind, Callable[[bytes], bytes]] | None
     listen: str | None
     connect: str | None

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config
-from schema.agent.supervision import CPU_LIMIT_S, Death, Post
+from schema.agent.supervision import CPU_LIMIT_S, Death, ProcessSlot
 from schema.agent.supervisor import ProcessPool, stop_on_signals, stop_with_input
 from schema.agent.topics import Role, check_name
 from schema.errors import NetworkError, RevolveError
@@ -74,7 +74,7 @@ def host_name() -> str:
 
 def run_pool(
     role: Role,
-    body: Callable[[Agent, Post], None],
+    body: Callable[[Agent, ProcessSlot], None],
     arguments: list[str],
     processes: int,
 ) -> int:

@@ -18,7 +18,7 @@ import zenoh
 from schema.agent.network import Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.serving import Server, Tally
-from schema.agent.supervision import Post
+from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
 from schema.agent.turns import Turns
@@ -27,7 +27,7 @@ _POLL_S = 0.2
 _RETRY_S = 0.3
 _SAY_S = 5.0
 
-NOBODYS = Post()
+NOBODYS = ProcessSlot()
 """The place of a process that nobody looks after."""
 
 
@@ -83,7 +83,7 @@ def serve(
     say: Callable[[str], None] = tell_user,
     *,
     outlet: Outlet | None = None,
-    post: Post = NOBODYS,
+    slot: ProcessSlot = NOBODYS,
 ) -> Tally:
     """Answer jobs until told to stop; wait for the hub as long as it takes.
 
@@ -97,7 +97,7 @@ def serve(
         stop: ends it; looked at between jobs.
         say: told, in one line, when there is no hub and when there is one again.
         outlet: publishes by this agent's session while there is one.
-        post: this process's place in a crew, if it has one.
+        slot: this process's place in a crew, if it has one.
 
     Raises:
         NetworkError: a name or an address that is none.
@@ -105,7 +105,7 @@ def serve(
     check_name(agent.name, "name")
     check_name(agent.fleet, "fleet")
     config = client_config(agent.connect, agent.tls)
-    server = Server(answer, agent, post)
+    server = Server(answer, agent, slot)
     hub = _Hub(agent.connect, say)
     zenoh.init_log_from_env_or("error")
     session = _open(config, hub, stop)
@@ -137,7 +137,7 @@ def own_agent(agent: Agent, index: int) -> Agent:
 def serve_as_process(
     answer: Callable[[bytes], bytes],
     agent: Agent,
-    post: Post,
+    slot: ProcessSlot,
     outlet: Outlet | None = None,
 ) -> None:
     """Be one process of a crew: serve until asked to end, or left alone.
@@ -145,14 +145,14 @@ def serve_as_process(
     Args:
         answer: as for ``serve``.
         agent: of this process, or of the whole crew if it has no version yet.
-        post: of the process; the first one speaks for all.
+        slot: of the process; the first one speaks for all.
         outlet: as for ``serve``.
     """
     stop = stop_on_signals()
     stop_with_parent(stop)
-    own = agent if agent.version else own_agent(agent, post.index)
-    say = tell_user if post.index == 0 else _keep_quiet
-    tally = serve(answer, own, stop, say, outlet=outlet, post=post)
+    own = agent if agent.version else own_agent(agent, slot.index)
+    say = tell_user if slot.index == 0 else _keep_quiet
+    tally = serve(answer, own, stop, say, outlet=outlet, slot=slot)
     if tally.refused:
         tell_user(
             f"{own.name} refused {tally.refused} requests, "

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from google.protobuf.message import DecodeError
 
 from schema.agent.network import FENCED, UNFIT, Agent
-from schema.agent.supervision import Post, Task
+from schema.agent.supervision import ProcessSlot, Task
 from schema.errors import MalformedMessage, PluginDiffers, RevolveError, UnknownPlugin
 from schema.experiment.plugin_source import check_plugins
 from schema.wire import revolve_pb2 as pb
@@ -51,13 +51,13 @@ class Server:
         compute: bytes of a ``Request`` to bytes of an ``Answer``; it raises if the
             request is bad.
         agent: who this is.
-        post: its place in a crew.
+        slot: its place in a crew.
         tally: what it did.
     """
 
     compute: Callable[[bytes], bytes]
     agent: Agent
-    post: Post = field(default_factory=Post)
+    slot: ProcessSlot = field(default_factory=ProcessSlot)
     tally: Tally = field(default_factory=Tally)
     _epochs: dict[str, int] = field(default_factory=dict)
     _cancelled: dict[Task, None] = field(default_factory=dict)
@@ -73,7 +73,7 @@ class Server:
             platform=agent.platform,
             version=agent.version,
         )
-        for death in self.post.deaths:
+        for death in self.slot.deaths:
             task = death.task
             info.deaths.add(
                 agent=task.agent,
@@ -108,7 +108,7 @@ class Server:
                 del self._cancelled[task]
                 self.tally.skipped += 1
                 return Reply(reason="nobody waits for this job any more")
-            answer = self.post.do(
+            answer = self.slot.do(
                 lambda: self.compute(data), task, self.agent.cpu_limit_s
             )
         except (UnknownPlugin, PluginDiffers) as error:

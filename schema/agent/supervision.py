@@ -112,7 +112,7 @@ def own_doing(exit_code: int) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Post:
+class ProcessSlot:
     """A process's place in a crew.
 
     Attributes:

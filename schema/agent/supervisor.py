@@ -20,7 +20,7 @@ from multiprocessing import connection, get_context, parent_process, resource_tr
 from multiprocessing.context import SpawnProcess
 from typing import Any, Self
 
-from schema.agent.supervision import LAST_DEATHS, Death, JobNote, Post, own_doing
+from schema.agent.supervision import LAST_DEATHS, Death, JobNote, ProcessSlot, own_doing
 
 # So that results depend on no library's number of threads. These count only if
 # set before numpy is imported: in whoever starts the crew.
@@ -96,7 +96,7 @@ class ProcessPool:
         self._started_s = [-1.0] * size
         self._due_s = [0.0] * size
         self._rests_s = [_BETWEEN_STARTS_S] * size
-        self._posts = [Post(index, JobNote()) for index in range(size)]
+        self._slots = [ProcessSlot(index, JobNote()) for index in range(size)]
         self._codes: list[int | None] = [None] * size
         self.restarts = 0
         self.deaths: list[Death] = []
@@ -138,10 +138,10 @@ class ProcessPool:
         """Note how a process ended, and when its place is to be taken."""
         self._processes[index] = None
         self._due_s[index] = self._started_s[index] + _BETWEEN_STARTS_S
-        post = self._posts[index]
-        assert post.note is not None
-        task = post.note.read()
-        post.note.end()
+        slot = self._slots[index]
+        assert slot.note is not None
+        task = slot.note.read()
+        slot.note.end()
         if task is None and code >= 0:
             self._codes[index] = code
             if now_s - self._started_s[index] > _LONGEST_REST_S:
@@ -151,12 +151,12 @@ class ProcessPool:
         elif task is not None and (cause := own_doing(code)):
             death = Death(task, cause)
             self.deaths.append(death)
-            deaths = (*post.deaths, death)[-LAST_DEATHS:]
-            self._posts[index] = replace(post, deaths=deaths)
+            deaths = (*slot.deaths, death)[-LAST_DEATHS:]
+            self._slots[index] = replace(slot, deaths=deaths)
 
     def _start(self, index: int) -> SpawnProcess:
         process = self._context.Process(
-            target=self._body, args=(*self._arguments, self._posts[index])
+            target=self._body, args=(*self._arguments, self._slots[index])
         )
         # A Ctrl-C of the terminal reaches all; only this process shall act on it. The
         # tracker first: whoever starts it lets SIGINT in again for all that follow.

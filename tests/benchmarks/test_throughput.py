@@ -35,7 +35,7 @@ from coordinator.storage.journal import Journal
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
 from schema.agent.network import Agent
-from schema.agent.supervision import Post
+from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import ProcessPool, prepare_process
 from schema.agent.topics import unique_name
 from schema.experiment.document import Experiment, body_space
@@ -48,7 +48,7 @@ prepare_process()  # as the command does, before anybody opens a session
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
 
-Body = Callable[[Agent, Post], None]
+Body = Callable[[Agent, ProcessSlot], None]
 CPU_PER_BIRTH_S = 1.5e-3
 NULL_PER_S = 1000
 SECOND_WORKER = 1.85

@@ -8,7 +8,7 @@ import time
 
 from schema.agent.network import Agent
 from schema.agent.service import serve_as_process
-from schema.agent.supervision import Post
+from schema.agent.supervision import ProcessSlot
 from schema.robot.results import Evaluation
 from schema.wire import revolve_pb2 as pb
 from schema.wire.codec import Answer, encode_answer
@@ -27,12 +27,12 @@ def answer(request: bytes) -> bytes:
     return encode_answer(Answer(job.epoch, job.number, 0.0, nothing))
 
 
-def process(agent: Agent, post: Post) -> None:
+def process(agent: Agent, slot: ProcessSlot) -> None:
     """Be one process of a crew of such workers; returns when asked to end."""
-    serve_as_process(answer, agent, post)
+    serve_as_process(answer, agent, slot)
 
 
-def timed_process(agent: Agent, post: Post) -> None:
+def timed_process(agent: Agent, slot: ProcessSlot) -> None:
     """Be one that takes its time; returns when asked to end."""
 
     def slow_answer(request: bytes) -> bytes:
@@ -41,4 +41,4 @@ def timed_process(agent: Agent, post: Post) -> None:
         time.sleep(max(0.0, until_s - time.monotonic()))
         return answered
 
-    serve_as_process(slow_answer, agent, post)
+    serve_as_process(slow_answer, agent, slot)

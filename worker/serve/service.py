@@ -2,15 +2,15 @@
 
 from schema.agent.network import Agent
 from schema.agent.service import Outlet, own_agent, serve_as_process
-from schema.agent.supervision import Post
+from schema.agent.supervision import ProcessSlot
 from schema.agent.topics import Member
 from schema.wire.arena_codec import Live, encode_live
 from worker.serve.jobs import Jobs
 
 
-def process(agent: Agent, post: Post) -> None:
+def process(agent: Agent, slot: ProcessSlot) -> None:
     """Be one process of a crew of workers; returns when asked to end."""
-    own = own_agent(agent, post.index)
+    own = own_agent(agent, slot.index)
     member = Member(own.fleet, own.role, own.name)
     outlet = Outlet()
 
@@ -20,4 +20,4 @@ def process(agent: Agent, post: Post) -> None:
             outlet.put(key, encode_live(live))
 
     jobs = Jobs(threads=agent.threads, publish=publish)
-    serve_as_process(jobs.answer, own, post, outlet)
+    serve_as_process(jobs.answer, own, slot, outlet)

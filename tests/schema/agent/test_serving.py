@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from schema.agent.network import FENCED, UNFIT, Agent
 from schema.agent.serving import Reply, Server
-from schema.agent.supervision import Death, Post, Task
+from schema.agent.supervision import Death, ProcessSlot, Task
 from schema.errors import InvalidRobot, UnknownPlugin
 from schema.experiment.plugin_source import check_plugins, plugins_of
 from schema.wire import revolve_pb2 as pb
@@ -91,7 +91,9 @@ def test_any_bytes_get_a_reply(data: bytes) -> None:
 def test_an_agent_tells_of_the_dead() -> None:
     death = Death(Task("v", "r", 3, 7), "SIGSEGV")
     agent = Agent("worker", "w", "tcp/h:1", version="1", platform="p")
-    info = pb.AgentInfo.FromString(Server(bytes, agent, Post(0, None, (death,))).info)
+    info = pb.AgentInfo.FromString(
+        Server(bytes, agent, ProcessSlot(0, None, (death,))).info
+    )
     (told,) = info.deaths
     assert (told.agent, told.run, told.epoch, told.number) == ("v", "r", 3, 7)
     assert told.cause == "SIGSEGV"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from schema.agent.supervision import Death, JobNote, Post, Task, own_doing
+from schema.agent.supervision import Death, JobNote, ProcessSlot, Task, own_doing
 from schema.agent.supervisor import ProcessPool
 
 TASK = Task("worker-0.ab", "host:some/folder", 3, 2**40)
@@ -55,19 +55,19 @@ def test_only_some_ends_are_a_jobs_own_doing(code: int, doing: str) -> None:
 
 
 def test_a_job_is_noted_while_it_is_done_and_limited() -> None:
-    post = Post(0, JobNote())
-    assert post.note is not None
+    slot = ProcessSlot(0, JobNote())
+    assert slot.note is not None
     seen: list[object] = []
 
     def job() -> bytes:
-        assert post.note is not None
-        seen.append(post.note.read())
+        assert slot.note is not None
+        seen.append(slot.note.read())
         seen.append(signal.getitimer(signal.ITIMER_PROF)[0] > 1000.0)
         return b"done"
 
-    assert post.do(job, TASK, 2000.0) == b"done"
+    assert slot.do(job, TASK, 2000.0) == b"done"
     assert seen == [TASK, True]
-    assert post.note.read() is None
+    assert slot.note.read() is None
     assert signal.getitimer(signal.ITIMER_PROF)[0] == 0.0
 
 
@@ -77,23 +77,23 @@ def test_a_job_is_noted_while_it_is_done_and_limited() -> None:
 def test_an_error_is_no_death_but_leaving_is(
     error: type[BaseException], is_noted: object
 ) -> None:
-    post = Post(0, JobNote())
+    slot = ProcessSlot(0, JobNote())
 
     def job() -> bytes:
         raise error
 
     with pytest.raises(error):
-        post.do(job, TASK, 100.0)
-    assert post.note is not None
-    assert (post.note.read() == TASK) is is_noted
+        slot.do(job, TASK, 100.0)
+    assert slot.note is not None
+    assert (slot.note.read() == TASK) is is_noted
 
 
-def die(signal_number: int, log: str, post: Post) -> None:
+def die(signal_number: int, log: str, slot: ProcessSlot) -> None:
     """Die of a job the first time, and write down who died before."""
     with Path(log).open("a", encoding="utf-8") as file:
-        file.write(f"{[death.cause for death in post.deaths]}\n")
-    if len(post.deaths) < 2:
-        post.do(lambda: _kill(signal_number), TASK, 100.0)
+        file.write(f"{[death.cause for death in slot.deaths]}\n")
+    if len(slot.deaths) < 2:
+        slot.do(lambda: _kill(signal_number), TASK, 100.0)
 
 
 def _kill(signal_number: int) -> bytes:
@@ -122,9 +122,9 @@ def test_who_takes_a_dead_ones_place_is_told_what_it_died_of(tmp_path: Path) -> 
     assert lines == ["[]", "['SIGSEGV']", "['SIGSEGV', 'SIGSEGV']"]
 
 
-def leave(how: str, post: Post) -> None:
+def leave(how: str, slot: ProcessSlot) -> None:
     """End between two jobs."""
-    assert post.note is not None
+    assert slot.note is not None
     if how == "by an error":
         raise RuntimeError("the network's, not a job's")
 
