@@ -56,7 +56,7 @@ class Death:
     cause: str
 
 
-class JobNote:
+class CurrentJob:
     """What a process is at; its parent reads it when the process has died."""
 
     def __init__(self) -> None:
@@ -96,7 +96,7 @@ class JobNote:
         )
 
 
-def own_doing(exit_code: int) -> str:
+def crash_cause(exit_code: int) -> str:
     """Return what a process did that ended in the middle of a job; empty if nothing.
 
     Args:
@@ -122,7 +122,7 @@ class ProcessSlot:
     """
 
     index: int = 0
-    note: JobNote | None = None
+    note: CurrentJob | None = None
     deaths: tuple[Death, ...] = ()
 
     def do(self, job: Callable[[], bytes], task: Task, cpu_limit_s: float) -> bytes:

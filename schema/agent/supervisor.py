@@ -20,7 +20,13 @@ from multiprocessing import connection, get_context, parent_process, resource_tr
 from multiprocessing.context import SpawnProcess
 from typing import Any, Self
 
-from schema.agent.supervision import LAST_DEATHS, Death, JobNote, ProcessSlot, own_doing
+from schema.agent.supervision import (
+    LAST_DEATHS,
+    CurrentJob,
+    Death,
+    ProcessSlot,
+    crash_cause,
+)
 
 # So that results depend on no library's number of threads. These count only if
 # set before numpy is imported: in whoever starts the crew.
@@ -96,7 +102,7 @@ class ProcessPool:
         self._started_s = [-1.0] * size
         self._due_s = [0.0] * size
         self._rests_s = [_BETWEEN_STARTS_S] * size
-        self._slots = [ProcessSlot(index, JobNote()) for index in range(size)]
+        self._slots = [ProcessSlot(index, CurrentJob()) for index in range(size)]
         self._codes: list[int | None] = [None] * size
         self.restarts = 0
         self.deaths: list[Death] = []
@@ -148,7 +154,7 @@ class ProcessPool:
                 self._rests_s[index] = _BETWEEN_STARTS_S
             self._due_s[index] = now_s + self._rests_s[index]
             self._rests_s[index] = min(2.0 * self._rests_s[index], _LONGEST_REST_S)
-        elif task is not None and (cause := own_doing(code)):
+        elif task is not None and (cause := crash_cause(code)):
             death = Death(task, cause)
             self.deaths.append(death)
             deaths = (*slot.deaths, death)[-LAST_DEATHS:]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from schema.agent.supervision import Death, JobNote, ProcessSlot, Task, own_doing
+from schema.agent.supervision import CurrentJob, Death, ProcessSlot, Task, crash_cause
 from schema.agent.supervisor import ProcessPool
 
 TASK = Task("worker-0.ab", "host:some/folder", 3, 2**40)
@@ -17,7 +17,7 @@ PATIENCE_S = 30.0
 
 
 def test_a_note_stands_from_begin_to_end() -> None:
-    note = JobNote()
+    note = CurrentJob()
     assert note.read() is None
     note.begin(TASK)
     assert note.read() == TASK
@@ -26,7 +26,7 @@ def test_a_note_stands_from_begin_to_end() -> None:
 
 
 def test_a_note_of_a_longest_name_is_cut_and_not_refused() -> None:
-    note = JobNote()
+    note = CurrentJob()
     note.begin(Task("a" * 999, "r" * 9999, 1, 2))
     held = note.read()
     assert held is not None
@@ -51,11 +51,11 @@ def test_a_note_of_a_longest_name_is_cut_and_not_refused() -> None:
     ],
 )
 def test_only_some_ends_are_a_jobs_own_doing(code: int, doing: str) -> None:
-    assert own_doing(code) == doing
+    assert crash_cause(code) == doing
 
 
 def test_a_job_is_noted_while_it_is_done_and_limited() -> None:
-    slot = ProcessSlot(0, JobNote())
+    slot = ProcessSlot(0, CurrentJob())
     assert slot.note is not None
     seen: list[object] = []
 
@@ -77,7 +77,7 @@ def test_a_job_is_noted_while_it_is_done_and_limited() -> None:
 def test_an_error_is_no_death_but_leaving_is(
     error: type[BaseException], is_noted: object
 ) -> None:
-    slot = ProcessSlot(0, JobNote())
+    slot = ProcessSlot(0, CurrentJob())
 
     def job() -> bytes:
         raise error
