@@ -15,13 +15,13 @@ from typing import Any
 
 import zenoh
 
+from schema.agent.fair_queue import FairQueue
 from schema.agent.network import Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.serving import Server, Tally
 from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
-from schema.agent.turns import Turns
 
 _POLL_S = 0.2
 _RETRY_S = 0.3
@@ -201,7 +201,7 @@ def _serve_session(
         session.liveliness().declare_token(me.alive),
     ):
         hub.seen(is_there=True)
-        turns: Turns[zenoh.Query] = Turns()
+        turns: FairQueue[zenoh.Query] = FairQueue()
         while not stop.is_set():
             if not _let_in(inbox, turns):
                 hub.seen(is_there=bool(session.info.routers_zid()))
@@ -218,7 +218,7 @@ def _serve_session(
             pass  # its end without a reply is the asker's news
 
 
-def _let_in(inbox: SimpleQueue[zenoh.Query], turns: Turns[zenoh.Query]) -> bool:
+def _let_in(inbox: SimpleQueue[zenoh.Query], turns: FairQueue[zenoh.Query]) -> bool:
     """Have all that came wait its turn; return whether anything waits now."""
     try:
         while True:

@@ -2,11 +2,11 @@
 
 import pytest
 
-from schema.agent.turns import MOST_SOURCES, Turns
+from schema.agent.fair_queue import MOST_SOURCES, FairQueue
 
 
 def test_one_source_is_served_in_the_order_of_arrival() -> None:
-    turns: Turns[int] = Turns()
+    turns: FairQueue[int] = FairQueue()
     for item in range(5):
         turns.put(b"a", item)
     assert len(turns) == 5
@@ -17,7 +17,7 @@ def test_one_source_is_served_in_the_order_of_arrival() -> None:
 
 def _shares(jobs_s: dict[bytes, float], until_s: float) -> dict[bytes, float]:
     """Return the time that sources get that always have two jobs waiting."""
-    turns: Turns[bytes] = Turns()
+    turns: FairQueue[bytes] = FairQueue()
     for source in (*jobs_s, *jobs_s):
         turns.put(source, source)
     served = dict.fromkeys(jobs_s, 0.0)
@@ -37,7 +37,7 @@ def test_sources_get_equal_time_whatever_their_jobs_take() -> None:
 
 
 def test_jobs_of_equal_length_take_turns() -> None:
-    turns: Turns[bytes] = Turns()
+    turns: FairQueue[bytes] = FairQueue()
     for item in (b"a1", b"a2", b"a3", b"b1", b"b2", b"c1"):
         turns.put(item[:1], item)
     order = []
@@ -48,7 +48,7 @@ def test_jobs_of_equal_length_take_turns() -> None:
 
 
 def test_who_was_away_has_saved_nothing_up() -> None:
-    turns: Turns[bytes] = Turns()
+    turns: FairQueue[bytes] = FairQueue()
     for _ in range(100):
         turns.put(b"a", b"a")
         turns.take()
@@ -63,7 +63,7 @@ def test_who_was_away_has_saved_nothing_up() -> None:
 
 
 def test_who_never_comes_back_is_forgotten() -> None:
-    turns: Turns[int] = Turns()
+    turns: FairQueue[int] = FairQueue()
     for number in range(3 * MOST_SOURCES):
         turns.put(str(number).encode(), number)
         assert turns.take() == number

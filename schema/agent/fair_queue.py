@@ -17,7 +17,7 @@ MOST_SOURCES = 1000
 """Accounts that are kept of those who have nothing waiting."""
 
 
-class Turns(Generic[T]):
+class FairQueue(Generic[T]):
     """What waits, by who sent it."""
 
     def __init__(self) -> None:
