@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from schema.agent.network import FENCED, UNFIT, Agent
-from schema.agent.serving import Reply, Server
+from schema.agent.request_handler import Reply, Server
 from schema.agent.supervision import Death, ProcessSlot, Task
 from schema.errors import InvalidRobot, UnknownPlugin
 from schema.experiment.plugin_source import check_plugins, plugins_of
