@@ -7,7 +7,7 @@ from hypothesis.strategies import SearchStrategy
 
 from schema.parts import BUILT_IN
 from schema.robot.genome import develop
-from schema.robot.heredity import genome_of
+from schema.robot.inverse_development import genome_of
 from schema.robot.robot import Robot
 
 
