@@ -22,7 +22,7 @@ from analysis.render.picture import Simulate
 from schema.errors import RevolveError
 from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Origin
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.tables.files import read_table
 
 _TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}

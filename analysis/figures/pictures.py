@@ -9,7 +9,7 @@ from matplotlib.patches import ConnectionPatch, Rectangle
 from analysis.figures.family import Family
 from analysis.figures.portraits import Colour, Portrait
 from analysis.figures.style import label
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 _INK, _FAINT = "#333333", "#9A9A9A"
 FOUNDERS: tuple[Colour, ...] = (

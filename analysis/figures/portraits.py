@@ -15,7 +15,7 @@ from schema.errors import RunFolderError
 from schema.experiment.document import Experiment, body_space, island_experiment
 from schema.experiment.identity import Identity, Origin
 from schema.robot.genome import develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from schema.wire.codec import decode_genome

@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 from analysis.viewer.entries import island_path, motion_path, robot_path
 from analysis.viewer.motion import LANES
 from analysis.viewer.recording import BIRTHS, SIMULATED
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 _SKY = (246, 247, 250)
 _GRID = (205, 208, 216)

@@ -29,7 +29,7 @@ from schema.agent.command import add_network_flags, tls_of
 from schema.agent.service import tell_user
 from schema.agent.supervisor import stop_on_signals
 from schema.flags import Flags, number
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 LAST_S = 600.0
 """Simulated time that is replayed unless told otherwise: the last so much [s]."""

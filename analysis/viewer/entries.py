@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from analysis.viewer.body import Singles
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from analysis.viewer.body import standing
 from analysis.viewer.entries import When, robot_path
 from analysis.viewer.looks import Figures
 from analysis.viewer.recording import Recording
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire.news import Level
 
 SPACING_M = 0.6

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from analysis.viewer.entries import Kin, When
 from analysis.viewer.recording import Recording
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire.news import Departed, Level, Newborn
 
 _MOST = 150

@@ -8,7 +8,7 @@ import pyarrow.compute as pc
 
 from analysis.viewer.body import Figure, figure
 from schema.parts import BodySpace
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 
 

@@ -19,7 +19,7 @@ from analysis.viewer.entries import Kin, Moves, When, island_path
 from analysis.viewer.ground import Surface
 from analysis.viewer.stage import Stage
 from schema.errors import RevolveError
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 APPLICATION = "revolve"
 SIMULATED = "sim_time"

@@ -25,7 +25,7 @@ from schema.experiment.settings import (
     read_evaluation_settings,
 )
 from schema.robot.genome import develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.tables.files import read_table

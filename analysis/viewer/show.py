@@ -17,7 +17,7 @@ from analysis.viewer.lineage import Lineage
 from analysis.viewer.looks import Figures, rows_by_robot
 from analysis.viewer.recording import Recording
 from schema.parts import BodySpace
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire.news import Crewman, Departed, Level, Migrant, Newborn, News
 
 _REPEAT_S = 10.0

@@ -11,7 +11,7 @@ from analysis.viewer.ground import Surface, surfaces
 from schema.experiment.document import Arena, Experiment, body_space, island_count
 from schema.experiment.document import island_experiment as of_island
 from schema.parts import BodySpace
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 _MARGIN = 1.3
 _GALLERY_M = 2.0

@@ -16,7 +16,7 @@ from analysis.viewer.stage import stage
 from schema.agent.service import tell_user
 from schema.errors import MalformedMessage, NetworkError
 from schema.experiment.file import experiment_from_text
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.tables.columns import read_columns
 from schema.wire.arena_codec import Live
 from schema.wire.news import News

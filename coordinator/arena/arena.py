@@ -55,7 +55,7 @@ from coordinator.islands.rows import birth_record, migration_records
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
 from schema.robot.genome import develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 
 

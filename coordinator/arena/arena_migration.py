@@ -6,7 +6,7 @@ from dataclasses import replace
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Emigrate, Travelled
 from coordinator.islands.migration import MigrationEpochs
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 class ImmigrantQueue:

@@ -6,7 +6,7 @@ from coordinator.evolution.breeding import BARREN, Breeder, Candidate
 from coordinator.evolution.selection import Couple, Individual
 from coordinator.islands.events import Vet, Vetted, VettingFailed
 from schema.errors import UnexpectedEvent
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 class VettingQueue:

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from coordinator.arena.place import Place
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import BrainChange, Changes, Insertion
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from coordinator.arena.place import Place
 from coordinator.evolution.selection import Individual
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import Judgement
 

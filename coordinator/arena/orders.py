@@ -10,7 +10,7 @@ from schema.experiment.document import Experiment, body_space
 from schema.parts import BodySpace
 from schema.robot.brain import Brain
 from schema.robot.genome import develop, walk
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot, check_robot
 
 

@@ -11,7 +11,7 @@ from schema.agent.command import add_network_flags, tls_of
 from schema.errors import InvalidRobot, NetworkError
 from schema.flags import Flags, number, whole_number
 from schema.formats.files import read_robot
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire.operator import (
     BrainWish,
     InsertWish,

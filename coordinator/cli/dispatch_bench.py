@@ -38,7 +38,7 @@ from schema.experiment.document import body_space
 from schema.experiment.file import experiment_text, read_experiment
 from schema.experiment.settings import evaluation_settings
 from schema.robot.genome import develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire.codec import encode_request, encode_robot
 
 Body = Callable[[Agent, ProcessSlot], None]

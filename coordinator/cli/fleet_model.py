@@ -31,7 +31,7 @@ from coordinator.dispatch.events import (
     Returned,
     Ticked,
 )
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 LEAST_UTILISATION = 0.95
 _ROUNDS = 10

@@ -11,7 +11,7 @@ from schema.experiment.file import read_experiment
 from schema.flags import Flags, whole_number
 from schema.formats.files import settings_of, write_robot
 from schema.robot.genome import develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 def main(arguments: list[str]) -> int:

@@ -7,7 +7,7 @@ lives in one worker.
 from dataclasses import dataclass
 from typing import Literal
 
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 # --- Jobs
 

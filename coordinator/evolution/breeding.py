@@ -22,7 +22,7 @@ from coordinator.evolution.variation import mate
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, body_space
 from schema.robot.genome import Genome, develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 
 BARREN = "crossover found no fitting subtree, or the child had no motor"

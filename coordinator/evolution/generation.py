@@ -31,7 +31,7 @@ from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, body_space
 from schema.parts import COLOURS
 from schema.robot.genome import Genome
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 FIRST = BirthId(0, 0)
 MAX_TREES = 10_000

@@ -11,7 +11,7 @@ from itertools import count
 from schema.parts import BodySpace, PartType
 from schema.robot.brain import Layer
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, walk
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 @dataclass(slots=True, eq=False)

@@ -8,7 +8,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 class Purpose(IntEnum):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from coordinator.evolution.buffered_rng import BufferedRng
 from schema.experiment.document import Selection
 from schema.robot.genome import Genome
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 Couple = tuple["Individual", "Individual"]
 

@@ -34,7 +34,7 @@ from coordinator.evolution.mutable_genome import (
 from coordinator.evolution.size_counts import greatest, tallies, tally
 from schema.experiment.document import Experiment, body_space
 from schema.robot.genome import Genome
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 def mate(

@@ -10,7 +10,7 @@ from typing import Any
 from coordinator.evolution.selection import Individual
 from schema.robot.brain import Brain
 from schema.robot.genome import Genome
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.robot.robot import Robot
 from schema.wire.arena import Advance, Changes

@@ -34,7 +34,7 @@ from coordinator.islands.rows import birth_record, evaluation_record, population
 from coordinator.islands.survival import SurvivorSelection
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 @dataclass(slots=True)

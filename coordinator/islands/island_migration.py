@@ -23,7 +23,7 @@ from coordinator.islands.rows import evaluation_record, migration_records
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
 from schema.robot.genome import develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 Outcome = Evaluated | EvaluationFailed
 

@@ -18,7 +18,7 @@ from coordinator.evolution.selection import Individual, fittest_first
 from coordinator.islands.events import Emigrate, Immigrated, NeighbourClosed, Travelled
 from schema.errors import UnexpectedEvent
 from schema.experiment.migration import Migration, migrant_count
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 @dataclass(frozen=True, slots=True)

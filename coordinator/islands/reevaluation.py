@@ -19,7 +19,7 @@ from coordinator.islands.survival import EveryNBirths
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, body_space, steps_of
 from schema.robot.genome import develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 Outcome = Evaluated | EvaluationFailed
 

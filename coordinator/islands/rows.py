@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Emigrate, Evaluated, EvaluationFailed, Record
 from schema.parts import BodySpace
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.tables.columns import body_rows, sizes
 from schema.wire.codec import encode_genome

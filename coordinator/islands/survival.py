@@ -12,7 +12,7 @@ from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.culling import select_doomed
 from coordinator.evolution.selection import Individual
 from schema.experiment.document import Culling, Experiment
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 class SurvivorSelection:

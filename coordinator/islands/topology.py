@@ -11,7 +11,7 @@ from typing import Any
 from coordinator.evolution.seeding import Purpose, stream
 from schema.errors import ExperimentError
 from schema.experiment.migration import Migration
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 Edge = tuple[int, int]
 """From which island to which."""

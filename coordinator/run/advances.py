@@ -23,7 +23,7 @@ from coordinator.islands.events import Advanced, AdvanceShard, Record
 from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
 from schema.experiment.plugin_source import plugins_of
 from schema.parts import Vector
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.tables.columns import read_columns
 from schema.wire.arena import Advance, Casualty

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from coordinator.islands.events import Append, Record
 from coordinator.storage.folder import RunDetails
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.tables.columns import Row
 from schema.wire.news import (
     Crewman,

@@ -44,7 +44,7 @@ from coordinator.run.cross_checks import NO_CHECKS, Checks, audit_records, descr
 from coordinator.run.requests import Requests, RunContext, is_quarantined
 from coordinator.run.throttle import RealTimeThrottle
 from schema.errors import RunPaused, UnexpectedEvent
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 _LOG = logging.getLogger(__name__)
 

@@ -20,8 +20,8 @@ from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from schema.errors import MalformedMessage, RevolveError
 from schema.experiment.document import Experiment, body_space, island_experiment
+from schema.robot.ids import BirthId
 from schema.robot.inverse_development import genome_of
-from schema.robot.names import BirthId
 from schema.robot.robot import check_robot
 from schema.wire.operator import (
     BrainWish,

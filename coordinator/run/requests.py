@@ -30,7 +30,7 @@ from schema.experiment.settings import (
     evaluation_settings,
     vetting_settings,
 )
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.robot.robot import Robot
 from schema.wire.codec import (

@@ -18,7 +18,7 @@ from coordinator.islands.events import (
     VettingFailed,
 )
 from schema.errors import MalformedMessage
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import BrainChange

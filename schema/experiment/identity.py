@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from schema.experiment.section import Count, Section
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 class Origin(Section, frozen=True):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from schema.parts import Vector
 from schema.robot.brain import Brain
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from schema.errors import MalformedMessage
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import Advance, Changes
 from schema.wire.arena_messages import (

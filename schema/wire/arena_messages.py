@@ -4,7 +4,7 @@
 """
 
 from schema.errors import MalformedMessage
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import (
     Advance,

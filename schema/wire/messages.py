@@ -17,7 +17,7 @@ from schema.robot.brain import (
     check_brain,
 )
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, walk
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot, check_tree
 from schema.wire import revolve_pb2 as pb
 

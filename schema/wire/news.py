@@ -10,7 +10,7 @@ from itertools import groupby
 from math import fsum
 from typing import Any
 
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 
 

@@ -41,7 +41,7 @@ from schema.agent.topics import unique_name
 from schema.experiment.document import Experiment, body_space
 from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.genome import develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 
 prepare_process()  # as the command does, before anybody opens a session

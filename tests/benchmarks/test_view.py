@@ -20,7 +20,7 @@ from schema.experiment.document import Space, body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.identity import NOBODY
 from schema.experiment.settings import EvaluationSettings
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import Advance
 from schema.wire.arena_codec import Live, decode_live, encode_live

@@ -25,7 +25,7 @@ from coordinator.islands.events import (
 )
 from schema.experiment.document import Experiment
 from schema.experiment.file import read_experiment
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Provenance, Report
 from schema.tables.columns import POSES
 from schema.wire.arena import Advance, Casualty, Judgement, Touch

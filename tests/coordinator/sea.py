@@ -24,7 +24,7 @@ from coordinator.islands.events import (
 from coordinator.islands.island import Island
 from coordinator.run.archipelago import archipelago
 from schema.experiment.document import Experiment
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
 from tests.coordinator.arena_world import VIABLE, World, golden
 

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from schema.experiment.document import Arena, Experiment
 from schema.experiment.settings import ArenaSettings
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import Advance, Changes, Insertion
 from worker.arena.world import World

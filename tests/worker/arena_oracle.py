@@ -7,7 +7,7 @@ import numpy as np
 
 from schema.experiment.document import body_space
 from schema.mjcf.model import robot_spec, shared_model
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from worker.arena.world import World
 from worker.clusters.rollout import Rollout

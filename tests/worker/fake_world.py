@@ -8,7 +8,7 @@ import json
 from typing import Self
 
 from schema.experiment.settings import ArenaSettings
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Casualty, Changes, Judgement
 from tests.coordinator.arena_world import DT, MATURE, poses
 

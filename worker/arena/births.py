@@ -8,7 +8,7 @@ import numpy as np
 from schema.errors import UnexpectedEvent, one_line
 from schema.experiment.document import body_space
 from schema.robot.brain import Brain
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot, check_robot
 from schema.wire.arena import Casualty, Changes, Insertion
 from schema.wire.codec import encode_robot

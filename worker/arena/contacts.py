@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from schema.experiment.settings import ArenaSettings
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire.arena import Touch
 from worker.clusters.cluster import Cluster
 

@@ -5,7 +5,7 @@ import math
 import mujoco
 import numpy as np
 
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.wire.arena import Casualty
 from worker.clusters.cluster import Cluster

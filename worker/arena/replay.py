@@ -14,7 +14,7 @@ import pyarrow as pa
 
 from schema.experiment.identity import Identity
 from schema.experiment.settings import EvaluationSettings, read_arena_settings
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.tables.columns import POSES, read_columns

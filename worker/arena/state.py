@@ -3,7 +3,7 @@
 import numpy as np
 
 from schema.experiment.settings import ArenaSettings
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire.arena import Casualty
 from schema.wire.codec import decode_robot
 from worker.arena.births import arena_robot

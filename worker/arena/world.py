@@ -15,7 +15,7 @@ from typing import Self
 
 from schema.errors import UnexpectedEvent
 from schema.experiment.settings import ArenaSettings
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.wire.arena import Advance, Casualty, Changes, Insertion
 from worker.arena import light, state

@@ -22,7 +22,7 @@ from schema.experiment.plugin import load
 from schema.experiment.settings import ArenaSettings
 from schema.flags import add_count, whole_number
 from schema.robot.genome import develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Report
 from schema.robot.robot import Robot
 from worker.bench import arena_timing as timing

@@ -14,7 +14,7 @@ import mujoco
 import numpy as np
 
 from schema.experiment.settings import ArenaSettings
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from schema.wire.arena import Changes, Insertion

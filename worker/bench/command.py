@@ -28,7 +28,7 @@ from schema.experiment.settings import EvaluationSettings
 from schema.flags import Flags, add_count
 from schema.mjcf.model import solo_model
 from schema.robot.genome import Genome, develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.bench import arena_bench, fidelity

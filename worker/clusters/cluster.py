@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from schema.errors import one_line
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.clusters.bounds import Indices

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 Group = tuple[BirthId, ...]
 """Who lives together, ascending."""

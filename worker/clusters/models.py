@@ -12,7 +12,7 @@ from schema.experiment.settings import ArenaSettings
 from schema.mjcf.footing import footprint, standing_height
 from schema.mjcf.model import Furnish, robot_spec, shared_model, solo_model
 from schema.mjcf.world import add_ring_wall
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from worker.clusters.bounds import BoundingSpheres, bounding_spheres
 from worker.clusters.cluster import Cluster

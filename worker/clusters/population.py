@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from schema.experiment.settings import ArenaSettings
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from worker.clusters.cluster import Cluster
 from worker.clusters.columns import Layout, RobotRows

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from schema.parts import Vector
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.clusters.engine_view import EngineView

@@ -14,7 +14,7 @@ import numpy as np
 
 from schema.experiment.document import Simulation
 from schema.experiment.identity import Origin
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from worker.robot.controller import Widths
 

@@ -15,7 +15,7 @@ from typing import Protocol, Self
 from schema.errors import StateDiffers
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings, read_arena_settings
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import check_robot
 from schema.wire.arena import Advance, Changes
 from schema.wire.arena_codec import (

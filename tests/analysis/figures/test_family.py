@@ -13,7 +13,7 @@ from analysis.figures.pictures import FOUNDERS, family_tree, gaits
 from analysis.figures.portraits import Portrait
 from analysis.figures.robots import lineages
 from analysis.measures.outputs import schema
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from tests.analysis.bodies import Body, part
 from tests.analysis.tables import births
 

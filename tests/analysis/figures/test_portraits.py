@@ -13,7 +13,7 @@ from coordinator.evolution.generation import generate
 from schema.errors import SimulationDiverged
 from schema.experiment.document import Experiment, Islands
 from schema.experiment.identity import NOBODY, Identity, Origin
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire.codec import encode_genome
 from tests.analysis.bodies import part
 from tests.analysis.tables import births

@@ -25,7 +25,7 @@ from schema.experiment.document import Arena, Experiment, Simulation
 from schema.experiment.file import read_experiment
 from schema.mjcf.world import add_ring_wall
 from schema.parts import BUILT_IN
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import TABLES
 from schema.wire.news import Departed, Level, Newborn, News

@@ -14,7 +14,7 @@ from analysis.viewer.recording import Recording
 from analysis.viewer.stage import stage
 from schema.experiment.document import Arena, Experiment, Islands, Simulation
 from schema.experiment.environment import FLAT, Environment, relief
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 WORLD = Simulation()
 

@@ -8,7 +8,7 @@ import pytest
 
 from analysis.viewer.motion import best_ever, chosen
 from analysis.viewer.recording import ViewerError
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.tables.files import parquet_path
 from tests.analysis.tables import births, table
 

@@ -13,7 +13,7 @@ from analysis.viewer.output import Output
 from analysis.viewer.watch import Spectator, watch
 from schema.errors import NetworkError
 from schema.experiment.file import experiment_text, read_experiment
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire.news import Newborn, News
 
 

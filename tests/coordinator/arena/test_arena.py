@@ -20,7 +20,7 @@ from coordinator.islands.events import (
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment
 from schema.experiment.file import read_experiment
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.tables.columns import TABLES
 from schema.wire.arena import Advance
 from tests.coordinator.arena_world import (

@@ -19,7 +19,7 @@ from coordinator.islands.events import (
 from schema.errors import InvalidRobot, UnexpectedEvent
 from schema.robot.brain import Brain
 from schema.robot.genome import Genome, Node
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from tests.coordinator.arena_world import (
     DT,
     Life,

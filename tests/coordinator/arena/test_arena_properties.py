@@ -22,7 +22,7 @@ from coordinator.islands.events import (
     VettingFailed,
 )
 from coordinator.storage.journal_codec import decode_entry, encode_entry
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from tests.coordinator.arena_world import DT, Life, World, experiment, golden, picky
 
 fixed = settings(max_examples=12, derandomize=True, database=None, deadline=None)

@@ -28,7 +28,7 @@ from coordinator.dispatch.events import (
 from coordinator.dispatch.pool import LONGEST_REST_S, MOST_AHEAD, PAUSE_S, REST_S
 from coordinator.dispatch.stragglers import LEAST_S, PATIENCE
 from schema.errors import UnexpectedEvent
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 def job(number: int, kind: JobKind = "evaluate") -> Job:

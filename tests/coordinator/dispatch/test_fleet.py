@@ -16,7 +16,7 @@ from coordinator.dispatch.events import (
     ShardReturned,
 )
 from coordinator.dispatch.fleet import Fleet
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 
 class JobClient:

@@ -33,7 +33,7 @@ from schema.experiment.document import (
 )
 from schema.parts import BUILT_IN
 from schema.robot.genome import Genome, NeuronGene, Node, walk
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 TYPES = body_space(Space())
 NEURON = NeuronGene("Simple", (0.0, 0.5))

@@ -9,7 +9,7 @@ from coordinator.evolution.selection import Individual
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, Selection, Space
 from schema.robot.genome import Genome, NeuronGene, Node
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 GREY = (0.5, 0.5, 0.5)
 CHILD = BirthId(0, 40)

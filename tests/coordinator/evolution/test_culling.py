@@ -12,7 +12,7 @@ from coordinator.evolution.culling import select_doomed
 from coordinator.evolution.selection import Individual
 from schema.experiment.document import Arena
 from schema.robot.genome import Node
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 CORE = Node("Core", -1, 0, ())
 

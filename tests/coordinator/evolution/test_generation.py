@@ -13,7 +13,7 @@ from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, Generation, Space, body_space
 from schema.robot.brain import NEURON_TYPES
 from schema.robot.genome import Genome, develop, walk
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import ORIENTATIONS, Robot, check_robot
 
 DEFAULT = Experiment(name="test")

@@ -13,7 +13,7 @@ from coordinator.evolution.generation import generate
 from coordinator.evolution.seeding import Purpose, stream
 from schema.experiment.document import Experiment, Vetting, body_space
 from schema.robot.genome import develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 
 ROBOTS = 10_000

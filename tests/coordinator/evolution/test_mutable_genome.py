@@ -24,7 +24,7 @@ from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import BUILT_IN
 from schema.robot.frames import place_parts, shapes_of
 from schema.robot.genome import Genome, NeuronGene, Node, develop, walk
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 EXPERIMENT = Experiment(name="test")
 TYPES = body_space(EXPERIMENT.space)

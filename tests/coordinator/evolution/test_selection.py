@@ -15,7 +15,7 @@ from coordinator.evolution.selection import (
 )
 from schema.experiment.document import Selection
 from schema.robot.genome import Node
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 CORE = Node("Core", -1, 0, (0.5, 0.5, 0.5))
 N = 4000

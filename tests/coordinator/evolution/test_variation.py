@@ -22,7 +22,7 @@ from schema.experiment.document import Experiment, Space, Variation, body_space
 from schema.parts import BUILT_IN
 from schema.robot.frames import place_parts, shapes_of
 from schema.robot.genome import Genome, NeuronGene, Node, develop, walk
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import check_robot
 
 DEFAULT = Experiment(name="test")

@@ -27,7 +27,7 @@ from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment, Selection, body_space
 from schema.experiment.file import read_experiment, shipped_experiments
 from schema.robot.genome import develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.tables.columns import TABLES
 from schema.wire.codec import decode_genome

@@ -19,7 +19,7 @@ from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, Islands, Selection, Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.migration import Migration
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from tests.coordinator.sea import Sea
 
 Names = list[tuple[int, int]]

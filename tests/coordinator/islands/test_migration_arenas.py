@@ -9,7 +9,7 @@ from schema.experiment.check import check_experiment
 from schema.experiment.document import Arena as Rules
 from schema.experiment.document import Experiment, Islands, Selection, Simulation
 from schema.experiment.migration import Migration
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from tests.coordinator.arena_world import World
 from tests.coordinator.sea import Sea
 

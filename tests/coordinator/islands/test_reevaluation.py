@@ -17,7 +17,7 @@ from schema.experiment.document import (
     body_space,
 )
 from schema.robot.genome import Node, develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
 
 CORE = Node("Core", -1, 0, ())

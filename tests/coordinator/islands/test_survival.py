@@ -5,7 +5,7 @@ from coordinator.evolution.selection import Individual
 from coordinator.islands.survival import SurvivorSelection
 from schema.experiment.document import Culling, Experiment, Selection
 from schema.robot.genome import Node
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 CORE = Node("Core", -1, 0, ())
 

@@ -29,7 +29,7 @@ from coordinator.network.service import Network
 from schema.agent.network import client_config
 from schema.agent.topics import Member
 from schema.errors import NetworkError
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire import revolve_pb2 as pb
 from schema.wire.codec import decode_answer
 

@@ -31,7 +31,7 @@ from schema.errors import JobRefused, RunFolderError
 from schema.experiment.file import experiment_text
 from schema.parts import BUILT_IN
 from schema.robot.genome import develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.files import read_table
 from schema.wire.operator import (

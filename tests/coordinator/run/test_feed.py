@@ -5,7 +5,7 @@ from dataclasses import replace
 from coordinator.islands.events import Record
 from coordinator.run.feed import Feed
 from coordinator.storage.folder import RunDetails
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import Row, body_rows
 from schema.wire.news import Crewman, Newborn, News

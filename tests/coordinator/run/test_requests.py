@@ -28,7 +28,7 @@ from coordinator.run.requests import QUARANTINED, REMEMBERED, Requests, RunConte
 from schema.errors import JobRefused
 from schema.experiment.identity import NOBODY, Identity, Origin
 from schema.robot.brain import Brain, Connection, Neuron
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.robot.robot import Part, Robot
 from schema.wire import revolve_pb2 as pb

@@ -23,7 +23,7 @@ from coordinator.storage.folder import (
 )
 from coordinator.storage.journal import Journal
 from schema.errors import RunFolderError
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 
 DETAILS = RunDetails("scenario1", 3, 2**64 - 1, '{"name": "scenario1", "ü": 1}')
 HOLD = """

@@ -33,7 +33,7 @@ from coordinator.storage.journal_codec import decode_entry, encode_entry
 from schema.errors import MalformedMessage, RunFolderError
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.genome import Node
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.wire.arena import Advance, Casualty, Judgement, Touch
 
@@ -230,7 +230,7 @@ from pathlib import Path
 from coordinator.islands.events import VettingFailed
 from coordinator.storage.journal import Journal
 from schema.wire.arena import Advance, Casualty, Judgement, Touch
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.brain import Brain, Connection, Neuron
 journal = Journal.open(Path(sys.argv[1]))
 for number in range(10**9):

@@ -4,7 +4,7 @@ import pytest
 
 from coordinator.islands.events import Evaluated, EvaluationFailed
 from coordinator.storage.journal_codec import decode_entry, encode_entry
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
 
 NAME = BirthId(2, 17)

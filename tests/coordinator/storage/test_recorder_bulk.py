@@ -9,7 +9,7 @@ from coordinator.islands.events import Append
 from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from schema.errors import MalformedMessage, RunFolderError
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.tables.columns import POSES, TABLES, read_columns
 from schema.tables.files import read_table, segment_path, segments_of
 from tests.coordinator.arena_world import poses

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
 from schema.errors import MalformedMessage
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import (

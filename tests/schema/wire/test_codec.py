@@ -14,7 +14,7 @@ from schema.errors import MalformedMessage
 from schema.experiment.identity import NOBODY, Identity, Origin
 from schema.parts import BUILT_IN
 from schema.robot.genome import Genome, Node, develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Report
 from schema.robot.robot import Robot
 from schema.wire import revolve_pb2 as pb

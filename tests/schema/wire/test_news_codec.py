@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from schema.errors import MalformedMessage
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import Row
 from schema.wire.news import Crewman, Departed, Level, Migrant, Newborn, News, levels

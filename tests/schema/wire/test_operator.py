@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from schema.errors import MalformedMessage
 from schema.parts import BUILT_IN
 from schema.robot.genome import Node, develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.wire import revolve_pb2 as pb
 from schema.wire.operator import (
     BrainWish,

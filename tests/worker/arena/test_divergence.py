@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from schema import parts
 from schema.parts import Box, Shape
 from schema.robot.brain import Brain, Connection
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import Casualty, Changes, Insertion
 from tests.worker.arena_cases import (

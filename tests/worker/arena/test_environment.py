@@ -12,7 +12,7 @@ from schema.experiment.document import Simulation, Space
 from schema.experiment.environment import Environment
 from schema.experiment.settings import ArenaSettings
 from schema.robot.brain import INPUT, Brain, Neuron
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.wire.arena import Changes, Insertion
 from tests.worker.arena_cases import SECOND, crowd, populated, seconds, settings_of

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from schema.experiment.file import read_experiment
 from schema.experiment.identity import Origin
 from schema.experiment.settings import arena_settings, read_arena_settings
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import BrainChange, Changes
 from schema.wire.arena_codec import PastAdvance, Rebuild

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from schema.errors import MalformedMessage
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import Changes, Insertion
 from tests.worker.arena_cases import (

@@ -13,7 +13,7 @@ from schema.experiment.document import Space
 from schema.experiment.environment import FLAT
 from schema.parts import LIGHT_SENSOR
 from schema.robot.brain import Brain, Neuron
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import read_columns
 from schema.wire.arena import BrainChange, Changes, Insertion

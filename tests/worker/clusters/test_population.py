@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import Casualty, Changes, Insertion
 from tests.worker.arena_cases import SETTINGS, crowd, populated, seconds, settings_of

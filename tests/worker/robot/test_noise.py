@@ -13,7 +13,7 @@ from schema.experiment.environment import FLAT
 from schema.experiment.identity import NOBODY, Identity, Origin
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.robot.brain import Brain, Connection, Neuron
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats, Track
 from schema.robot.robot import Robot
 from schema.wire.arena import Changes, Insertion

@@ -10,7 +10,7 @@ from schema.experiment.identity import Origin
 from schema.experiment.settings import arena_settings
 from schema.parts import BUILT_IN
 from schema.robot.genome import Node, develop
-from schema.robot.names import BirthId
+from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.wire.arena import Advance, Changes, Insertion
 from schema.wire.arena_codec import (
