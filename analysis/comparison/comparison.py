@@ -22,7 +22,7 @@ from analysis.comparison.statistics import (
     signed_rank,
 )
 from analysis.measures.outputs import OUTCOME, schema
-from analysis.measures.populations_table import Numbers
+from analysis.measures.population_table import Numbers
 from analysis.measures.study import Measured, reach
 
 SURE = 0.05

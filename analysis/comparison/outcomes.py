@@ -8,7 +8,7 @@ import pyarrow as pa
 
 from analysis.comparison.statistics import ranks
 from analysis.measures.outputs import BODY, POPULATION
-from analysis.measures.populations_table import Numbers, Truths
+from analysis.measures.population_table import Numbers, Truths
 
 FOUNDERS = 15
 """Births that are founders in the thesis's experiments."""

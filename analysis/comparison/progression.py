@@ -5,7 +5,7 @@ import pyarrow as pa
 
 from analysis.comparison.statistics import t_quantile
 from analysis.measures.outputs import POPULATION, schema
-from analysis.measures.populations_table import Numbers
+from analysis.measures.population_table import Numbers
 from analysis.measures.trees import Integers
 
 

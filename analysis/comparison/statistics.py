@@ -10,7 +10,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from analysis.measures.populations_table import Numbers
+from analysis.measures.population_table import Numbers
 from analysis.measures.trees import Integers
 
 LEVEL = 0.95

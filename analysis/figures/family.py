@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.measures.ancestry import ancestors, parents_first, parents_of
-from analysis.measures.populations_table import names, rows_of
+from analysis.measures.population_table import names, rows_of
 
 LEVELS = 5
 """Levels of reproduction that a family tree shows, the robot's own included."""

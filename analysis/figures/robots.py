@@ -8,7 +8,7 @@ import pyarrow.compute as pc
 from analysis.comparison.statistics import t_quantile
 from analysis.figures.forms import BAND_RUNS, NothingToDraw, Tables
 from analysis.figures.style import in_order, label, paper, scales, whole
-from analysis.measures.populations_table import Numbers
+from analysis.measures.population_table import Numbers
 
 _MEANT = {"final": "last populations", "born": "all ever judged"}
 _ASIDE = 0.13

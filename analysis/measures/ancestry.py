@@ -3,7 +3,13 @@
 import numpy as np
 import pyarrow as pa
 
-from analysis.measures.populations_table import Census, Numbers, Truths, names, rows_of
+from analysis.measures.population_table import (
+    Numbers,
+    PopulationTable,
+    Truths,
+    names,
+    rows_of,
+)
 from analysis.measures.trees import Integers
 from schema.errors import RunFolderError
 
@@ -73,18 +79,23 @@ def ancestors(parents: list[list[int]]) -> list[int]:
     return found
 
 
-def unique_ancestors(census: Census, lines: list[int]) -> Integers:
+def unique_ancestors(population_table: PopulationTable, lines: list[int]) -> Integers:
     """Return how many different ancestors the judged of each population have, (G,).
 
     Args:
-        census: of a run.
+        population_table: of a run.
         lines: as ``ancestors`` returns them.
 
     Source: Hupkes 2016, table 6.2 and figure 6.4.
     """
-    is_judged, members = census.is_judged.tolist(), census.members.tolist()
+    is_judged, members = (
+        population_table.is_judged.tolist(),
+        population_table.members.tolist(),
+    )
     counts = []
-    for start, end in zip(census.starts[:-1], census.starts[1:], strict=True):
+    for start, end in zip(
+        population_table.starts[:-1], population_table.starts[1:], strict=True
+    ):
         union = 0
         for index in range(start, end):
             if is_judged[index]:
@@ -103,7 +114,7 @@ def origins(births: pa.Table, parents: list[list[int]]) -> list[int]:
 
 
 def foreign_share(
-    census: Census, births: pa.Table, parents: list[list[int]]
+    population_table: PopulationTable, births: pa.Table, parents: list[list[int]]
 ) -> Numbers:
     """Return the share of the living that is not of its island's own line, (G,).
 
@@ -111,13 +122,13 @@ def foreign_share(
 
     Source: own; how far migrants' descendants spread.
     """
-    if len(np.unique(census.islands)) <= 1:
-        return np.full(len(census), np.nan)
+    if len(np.unique(population_table.islands)) <= 1:
+        return np.full(len(population_table), np.nan)
     lines = origins(births, parents)
-    here = census.islands[census.group_of].tolist()
-    pairs = zip(census.members.tolist(), here, strict=True)
+    here = population_table.islands[population_table.group_of].tolist()
+    pairs = zip(population_table.members.tolist(), here, strict=True)
     is_foreign = [lines[member] != 1 << island for member, island in pairs]
-    return census.mean(np.array(is_foreign, np.float64))
+    return population_table.mean(np.array(is_foreign, np.float64))
 
 
 def descends(lines: list[int], ancestor: int) -> Truths:

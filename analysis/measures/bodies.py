@@ -5,7 +5,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.measures.outputs import BODY, PER_PART
-from analysis.measures.populations_table import Numbers
+from analysis.measures.population_table import Numbers
 
 TOUCH = ("TouchSensor",)
 """Part types that feel touch."""

@@ -6,45 +6,45 @@ import numpy as np
 import pyarrow as pa
 
 from analysis.measures.distance import tree_distances
-from analysis.measures.populations_table import Census, Numbers
+from analysis.measures.population_table import Numbers, PopulationTable
 from analysis.measures.trees import Integers, Trees
 
 _BLOCK = 2_000_000
 """Pairs that are held at a time."""
 
 
-def diversity(census: Census, trees: Trees) -> Numbers:
+def diversity(population_table: PopulationTable, trees: Trees) -> Numbers:
     """Return the mean tree edit distance of the pairs of each population, (G,).
 
     All the living count, mature or not, each unordered pair once; brains do not.
     NaN where less than two live.
 
     Args:
-        census: of a run.
+        population_table: of a run.
         trees: of the bodies of the run's births table, row by row.
 
     Source: Hupkes 2016, section 6.2.1 and figure 6.5.
     """
-    found = np.full(len(census), np.nan)
-    for groups, first, second in _pairs(census, trees):
+    found = np.full(len(population_table), np.nan)
+    for groups, first, second in _pairs(population_table, trees):
         distances = distances_of(trees, first.ravel(), second.ravel())
         found[groups] = distances.reshape(first.shape).mean(axis=1)
     return found
 
 
 def _pairs(
-    census: Census, trees: Trees
+    population_table: PopulationTable, trees: Trees
 ) -> Iterator[tuple[Integers, Integers, Integers]]:
     """Yield populations of one size, and the trees of all their pairs, (g, pairs)."""
-    sizes = census.sizes
+    sizes = population_table.sizes
     for size in np.unique(sizes[sizes > 1]).tolist():
         first, second = np.triu_indices(size, 1)
         step = max(1, _BLOCK // len(first))
         every = np.flatnonzero(sizes == size)
         for begin in range(0, len(every), step):
             groups = every[begin : begin + step]
-            rows = census.starts[groups][:, None] + np.arange(size)
-            living = trees.tree_of[census.members[rows]]
+            rows = population_table.starts[groups][:, None] + np.arange(size)
+            living = trees.tree_of[population_table.members[rows]]
             yield groups, living[:, first], living[:, second]
 
 
@@ -63,11 +63,13 @@ def distances_of(trees: Trees, first: Integers, second: Integers) -> Integers:
     return found
 
 
-def mean_distances(census: Census, trees: Trees, step: int = 15) -> pa.Table:
+def mean_distances(
+    population_table: PopulationTable, trees: Trees, step: int = 15
+) -> pa.Table:
     """Return how different the bodies of islands are, within and between them.
 
     Args:
-        census: of a run.
+        population_table: of a run.
         trees: of the bodies of its births table, row by row.
         step: births on each island from one row to the next.
 
@@ -79,13 +81,17 @@ def mean_distances(census: Census, trees: Trees, step: int = 15) -> pa.Table:
 
     Source: own, after Hupkes 2016, section 6.2.1.
     """
-    within = diversity(census, trees)
+    within = diversity(population_table, trees)
     rows = []
-    last = int(census.births.max(initial=0))
+    last = int(population_table.births.max(initial=0))
     for births in range(step, last + 1, step):
-        latest = _latest(census, births)
+        latest = _latest(population_table, births)
         living = [
-            trees.tree_of[census.members[census.starts[g] : census.starts[g + 1]]]
+            trees.tree_of[
+                population_table.members[
+                    population_table.starts[g] : population_table.starts[g + 1]
+                ]
+            ]
             for g in latest
         ]
         grids = [
@@ -114,10 +120,10 @@ def mean_distances(census: Census, trees: Trees, step: int = 15) -> pa.Table:
     return pa.Table.from_pylist(rows, pa.schema(list(zip(names, kinds, strict=True))))
 
 
-def _latest(census: Census, births: int) -> Integers:
+def _latest(population_table: PopulationTable, births: int) -> Integers:
     """Return each island's last population at or before so many births."""
-    before = np.flatnonzero(census.births <= births)
-    islands = census.islands[before]
+    before = np.flatnonzero(population_table.births <= births)
+    islands = population_table.islands[before]
     is_last = np.append(islands[1:] != islands[:-1], True)[: len(islands)]
     latest: Integers = before[is_last]
     return latest

@@ -3,7 +3,7 @@
 import numpy as np
 import pyarrow as pa
 
-from analysis.measures.populations_table import Numbers, stays, unnamed
+from analysis.measures.population_table import Numbers, stays, unnamed
 from analysis.measures.trees import Integers
 
 

@@ -7,7 +7,11 @@ import pyarrow as pa
 
 from analysis.measures.ancestry import ancestors, parents_of
 from analysis.measures.bodies import body_sizes
-from analysis.measures.populations_table import Census, Numbers, census
+from analysis.measures.population_table import (
+    Numbers,
+    PopulationTable,
+    population_table,
+)
 from analysis.measures.trees import SlotRule, Trees, encode
 
 Refusals = dict[str, str]
@@ -35,9 +39,9 @@ class Material:
         return self.tables["births"]
 
     @cached_property
-    def census(self) -> Census:
+    def population_table(self) -> PopulationTable:
         """Who is alive when."""
-        return census(self.tables["population"], self.births)
+        return population_table(self.tables["population"], self.births)
 
     @cached_property
     def trees(self) -> Trees:

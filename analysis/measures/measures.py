@@ -32,12 +32,12 @@ _OTHERS: dict[str, tuple[Callable[[Material], pa.Table], tuple[str, ...]]] = {
         ("births", "fitness", "deaths", "touches"),
     ),
     "between": (
-        lambda run: mean_distances(run.census, run.trees),
+        lambda run: mean_distances(run.population_table, run.trees),
         ("births", "population"),
     ),
     "migrants": (
         lambda run: migrants(
-            run.tables["migrations"], run.births, run.census, run.lines
+            run.tables["migrations"], run.births, run.population_table, run.lines
         ),
         ("births", "population", "migrations"),
     ),

@@ -4,11 +4,14 @@ import numpy as np
 import pyarrow as pa
 
 from analysis.measures.ancestry import descends
-from analysis.measures.populations_table import Census, names, rows_of
+from analysis.measures.population_table import PopulationTable, names, rows_of
 
 
 def migrants(
-    migrations: pa.Table, births: pa.Table, census: Census, lines: list[int]
+    migrations: pa.Table,
+    births: pa.Table,
+    population_table: PopulationTable,
+    lines: list[int],
 ) -> pa.Table:
     """Return how far each migrant's descendants have spread.
 
@@ -16,7 +19,7 @@ def migrants(
         migrations: of one run: ``epoch``, ``birth_island`` and ``birth`` (the migrant's
             name), ``island`` (it left), ``to``, ``fitness`` [m/s].
         births: of the same run: ``island``, ``birth``.
-        census: of the same run.
+        population_table: of the same run.
         lines: as ``analysis.measures.ancestry.ancestors`` returns them.
 
     Returns:
@@ -27,9 +30,9 @@ def migrants(
 
     Source: own.
     """
-    is_last = census.is_last[census.group_of]
-    members = census.members[is_last]
-    where = census.islands[census.group_of][is_last]
+    is_last = population_table.is_last[population_table.group_of]
+    members = population_table.members[is_last]
+    where = population_table.islands[population_table.group_of][is_last]
     homes = np.asarray(births["island"], np.int64)
     named = ("epoch", "birth_island", "birth", "island", "to", "fitness")
     table = migrations.select(named)

@@ -9,7 +9,7 @@ from analysis.measures.ancestry import foreign_share, unique_ancestors
 from analysis.measures.diversity import diversity
 from analysis.measures.material import Material, Refusals
 from analysis.measures.outputs import POPULATION
-from analysis.measures.populations_table import Numbers
+from analysis.measures.population_table import Numbers
 from analysis.measures.retention import retention
 from schema.errors import RevolveError
 
@@ -18,7 +18,7 @@ Columns = dict[str, Numbers]
 
 def _fitness(run: Material) -> Columns:
     """Return how many there are, and how fit (Hupkes 2016, figures 6.2 and 6.3)."""
-    who = run.census
+    who = run.population_table
     best = np.full(len(who), -np.inf)
     np.fmax.at(best, who.group_of, who.fitness)
     return {
@@ -36,23 +36,23 @@ def _rank(run: Material) -> Columns:
 
 def _ancestors(run: Material) -> Columns:
     """Return unique ancestors, absolute and by robot (figure 6.4)."""
-    count = unique_ancestors(run.census, run.lines).astype(np.float64)
-    judged = run.census.sum(run.census.is_judged.astype(np.float64))
+    count = unique_ancestors(run.population_table, run.lines).astype(np.float64)
+    judged = run.population_table.sum(run.population_table.is_judged.astype(np.float64))
     unknown = np.full(len(count), np.nan)
     share = np.divide(count, judged, out=unknown, where=judged > 0)
     return {"ancestors": count, "ancestors_per_robot": share}
 
 
 def _diversity(run: Material) -> Columns:
-    return {"diversity": diversity(run.census, run.trees)}
+    return {"diversity": diversity(run.population_table, run.trees)}
 
 
 def _retention(run: Material) -> Columns:
-    return {"retention": retention(run.census)}
+    return {"retention": retention(run.population_table)}
 
 
 def _foreign(run: Material) -> Columns:
-    return {"foreign": foreign_share(run.census, run.births, run.parents)}
+    return {"foreign": foreign_share(run.population_table, run.births, run.parents)}
 
 
 def _sizes(run: Material) -> Columns:
@@ -64,7 +64,7 @@ def _sizes(run: Material) -> Columns:
 
 def _mean(run: Material, values: Numbers) -> Numbers:
     """Return the mean of the judged of each population, of values per birth."""
-    who = run.census
+    who = run.population_table
     return who.mean(np.where(who.is_judged, values[who.members], np.nan))
 
 
@@ -87,12 +87,12 @@ def populations(run: Material) -> tuple[pa.Table, Refusals]:
             found |= measure(run)
         except RevolveError as error:
             refusals[measure.__name__.strip("_")] = str(error)
-    nothing = np.full(len(run.census), np.nan)
+    nothing = np.full(len(run.population_table), np.nan)
     columns = {name: found.get(name, nothing) for name in POPULATION}
     table = pa.table(
         {
-            "island": run.census.islands,
-            "births": run.census.births,
+            "island": run.population_table.islands,
+            "births": run.population_table.births,
             **{
                 name: pa.array(values, from_pandas=True)
                 for name, values in columns.items()

@@ -4,7 +4,7 @@ import numpy as np
 import pyarrow as pa
 
 from analysis.measures.material import Material
-from analysis.measures.populations_table import Numbers, Truths, names, rows_of
+from analysis.measures.population_table import Numbers, Truths, names, rows_of
 from analysis.measures.variability import last_fitness
 
 
@@ -43,7 +43,7 @@ def _judged(
     named, sampled = last_fitness(run.tables["fitness"])
     rows = rows_of(named, run.births)
     fitness[rows[rows >= 0]] = sampled[rows >= 0]
-    who = run.census
+    who = run.population_table
     chosen = who.is_last[who.group_of] & who.is_judged
     fitness[who.members[chosen]] = who.fitness[chosen]
     is_last = np.zeros(len(fitness), np.bool_)

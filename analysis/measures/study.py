@@ -73,10 +73,10 @@ def measure_run(run: Run, slots: SlotRule) -> Measured:
     material = Material(tables, slots)
     unread = frozenset(one.what.removeprefix(TABLE) for one in left_out)
     found, refusals = measure(material, _wanted(run), unread)
-    if material.census.lacking:
-        why = f"{material.census.lacking} name somebody whose birth is not recorded"
+    if material.population_table.lacking:
+        why = f"{material.population_table.lacking} name somebody whose birth is not recorded"
         left_out.append(LeftOut(folder, "populations", why))
-    if not len(material.census):
+    if not len(material.population_table):
         left_out.append(LeftOut(folder, "measures", "no population is recorded"))
     if any(island.is_online and not island.records_touches for island in run.islands):
         why = "touches are not recorded (arena.record_touches is false)"

@@ -19,7 +19,7 @@ from analysis.comparison.statistics import (
     signed_rank,
     t_quantile,
 )
-from analysis.measures.populations_table import Numbers
+from analysis.measures.population_table import Numbers
 
 
 def numbers(*values: float) -> Numbers:

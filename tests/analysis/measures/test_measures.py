@@ -15,8 +15,8 @@ from analysis.measures.material import Material
 from analysis.measures.measures import measure
 from analysis.measures.migrants import migrants
 from analysis.measures.outputs import OUTPUTS
+from analysis.measures.population_table import population_table
 from analysis.measures.populations import populations
-from analysis.measures.populations_table import census
 from analysis.measures.retention import retention
 from analysis.measures.robots import robots
 from analysis.measures.trees import encode
@@ -126,7 +126,7 @@ def test_diversity_is_the_mean_over_pairs() -> None:
     # Core to brick 1, core to hinge 1, brick to hinge 1, core to far 2, brick to far
     # 1 + 2 (type and slot differ, one more part), hinge to far the same.
     bodies = births((A, []), (B, []), (C, []), (D, []), body=[CORE, BRICK, HINGE, FAR])
-    who = census(
+    who = population_table(
         population(
             (0, 2, {A: 0.1}),
             (0, 3, {A: 0.1, B: None, C: 0.1}),
@@ -142,7 +142,7 @@ def test_diversity_is_the_mean_over_pairs() -> None:
 
 def test_retention_is_the_share_that_still_lives() -> None:
     born = births(*((name, []) for name in (A, B, C, D, E)))
-    who = census(
+    who = population_table(
         population(
             (0, 10, {A: 1, B: 1, C: 1, D: 1}),
             # Nothing was recorded at 130 + 5: skipped, and so are the last.
@@ -338,7 +338,9 @@ def test_migrants_and_their_descendants() -> None:
         ],
     )
     lines = ancestors(parents_of(ISLANDS))
-    found = migrants(moved, ISLANDS, census(living, ISLANDS), lines).to_pylist()
+    found = migrants(
+        moved, ISLANDS, population_table(living, ISLANDS), lines
+    ).to_pylist()
     # A has G and H on island 1, where both live, and C at home.
     assert [row["descendants"] for row in found] == [2, 0]
     assert [row["living"] for row in found] == [2, 0]
@@ -354,7 +356,7 @@ def test_one_island_has_no_foreigners() -> None:
 def test_distances_between_islands() -> None:
     bodies = [CORE, BRICK, FAR, HINGE, CORE, CORE]
     born = births((A, []), (B, []), (F, []), (C, []), (G, []), (H, []), body=bodies)
-    who = census(
+    who = population_table(
         population(
             (0, 2, {A: 1, B: 1}),
             (1, 1, {F: 1}),
@@ -413,7 +415,7 @@ def test_progression_of_islands_is_where_all_of_them_are_recorded() -> None:
 
 def test_a_population_with_somebody_unknown_is_left_out() -> None:
     born = births((A, []), (B, []))
-    who = census(population((0, 1, {A: 1}), (0, 3, {B: 1, C: 2})), born)
+    who = population_table(population((0, 1, {A: 1}), (0, 3, {B: 1, C: 2})), born)
     assert who.births.tolist() == [1]
     assert who.lacking == 1
 
@@ -429,6 +431,8 @@ def test_nothing_born_is_nothing_measured() -> None:
         found, 0
     )
     assert (
-        np.isnan(census(tables["population"], tables["births"]).mean(np.zeros(0))).size
+        np.isnan(
+            population_table(tables["population"], tables["births"]).mean(np.zeros(0))
+        ).size
         == 0
     )

@@ -16,7 +16,7 @@ _BITS, _PLACE = 38, 50
 
 
 @dataclass(frozen=True, slots=True)
-class Census:
+class PopulationTable:
     """The recorded populations of a run, by island and births.
 
     Attributes:
@@ -127,7 +127,7 @@ def rows_of(wanted: Integers, births: pa.Table) -> Integers:
     return found
 
 
-def census(population: pa.Table, births: pa.Table) -> Census:
+def population_table(population: pa.Table, births: pa.Table) -> PopulationTable:
     """Return who is alive when.
 
     A population with a member that the births table lacks is left out: a killed run
@@ -155,7 +155,7 @@ def census(population: pa.Table, births: pa.Table) -> Census:
     kept = ~np.isin(group, lacking)
     islands, numbers, members = islands[kept], numbers[kept], members[kept]
     firsts = np.flatnonzero(is_first[kept])
-    return Census(
+    return PopulationTable(
         islands[firsts],
         numbers[firsts],
         np.append(firsts, len(members)),
