@@ -10,7 +10,7 @@ import pyarrow.compute as pc
 from rich.progress import Progress
 
 from analysis.figures.catalogue import FIGURES, THE_BIRTHS
-from analysis.figures.family import LINEAGE, Best, best_robots, ordered
+from analysis.figures.family_tree import LINEAGE, Best, best_robots, ordered
 from analysis.figures.forms import NothingToDraw
 from analysis.figures.graphviz import NoDot, ordered_by_dot
 from analysis.figures.pictures import FOUNDERS, family_tree, gaits

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import ConnectionPatch, Rectangle
 
-from analysis.figures.family import Family
+from analysis.figures.family_tree import Family
 from analysis.figures.portraits import Colour, Portrait
 from analysis.figures.style import label
 from schema.robot.ids import BirthId
@@ -67,8 +67,8 @@ def family_tree(
 
     Source: Hupkes 2016, figures 6.18 to 6.20.
     """
-    kin = one.family or Family((), (), (), {})
-    width = float(max(5, *map(len, levels), len(kin.founders)))
+    relatives = one.family or Family((), (), (), {})
+    width = float(max(5, *map(len, levels), len(relatives.founders)))
     spots = {
         who: ((at + 0.5) * width / len(level), _STEP * height)
         for height, level in enumerate(levels)
@@ -78,7 +78,7 @@ def family_tree(
     figure = Figure(figsize=(8.0, 8.0 / width * (top + 1.75)))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
-    for child, parent in kin.edges:
+    for child, parent in relatives.edges:
         _line(axes, spots[child], spots[parent])
     for who, spot in spots.items():
         said = fitness.get(one.births[who])
@@ -86,8 +86,8 @@ def family_tree(
         _hang(axes, one, who, spot, said=f"{_name(one, who)}  {worth}")
     line = top + 0.35
     axes.plot([0, width], [line, line], "--", color=_FAINT, linewidth=0.8)
-    for at, who in enumerate(kin.founders):
-        spot = ((at + 0.5) * width / len(kin.founders), line + 0.35)
+    for at, who in enumerate(relatives.founders):
+        spot = ((at + 0.5) * width / len(relatives.founders), line + 0.35)
         colour = FOUNDERS[min(at, len(FOUNDERS) - 1)]
         _hang(axes, one, who, spot, said=f"founder {_name(one, who)}", colour=colour)
     axes.set_xlim(0, width)

@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 from msgspec.structs import replace
 
-from analysis.figures.family import Best, Family, family, lineage, row_of
+from analysis.figures.family_tree import Best, Family, family, lineage, row_of
 from analysis.render.picture import Picture, Simulate, Studio
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment, body_space, island_experiment
@@ -46,7 +46,7 @@ class Portrait:
         family: its nearest ancestors; None if they are not wanted.
         pictures: of everybody in the family, by births row.
         births: name of each of those.
-        lineage: itself and all its ancestors, as ``analysis.figures.family.LINEAGE``.
+        lineage: itself and all its ancestors, as ``analysis.figures.family_tree.LINEAGE``.
     """
 
     best: Best
@@ -89,11 +89,11 @@ def portrait(
     if row < 0:
         raise RunFolderError(f"{best.folder}: birth {best.birth} is not recorded")
     settings = island_experiment(experiment, best.birth_island)
-    kin = family(births, row)
-    paint = dict(zip(kin.founders, colours, strict=False))
+    relatives = family(births, row)
+    paint = dict(zip(relatives.founders, colours, strict=False))
 
     def colour(gene: int) -> Colour:
-        founder = kin.paint.get(gene)
+        founder = relatives.paint.get(gene)
         return NOBODYS if founder is None else paint.get(founder, colours[-1])
 
     def painted(who: int) -> Robot:
@@ -105,7 +105,10 @@ def portrait(
         )
         return Robot(parts, robot.brain)
 
-    people = [*kin.founders, *(one for level in kin.levels for one in level)]
+    people = [
+        *relatives.founders,
+        *(one for level in relatives.levels for one in level),
+    ]
     pictures = {}
     for who in sorted(set(people)) if has_family else ():
         with _studio(painted(who), settings, _SMALL) as studio:
@@ -117,7 +120,7 @@ def portrait(
         best,
         gait,
         times,
-        kin if has_family else None,
+        relatives if has_family else None,
         pictures,
         {
             who: BirthId(births["island"][who].as_py(), births["birth"][who].as_py())

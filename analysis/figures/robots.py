@@ -132,7 +132,7 @@ def lineages(tables: Tables) -> p9.ggplot:
     """Return all ancestors of the best robots, by when they were born and their rank.
 
     Args:
-        tables: ``lineage``, as ``analysis.figures.family.LINEAGE``.
+        tables: ``lineage``, as ``analysis.figures.family_tree.LINEAGE``.
 
     Raises:
         NothingToDraw: nobody who lives has parents.

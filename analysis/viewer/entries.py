@@ -28,7 +28,7 @@ class Moves:
 
 
 @dataclass(frozen=True, slots=True)
-class Kin:
+class FamilyTree:
     """One individual in the ancestry: column and row in the picture, and parents."""
 
     birth: BirthId

@@ -3,7 +3,7 @@
 from collections import OrderedDict
 from dataclasses import dataclass
 
-from analysis.viewer.entries import Kin, When
+from analysis.viewer.entries import FamilyTree, When
 from analysis.viewer.recording import Recording
 from schema.robot.ids import BirthId
 from schema.wire.news import Departed, Level, Newborn
@@ -66,7 +66,7 @@ class Lineage:
         first = next(iter(self._people.values())).order
         self._recording.ancestry(
             [
-                Kin(
+                FamilyTree(
                     birth,
                     person.order - first,
                     person.newborn.rank,

@@ -15,7 +15,7 @@ import numpy.typing as npt
 import rerun as rr
 
 from analysis.viewer.body import Figure, Singles
-from analysis.viewer.entries import Kin, Moves, When, island_path
+from analysis.viewer.entries import FamilyTree, Moves, When, island_path
 from analysis.viewer.ground import Surface
 from analysis.viewer.stage import Stage
 from schema.errors import RevolveError
@@ -224,10 +224,10 @@ class Recording:
         self._at(when)
         self._stream.log("log", rr.TextLog(text, level=level))
 
-    def ancestry(self, kin: Iterable[Kin], when: When) -> None:
+    def ancestry(self, relatives: Iterable[FamilyTree], when: When) -> None:
         """Draw who descends from whom, anew."""
         self._at(when)
-        people = list(kin)
+        people = list(relatives)
         shown = {each.birth for each in people}
         nodes = rr.GraphNodes(
             [_name(each.birth) for each in people],

@@ -6,7 +6,7 @@ from typing import NoReturn
 import numpy as np
 import pytest
 
-from analysis.figures.family import Best
+from analysis.figures.family_tree import Best
 from analysis.figures.pictures import FOUNDERS
 from analysis.figures.portraits import portrait
 from coordinator.evolution.generation import generate

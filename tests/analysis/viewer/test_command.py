@@ -123,10 +123,10 @@ def test_the_lineage_is_drawn_every_ten_births_and_knows_the_living() -> None:
     assert len(recorded.told) == 1
     lineage.keep(Level(0, 11, 2, 2, 0.0, 0.0, (BirthId(0, 3), BirthId(0, 10))))
     lineage.draw()
-    _, kin, _ = recorded.told[1]
-    assert isinstance(kin, list)
+    _, relatives, _ = recorded.told[1]
+    assert isinstance(relatives, list)
     # The last one was born since.
-    assert [each.birth.number for each in kin if each.is_alive] == [3, 10, 11]
+    assert [each.birth.number for each in relatives if each.is_alive] == [3, 10, 11]
 
 
 def test_who_dies_vanishes_with_as_many_births_as_its_last_pose_has() -> None:

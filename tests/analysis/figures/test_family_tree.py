@@ -7,7 +7,14 @@ import pyarrow as pa
 import pytest
 from matplotlib.image import AxesImage
 
-from analysis.figures.family import Best, best_robots, family, lineage, ordered, row_of
+from analysis.figures.family_tree import (
+    Best,
+    best_robots,
+    family,
+    lineage,
+    ordered,
+    row_of,
+)
 from analysis.figures.graphviz import NoDot, ordered_by_dot
 from analysis.figures.pictures import FOUNDERS, family_tree, gaits
 from analysis.figures.portraits import Portrait
@@ -128,13 +135,13 @@ def test_dot_is_asked_where_it_is(
 
 @pytest.fixture
 def portrait(people: pa.Table) -> Portrait:
-    kin = family(people, 5, 3)
+    relatives = family(people, 5, 3)
     pictures = {who: np.full((9, 16, 3), who, np.uint8) for who in range(6)}
     return Portrait(
         Best("scenario1", Path("f"), 0, 5, 0.25),
         (pictures[0], pictures[1]),
         (0.0, 0.5),
-        kin,
+        relatives,
         pictures,
         {who: BirthId(0 if who else 1, who) for who in pictures},
         lineage(people, "scenario1", 5),
