@@ -15,7 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 
 from analysis.comparison.comparison import Outcomes, comparison, findings
 from analysis.comparison.progression import progression
-from analysis.figures.draw import draw_figures
+from analysis.figures.figure_writer import draw_figures
 from analysis.figures.report import Drawn, Making, report
 from analysis.measures.benchmarks import read_benchmarks
 from analysis.measures.load import LeftOut, Run, read_runs

@@ -30,7 +30,7 @@ _BASELINES = ("no-reproduction", "no-selection")
 """Their robots have no ancestry that selection made."""
 
 
-class Plates:
+class FigureWriter:
     """The figures drawn so far, and those that could not be."""
 
     def __init__(self, folder: Path) -> None:
@@ -102,23 +102,23 @@ def draw_figures(
     Returns:
         What was drawn, in order, and what was left out and why.
     """
-    plates = Plates(folder)
+    writer = FigureWriter(folder)
     portraits, problems = _portraits(tables["robots"], runs, simulate, bar)
     lineages = [one.lineage for one in portraits if one.family is not None]
     given = {**tables, "lineage": pa.concat_tables([LINEAGE.empty_table(), *lineages])}
     task = bar.add_task("figures drawn", total=len(FIGURES) + len(portraits) + 1)
     for one in FIGURES:
-        plates.add(
+        writer.add(
             one.number, one.title, one.caption, one.source, partial(one.draw, given)
         )
         bar.advance(task)
-    _add_gaits(plates, portraits, problems)
+    _add_gaits(writer, portraits, problems)
     bar.advance(task)
     for name in dict.fromkeys((*_TREES, *(one.best.experiment for one in portraits))):
         found = [one for one in portraits if one.best.experiment == name]
-        _add_tree(plates, name, found, problems, tables["robots"])
+        _add_tree(writer, name, found, problems, tables["robots"])
         bar.advance(task, len(found))
-    return plates.drawn, plates.left_out
+    return writer.drawn, writer.left_out
 
 
 def _portraits(
@@ -158,14 +158,14 @@ def _portrait(best: Best, runs: Mapping[Path, Run], simulate: Simulate) -> Portr
 
 
 def _add_gaits(
-    plates: Plates, portraits: Sequence[Portrait], problems: Mapping[str, str]
+    writer: FigureWriter, portraits: Sequence[Portrait], problems: Mapping[str, str]
 ) -> None:
     number, title = "6.10", "Gaits of the best robots"
     for name, why in problems.items():
-        plates.leave_out(number, f"{name}: {why}")
+        writer.leave_out(number, f"{name}: {why}")
     if not portraits:
         if not problems:
-            plates.leave_out(number, "nobody was judged")
+            writer.leave_out(number, "nobody was judged")
         return
     caption = (
         "The fittest robot of each experiment's last populations, alone, from the "
@@ -173,11 +173,11 @@ def _add_gaits(
         "white parts came by mutation."
     )
     source = ("robots", THE_BIRTHS)
-    plates.add(number, title, caption, source, partial(gaits, portraits))
+    writer.add(number, title, caption, source, partial(gaits, portraits))
 
 
 def _add_tree(
-    plates: Plates,
+    writer: FigureWriter,
     name: str,
     portraits: Sequence[Portrait],
     problems: Mapping[str, str],
@@ -187,13 +187,13 @@ def _add_tree(
     number = _TREES.get(name, _tree_of(name))
     if not portraits:
         why = problems.get(name, f"no robot of {name} was judged")
-        plates.leave_out(number, why)
+        writer.leave_out(number, why)
         return
     (one,) = portraits
     if one.family is None:
         return
     if len(one.family.levels) == 1:
-        plates.leave_out(number, f"the best robot of {name} is a founder")
+        writer.leave_out(number, f"the best robot of {name} is a founder")
         return
     mine = robots.filter(pc.field("folder") == str(one.best.folder))
     known = mine.select(["birth_island", "birth", "fitness"]).to_pylist()
@@ -211,7 +211,7 @@ def _add_tree(
         "whose parts live on in them, whose colours the parts have. White parts came "
         f"by mutation. It has {one.lineage.num_rows - 1} ancestors in all."
     )
-    plates.add(
+    writer.add(
         number,
         f"Ancestry of the best robot of {label(name)}",
         caption,
