@@ -14,8 +14,8 @@ from analysis.figures.family_tree import LINEAGE, Best, best_robots, ordered
 from analysis.figures.forms import NothingToDraw
 from analysis.figures.graphviz import NoDot, ordered_by_dot
 from analysis.figures.pictures import FOUNDERS, family_tree, gaits
-from analysis.figures.portraits import Portrait, portrait
 from analysis.figures.report import Drawn
+from analysis.figures.robot_pictures import RobotPicture, robot_picture
 from analysis.figures.style import PICTURE_ENDING, in_order, label, save
 from analysis.measures.load import LeftOut, Run
 from analysis.render.picture import Simulate
@@ -103,50 +103,54 @@ def draw_figures(
         What was drawn, in order, and what was left out and why.
     """
     writer = FigureWriter(folder)
-    portraits, problems = _portraits(tables["robots"], runs, simulate, bar)
-    lineages = [one.lineage for one in portraits if one.family is not None]
+    robot_pictures, problems = _robot_pictures(tables["robots"], runs, simulate, bar)
+    lineages = [one.lineage for one in robot_pictures if one.family is not None]
     given = {**tables, "lineage": pa.concat_tables([LINEAGE.empty_table(), *lineages])}
-    task = bar.add_task("figures drawn", total=len(FIGURES) + len(portraits) + 1)
+    task = bar.add_task("figures drawn", total=len(FIGURES) + len(robot_pictures) + 1)
     for one in FIGURES:
         writer.add(
             one.number, one.title, one.caption, one.source, partial(one.draw, given)
         )
         bar.advance(task)
-    _add_gaits(writer, portraits, problems)
+    _add_gaits(writer, robot_pictures, problems)
     bar.advance(task)
-    for name in dict.fromkeys((*_TREES, *(one.best.experiment for one in portraits))):
-        found = [one for one in portraits if one.best.experiment == name]
+    for name in dict.fromkeys(
+        (*_TREES, *(one.best.experiment for one in robot_pictures))
+    ):
+        found = [one for one in robot_pictures if one.best.experiment == name]
         _add_tree(writer, name, found, problems, tables["robots"])
         bar.advance(task, len(found))
     return writer.drawn, writer.left_out
 
 
-def _portraits(
+def _robot_pictures(
     robots: pa.Table,
     runs: Mapping[Path, Run],
     simulate: Callable[[], Simulate],
     bar: Progress,
-) -> tuple[list[Portrait], dict[str, str]]:
+) -> tuple[list[RobotPicture], dict[str, str]]:
     """Return portraits of the best robots, and of the others why there is none."""
     best = {one.experiment: one for one in best_robots(robots)}
     try:
         simulation = simulate()
     except RevolveError as error:
         return [], dict.fromkeys(best, str(error))
-    portraits: list[Portrait] = []
+    robot_pictures: list[RobotPicture] = []
     problems: dict[str, str] = {}
     for name in bar.track(in_order(best), description="robots pictured"):
         try:
-            portraits.append(_portrait(best[name], runs, simulation))
+            robot_pictures.append(_robot_picture(best[name], runs, simulation))
         except RevolveError as error:
             problems[name] = str(error)
-    return portraits, problems
+    return robot_pictures, problems
 
 
-def _portrait(best: Best, runs: Mapping[Path, Run], simulate: Simulate) -> Portrait:
+def _robot_picture(
+    best: Best, runs: Mapping[Path, Run], simulate: Simulate
+) -> RobotPicture:
     run = runs[best.folder]
     births = read_table(best.folder, "births")
-    return portrait(
+    return robot_picture(
         best,
         births,
         experiment_from_text(run.document),
@@ -158,12 +162,14 @@ def _portrait(best: Best, runs: Mapping[Path, Run], simulate: Simulate) -> Portr
 
 
 def _add_gaits(
-    writer: FigureWriter, portraits: Sequence[Portrait], problems: Mapping[str, str]
+    writer: FigureWriter,
+    robot_pictures: Sequence[RobotPicture],
+    problems: Mapping[str, str],
 ) -> None:
     number, title = "6.10", "Gaits of the best robots"
     for name, why in problems.items():
         writer.leave_out(number, f"{name}: {why}")
-    if not portraits:
+    if not robot_pictures:
         if not problems:
             writer.leave_out(number, "nobody was judged")
         return
@@ -173,23 +179,23 @@ def _add_gaits(
         "white parts came by mutation."
     )
     source = ("robots", THE_BIRTHS)
-    writer.add(number, title, caption, source, partial(gaits, portraits))
+    writer.add(number, title, caption, source, partial(gaits, robot_pictures))
 
 
 def _add_tree(
     writer: FigureWriter,
     name: str,
-    portraits: Sequence[Portrait],
+    robot_pictures: Sequence[RobotPicture],
     problems: Mapping[str, str],
     robots: pa.Table,
 ) -> None:
     """Draw one experiment's best robot and its family, or note why not."""
     number = _TREES.get(name, _tree_of(name))
-    if not portraits:
+    if not robot_pictures:
         why = problems.get(name, f"no robot of {name} was judged")
         writer.leave_out(number, why)
         return
-    (one,) = portraits
+    (one,) = robot_pictures
     if one.family is None:
         return
     if len(one.family.levels) == 1:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import ConnectionPatch, Rectangle
 
 from analysis.figures.family_tree import Family
-from analysis.figures.portraits import Colour, Portrait
+from analysis.figures.robot_pictures import Colour, RobotPicture
 from analysis.figures.style import label
 from schema.robot.ids import BirthId
 
@@ -27,21 +27,21 @@ _STEP = 1.0
 """From one level to the next."""
 
 
-def gaits(portraits: Sequence[Portrait]) -> Figure:
+def gaits(robot_pictures: Sequence[RobotPicture]) -> Figure:
     """Return how robots move: a row of consecutive pictures each.
 
     Args:
-        portraits: of the best robots; at least one.
+        robot_pictures: of the best robots; at least one.
 
     Source: Hupkes 2016, figure 6.10.
     """
-    columns = max(len(one.gait) for one in portraits)
+    columns = max(len(one.gait) for one in robot_pictures)
     figure = Figure(
-        figsize=(8.0, 0.25 + len(portraits) * (8.0 / columns * 0.525 + 0.26))
+        figsize=(8.0, 0.25 + len(robot_pictures) * (8.0 / columns * 0.525 + 0.26))
     )
-    axes = figure.subplots(len(portraits), columns, squeeze=False)
+    axes = figure.subplots(len(robot_pictures), columns, squeeze=False)
     figure.subplots_adjust(0, 0, 1, 0.97, wspace=0.02, hspace=0.18)
-    for row, one in zip(axes, portraits, strict=True):
+    for row, one in zip(axes, robot_pictures, strict=True):
         for axis in row:
             axis.set_axis_off()
         for axis, picture, time_s in zip(row, one.gait, one.times_s, strict=False):
@@ -56,7 +56,7 @@ def gaits(portraits: Sequence[Portrait]) -> Figure:
 
 
 def family_tree(
-    one: Portrait, levels: Sequence[Sequence[int]], fitness: Mapping[BirthId, float]
+    one: RobotPicture, levels: Sequence[Sequence[int]], fitness: Mapping[BirthId, float]
 ) -> Figure:
     """Return a robot, its parents above it, and so on, and the founders on top.
 
@@ -96,7 +96,7 @@ def family_tree(
     return figure
 
 
-def _name(one: Portrait, who: int) -> str:
+def _name(one: RobotPicture, who: int) -> str:
     """Return a number of birth, and the island's of those of other islands."""
     island, number = one.births[who]
     return f"{number}" if island == one.best.birth_island else f"{island}:{number}"
@@ -108,7 +108,7 @@ Spot = tuple[float, float]
 
 def _hang(
     axes: Axes,
-    one: Portrait,
+    one: RobotPicture,
     who: int,
     spot: Spot,
     *,

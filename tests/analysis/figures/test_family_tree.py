@@ -17,7 +17,7 @@ from analysis.figures.family_tree import (
 )
 from analysis.figures.graphviz import NoDot, ordered_by_dot
 from analysis.figures.pictures import FOUNDERS, family_tree, gaits
-from analysis.figures.portraits import Portrait
+from analysis.figures.robot_pictures import RobotPicture
 from analysis.figures.robots import lineages
 from analysis.measures.outputs import schema
 from schema.robot.ids import BirthId
@@ -134,10 +134,10 @@ def test_dot_is_asked_where_it_is(
 
 
 @pytest.fixture
-def portrait(people: pa.Table) -> Portrait:
+def robot_picture(people: pa.Table) -> RobotPicture:
     relatives = family(people, 5, 3)
     pictures = {who: np.full((9, 16, 3), who, np.uint8) for who in range(6)}
-    return Portrait(
+    return RobotPicture(
         Best("scenario1", Path("f"), 0, 5, 0.25),
         (pictures[0], pictures[1]),
         (0.0, 0.5),
@@ -155,11 +155,13 @@ def shade(image: AxesImage) -> int:
     return int(pixels[0, 0, 0])
 
 
-def test_a_tree_shows_everybody_once_and_founders_on_top(portrait: Portrait) -> None:
-    assert portrait.family is not None
-    levels = ordered(portrait.family.levels, portrait.family.edges)
+def test_a_tree_shows_everybody_once_and_founders_on_top(
+    robot_picture: RobotPicture,
+) -> None:
+    assert robot_picture.family is not None
+    levels = ordered(robot_picture.family.levels, robot_picture.family.edges)
     fitness = {BirthId(0, 5): 0.25}
-    (axes,) = family_tree(portrait, levels, fitness).axes
+    (axes,) = family_tree(robot_picture, levels, fitness).axes
     heights = [(shade(image), image.get_extent()[2]) for image in axes.images]
     told = {
         text.get_text().split("  ")[0]: text.get_text().split("  ")[-1]
@@ -180,8 +182,8 @@ def test_a_tree_shows_everybody_once_and_founders_on_top(portrait: Portrait) -> 
     assert {FOUNDERS[0], FOUNDERS[1]} <= frames
 
 
-def test_gaits_stand_in_rows_with_their_times(portrait: Portrait) -> None:
-    figure = gaits([portrait, portrait])
+def test_gaits_stand_in_rows_with_their_times(robot_picture: RobotPicture) -> None:
+    figure = gaits([robot_picture, robot_picture])
     assert len(figure.axes) == 4
     assert figure.axes[0].get_title(loc="left") == "scenario 1, 0.250 m/s"
     assert figure.axes[3].get_title() == "0.5 s"

@@ -8,7 +8,7 @@ import pytest
 
 from analysis.figures.family_tree import Best
 from analysis.figures.pictures import FOUNDERS
-from analysis.figures.portraits import portrait
+from analysis.figures.robot_pictures import robot_picture
 from coordinator.evolution.generation import generate
 from schema.errors import SimulationDiverged
 from schema.experiment.document import Experiment, Islands
@@ -33,7 +33,7 @@ def test_a_robot_moves_by_the_noise_of_its_own_run_and_island() -> None:
         ((2, 4), []), genome=[encode_genome(genome)], body=[[part(0, -1, -1, "Core")]]
     )
     with pytest.raises(SimulationDiverged):
-        portrait(
+        robot_picture(
             Best("x", Path("f"), 2, 4, 0.1),
             people,
             EXPERIMENT,

@@ -36,7 +36,7 @@ Colour = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Portrait:
+class RobotPicture:
     """What pictures show of an experiment's best robot.
 
     Attributes:
@@ -58,7 +58,7 @@ class Portrait:
     lineage: pa.Table
 
 
-def portrait(
+def robot_picture(
     best: Best,
     births: pa.Table,
     experiment: Experiment,
@@ -67,7 +67,7 @@ def portrait(
     *,
     origin: Origin,
     has_family: bool,
-) -> Portrait:
+) -> RobotPicture:
     """Return pictures of a robot, of how it moves, and of its family.
 
     Args:
@@ -116,7 +116,7 @@ def portrait(
     island = best.birth_island
     own = Identity(replace(origin, island=island), BirthId(island, best.birth), 0)
     gait, times = _gait(painted(row), settings, partial(simulate, identity=own))
-    return Portrait(
+    return RobotPicture(
         best,
         gait,
         times,
