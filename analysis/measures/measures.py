@@ -11,14 +11,14 @@ import pyarrow as pa
 from analysis.measures.bodies import extremity_bins
 from analysis.measures.diversity import mean_distances
 from analysis.measures.interactions import interactions
-from analysis.measures.material import Material, Refusals
 from analysis.measures.migrants import migrants
 from analysis.measures.populations import populations
 from analysis.measures.robots import robots
+from analysis.measures.run_tables import Refusals, RunTables
 from analysis.measures.variability import variability
 from schema.errors import RevolveError
 
-_OTHERS: dict[str, tuple[Callable[[Material], pa.Table], tuple[str, ...]]] = {
+_OTHERS: dict[str, tuple[Callable[[RunTables], pa.Table], tuple[str, ...]]] = {
     "robots": (robots, ("births", "population", "evaluations", "fitness")),
     "extremities": (
         lambda run: extremity_bins(robots(run)),
@@ -46,7 +46,7 @@ _OTHERS: dict[str, tuple[Callable[[Material], pa.Table], tuple[str, ...]]] = {
 
 
 def measure(
-    run: Material, wanted: frozenset[str], unread: frozenset[str] = frozenset()
+    run: RunTables, wanted: frozenset[str], unread: frozenset[str] = frozenset()
 ) -> tuple[dict[str, pa.Table], Refusals]:
     """Return all measures of a run.
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pyarrow as pa
 
-from analysis.measures.material import Material
 from analysis.measures.population_table import Numbers, Truths, names, rows_of
+from analysis.measures.run_tables import RunTables
 from analysis.measures.variability import last_fitness
 
 
-def robots(run: Material) -> pa.Table:
+def robots(run: RunTables) -> pa.Table:
     """Return everybody who was ever judged, with sizes, rank and fitness.
 
     Returns:
@@ -32,7 +32,7 @@ def robots(run: Material) -> pa.Table:
 
 
 def _judged(
-    run: Material,
+    run: RunTables,
 ) -> tuple[Numbers, Truths]:
     """Return each individual's last fitness, NaN if none, and who is alive last."""
     fitness = np.full(run.births.num_rows, np.nan)

@@ -9,9 +9,9 @@ import numpy as np
 import pyarrow as pa
 
 from analysis.measures.load import TABLE, LeftOut, Run, read_tables
-from analysis.measures.material import Material
 from analysis.measures.measures import measure
 from analysis.measures.outputs import schema
+from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import SlotRule
 
 _FEW = 3
@@ -70,7 +70,7 @@ def measure_run(run: Run, slots: SlotRule) -> Measured:
     """Return the measures of one run: reads, measures, names what was left out."""
     tables, left_out = read_tables(run)
     folder = str(run.folder)
-    material = Material(tables, slots)
+    material = RunTables(tables, slots)
     unread = frozenset(one.what.removeprefix(TABLE) for one in left_out)
     found, refusals = measure(material, _wanted(run), unread)
     if material.population_table.lacking:

@@ -11,7 +11,6 @@ from analysis.comparison.progression import progression
 from analysis.measures.ancestry import ancestors, parents_of
 from analysis.measures.bodies import body_sizes, extremity_bins
 from analysis.measures.diversity import diversity, mean_distances
-from analysis.measures.material import Material
 from analysis.measures.measures import measure
 from analysis.measures.migrants import migrants
 from analysis.measures.outputs import OUTPUTS
@@ -19,6 +18,7 @@ from analysis.measures.population_table import population_table
 from analysis.measures.populations import populations
 from analysis.measures.retention import retention
 from analysis.measures.robots import robots
+from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import encode
 from analysis.measures.variability import variability
 from schema.errors import RunFolderError
@@ -31,7 +31,7 @@ FAMILY = births((A, []), (B, []), (C, [A, B]), (D, [C, A]), (E, [D, C]))
 
 
 def column(tables: dict[str, pa.Table], name: str) -> list[Any]:
-    found, refusals = populations(Material(tables))
+    found, refusals = populations(RunTables(tables))
     assert not refusals
     values: list[Any] = found[name].to_pylist()
     return values
@@ -111,7 +111,7 @@ def test_a_parent_that_is_not_there_is_told_and_the_rest_is_measured() -> None:
     )
     with pytest.raises(RunFolderError, match="row 1 has a parent whose birth is not"):
         parents_of(tables["births"])
-    found, refusals = measure(Material(tables), frozenset())
+    found, refusals = measure(RunTables(tables), frozenset())
     assert found["populations"]["fitness"].to_pylist() == [1.5]
     assert found["populations"]["ancestors"].to_pylist() == [None]
     assert {"ancestors", "foreign", "robots"} <= set(refusals)
@@ -234,7 +234,7 @@ def test_robots_have_the_fitness_that_they_were_last_judged_by() -> None:
         population=population((0, 3, {A: 0.1, B: None}), (0, 5, {A: 0.2, C: 0.3})),
         evaluations=table("evaluations", evaluations),
     )
-    found = robots(Material(tables))
+    found = robots(RunTables(tables))
     assert found["birth"].to_pylist() == [0, 1, 2]
     assert found["fitness"].to_pylist() == [0.2, 0.0, 0.3]
     assert found["is_last"].to_pylist() == [True, False, True]
@@ -249,7 +249,7 @@ def test_robots_of_an_arena_count_once_they_were_mature() -> None:
     ]
     living = population((0, 2, {A: 0.15, B: None}), is_online=True)
     tables = run(births=FAMILY, population=living, fitness=table("fitness", samples))
-    (row,) = robots(Material(tables)).to_pylist()
+    (row,) = robots(RunTables(tables)).to_pylist()
     # Alive at the last birth: as it was judged then.
     assert (row["birth"], row["fitness"], row["is_last"]) == (0, 0.15, True)
 
@@ -302,7 +302,7 @@ def test_interactions_by_hand() -> None:
     samples = table("fitness", [{"birth": 1, "sim_time_s": 60.0}])
     tables = run(births=born, population=population((0, 3, {B: None}), is_online=True))
     tables |= {"deaths": deaths, "touches": touches, "fitness": samples}
-    found, _ = measure(Material(tables), frozenset({"interactions"}))
+    found, _ = measure(RunTables(tables), frozenset({"interactions"}))
     (row,) = found["interactions"].to_pylist()
     # A lived 40 s, B 50 s and C 40 s, to the last sample; D off-line.
     assert row == {
@@ -423,7 +423,7 @@ def test_a_population_with_somebody_unknown_is_left_out() -> None:
 def test_nothing_born_is_nothing_measured() -> None:
     tables = run(births=births(), population=population())
     found, refusals = measure(
-        Material(tables),
+        RunTables(tables),
         frozenset({"variability", "interactions", "between", "migrants"}),
     )
     assert not refusals

@@ -18,7 +18,7 @@ Refusals = dict[str, str]
 """Why a measure could not be had, by its name."""
 
 
-class Material:
+class RunTables:
     """A run's tables, and what several measures derive from them, once.
 
     Attributes:
