@@ -18,8 +18,8 @@ from analysis.comparison.progression import progression
 from analysis.figures.figure_writer import draw_figures
 from analysis.figures.report import Drawn, Making, report
 from analysis.measures.benchmarks import read_benchmarks
+from analysis.measures.distinct_names import told_apart
 from analysis.measures.load import LeftOut, Run, read_runs
-from analysis.measures.namesakes import told_apart
 from analysis.measures.outputs import OUTPUTS, schema
 from analysis.measures.study import gathered, measure_runs
 from analysis.progress import bars

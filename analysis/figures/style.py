@@ -10,7 +10,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from analysis.measures.namesakes import MARK
+from analysis.measures.distinct_names import MARK
 
 WIDTH_IN = 7.0
 DPI = 160

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from analysis.figures.style import broken, colours, in_order, label
+from analysis.measures.distinct_names import told_apart
 from analysis.measures.load import Run, Settings
-from analysis.measures.namesakes import told_apart
 from schema.experiment.document import Experiment, Islands, Selection
 from schema.experiment.file import experiment_text, read_experiment
 
