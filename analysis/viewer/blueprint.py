@@ -6,7 +6,7 @@ from collections.abc import Set as AbstractSet
 import rerun as rr
 import rerun.blueprint as rrb
 
-from analysis.viewer.entries import island_path, motion_path, robot_path
+from analysis.viewer.entities import island_path, motion_path, robot_path
 from analysis.viewer.motion import LANES
 from analysis.viewer.recording import BIRTHS, SIMULATED
 from schema.robot.ids import BirthId

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from analysis.viewer.rotations import product, quaternion, rotated
+from analysis.viewer.quaternions import product, quaternion, rotated
 from schema.parts import BodySpace, Box
 from schema.robot.frames import place_parts, shapes_of
 from schema.robot.results import Floats

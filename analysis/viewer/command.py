@@ -22,8 +22,8 @@ from analysis.viewer.replay import (
     read_poses,
 )
 from analysis.viewer.resimulate import Simulators, move_again
+from analysis.viewer.scene import stage
 from analysis.viewer.show import Show
-from analysis.viewer.stage import stage
 from analysis.viewer.watch import watch
 from schema.agent.command import add_network_flags, tls_of
 from schema.agent.service import tell_user

@@ -3,7 +3,7 @@
 from itertools import count
 
 from analysis.viewer.body import standing
-from analysis.viewer.entries import When, robot_path
+from analysis.viewer.entities import When, robot_path
 from analysis.viewer.looks import Figures
 from analysis.viewer.recording import Recording
 from schema.robot.ids import BirthId

@@ -3,7 +3,7 @@
 from collections import OrderedDict
 from dataclasses import dataclass
 
-from analysis.viewer.entries import FamilyTree, When
+from analysis.viewer.entities import FamilyTree, When
 from analysis.viewer.recording import Recording
 from schema.robot.ids import BirthId
 from schema.wire.news import Departed, Level, Newborn

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.viewer.body import Figure, place_rows
-from analysis.viewer.entries import Moves, When, motion_path
+from analysis.viewer.entities import Moves, When, motion_path
 from analysis.viewer.recording import Recording, ViewerError
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table

@@ -15,9 +15,9 @@ import numpy.typing as npt
 import rerun as rr
 
 from analysis.viewer.body import Figure, Singles
-from analysis.viewer.entries import FamilyTree, Moves, When, island_path
+from analysis.viewer.entities import FamilyTree, Moves, When, island_path
 from analysis.viewer.ground import Surface
-from analysis.viewer.stage import Stage
+from analysis.viewer.scene import Stage
 from schema.errors import RevolveError
 from schema.robot.ids import BirthId
 

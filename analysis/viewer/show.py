@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from analysis.viewer.body import Singles, place_rows
-from analysis.viewer.entries import Moves, When, robot_path
+from analysis.viewer.entities import Moves, When, robot_path
 from analysis.viewer.gallery import Gallery
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.looks import Figures, rows_by_robot

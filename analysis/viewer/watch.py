@@ -11,8 +11,8 @@ from analysis.viewer.blueprint import layout
 from analysis.viewer.live import Ended, LiveSource, Told
 from analysis.viewer.output import Output, Window, linger
 from analysis.viewer.recording import Recording
+from analysis.viewer.scene import stage
 from analysis.viewer.show import Show
-from analysis.viewer.stage import stage
 from schema.agent.service import tell_user
 from schema.errors import MalformedMessage, NetworkError
 from schema.experiment.file import experiment_from_text

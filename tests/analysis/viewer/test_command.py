@@ -12,15 +12,15 @@ import pyarrow as pa
 import pytest
 
 from analysis.viewer.blueprint import layout
-from analysis.viewer.entries import Moves, When
+from analysis.viewer.entities import Moves, When
 from analysis.viewer.gallery import Gallery, spot_place
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.live import Sequel
 from analysis.viewer.looks import Figures
 from analysis.viewer.output import Output, Window, linger
 from analysis.viewer.recording import ViewerError
+from analysis.viewer.scene import stage
 from analysis.viewer.show import Show
-from analysis.viewer.stage import stage
 from schema.experiment.document import Arena, Experiment, Simulation
 from schema.experiment.file import read_experiment
 from schema.mjcf.world import add_ring_wall

@@ -11,7 +11,7 @@ from rerun.chunk import RrdReader
 from analysis.viewer.blueprint import layout
 from analysis.viewer.ground import Surface, surfaces
 from analysis.viewer.recording import Recording
-from analysis.viewer.stage import stage
+from analysis.viewer.scene import stage
 from schema.experiment.document import Arena, Experiment, Islands, Simulation
 from schema.experiment.environment import FLAT, Environment, relief
 from schema.robot.ids import BirthId
