@@ -46,7 +46,7 @@ class RobotPicture:
         family: its nearest ancestors; None if they are not wanted.
         pictures: of everybody in the family, by births row.
         births: name of each of those.
-        lineage: itself and all its ancestors, as ``analysis.figures.family_tree.LINEAGE``.
+        lineage: itself and all its ancestors, as ``family_tree.LINEAGE``.
     """
 
     best: Best

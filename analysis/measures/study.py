@@ -74,7 +74,7 @@ def measure_run(run: Run, slots: SlotRule) -> Measured:
     unread = frozenset(one.what.removeprefix(TABLE) for one in left_out)
     found, refusals = measure(material, _wanted(run), unread)
     if material.population_table.lacking:
-        why = f"{material.population_table.lacking} name somebody whose birth is not recorded"
+        why = f"{material.population_table.lacking} rows name a birth without a row"
         left_out.append(LeftOut(folder, "populations", why))
     if not len(material.population_table):
         left_out.append(LeftOut(folder, "measures", "no population is recorded"))

@@ -68,7 +68,7 @@ class EvaluationFailed:
         birth: whose robot.
         reason: why.
         provenance: who found out.
-        trial, asker: as of ``Evaluated``.
+        trial, requester: as of ``Evaluated``.
     """
 
     birth: BirthId

@@ -49,7 +49,7 @@ from schema.robot.ids import BirthId
 _LOG = logging.getLogger(__name__)
 
 Key = tuple[str, int, BirthId, int]
-"""What an open question is known by: kind, asker, birth, attempt or trial."""
+"""What an open question is known by: kind, requester, birth, attempt or trial."""
 
 Asked = Vet | Evaluate | AdvanceShard
 """What islands and arenas have others do."""

@@ -128,7 +128,7 @@ def _event(entry: pb.Entry) -> Heard:
     signed = Provenance(
         entry.provenance.agent, entry.provenance.platform, entry.provenance.wall_s
     )
-    requester = entry.requester if entry.HasField("asker") else None
+    requester = entry.requester if entry.HasField("requester") else None
     match entry.WhichOneof("event"):
         case "vetted":
             return Vetted(birth, entry.attempt, report_from_message(entry.vetted))

@@ -252,9 +252,7 @@ def test_another_version_s_segment_is_named(made: Maker) -> None:
         stream.write_table(rows)
     measured = measure_run(found_in(folder), "parent")
     assert "another version" in whys(measured)["table births"]
-    assert (
-        "2 name somebody whose birth is not recorded" in whys(measured)["populations"]
-    )
+    assert "2 rows name a birth without a row" in whys(measured)["populations"]
 
 
 def test_columns_that_an_older_run_lacks_are_filled(made: Maker) -> None:

@@ -114,7 +114,7 @@ def test_the_seed_says_who_is_drawn() -> None:
     assert stories[0] == stories[1] != stories[2]
 
 
-@pytest.mark.parametrize("asker", [None, 0, 3])
+@pytest.mark.parametrize("requester", [None, 0, 3])
 def test_a_journal_keeps_who_asked(requester: int | None) -> None:
     signed = Provenance("worker-1", "x86", 0.5)
     done = Evaluated(

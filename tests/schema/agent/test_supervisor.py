@@ -85,24 +85,24 @@ def test_a_child_gives_back_what_it_leaves() -> None:
 
 _SHIELDED = """
 import pathlib, signal, sys
-from schema.agent.supervisor import Crew
+from schema.agent.supervisor import ProcessPool
 
-def body(folder, post):
+def body(folder, slot):
     masked = signal.pthread_sigmask(signal.SIG_BLOCK, [])
-    pathlib.Path(folder, str(post.index)).write_text(str(signal.SIGINT in masked))
+    pathlib.Path(folder, str(slot.index)).write_text(str(signal.SIGINT in masked))
 
 if __name__ == "__main__":
-    with Crew(body, (sys.argv[1],), size=2) as crew:
-        while len(crew.exit_codes) < 2:
-            crew.wait(1.0)
-            crew.look_after()
+    with ProcessPool(body, (sys.argv[1],), size=2) as pool:
+        while len(pool.exit_codes) < 2:
+            pool.wait(1.0)
+            pool.look_after()
     print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))
 """
 
 
 def test_a_ctrl_c_reaches_no_child_from_its_birth_on(tmp_path: Path) -> None:
     """Nor the first one, with which Python starts a process of its own."""
-    script = tmp_path / "crew.py"
+    script = tmp_path / "pool.py"
     script.write_text(_SHIELDED)
     done = subprocess.check_output(
         [sys.executable, script, tmp_path],

@@ -59,7 +59,8 @@ def test_no_contact_comes_late_in_long_lives(robot_of: Robots) -> None:
         )
         sys.stdout.write(
             f"\nradius {radius_m} m, drop {drop_m} m: {oracle.pair_steps} pair-steps "
-            f"in contact, {len(oracle.missed)} missed, {world.population.merges} merges, "
+            f"in contact, {len(oracle.missed)} missed, "
+            f"{world.population.merges} merges, "
             f"{world.population.splits} partings"
         )
         assert oracle.missed == []
