@@ -1,0 +1,201 @@
+"""Probe of ``birth_trace.py``: notes which file of ours calls which, and when.
+
+``birth_trace.py`` copies this file as ``sitecustomize.py`` into a folder of PYTHONPATH,
+so every process of a run imports it before anything of ours. It knows no module of
+ours, only the root of the tree and the names of its top folders.
+
+A process writes its notes when it ends: a line of JSON (``files``, ``marks``,
+``bits``), then unsigned 64-bit integers, one per call: microseconds, number of the
+calling file, number of the called file, each ``bits`` wide. File 0 is none of ours.
+"""
+
+import atexit
+import json
+import os
+import sys
+import time
+from array import array
+from collections.abc import Callable, Sequence
+from importlib.machinery import ModuleSpec
+from importlib.util import find_spec
+from pathlib import Path
+from types import FrameType, FunctionType, MethodType, ModuleType
+from typing import Any
+
+FOLDER = "BIRTH_TRACE_FOLDER"
+"""Environment variable: where the notes go."""
+ROOT = "BIRTH_TRACE_ROOT"
+"""Environment variable: root of the tree that is traced."""
+BEGIN = "BIRTH_TRACE_BEGIN_US"
+"""Environment variable: time from which all processes count, of the monotonic clock."""
+TOPS = ("schema", "coordinator", "worker", "analyzer", "analysis", "revolve")
+"""Folders of the root, or single files, that hold our code."""
+BITS = 12
+"""Of a file's number in a note."""
+SLOWER = 1000
+"""How much slower the wall clock of our code goes once parents mate."""
+
+_NAMED_BY = 5  # run, island, birth, attempt, purpose
+_PARENTS = 2
+_OPTIMIZED = 0x01  # code of a function, not of a module or class body
+
+_now_ns = time.monotonic_ns
+_monotonic_s = time.monotonic
+
+
+class Probe:
+    """The notes of one process.
+
+    Attributes:
+        marks: island, birth and microsecond of each choice of parents.
+    """
+
+    def __init__(self, root: Path, folder: Path, begin_us: int) -> None:
+        self.marks: list[tuple[int, int, int]] = []
+        self._begin_us = begin_us
+        self._root = f"{root}{os.sep}"
+        self._folder = folder
+        self._names = [""]
+        self._numbers: dict[str, int] = {}
+        self._notes = array("Q")
+        self._slow_since_s: float | None = None
+
+    def install(self) -> None:
+        """Watch all threads that Python starts, the clock and two libraries."""
+        import threading  # noqa: PLC0415 - its own clock is bound before ours is set
+
+        time.monotonic = self.monotonic
+        threading.setprofile(self.watch)
+        sys.setprofile(self.watch)
+        sys.meta_path.insert(0, _Patches(self))
+        atexit.register(self.write)
+
+    def watch(self, frame: FrameType, event: str, _argument: object) -> None:
+        """Note a call of a function of ours; a profile function."""
+        if event != "call":
+            return
+        code = frame.f_code
+        called = self._number(code.co_filename)
+        if not called or not code.co_flags & _OPTIMIZED:
+            return
+        back, caller = frame.f_back, 0
+        while back is not None and not caller:
+            caller = self._number(back.f_code.co_filename)
+            back = back.f_back
+        self._notes.append(((self._now_us() << BITS | caller) << BITS) | called)
+
+    def watched(self, function: Any) -> Any:  # noqa: ANN401 - any callable
+        """Return a callback that is watched on a thread that Python did not start."""
+        if not isinstance(function, FunctionType | MethodType):
+            return function
+
+        def call(*arguments: object) -> object:
+            sys.setprofile(self.watch)
+            return function(*arguments)
+
+        return call
+
+    def mark(self, key: Sequence[int]) -> None:
+        """Note the first choice of parents for a birth by the name of its stream."""
+        if len(key) != _NAMED_BY or (key[3], key[4]) != (0, _PARENTS):
+            return
+        if self._slow_since_s is None:
+            self._slow_since_s = _monotonic_s()
+        self.marks.append((int(key[1]), int(key[2]), self._now_us()))
+
+    def monotonic(self) -> float:
+        """Return the time [s]; to our code it goes slower once parents mate."""
+        since_s, now_s = self._slow_since_s, _monotonic_s()
+        if since_s is None or not self._number(sys._getframe(1).f_code.co_filename):
+            return now_s
+        return since_s + (now_s - since_s) / SLOWER
+
+    def write(self) -> None:
+        """Write the notes, if there are any."""
+        sys.setprofile(None)
+        if not self._notes:
+            return
+        entries = {"files": self._names, "marks": self.marks, "bits": BITS}
+        head = json.dumps(entries)
+        path = self._folder / f"{os.getpid()}.trace"
+        path.write_bytes(head.encode() + b"\n" + self._notes.tobytes())
+
+    def _now_us(self) -> int:
+        return _now_ns() // 1000 - self._begin_us
+
+    def _number(self, file: str) -> int:
+        """Return the number of a file of ours, 0 of any other."""
+        known = self._numbers.get(file)
+        return self._new_number(file) if known is None else known
+
+    def _new_number(self, file: str) -> int:
+        number = 0
+        if file.startswith(self._root) and not file.endswith("_pb2.py"):
+            name = file.removeprefix(self._root).replace(os.sep, "/")
+            if name.partition("/")[0].removesuffix(".py") in TOPS:
+                number = len(self._names)
+                self._names.append(name)
+        self._numbers[file] = number
+        return number
+
+
+class _Patches:
+    """Changes a library when it has been imported; an entry of ``sys.meta_path``."""
+
+    def __init__(self, probe: Probe) -> None:
+        self._waiting: dict[str, Callable[[ModuleType], None]] = {
+            "numpy.random": lambda module: _patch_streams(module, probe),
+            "zenoh": lambda module: _patch_callbacks(module, probe),
+        }
+
+    def find_spec(
+        self, name: str, _path: object = None, _target: object = None
+    ) -> ModuleSpec | None:
+        patch = self._waiting.pop(name, None)
+        if patch is None:
+            return None
+        spec = find_spec(name)
+        assert spec is not None
+        assert spec.loader is not None
+        execute = spec.loader.exec_module
+
+        def load(module: ModuleType) -> None:
+            execute(module)
+            patch(module)
+
+        spec.loader.exec_module = load  # type: ignore[method-assign]
+        return spec
+
+
+def _patch_streams(module: Any, probe: Probe) -> None:  # noqa: ANN401 - numpy.random
+    """Have seeds of random streams tell by what they are named."""
+
+    class Marked(module.SeedSequence):  # type: ignore[misc]
+        def __init__(
+            self,
+            entropy: int | Sequence[int] | None = None,
+            *,
+            spawn_key: Sequence[int] = (),
+            **more: int,
+        ) -> None:
+            super().__init__(entropy, spawn_key=spawn_key, **more)
+            probe.mark(spawn_key)
+
+    module.SeedSequence = Marked
+
+
+def _patch_callbacks(module: Any, probe: Probe) -> None:  # noqa: ANN401 - zenoh
+    """Have callbacks watched that run on the network's own threads."""
+    original = module.handlers.Callback
+
+    def callback(function: Any, *more: Any, **named: Any) -> Any:  # noqa: ANN401
+        others = [probe.watched(each) for each in more]
+        return original(probe.watched(function), *others, **named)
+
+    module.handlers.Callback = callback
+
+
+if FOLDER in os.environ:
+    Probe(
+        Path(os.environ[ROOT]), Path(os.environ[FOLDER]), int(os.environ[BEGIN])
+    ).install()
