@@ -7,6 +7,7 @@ experiment; taking such runs for independent, as is done here, errs on the safe 
 import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
+from typing import Protocol
 
 import numpy as np
 import pyarrow as pa
@@ -30,6 +31,20 @@ NEGLIGIBLE, LARGE = 0.147, 0.474
 """Of Cliff's delta. Source: Romano et al., 2006, after Cohen's d."""
 
 Row = dict[str, object]
+
+
+class Compared(Protocol):
+    """What is compared: outcomes of runs, wherever they come from."""
+
+    @property
+    def experiments(self) -> list[str]:
+        """Those that have finished runs, by name."""
+
+    def births(self, *experiments: str) -> int:
+        """Return the greatest births that all runs of some experiments reach."""
+
+    def values(self, experiment: str, measure: str, births: int) -> Numbers:
+        """Return the runs' numbers of one measure, without those that have none."""
 
 
 class Outcomes:
@@ -88,7 +103,7 @@ class Outcomes:
         return pa.Table.from_pylist(rows, schema("outcomes"))
 
 
-def comparison(outcomes: Outcomes) -> pa.Table:
+def comparison(outcomes: Compared) -> pa.Table:
     """Return every measure of every pair of experiments.
 
     Args:
@@ -109,7 +124,7 @@ def comparison(outcomes: Outcomes) -> pa.Table:
     return pa.Table.from_pylist(_corrected(rows), schema("comparison"))
 
 
-def findings(outcomes: Outcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
+def findings(outcomes: Compared, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
     """Return what became of the thesis's findings.
 
     Args:
@@ -138,7 +153,7 @@ def findings(outcomes: Outcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
     return pa.Table.from_pylist(rows, schema("findings"))
 
 
-def _tested(outcomes: Outcomes, claim: Claim) -> Row:
+def _tested(outcomes: Compared, claim: Claim) -> Row:
     """Return the numbers of a claim, or why there are none."""
     names = [name for name in (claim.a, claim.b) if name is not None]
     for name in names:

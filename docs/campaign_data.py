@@ -1,0 +1,327 @@
+"""What is kept of the campaign in docs/data: tables, their files, how they are read.
+
+A table is a folder, a repeat a file in it. Rows of a finished repeat never change.
+"""
+
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from analysis.measures.outputs import BODY, schema
+from analysis.measures.population_table import Numbers
+
+DATA = Path(__file__).resolve().parent / "data"
+LEVEL = 19
+"""Of zstd: files are written once and stay in the history for good."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Part of the campaign: what one ``revolve run`` makes.
+
+    Attributes:
+        option: its name for ``--only``.
+        folder: its name below ``runs``.
+        experiments: names of shipped experiments, or paths.
+        repeats: of each.
+        births: of each run.
+        seed: of all runs.
+    """
+
+    option: str
+    folder: str
+    experiments: tuple[str, ...]
+    repeats: int
+    births: int = 3000
+    seed: int = 1
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the experiments."""
+        return [Path(experiment).stem for experiment in self.experiments]
+
+
+PARTS = (
+    Part(
+        "off-line",
+        "thesis",
+        ("scenario1", "scenario2", "no-selection", "no-reproduction"),
+        repeats=30,
+    ),
+    Part("arena", "thesis-arena", ("scenario3",), repeats=10),
+)
+
+_WHOSE = [("experiment", pa.string()), ("run", pa.int32())]
+
+
+def _of_analysis(table: str) -> pa.Schema:
+    """Return the columns of ``revolve analyze``, with the repeat for the folder."""
+    names = {"experiment", "folder"}
+    fields = [(one.name, one.type) for one in schema(table) if one.name not in names]
+    return pa.schema([*_WHOSE, *fields])
+
+
+_RUNS = {
+    "seed": pa.uint64(),
+    "births": pa.int64(),
+    "state": pa.string(),
+    "platform": pa.string(),
+    "versions": pa.string(),
+    "commit": pa.string(),
+    "document": pa.string(),
+}
+_FINAL = {
+    "birth": pa.int64(),
+    "parents": pa.list_(pa.int64()),
+    "fitness": pa.float64(),
+    **dict.fromkeys(("rank", "ancestors", *BODY), pa.int64()),
+    "genome": pa.binary(),
+}
+TABLES = {
+    **{
+        name: _of_analysis(name)
+        for name in ("outcomes", "populations", "extremities", "variability")
+    },
+    "final": pa.schema([*_WHOSE, *_FINAL.items()]),
+    "runs": pa.schema([*_WHOSE, *_RUNS.items()]),
+}
+"""Columns of the tables; each is a folder of ``docs/data``, a file per repeat.
+
+``runs`` is written last: where it is, the others are.
+"""
+
+_ONLY_OF_ARENAS = {"variability"}
+_TO_THE_END = {"outcomes", "populations", "runs"}
+
+
+def parquet(table: pa.Table) -> bytes:
+    """Return a table as Parquet, small and with the same bytes every time."""
+    counts = {"birth", "births", "rank", "ancestors"}
+    splits = {"fitness", "fitness_range", "population_range"}
+    texts = [field.name for field in table.schema if pa.types.is_string(field.type)]
+    encodings = {}
+    for field in table.schema:
+        if field.name in counts and pa.types.is_integer(field.type):
+            encodings[field.name] = "DELTA_BINARY_PACKED"
+        elif field.name in splits:
+            encodings[field.name] = "BYTE_STREAM_SPLIT"
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        table,
+        sink,
+        compression="zstd",
+        compression_level=LEVEL,
+        use_dictionary=texts,
+        column_encoding=encodings,
+        write_statistics=False,
+        store_schema=False,
+        write_page_checksum=True,
+    )
+    found: bytes = sink.getvalue().to_pybytes()
+    return found
+
+
+def replace(path: Path, content: bytes) -> None:
+    """Write a file whole, or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    new = path.with_name(f"{path.name}.new")
+    with new.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    new.replace(path)
+
+
+def stem(experiment: str, number: int) -> str:
+    """Return the name of a repeat's files, without their ending."""
+    return f"{experiment}-{number:02}"
+
+
+def path_of(data: Path, table: str, name: str) -> Path:
+    """Return where the rows of a repeat are, by what ``stem`` returns."""
+    return data / table / f"{name}.parquet"
+
+
+def tables_of(part: Part) -> list[str]:
+    """Return the tables that each run of a part has."""
+    is_arena = part.option == "arena"
+    return [name for name in TABLES if is_arena or name not in _ONLY_OF_ARENAS]
+
+
+def troubles_of(data: Path, part: Part, name: str) -> Iterator[str]:
+    """Yield what is wrong with the files of a repeat."""
+    for table in tables_of(part):
+        path = path_of(data, table, name)
+        place = f"{table}/{path.name}"
+        try:
+            rows = read_rows(data, table, name)
+        except FileNotFoundError:
+            yield f"{place}: is missing"
+        except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
+            yield f"{place}: cannot be read: {error}"
+        else:
+            if why := _mistake(rows, table, part, name):
+                yield f"{place}: {why}"
+
+
+def _mistake(rows: pa.Table, table: str, part: Part, name: str) -> str:
+    """Return what is wrong with rows that can be read, empty if nothing is."""
+    if rows.schema != TABLES[table]:
+        found = ", ".join(f"{field.name} {field.type}" for field in rows.schema)
+        return f"has other columns than expected: {found}"
+    whose = set(zip(*(rows[key].to_pylist() for key, _ in _WHOSE), strict=True))
+    if {stem(*each) for each in whose} != {name}:
+        return f"must have rows of {name} only, and has of {sorted(whose)}"
+    if table in _TO_THE_END and pc.max(rows["births"]).as_py() != part.births:
+        return f"does not reach {part.births} births"
+    if table == "runs" and (
+        rows.num_rows != 1 or rows["state"][0].as_py() != "finished"
+    ):
+        return "must be one finished run"
+    return ""
+
+
+def read_rows(data: Path, table: str, name: str) -> pa.Table:
+    """Return the rows of a repeat; damaged pages raise.
+
+    Args:
+        data: where rows are kept.
+        table: a key of ``TABLES``.
+        name: of the repeat, as ``stem`` returns it.
+    """
+    content = path_of(data, table, name).read_bytes()
+    with pq.ParquetFile(
+        pa.BufferReader(content), page_checksum_verification=True
+    ) as file:
+        return file.read()
+
+
+def _kept_repeats(data: Path, part: Part, experiment: str) -> list[int]:
+    """Return the repeats that have any file."""
+    there = {path.stem for path in data.glob("*/*.parquet")}
+    return [each for each in range(part.repeats) if stem(experiment, each) in there]
+
+
+def check(data: Path, parts: Sequence[Part] = PARTS) -> int:
+    """Print what is kept, what is missing and what is damaged.
+
+    Args:
+        data: where rows are kept.
+        parts: of the campaign.
+
+    Returns:
+        0, or 1 if a file is damaged, missing of a repeat, or not expected, or if the
+        runs differ in platform or, of one experiment, in settings. Repeats that are
+        not there yet are no damage.
+    """
+    troubles = []
+    details: list[dict[str, str]] = []
+    expected: set[Path] = set()
+    for part in parts:
+        for experiment in part.names:
+            kept = _kept_repeats(data, part, experiment)
+            for name in (stem(experiment, number) for number in kept):
+                found = list(troubles_of(data, part, name))
+                troubles += found
+                expected |= {path_of(data, table, name) for table in tables_of(part)}
+                if not found:
+                    details += read_rows(data, "runs", name).to_pylist()
+            missing = [each for each in range(part.repeats) if each not in kept]
+            lack = f", missing: {_ranges(missing)}" if missing else ""
+            print(f"{experiment}: {len(kept)} of {part.repeats} repeats{lack}")
+    there = {path for table in data.glob("*/") for path in table.iterdir()}
+    strays = sorted(there - expected)
+    troubles += [f"{path.relative_to(data)}: is not expected" for path in strays]
+    size = sum(path.stat().st_size for path in there)
+    print(f"{len(there)} files, {size / 1e6:.1f} MB")
+    for column in ("platform", "versions", "commit"):
+        for value in sorted({str(row[column]) for row in details}):
+            print(f"{column}: {value}")
+    troubles += _differences(details)
+    for trouble in troubles:
+        print(f"damaged: {trouble}")
+    return 1 if troubles else 0
+
+
+def _differences(details: Sequence[dict[str, str]]) -> Iterator[str]:
+    """Yield in what runs differ that must not."""
+    platforms = {tag for row in details for tag in row["platform"].split()}
+    if len(platforms) > 1:
+        yield f"runs: of {len(platforms)} platforms, must be of one"
+    for experiment in sorted({row["experiment"] for row in details}):
+        mine = [row for row in details if row["experiment"] == experiment]
+        if len({row["document"] for row in mine}) > 1:
+            yield f"runs: those of {experiment} differ in their settings"
+
+
+def _ranges(numbers: Sequence[int]) -> str:
+    """Return ascending numbers in words, such as ``0-3, 7``."""
+    found: list[list[int]] = []
+    for number in numbers:
+        if found and found[-1][-1] == number - 1:
+            found[-1].append(number)
+        else:
+            found.append([number])
+    ends = (dict.fromkeys((each[0], each[-1])) for each in found)
+    return ", ".join("-".join(map(str, each)) for each in ends)
+
+
+def kept(data: Path, table: str) -> pa.Table:
+    """Return the rows of a table of all repeats, with the column ``folder``.
+
+    ``analysis.progression`` and the figures take them for those of ``revolve
+    analyze``; the name of the repeat stands for the folder of its run.
+
+    Args:
+        data: where rows are kept; all of it passes ``check``.
+        table: a key of ``TABLES``.
+    """
+    pieces = []
+    for name in sorted(path.stem for path in (data / table).glob("*.parquet")):
+        rows = read_rows(data, table, name)
+        pieces.append(rows.append_column("folder", pa.repeat(name, rows.num_rows)))
+    return pa.concat_tables(pieces)
+
+
+class KeptOutcomes:
+    """Outcomes of the kept runs, as ``analysis.comparison`` takes them.
+
+    Attributes:
+        experiments: those that have rows, by name.
+    """
+
+    def __init__(self, rows: pa.Table, most: int | None = None) -> None:
+        """Take rows of the table ``outcomes``.
+
+        Args:
+            rows: as ``kept`` returns them.
+            most: births at which experiments are compared at most; None is no limit.
+        """
+        self._rows = rows if most is None else rows.filter(pc.field("births") <= most)
+        self.experiments: list[str] = sorted(set(self._rows["experiment"].to_pylist()))
+
+    def births(self, *experiments: str) -> int:
+        """Return the greatest births that all runs of some experiments have rows at.
+
+        0 if there is no such number.
+        """
+        reached: dict[str, set[int]] = {}
+        columns = ("experiment", "folder", "births")
+        for experiment, folder, births in zip(
+            *(self._rows[name].to_pylist() for name in columns), strict=True
+        ):
+            if experiment in experiments:
+                reached.setdefault(folder, set()).add(births)
+        return max(set.intersection(*reached.values()), default=0)
+
+    def values(self, experiment: str, measure: str, births: int) -> Numbers:
+        """Return the runs' numbers of one measure, without those that have none."""
+        is_of = pc.field("experiment") == experiment
+        rows = self._rows.filter(is_of & (pc.field("births") == births))
+        return np.asarray(rows[measure].drop_null(), np.float64)
