@@ -1,5 +1,5 @@
 # Everything a person or CI does here. `make demo` and `make test` need only
-# Python 3.11-3.13, make and git; the first of them makes .venv.
+# Python 3.11-3.14, make and git; the first of them makes .venv.
 
 PYTHON ?= python3
 VENV := .venv
@@ -70,8 +70,8 @@ clean:
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(STAMP): pyproject.toml constraints.txt
-	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' \
-		|| { echo 'Python 3.11, 3.12 or 3.13 is needed, and "$(PYTHON)" is' \
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15))' \
+		|| { echo 'Python 3.11, 3.12, 3.13 or 3.14 is needed, and "$(PYTHON)" is' \
 		"$$($(PYTHON) --version 2>/dev/null || echo missing)." \
 		'Name another: make PYTHON=python3.12 ...' >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null \
