@@ -12,11 +12,13 @@ BIRTHS ?= 1500
 DEMO = $(BIN)/revolve run scenario1 --seed $(SEED) --births $(BIRTHS) \
 	--out runs/demo-$$(date +%Y%m%d-%H%M%S)-$$$$
 
-.PHONY: help demo compiled test bench lint format check proto constraints clean
+.PHONY: help demo compiled test test-long test-fresh bench lint format check proto \
+	constraints clean
 
 help:
 	@echo 'make demo         evolve robots for about a minute'
 	@echo 'make test         run all tests'
+	@echo 'make test-long    run tests that take an hour, as root'
 	@echo 'make bench        hold the speed promises, on an idle machine'
 	@echo 'make lint         ruff, mypy, import contracts'
 	@echo 'make check        lint and test'
@@ -37,6 +39,13 @@ compiled: $(STAMP)
 test: compiled
 	$(BIN)/python -m pytest -q -n 2 -m 'not system and not benchmark'
 	$(BIN)/python -m pytest -q -n 4 --dist worksteal -m 'system'
+
+# Long tests: each is a target of its own, listed here.
+test-long: test-fresh
+
+# make SUITES=sid test-fresh tries one release of Debian only.
+test-fresh:
+	@tests/fresh_machine.sh $(SUITES)
 
 # Holds the speed promises to their figures: for a machine with nothing else to do.
 bench: compiled
