@@ -1,5 +1,5 @@
 # Everything a person or CI does here. `make demo` and `make test` need only
-# Python 3.11-3.13, make and git; the first of them makes .venv.
+# Python 3.11-3.14, make and git; the first of them makes .venv.
 
 PYTHON ?= python3
 VENV := .venv
@@ -12,11 +12,13 @@ BIRTHS ?= 1500
 DEMO = $(BIN)/revolve run scenario1 --seed $(SEED) --births $(BIRTHS) \
 	--out runs/demo-$$(date +%Y%m%d-%H%M%S)-$$$$
 
-.PHONY: help demo compiled test bench lint format check proto constraints clean
+.PHONY: help demo compiled test test-long test-fresh bench lint format check proto \
+	constraints clean
 
 help:
 	@echo 'make demo         evolve robots for about a minute'
 	@echo 'make test         run all tests'
+	@echo 'make test-long    run tests that take an hour, as root'
 	@echo 'make bench        hold the speed promises, on an idle machine'
 	@echo 'make lint         ruff, mypy, import contracts'
 	@echo 'make check        lint and test'
@@ -37,6 +39,13 @@ compiled: $(STAMP)
 test: compiled
 	$(BIN)/python -m pytest -q -n 2 -m 'not system and not benchmark'
 	$(BIN)/python -m pytest -q -n 4 --dist worksteal -m 'system'
+
+# Long tests: each is a target of its own, listed here.
+test-long: test-fresh
+
+# make SUITES=sid test-fresh tries one release of Debian only.
+test-fresh:
+	@tests/fresh_machine.sh $(SUITES)
 
 # Holds the speed promises to their figures: for a machine with nothing else to do.
 bench: compiled
@@ -70,8 +79,8 @@ clean:
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(STAMP): pyproject.toml constraints.txt
-	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' \
-		|| { echo 'Python 3.11, 3.12 or 3.13 is needed, and "$(PYTHON)" is' \
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15))' \
+		|| { echo 'Python 3.11, 3.12, 3.13 or 3.14 is needed, and "$(PYTHON)" is' \
 		"$$($(PYTHON) --version 2>/dev/null || echo missing)." \
 		'Name another: make PYTHON=python3.12 ...' >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null \

@@ -3,11 +3,13 @@
 Kills are drawn over the whole run; each test prints what its kills hit.
 """
 
+import os
 import shutil
 import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -122,7 +124,8 @@ class Fleet:
         process_pool = self.workers.pop(name)
         process_pool.send_signal(signal.SIGSTOP)
         for child in children(process_pool.pid):
-            subprocess.run(["kill", "-KILL", str(child)], check=False)
+            with suppress(ProcessLookupError):
+                os.kill(child, signal.SIGKILL)
         process_pool.send_signal(signal.SIGKILL)
         return name
 

@@ -112,7 +112,10 @@ def test_an_error_that_is_not_of_the_output_is_none_of_it(
 
 def _shown(*words: str) -> str:
     """Return what a command shows on a terminal that is its standard error."""
-    screen, terminal = os.openpty()
+    try:
+        screen, terminal = os.openpty()
+    except OSError as error:
+        pytest.skip(f"no pseudo-terminal can be opened: {error}")
     with subprocess.Popen(
         [sys.executable, "-m", "revolve", *words],
         stdout=subprocess.DEVNULL,

@@ -50,10 +50,12 @@ libc = ctypes.CDLL(None)
 libc.malloc.restype = ctypes.c_void_p
 libc.malloc.argtypes = [ctypes.c_size_t]
 libc.free.argtypes = [ctypes.c_void_p]
-def resident():
-    with open("/proc/self/statm") as file:
+def resident():  # unbuffered: a buffer would leave a hole for the blocks that stay
+    with open("/proc/self/statm", "rb", buffering=0) as file:
         return int(file.read().split()[1]) * os.sysconf("SC_PAGESIZE")
 libc.free(libc.malloc(8 << 20))  # from such a block a C library may learn
+for _ in range(1 << 12):  # fills the holes that are there
+    libc.malloc(1 << 10)
 before = resident()
 large = []
 for _ in range(50):
@@ -67,7 +69,11 @@ print((resident() - before) >> 20)
 
 
 def test_a_child_gives_back_what_it_leaves() -> None:
-    """Of 50 MiB of models whose robots died, with what lives on between them."""
+    """Of 50 MiB of models whose robots died, with what lives on between them.
+
+    Measured with and without our setting: where a C library returns the memory in both
+    cases, the setting has no effect to test.
+    """
     start = (
         "import subprocess, sys\n"
         "from schema.agent.supervisor import prepare_process\n"
@@ -75,12 +81,14 @@ def test_a_child_gives_back_what_it_leaves() -> None:
         f"subprocess.run([sys.executable, '-c', {_FORGET!r}], check=True)\n"
     )
     bare = {k: v for k, v in os.environ.items() if not k.startswith("MALLOC_")}
-    left_mib = [
+    alone_mib, helped_mib = (
         int(subprocess.check_output([sys.executable, "-c", text], env=bare))
         for text in (_FORGET, start)
-    ]
-    assert left_mib[0] > 40
-    assert left_mib[1] < 5
+    )
+    assert helped_mib < 5
+    if alone_mib < 5:
+        pytest.skip("this C library returns freed memory without the setting")
+    assert alone_mib > 40
 
 
 _SHIELDED = """
