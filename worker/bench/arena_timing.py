@@ -171,8 +171,8 @@ def time_arena(
     world.apply(Changes(insertions=tuple(newcomers)))
     if warm_s:
         world.advance(warm_s * second)
-    looking.wrap(world.population, "look")
-    coming.wrap(world.population, "regroup", "part", "remove", "catch_up")
+    looking.wrap(world.population, "merge")
+    coming.wrap(world.population, "regroup", "split", "remove", "catch_up")
     coming.wrap(world, "apply")
     population, wall, bare, steps = world.population, 0.0, 0.0, 0
     merges, splits = population.merges, population.splits
@@ -217,7 +217,7 @@ def bare_time(world: World, pool: Pool, steps: int, clock: Clock) -> float:
     """
     tick = world.population.model_cache.settings.simulation.brain_steps
     jobs = []
-    for one in world.population.everybody:
+    for one in world.population.robots:
         model = one.body.home.model
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = one.view.qpos, one.view.qvel
