@@ -1,4 +1,4 @@
-"""Robot into motion, motion into a number.
+"""Simulation and evaluation of robots.
 
 Everything but `service` and `__main__` is a pure function of its arguments.
 """

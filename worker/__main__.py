@@ -1,4 +1,4 @@
-"""``revolve worker``: evaluate robots for a coordinator, here or far away."""
+"""``revolve worker``: evaluate robots for a coordinator, local or remote."""
 
 import sys
 
@@ -6,7 +6,7 @@ from schema.agent.supervisor import cores, prepare_process
 
 
 def main(arguments: list[str]) -> int:
-    """Serve until told to end.
+    """Serve until stopped.
 
     Args:
         arguments: the command's name first.

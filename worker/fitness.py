@@ -1,41 +1,66 @@
-"""Fitness functions, and what every one of them must keep.
+"""Fitness functions and the check of their contract.
 
 A fitness function is any ``module:attribute`` that takes a track and the
 experiment's fitness section and returns a finite number, higher is better.
 """
 
 import math
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, FitnessUndefined
 from schema.experiment.document import Fitness
+from schema.experiment.settings import fitness_function
 from schema.robot.results import Floats, Track
 
 
 class FitnessFunction(Protocol):
-    """What the experiment's ``fitness.function`` names."""
+    """Signature of the function that ``fitness.function`` names."""
 
     def __call__(self, track: Track, fitness: Fitness) -> float:
-        """Return how good a track is; always maximised, finite."""
+        """Return the fitness of a track; finite, always maximised."""
         ...
 
 
+def fitness_of(track: Track, fitness: Fitness) -> float:
+    """Return the fitness of a track, by the experiment's function.
+
+    Args:
+        track: (T, 3) positions; T >= 2.
+        fitness: names the function and its weights.
+
+    Raises:
+        FitnessUndefined: the function raised or gave no finite number.
+    """
+    function = cast("FitnessFunction", fitness_function(fitness))
+    try:
+        value = float(function(track, fitness))
+    except Exception as error:
+        raise FitnessUndefined(
+            f"{fitness.function} raised {type(error).__name__}: {error}"
+        ) from error
+    if not math.isfinite(value):
+        raise FitnessUndefined(
+            f"{fitness.function} must return a finite number, got {value}"
+        )
+    return value
+
+
 def path_velocity(track: Track) -> float:
-    """Return the length of the path over its time, in the ground plane [m/s].
+    """Return path length over time in the ground plane [m/s].
 
     Args:
         track: (T, 3) positions; T >= 2.
     """
     steps = np.diff(track.core_position[:, :2], axis=0)
-    # hypot of plain floats: the sum's order is the track's.
+    # Plain floats, so that the order of the sum is that of the track.
     length = sum(math.hypot(x, y) for x, y in steps.tolist())
     return length / _duration_s(track)
 
 
 def straight_velocity(track: Track) -> float:
-    """Return the net distance over the time, in the ground plane [m/s].
+    """Return net distance over time in the ground plane [m/s].
 
     Args:
         track: (T, 3) positions; T >= 2.
@@ -52,7 +77,7 @@ def thesis(track: Track, fitness: Fitness) -> float:
     """Return f = path_weight v + straight_weight s, or 0 above the limit.
 
     v is the path velocity, s the straight one. The limit is one of fitness, not
-    of speed: what is faster has broken the physics.
+    of speed: fitness above it comes from broken physics.
 
     Args:
         track: (T, 3) positions; T >= 2.
@@ -70,17 +95,17 @@ def thesis(track: Track, fitness: Fitness) -> float:
 
 
 def check_fitness(function: FitnessFunction, fitness: Fitness) -> None:
-    """Raise unless a fitness function keeps its contract on a few plain tracks.
+    """Raise unless a fitness function keeps its contract on four simple tracks.
 
     Args:
-        function: what an experiment would name.
-        fitness: the section that it will be given.
+        function: the function that an experiment would name.
+        fitness: the experiment's section.
 
     Raises:
-        ExperimentError: it returns no number, one that is not finite, another one
-            the second time, or writes to the track.
+        ExperimentError: it returns no number, a number that is not finite, different
+            numbers for one track, or writes to the track.
     """
-    for name, positions in _plain_tracks():
+    for name, positions in _simple_tracks():
         track = Track(0.2, positions.copy())
         values = [function(track, fitness) for _ in range(2)]
         for value in values:
@@ -106,7 +131,7 @@ def check_fitness(function: FitnessFunction, fitness: Fitness) -> None:
             )
 
 
-def _plain_tracks() -> list[tuple[str, Floats]]:
+def _simple_tracks() -> list[tuple[str, Floats]]:
     along = np.linspace(0.0, 0.6, 61)
     turn = np.linspace(0.0, 2.0 * np.pi, 61)
     still = np.zeros((61, 3))

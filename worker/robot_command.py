@@ -1,4 +1,4 @@
-"""``revolve robot simulate``: the robot of a file, judged as in a run."""
+"""``revolve robot simulate``: simulate and evaluate the robot of a file."""
 
 import argparse
 import sys
@@ -11,44 +11,41 @@ from schema.flags import Flags
 from schema.formats.files import MJCF_ENDING, read_robot, settings_of
 from schema.formats.mjcf import read_mjcf
 from schema.robot.robot import Robot
-from worker.fitness import path_velocity, straight_velocity
-from worker.robot.evaluation import judge, simulate
+from worker.robot.evaluation import evaluate
 
 
 def main(arguments: list[str]) -> int:
-    """Simulate a robot, print what it came to, and return the exit code.
+    """Simulate a robot, print its evaluation, and return the exit code.
 
     Args:
         arguments: the command's name, ``robot simulate``, first.
 
     Returns:
-        0 if it was judged.
+        0 if it was evaluated.
 
     Raises:
-        InvalidRobot: a file that holds no robot.
-        SimulationDiverged: the physics did.
-        FitnessUndefined: there is no number for what it did.
-        ExperimentError: an experiment that is none, or a sensor that it cannot feed.
+        InvalidRobot: the file holds no valid robot.
+        SimulationDiverged: the physics diverged.
+        FitnessUndefined: the fitness function raised or gave no finite number.
+        ExperimentError: an invalid experiment, or a sensor that has no stimulus in
+            its environment.
     """
     options = _parser().parse_args(arguments[1:])
     robot, settings = _read(options.file, options.experiment)
-    world = settings.environment
-    track = simulate(robot, settings.space, settings.simulation, world)
-    clock = settings.simulation
-    duration_s = (clock.warmup_steps + clock.window_steps) * clock.timestep_s
+    found = evaluate(robot, settings)
     for name, value, unit in (
-        ("fitness", judge(track, settings.fitness), ""),
-        ("path velocity", path_velocity(track), " m/s"),
-        ("straight velocity", straight_velocity(track), " m/s"),
-        ("simulated", duration_s, " s"),
+        ("fitness", found.fitness, ""),
+        ("path velocity", found.path_velocity, " m/s"),
+        ("straight velocity", found.straight_velocity, " m/s"),
+        ("simulated", found.simulated_s, " s"),
     ):
-        # All digits: whoever compares two runs wants them.
+        # All digits, for comparisons of two runs.
         print(f"{name + ':':19}{value!r}{unit}")
     return 0
 
 
 def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings]:
-    """Return a file's robot and the settings to judge it by, the file's own first."""
+    """Return a file's robot and its settings; those of an MJCF file are the default."""
     if path.suffix.lower() == MJCF_ENDING and experiment is None:
         return read_mjcf(path)
     settings = settings_of(read_experiment(experiment) if experiment else None)
@@ -58,15 +55,15 @@ def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings
 def _parser() -> argparse.ArgumentParser:
     parser = Flags(
         prog="revolve robot simulate",
-        description="Simulate a robot alone, and judge it as an experiment does.",
+        description="Simulate a robot alone and evaluate it as an experiment does.",
         epilog="example: revolve robot simulate best.yaml --experiment scenario1",
     )
     parser.add_argument("file", type=Path, metavar="FILE")
     parser.add_argument(
         "--experiment",
         metavar="NAME|FILE.toml",
-        help="judge as this experiment does; by default as an MJCF file says, and any "
-        "other as the thesis's off-line experiments do",
+        help="experiment whose settings to use (default: those in an MJCF file, or "
+        "those of the thesis's off-line experiments)",
     )
     return parser
 

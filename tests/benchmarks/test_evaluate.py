@@ -1,4 +1,4 @@
-"""An evaluation is little more than its physics: a promise of the design."""
+"""An evaluation costs little more than its physics: a goal of the design."""
 
 import pytest
 
@@ -16,10 +16,10 @@ SETTINGS = EvaluationSettings(
 
 @pytest.mark.benchmark
 @pytest.mark.slow
-def test_build_brain_and_sensors_vanish_beside_the_engine() -> None:
+def test_engine_steps_are_most_of_the_time_of_an_evaluation() -> None:
     timing = time_evaluations(random_robots(EXPERIMENT, 30, seed=1), SETTINGS)
     assert timing.ratio >= LEAST_RATIO, timing
 
 
-def test_a_timing_s_ratio_is_the_engine_s_share() -> None:
+def test_ratio_is_the_share_of_the_engine() -> None:
     assert Timing(robots=2, evaluation_s=4.0, engine_s=3.0).ratio == 0.75

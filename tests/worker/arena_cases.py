@@ -66,7 +66,7 @@ def populated(
 def state_of(world: World, birth: BirthId) -> bytes:
     """Return a robot's physics, readings and mind as bytes."""
     one = world.population.find(birth)
-    arrays = (one.view.qpos, one.view.qvel, one.view.ctrl, one.view.senses.readings)
+    arrays = (one.view.qpos, one.view.qvel, one.view.ctrl, one.view.sensors.readings)
     return b"".join(np.asarray(a).tobytes() for a in (*arrays, one.states))
 
 

@@ -1,7 +1,5 @@
 """A joint model of all robots of an arena: what the clusters must not overlook."""
 
-from collections.abc import Callable
-
 import mujoco
 import numpy as np
 
@@ -36,10 +34,8 @@ class Oracle:
     def _every_step(self, step: int, until: int) -> tuple[int, ...]:
         return tuple(range(step + 1, self._moments(step, until)[-1] + 1))
 
-    def _watched_arrival(
-        self, rollout: Rollout, watch: Callable[[bytes], None] | None
-    ) -> None:
-        self._arrive(rollout, watch)
+    def _watched_arrival(self, rollout: Rollout) -> None:
+        self._arrive(rollout)
         self._look(self.world.step, rollout.state)
 
     def _look(self, step: int, state: Floats) -> None:
@@ -49,8 +45,10 @@ class Oracle:
         if self._model is None or self._data is None:
             return
         data, layout = self._data, population.layout
-        rows = range(len(self._births))
-        data.qpos[:] = np.concatenate([state[layout.part(row)] for row in rows])
+        places = zip(layout.starts, layout.robot_rows.sizes, strict=True)
+        data.qpos[:] = np.concatenate(
+            [state[start : start + size] for start, size in places]
+        )
         mujoco.mj_kinematics(self._model, data)
         mujoco.mj_comPos(self._model, data)
         mujoco.mj_collision(self._model, data)
@@ -72,8 +70,8 @@ class Oracle:
         types = body_space(settings.space)
         prefixes = [f"{number}/" for number in range(len(self._births))]
         specs = [
-            robot_spec(one.robot, types, settings.simulation).spec
-            for one in population.everybody
+            robot_spec(one.phenotype, types, settings.simulation).spec
+            for one in population.robots
         ]
         self._model = shared_model(
             list(zip(prefixes, specs, strict=True)),

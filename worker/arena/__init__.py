@@ -1,1 +1,1 @@
-"""The on-line world: clock, insertions, batched control, snapshots."""
+"""The on-line world: time, insertions, batched control, records, snapshots."""

@@ -1,4 +1,4 @@
-"""How robots come into an arena, and which changes are none."""
+"""Insertion of robots into an arena, and checks of changes."""
 
 from collections.abc import Collection
 
@@ -14,27 +14,26 @@ from schema.wire.arena import Casualty, Changes, Insertion
 from schema.wire.codec import encode_robot
 from worker.clusters.models import Body
 from worker.clusters.population import ArenaPopulation
-from worker.clusters.robot import ArenaRobot, put
-from worker.clusters.window import Window
+from worker.clusters.robot import ArenaRobot, Window
 from worker.robot.controller import Widths, pack
 
 
 def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> None:
-    """Raise unless changes can be made to a company.
+    """Raise unless changes can be made to a population.
 
     Args:
         changes: removals first, then insertions, then brains.
-        population: who lives there.
-        step: the arena's.
+        population: the living robots.
+        step: of the arena.
 
     Raises:
-        UnexpectedEvent: somebody is not there, or there already, named twice, or
-            born between two ticks of the brains.
-        InvalidRobot: a robot that breaks the rules, a brain that does not fit.
+        UnexpectedEvent: a robot that does not live here, lives here already, is named
+            twice, or is born between two ticks of the controllers.
+        InvalidRobot: a robot that breaks the rules, or a brain that does not fit.
     """
-    gone = _once(changes.removals)
-    new = _once(tuple(insertion.birth for insertion in changes.insertions))
-    _once(tuple(change.birth for change in changes.brains))
+    gone = _distinct(changes.removals)
+    new = _distinct(tuple(insertion.birth for insertion in changes.insertions))
+    _distinct(tuple(change.birth for change in changes.brains))
     for birth in gone:
         if birth not in population:
             raise UnexpectedEvent(f"apply: {birth} does not live here")
@@ -52,24 +51,25 @@ def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> N
         birth = change.birth
         if birth not in new and (birth in gone or birth not in population):
             raise UnexpectedEvent(f"apply: {birth} does not live here")
-        body = robots[birth] if birth in new else population.find(birth).robot
+        body = robots[birth] if birth in new else population.find(birth).phenotype
         robots[birth] = Robot(body.parts, change.brain)
     for robot in robots.values():
         check_robot(robot, body_space(population.model_cache.settings.space))
         pack(robot.brain, population.model_cache.width)
 
 
-def _once(births: tuple[BirthId, ...]) -> tuple[BirthId, ...]:
+def _distinct(births: tuple[BirthId, ...]) -> tuple[BirthId, ...]:
     if len(set(births)) < len(births):
-        raise UnexpectedEvent(f"apply: somebody is named twice in {births}")
+        raise UnexpectedEvent(f"apply: a robot is named twice in {births}")
     return births
 
 
 def possible(changes: Changes, living: Collection[BirthId]) -> Changes:
-    """Return what of changes made on another platform can be made here.
+    """Return the part of changes from another platform that is possible here.
 
-    Who fell here only is let alone; who fell there only, and comes back as a migrant,
-    makes room for itself. Where the same live as there, these are the same changes.
+    Robots that were lost here only are not removed again. Robots that were lost there
+    only, and return as migrants, are removed first. With the same robots alive as
+    there, the changes are the same.
     """
     coming = [each.birth for each in changes.insertions]
     going = dict.fromkeys((*changes.removals, *coming))
@@ -87,72 +87,72 @@ def possible(changes: Changes, living: Collection[BirthId]) -> Changes:
 def newborn(
     insertion: Insertion, population: ArenaPopulation, step: int
 ) -> ArenaRobot | Casualty:
-    """Return a robot that feels for the first time, or why it never will.
+    """Return a robot at its place with its first readings, or a casualty.
 
     Args:
-        insertion: who, what, where.
+        insertion: birth, robot, place and heading.
         population: that it is to join.
-        step: the arena's.
+        step: of the arena.
 
     Raises:
-        ExperimentError: a sensor that the arena has nothing for.
+        ExperimentError: a sensor that has no stimulus in the arena.
     """
+    cache, (x, y) = population.model_cache, insertion.place
     try:
-        body = population.model_cache.body(insertion.birth, insertion.robot)
+        body = cache.body(insertion.birth, insertion.robot)
     except ValueError as error:
-        place = (*insertion.place, 0.0)
         reason = f"cannot be built: {one_line(error)}"
-        return Casualty(insertion.birth, step, reason, place)
-    view = body.home.views[0]
-    x, y = insertion.place
-    z = population.model_cache.height(body, insertion.place, insertion.heading)
-    put(view, (x, y, z), insertion.heading)
+        return Casualty(insertion.birth, step, reason, (x, y, 0.0))
+    view, half = body.home.views[0], 0.5 * insertion.heading
+    place = (x, y, cache.height(body, insertion.place, insertion.heading))
+    view.qpos[:3] = place
+    if half:
+        view.qpos[3:7] = np.cos(half), 0.0, 0.0, np.sin(half)
     try:
-        view.start()
+        view.sensors.start()
     except mujoco.FatalError as error:
         reason = f"physics diverged: {one_line(error)}"
-        return Casualty(insertion.birth, step, reason, (x, y, z))
-    window = Window(population.model_cache.settings.simulation, step)
-    one = arena_robot(insertion.birth, insertion.robot, body, window, population)
-    one.thinks_since, one.place = step, (x, y, z)
-    window.add(step, one.place)
-    return one
+        return Casualty(insertion.birth, step, reason, place)
+    window = Window(cache.settings.simulation, step)
+    robot = arena_robot(insertion.birth, insertion.robot, body, window, population)
+    robot.brain_start, robot.place = step, place
+    window.add(step, place)
+    return robot
 
 
 def arena_robot(
     birth: BirthId,
-    robot: Robot,
+    phenotype: Robot,
     body: Body,
     window: Window,
     population: ArenaPopulation,
 ) -> ArenaRobot:
-    """Return a robot at home, its mind at rest, before anything is known of it."""
-    network = pack(robot.brain, population.model_cache.width)
+    """Return a robot in its own cluster, its network at rest."""
     return ArenaRobot(
         birth=birth,
-        robot=robot,
-        encoded=encode_robot(robot),
+        phenotype=phenotype,
+        encoded=encode_robot(phenotype),
         body=body,
         view=body.home.views[0],
-        network=network,
+        network=pack(phenotype.brain, population.model_cache.width),
         states=np.zeros(population.model_cache.width.states),
-        thinks_since=0,
+        brain_start=0,
         window=window,
         place=(0.0, 0.0, 0.0),
     )
 
 
-def equip(one: ArenaRobot, brain: Brain, width: Widths, since: int) -> None:
+def replace_brain(robot: ArenaRobot, brain: Brain, width: Widths, start: int) -> None:
     """Give a robot another brain, at rest.
 
     Args:
-        one: the robot; its held commands stay until its next tick.
+        robot: the robot; its commands are held until its next tick.
         brain: that fits its body.
         width: of every network.
-        since: step of that tick, from which the brain's clock counts.
+        start: step of that tick, from which the brain's age counts.
     """
-    one.robot = Robot(one.robot.parts, brain)
-    one.encoded = encode_robot(one.robot)
-    one.network = pack(brain, width)
-    one.states = np.zeros_like(one.states)
-    one.thinks_since = since
+    robot.phenotype = Robot(robot.phenotype.parts, brain)
+    robot.encoded = encode_robot(robot.phenotype)
+    robot.network = pack(brain, width)
+    robot.states = np.zeros_like(robot.states)
+    robot.brain_start = start

@@ -1,4 +1,4 @@
-"""Whose physics has left the realm of numbers."""
+"""Detection of robots whose physics diverged."""
 
 import math
 
@@ -13,41 +13,41 @@ from worker.clusters.population import ArenaPopulation
 from worker.clusters.rollout import PLAUSIBLE, Rollout
 
 FASTEST_CORE = 20.0
-"""A core faster than this has broken the physics [m/s]; a fall from the thesis's
+"""Core speed above which the physics is broken [m/s]; a fall from the thesis's
 0.25 m ends at 2.2."""
 
 
 def diverged(
-    population: ArenaPopulation, rollout: Rollout, step: int, *, looks_closely: bool
+    population: ArenaPopulation, rollout: Rollout, step: int, *, reads_warnings: bool
 ) -> list[Casualty]:
-    """Return those whose physics diverged, by birth.
+    """Return the robots whose physics diverged, by birth.
 
-    In a cluster, only members whose own state tells fall; where none does, the
-    engine's complaint is about all of them.
+    In a cluster, only members whose own state is implausible are lost. If there is
+    none, an error or a warning of the engine removes all members.
 
     Args:
-        population: the living.
-        rollout: what they did, and which moment of it is looked at.
-        step: the arena's.
-        looks_closely: the engine's warnings are read in any case.
+        population: the living robots.
+        rollout: their states, at the present moment.
+        step: of the arena.
+        reads_warnings: read the engine's warnings even if all states are plausible.
     """
-    is_quiet = _is_quiet(rollout.loudest)
-    if not is_quiet:
+    is_plausible = _is_plausible(rollout.max_velocity)
+    if not is_plausible:
         velocities = np.abs(rollout.state[population.layout.velocities])
-        is_quiet = _is_quiet(float(velocities.max(initial=0.0)))
-    if is_quiet and not looks_closely and not rollout.has_failures:
+        is_plausible = _is_plausible(float(velocities.max(initial=0.0)))
+    if is_plausible and not reads_warnings and not rollout.has_failures:
         return []
     moment = rollout.moment
     found: list[Casualty] = []
     for cluster in population.clusters:
-        reasons, complaint = {}, ""
+        reasons, problem = {}, ""
         if cluster.failed_at <= moment:
-            complaint = cluster.failure
-        if looks_closely or not is_quiet:
-            reasons = {} if is_quiet else _reasons(cluster, moment)
-            complaint = complaint or _warnings(cluster, moment)
-        if complaint and not reasons:
-            reasons = dict.fromkeys(cluster.members, f"physics diverged: {complaint}")
+            problem = cluster.failure
+        if reads_warnings or not is_plausible:
+            reasons = {} if is_plausible else _reasons(cluster, moment)
+            problem = problem or _warnings(cluster, moment)
+        if problem and not reasons:
+            reasons = dict.fromkeys(cluster.members, f"physics diverged: {problem}")
         found += [
             Casualty(birth, step, reason, population.find(birth).place)
             for birth, reason in reasons.items()
@@ -55,17 +55,16 @@ def diverged(
     return found
 
 
-def _is_quiet(loudest: float) -> bool:
-    """Return whether the greatest of all velocities tells that nobody diverged."""
-    return math.isfinite(loudest) and loudest <= FASTEST_CORE
+def _is_plausible(max_velocity: float) -> bool:
+    return math.isfinite(max_velocity) and max_velocity <= FASTEST_CORE
 
 
 def _reasons(cluster: Cluster, moment: int) -> dict[BirthId, str]:
     reasons = {}
-    track = cluster.track
+    history = cluster.history
     for birth, view in zip(cluster.members, cluster.views, strict=True):
-        positions = track.qpos[moment, view.joints : view.joints + len(view.qpos)]
-        velocities = track.qvel[moment, view.dofs : view.dofs + len(view.qvel)]
+        positions = history.qpos[moment, view.joints]
+        velocities = history.qvel[moment, view.dofs]
         if reason := _reason(positions, velocities):
             reasons[birth] = f"physics diverged: {reason}"
     return reasons
@@ -84,7 +83,7 @@ def _reason(positions: Floats, velocities: Floats) -> str:
 
 
 def _warnings(cluster: Cluster, moment: int) -> str:
-    counts = cluster.track.warnings[moment]
+    counts = cluster.history.warnings[moment]
     if not counts.any():
         return ""
     return ", ".join(

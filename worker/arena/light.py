@@ -1,11 +1,11 @@
-"""What light sensors read in an arena that has a light.
+"""Light sensors in an arena that has a light.
 
-The light is a point. A sensor looks along its part's x axis from the face of its
-box and reads cos(theta) min(1, (1 m / d)^2): theta is the angle between where it
-looks and where the light is, d how far away that is. It reads 0 with the light
-behind it or with a robot or a wall in between. Source: own; the fall with distance
-is that of the original's PointIntensity sensor (facts, section 1.2), and no camera
-takes part, so that births and deaths disturb nothing.
+The light is a point. A sensor faces along its part's x axis from the face of its
+box and reads cos(theta) min(1, (1 m / d)^2): theta is the angle between its axis
+and the direction of the light, d the distance of the light. It reads 0 if the light
+is behind it or hidden by a robot or a wall. Source: own; the fall with distance is
+that of the original's PointIntensity sensor (facts, section 1.2). No camera is used,
+so births and deaths do not disturb the readings.
 """
 
 from collections.abc import Sequence
@@ -14,33 +14,35 @@ import mujoco
 import numpy as np
 
 from schema.parts import Vector
-from worker.clusters.cluster import Cluster
-from worker.clusters.engine_view import EngineView
+from schema.robot.results import Floats
+from worker.clusters.cluster import Cluster, EngineView
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
 
 FULL_WITHIN_M = 1.0
-"""Within this distance the light is as bright as it gets."""
+"""Distance within which the light has full brightness."""
 _OUTSIDE_M = 1e-6
-"""So far before its face a sensor's ray starts."""
+"""Distance from a sensor's face at which its ray starts."""
 
 
-def shine(population: ArenaPopulation, people: Sequence[ArenaRobot]) -> None:
-    """Fill in what the light sensors of some robots read, if there is a light.
+def read_light(
+    light: Vector, population: ArenaPopulation, robots: Sequence[ArenaRobot]
+) -> None:
+    """Write the readings of some robots' light sensors.
 
     Args:
-        population: all of the arena, any of whom may stand in the way.
-        people: whose sensors.
+        light: position of the light, world frame [m].
+        population: all robots of the arena; any of them may hide the light.
+        robots: whose sensors to read.
     """
-    source = population.model_cache.settings.arena.light
-    views = [one.view for one in people if one.view.senses.lights]
-    if source is None or not views:
+    views = [robot.view for robot in robots if robot.view.sensors.lights]
+    if not views:
         return
     population.kinematics()
     for view in views:
-        for geom, place in view.senses.lights:
-            view.senses.readings[0, place] = _brightness(
-                source, population.clusters, view, geom
+        for geom, place in view.sensors.lights:
+            view.sensors.readings[0, place] = _brightness(
+                light, population.clusters, view, geom
             )
 
 
@@ -50,22 +52,22 @@ def _brightness(
     model, data = view.model, view.data
     outward = data.geom_xmat[geom].reshape(3, 3)[:, 0]
     face = float(model.geom_size[geom][0]) + _OUTSIDE_M
-    eye = data.geom_xpos[geom] + face * outward
-    ray = np.array(light) - eye
+    start = data.geom_xpos[geom] + face * outward
+    ray = np.array(light) - start
     distance = float(np.sqrt(ray @ ray))
     if distance == 0.0:
         return 1.0
     slope = float(ray @ outward) / distance
-    if slope <= 0.0 or _is_hidden(clusters, eye, ray):
+    if slope <= 0.0 or _is_hidden(clusters, start, ray):
         return 0.0
     return slope * min(1.0, (FULL_WITHIN_M / distance) ** 2)
 
 
-def _is_hidden(clusters: Sequence[Cluster], eye: np.ndarray, ray: np.ndarray) -> bool:
-    """Return whether anything opaque stands between an eye and the ray's end."""
+def _is_hidden(clusters: Sequence[Cluster], start: Floats, ray: Floats) -> bool:
+    """Return whether a geom lies between a sensor's face and the end of its ray."""
     hit = np.zeros(1, dtype=np.int32)
     for cluster in clusters:
-        share = mujoco.mj_ray(cluster.model, cluster.data, eye, ray, None, 1, -1, hit)
+        share = mujoco.mj_ray(cluster.model, cluster.data, start, ray, None, 1, -1, hit)
         if 0.0 <= share < 1.0:
             return True
     return False

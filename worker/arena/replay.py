@@ -1,8 +1,8 @@
-"""Doing again what robots did, to see all of it.
+"""Replay of evaluations and arenas, with the motion of chosen robots.
 
-What comes out is what came out the first time, to the last bit, on an equal platform;
-whoever asks compares. An arena that drifted has lived on several, and is done again as
-nearly as it goes.
+On an equal platform, results equal the original ones to the last bit; the caller
+compares them. An arena that drifted has run on several platforms, and its replay is an
+approximation.
 """
 
 from collections.abc import Iterator
@@ -15,24 +15,25 @@ import pyarrow as pa
 from schema.experiment.identity import Identity
 from schema.experiment.settings import EvaluationSettings, read_arena_settings
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation
+from schema.robot.results import Evaluation, Floats
 from schema.robot.robot import Robot
 from schema.tables.columns import POSES, read_columns
 from schema.wire.arena_codec import Rebuild
 from worker.arena.births import possible
+from worker.arena.records import pose_batch
 from worker.arena.world import World
 from worker.robot.evaluation import evaluate, simulate
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """What an arena came to on the way to a step.
+    """One advance of a replayed arena.
 
     Attributes:
         step: reached.
-        is_equal: its state there has the digest that it had.
-        samples: the poses that were recorded on the way, of all robots.
-        motion: of the robots in question, at every tick of the brains.
+        is_equal: whether the state there has the recorded digest.
+        samples: poses of all robots that the advance records.
+        motion: poses of the chosen robots at every tick of the controllers.
     """
 
     step: int
@@ -44,12 +45,12 @@ class Scene:
 def alone(
     robot: Robot, settings: EvaluationSettings, identity: Identity
 ) -> tuple[Evaluation, pa.Table]:
-    """Return a robot's evaluation, and its poses at every tick of its brain.
+    """Return a robot's evaluation, and its poses at every tick of its controller.
 
     Args:
         robot: a checked robot.
         settings: as for ``evaluate``.
-        identity: which evaluation it is; the rows have its birth.
+        identity: of the evaluation; the rows have its birth.
 
     Returns:
         The evaluation; rows of the poses table, without ``record``.
@@ -57,7 +58,7 @@ def alone(
     Raises:
         RevolveError: as ``evaluate`` raises.
     """
-    positions: list[np.ndarray[tuple[int], np.dtype[np.float64]]] = []
+    positions: list[Floats] = []
     times: list[float] = []
 
     def watch(data: mujoco.MjData) -> None:
@@ -66,20 +67,28 @@ def alone(
 
     space, simulation, world = settings.space, settings.simulation, settings.environment
     simulate(robot, space, simulation, world, identity=identity, watch=watch)
-    rows = _rows(identity.birth, times, np.array(positions))
-    return evaluate(robot, settings, identity), rows
+    count, qpos = len(times), np.array(positions)
+    rows = pose_batch(
+        islands=np.full(count, identity.birth.island, dtype=np.int32),
+        numbers=np.full(count, identity.birth.number, dtype=np.int64),
+        times_s=np.array(times),
+        roots=qpos[:, :7],
+        joint_counts=np.full(count, qpos.shape[1] - 7, dtype=np.int32),
+        angles=qpos[:, 7:].ravel(),
+    )
+    return evaluate(robot, settings, identity), pa.Table.from_batches([rows])
 
 
 def together(
     settings: bytes, past: Rebuild, births: frozenset[BirthId], threads: int = 1
 ) -> Iterator[Scene]:
-    """Return, advance by advance, what an arena came to.
+    """Replay an arena, advance by advance.
 
     Args:
         settings: JSON of the arena's settings.
         past: a state, and the advances since.
-        births: the robots in question.
-        threads: that advance it together.
+        births: the robots whose motion to return.
+        threads: that step clusters.
 
     Raises:
         MalformedMessage: a snapshot of other settings.
@@ -94,16 +103,17 @@ def together(
     try:
         for advance in past.history:
             world.apply(possible(advance.changes, world.births))
-            is_seen = not births.isdisjoint(world.births)
+            is_shown = not births.isdisjoint(world.births)
             samples: list[pa.Table] = []
             motion: list[pa.Table] = []
             while world.step < advance.until:
-                stop = world.step - world.step % tick + tick if is_seen else 1 << 62
-                came = world.advance(min(stop, advance.until))
-                samples.append(read_columns("poses", came.poses))
-                if is_seen:
+                stop = advance.until
+                if is_shown:
+                    stop = min(stop, world.step - world.step % tick + tick)
+                samples.append(read_columns("poses", world.advance(stop).poses))
+                if is_shown:
                     now = read_columns("poses", world.poses())
-                    motion.append(_of(now, births))
+                    motion.append(_rows_of(now, births))
             yield Scene(
                 world.step,
                 world.digest() == advance.digest,
@@ -114,28 +124,7 @@ def together(
         world.close()
 
 
-def _rows(
-    birth: BirthId,
-    times_s: list[float],
-    positions: np.ndarray[tuple[int, int], np.dtype[np.float64]],
-) -> pa.Table:
-    """Return rows of the poses table, from times and (T, 7 + J) positions."""
-    schema = POSES.remove(0)
-    angles = positions[:, 7:].astype(np.float32)
-    columns = {
-        "island": np.full(len(times_s), birth.island, dtype=np.int32),
-        "birth": np.full(len(times_s), birth.number, dtype=np.int64),
-        "sim_time_s": np.array(times_s),
-        "angles": pa.array(list(angles), schema.field("angles").type),
-    }
-    for index, axis in enumerate(("x", "y", "z", "qw", "qx", "qy", "qz")):
-        columns[axis] = positions[:, index].astype(np.float32)
-    missing = pa.nulls(len(times_s), pa.int32())
-    arrays = [columns.get(name, missing) for name in schema.names]
-    return pa.table(arrays, schema=schema)
-
-
-def _of(poses: pa.Table, births: frozenset[BirthId]) -> pa.Table:
+def _rows_of(poses: pa.Table, births: frozenset[BirthId]) -> pa.Table:
     """Return the rows of some robots."""
     names = zip(poses["island"].to_pylist(), poses["birth"].to_pylist(), strict=True)
     return poses.filter(pa.array([BirthId(*name) in births for name in names]))

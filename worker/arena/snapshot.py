@@ -1,13 +1,13 @@
-"""The whole state of an arena as bytes, and back.
+"""Snapshots: the whole state of an arena as bytes, and back.
 
-MessagePack of fixed fields; arrays are little-endian float64. Nothing is executed
-when it is read. What is not here is a function of what is, models, contacts, frames
-of bodies, or spares work only: distances that were measured. Touch tallies and
-samples of poses are handed over at the end of each advance, so between two of them
-there are none.
+MessagePack of fixed fields; arrays are little-endian float64. Decoding executes no
+code. What is missing here is a function of the fields (models, contacts, frames of
+bodies) or a cache (measured distances). Contact durations and samples of poses leave
+with each advance, so there are none between two advances.
 """
 
 import hashlib
+from collections.abc import Sequence
 
 import msgspec
 import numpy as np
@@ -15,19 +15,25 @@ from msgspec import Struct
 
 from schema.errors import MalformedMessage
 from schema.experiment.settings import ArenaSettings
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats
+from schema.wire.arena import Casualty
+from schema.wire.codec import decode_robot
+from worker.arena.births import arena_robot
+from worker.clusters.population import ArenaPopulation
+from worker.clusters.robot import ArenaRobot, Window
 
 FORMAT = 2
-"""Goes up when the meaning of a field changes."""
+"""Increases when the meaning of a field changes."""
 
 
-class RobotState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """One robot: who and what, physics, readings and memory, mind, window."""
+class _RobotState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """State of one robot: phenotype, physics, sensors, network, window."""
 
     birth: tuple[int, int]
     robot: bytes
     born: int
-    thinks_since: int
+    brain_start: int
     qpos: bytes
     qvel: bytes
     ctrl: bytes
@@ -38,8 +44,8 @@ class RobotState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tru
     place: tuple[float, float, float]
 
 
-class CasualtyState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A robot that fell before the next advance could say so."""
+class _CasualtyState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """A robot that was lost and is not yet reported by an advance."""
 
     birth: tuple[int, int]
     step: int
@@ -47,69 +53,147 @@ class CasualtyState(Struct, frozen=True, array_like=True, forbid_unknown_fields=
     place: tuple[float, float, float]
 
 
-class ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """An arena between two advances.
+class _ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """State of an arena between two advances.
 
     Attributes:
-        settings: SHA-256 of the settings it goes with.
+        settings: SHA-256 of the arena's settings.
         robots: by birth.
-        clusters: who lives together, as indices into the robots.
-        casualties: not yet told.
+        clusters: members of each, as indices into the robots.
+        casualties: not yet reported.
     """
 
     format: int
     settings: bytes
     step: int
-    robots: list[RobotState]
+    robots: list[_RobotState]
     clusters: list[list[int]]
-    casualties: list[CasualtyState]
+    casualties: list[_CasualtyState]
 
 
-def settings_digest(settings: ArenaSettings) -> bytes:
-    """Return the SHA-256 of an arena's settings."""
-    return hashlib.sha256(msgspec.json.encode(settings)).digest()
+def write_snapshot(
+    settings: ArenaSettings,
+    step: int,
+    population: ArenaPopulation,
+    casualties: Sequence[Casualty],
+) -> bytes:
+    """Return an arena's whole state; equal states give equal bytes.
 
-
-def encode_state(state: ArenaState) -> bytes:
-    """Return the bytes of a state; equal states give equal bytes."""
+    Args:
+        settings: of the arena.
+        step: of the arena.
+        population: the living robots.
+        casualties: not yet reported.
+    """
+    rows = population.robot_rows.rows
+    state = _ArenaState(
+        format=FORMAT,
+        settings=_digest(settings),
+        step=step,
+        robots=[_robot_state(robot) for robot in population.robots],
+        clusters=[[rows[b] for b in c.members] for c in population.clusters],
+        casualties=[
+            _CasualtyState(_name(c.birth), c.step, c.reason, c.place)
+            for c in casualties
+        ],
+    )
     return msgspec.msgpack.encode(state)
 
 
-def decode_state(data: bytes, settings: ArenaSettings) -> ArenaState:
-    """Return the state of some bytes.
+def read_snapshot(
+    settings: ArenaSettings, data: bytes, population: ArenaPopulation
+) -> tuple[int, list[Casualty]]:
+    """Fill an empty population from a snapshot.
 
     Args:
-        data: a snapshot.
-        settings: of the arena that it is to be restored in.
+        settings: of the arena.
+        data: the snapshot.
+        population: without robots.
+
+    Returns:
+        The arena's step, and the casualties not yet reported.
 
     Raises:
-        MalformedMessage: not a snapshot's bytes, another format, or one of an
-            arena with other settings.
+        MalformedMessage: not a snapshot's bytes, another format, or of an arena with
+            other settings.
     """
     try:
-        state = msgspec.msgpack.decode(data, type=ArenaState)
+        state = msgspec.msgpack.decode(data, type=_ArenaState)
     except msgspec.MsgspecError as error:
         raise MalformedMessage(f"snapshot: {error}") from None
     if state.format != FORMAT:
         raise MalformedMessage(f"snapshot: format must be {FORMAT}, got {state.format}")
-    if state.settings != settings_digest(settings):
+    if state.settings != _digest(settings):
         raise MalformedMessage("snapshot: of an arena with other settings")
-    viewed = sorted(row for group in state.clusters for row in group)
-    if viewed != list(range(len(state.robots))):
+    members = sorted(row for group in state.clusters for row in group)
+    if members != list(range(len(state.robots))):
         raise MalformedMessage("snapshot: every robot must be in one cluster")
-    return state
+    population.add([_restored(robot, population) for robot in state.robots])
+    births = [robot.birth for robot in population.robots]
+    population.regroup([tuple(births[row] for row in g) for g in state.clusters])
+    population.merges = population.splits = 0
+    return state.step, [
+        Casualty(BirthId(*c.birth), c.step, c.reason, c.place) for c in state.casualties
+    ]
 
 
-def pack_floats(numbers: Floats) -> bytes:
+def _digest(settings: ArenaSettings) -> bytes:
+    """Return the SHA-256 of an arena's settings."""
+    return hashlib.sha256(msgspec.json.encode(settings)).digest()
+
+
+def _name(birth: BirthId) -> tuple[int, int]:
+    return birth.island, birth.number
+
+
+def _robot_state(robot: ArenaRobot) -> _RobotState:
+    view, sensors = robot.view, robot.view.sensors
+    return _RobotState(
+        birth=_name(robot.birth),
+        robot=robot.encoded,
+        born=robot.window.born,
+        brain_start=robot.brain_start,
+        qpos=_pack(view.qpos),
+        qvel=_pack(view.qvel),
+        ctrl=_pack(view.ctrl),
+        readings=_pack(sensors.readings),
+        velocities=_pack(np.array(sensors.velocities)),
+        states=_pack(robot.states),
+        window=_pack(np.array(robot.window.positions)),
+        place=robot.place,
+    )
+
+
+def _restored(state: _RobotState, population: ArenaPopulation) -> ArenaRobot:
+    birth, phenotype = BirthId(*state.birth), decode_robot(state.robot)
+    body = population.model_cache.body(birth, phenotype)
+    window = Window(population.model_cache.settings.simulation, state.born)
+    for x, y, z in _unpack(state.window, -1, 3).tolist():
+        window.positions.append((x, y, z))
+    robot = arena_robot(birth, phenotype, body, window, population)
+    view, sensors = robot.view, robot.view.sensors
+    view.qpos[:] = _unpack(state.qpos, *view.qpos.shape)
+    view.qvel[:] = _unpack(state.qvel, *view.qvel.shape)
+    view.ctrl[:] = _unpack(state.ctrl, *view.ctrl.shape)
+    sensors.readings[:] = _unpack(state.readings, *sensors.readings.shape)
+    sensors.velocities = [
+        (x, y, z) for x, y, z in _unpack(state.velocities, -1, 3).tolist()
+    ]
+    robot.states = _unpack(state.states, *robot.states.shape)
+    robot.brain_start, robot.place = state.brain_start, state.place
+    return robot
+
+
+def _pack(numbers: Floats) -> bytes:
     """Return numbers as bytes, without their shape."""
     return np.ascontiguousarray(numbers, dtype="<f8").tobytes()
 
 
-def unpack_floats(data: bytes, *shape: int) -> Floats:
+def _unpack(data: bytes, *shape: int) -> Floats:
     """Return the numbers of some bytes.
 
     Raises:
-        MalformedMessage: not so many as the shape has.
+        MalformedMessage: a number of bytes that does not fit the shape.
     """
     try:
         return np.frombuffer(data, dtype="<f8").reshape(shape).copy()

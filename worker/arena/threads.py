@@ -1,7 +1,7 @@
-"""Threads that share out independent jobs, the caller's own thread among them.
+"""Thread pool for independent jobs; the caller's thread works, too.
 
-The jobs must not know of each other; then what they come to does not depend on
-how many threads there are, nor on which of them does which job.
+The jobs must be independent of each other. Their results then depend neither on the
+number of threads nor on the assignment of jobs to threads.
 """
 
 import itertools
@@ -12,27 +12,27 @@ Job = Callable[[], None]
 
 
 class Pool:
-    """A few threads that wait for jobs.
+    """Threads that wait for jobs.
 
     Attributes:
-        threads: how many work, the caller's included.
+        threads: number of threads, including the caller's.
     """
 
     def __init__(self, threads: int = 1) -> None:
         """Start the other threads.
 
         Args:
-            threads: how many work, the caller's included; >= 1.
+            threads: number of threads, including the caller's; >= 1.
 
         Raises:
-            ValueError: fewer than one.
+            ValueError: fewer than one thread.
         """
         if threads < 1:
             raise ValueError(f"threads must be >= 1, got {threads}")
         self.threads = threads
         self._jobs: Sequence[Job] = ()
         self._next = itertools.count()
-        self._wanted = threading.Semaphore(0)
+        self._ready = threading.Semaphore(0)
         self._done = threading.Semaphore(0)
         self._errors: list[BaseException] = []
         self._is_open = True
@@ -41,19 +41,18 @@ class Pool:
             threading.Thread(target=self._serve, name=name, daemon=True).start()
 
     def run(self, jobs: Sequence[Job]) -> None:
-        """Do all jobs and return when they are done.
+        """Run all jobs and return when they have finished.
 
         Args:
-            jobs: dearest first, so that none is left alone at the end.
+            jobs: most expensive first, for an even load.
 
         Raises:
-            BaseException: what a job raised, the first that was seen; the other
-                jobs have been done all the same.
+            BaseException: the first error that a job raised; all other jobs have run.
         """
         others = min(self.threads, len(jobs)) - 1
         self._jobs, self._next = jobs, itertools.count()
         if others > 0:
-            self._wanted.release(others)
+            self._ready.release(others)
         self._work()
         for _ in range(others):
             self._done.acquire()
@@ -63,14 +62,14 @@ class Pool:
             raise error
 
     def close(self) -> None:
-        """Let the threads end; the pool can do nothing more."""
+        """Stop the threads; the pool cannot run any more jobs."""
         if self._is_open and self.threads > 1:
             self._is_open = False
-            self._wanted.release(self.threads - 1)
+            self._ready.release(self.threads - 1)
 
     def _serve(self) -> None:
         while True:
-            self._wanted.acquire()
+            self._ready.acquire()
             if not self._is_open:
                 return
             self._work()
@@ -78,11 +77,11 @@ class Pool:
 
     def _work(self) -> None:
         jobs, numbers = self._jobs, self._next
-        # One number is handed out once: the counter's step is atomic.
+        # The counter's step is atomic, so each number goes to one thread.
         for number in numbers:
             if number >= len(jobs):
                 return
             try:
                 jobs[number]()
-            except BaseException as error:  # noqa: BLE001 - raised anew by the caller
+            except BaseException as error:  # noqa: BLE001 - re-raised by the caller
                 self._errors.append(error)

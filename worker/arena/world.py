@@ -1,15 +1,15 @@
-"""An arena: robots that come, live together, are judged all the time, and go.
+"""An arena: robots that are born, live together, are evaluated and die.
 
-All that happens at a step happens on arriving there, in this order: the diverged
-fall; brains tick; positions are sampled; touches are counted; those who may touch
-soon join. Then physics goes on, with nothing but steps, to the next such moment.
-So a state between two advances is whole, and how an arena gets somewhere does not
-depend on how many advances it took.
+Everything that happens at a step happens on arrival there, in this order: diverged
+robots are removed; controllers tick; positions are sampled; contacts are counted;
+clusters of robots that may touch soon are merged. Then the physics continues, without
+interruption, to the next such moment. A state between two advances is therefore
+complete, and the way of an arena does not depend on the number of advances.
 """
 
 import hashlib
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Self
 
@@ -17,91 +17,85 @@ from schema.errors import UnexpectedEvent
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
-from schema.wire.arena import Advance, Casualty, Changes, Insertion
-from worker.arena import light, state
-from worker.arena.batched_sensors import BatchedIO
-from worker.arena.births import check_changes, equip, newborn
-from worker.arena.brains import BatchedControllers
-from worker.arena.contacts import Contacts
+from schema.wire.arena import Advance, Casualty, Changes, Insertion, Judgement
+from worker.arena.batched_control import BatchedControllers, BatchedIO
+from worker.arena.births import check_changes, newborn, replace_brain
 from worker.arena.divergence import diverged
-from worker.arena.fitness_window import judge_all
-from worker.arena.poses import Poses
-from worker.arena.schedule import Schedule
+from worker.arena.light import read_light
+from worker.arena.records import Contacts, Poses
+from worker.arena.snapshot import read_snapshot, write_snapshot
 from worker.arena.threads import Pool
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
-from worker.clusters.rollout import Rollout
+from worker.clusters.rollout import Rollout, Schedule
 from worker.robot.evaluation import silence_engine
-from worker.robot.noise import Source
+from worker.robot.noise import NoiseSource
 
 _FEW = 5
-"""Clusters that one thread steps faster than several."""
+"""Fewer clusters than this are stepped faster by one thread than by several."""
 
 
 class World:
     """One arena shard; a pure function of its settings, changes and advances.
 
     Attributes:
-        step: physics steps since it began.
-        population: the living and their clusters, to look at.
+        step: physics steps since the start.
+        population: the living robots and their clusters; read only.
     """
 
     def __init__(self, settings: ArenaSettings, threads: int = 1) -> None:
-        """Begin with nobody.
+        """Initialise an empty arena.
 
         Args:
-            settings: the arena's.
-            threads: that step clusters, the caller's included; what happens does
-                not depend on their number.
+            settings: of the arena.
+            threads: that step clusters, including the caller's; results do not depend
+                on their number.
         """
         silence_engine()
+        clock = settings.simulation
+        self.step = 0
+        self.population = ArenaPopulation(settings)
         self._settings = settings
-        self._clock = settings.simulation
         self._schedule = Schedule(settings)
         self._pool = Pool(threads)
-        self.reset()
-
-    def reset(self) -> None:
-        """Begin anew, with nobody."""
-        self.step = 0
-        self.population = ArenaPopulation(self._settings)
         width = self.population.model_cache.width
         self._controllers = BatchedControllers(
-            Source(self._clock, width, self._settings.origin)
+            NoiseSource(clock, width, settings.origin)
         )
-        gravity = self._settings.environment.gravity_vector(self._clock.gravity)
-        self._io = BatchedIO(width, self._clock, gravity)
+        gravity = settings.environment.gravity_vector(clock.gravity)
+        self._io = BatchedIO(width, clock, gravity)
         self._casualties: list[Casualty] = []
-        self._touches = Contacts(self._settings)
-        self._poses = Poses(self._clock.timestep_s)
+        self._contacts = Contacts(settings) if settings.arena.record_touches else None
+        self._poses = Poses(clock.timestep_s)
 
     def close(self) -> None:
-        """Let the threads end; the world cannot be advanced any more."""
+        """Stop the threads; the world cannot be advanced any more."""
         self._pool.close()
 
     @property
     def births(self) -> tuple[BirthId, ...]:
-        """The names of the living, ascending."""
-        return tuple(one.birth for one in self.population.everybody)
+        """Births of the living robots, ascending."""
+        return tuple(robot.birth for robot in self.population.robots)
 
     def poses(self) -> bytes:
-        """Return where everybody is now: Arrow IPC of ``columns.POSES``."""
-        now = Poses(self._clock.timestep_s)
+        """Return the present poses: Arrow IPC of ``columns.POSES``."""
+        now = Poses(self._settings.simulation.timestep_s)
         now.add(self.step, self.population.layout, self.population.layout.read())
         return now.columns()
 
     def apply(self, changes: Changes) -> None:
-        """Take robots out, put robots in, replace brains, in this order.
+        """Remove robots, insert robots, replace brains, in this order.
 
-        A robot that the engine cannot build, or gives up on at once, is a casualty of
+        A robot that the engine cannot build, or fails on at once, is a casualty of
         the next advance.
 
         Args:
-            changes: what is done before the next advance.
+            changes: made before the next advance.
 
         Raises:
-            UnexpectedEvent: somebody is not there, or there already, named twice,
-                or born between two ticks of the brains; nothing is changed.
+            UnexpectedEvent: a robot that does not live here, lives here already, is
+                named twice, or is born between two ticks of the controllers; nothing
+                is changed.
             InvalidRobot: a robot that breaks the rules, or a brain that does not
                 fit its body; nothing is changed.
         """
@@ -110,36 +104,34 @@ class World:
         if changes.insertions:
             self._insert(changes.insertions)
         for change in changes.brains:
-            one = self.population.find(change.birth)
-            since = self._schedule.next_tick(self.step)
-            equip(one, change.brain, self.population.model_cache.width, since)
+            robot = self.population.find(change.birth)
+            start = self._schedule.next_tick(self.step)
+            width = self.population.model_cache.width
+            replace_brain(robot, change.brain, width, start)
         if changes.removals or changes.insertions or changes.brains:
-            self._controllers.gather(self.population.everybody)
+            self._controllers.gather(self.population.robots)
 
-    def advance(
-        self, until: int, watch: Callable[[bytes], None] | None = None
-    ) -> Advance:
-        """Let time pass.
+    def advance(self, until: int) -> Advance:
+        """Advance the arena to a step.
 
         Args:
-            until: step to reach, later than now.
-            watch: is shown each sample of poses as it happens, as ``poses`` does.
+            until: step to reach, later than the present one.
 
         Raises:
-            UnexpectedEvent: ``until`` is not later than now.
+            UnexpectedEvent: ``until`` is not later than the present step.
         """
         if until <= self.step:
             raise UnexpectedEvent(
                 f"advance: until must be > step = {self.step}, got {until}"
             )
         while self.step < until:
-            self._go(self._schedule.moments(self.step, until), watch)
+            self._advance_interval(self._schedule.moments(self.step, until))
         return self._report()
 
     def snapshot(self) -> bytes:
-        """Return the whole state; ``restore`` goes on from it bit for bit."""
-        return state.write(
-            self._settings, self.step, self.population, tuple(self._casualties)
+        """Return the whole state, for ``restore``."""
+        return write_snapshot(
+            self._settings, self.step, self.population, self._casualties
         )
 
     def digest(self) -> bytes:
@@ -148,39 +140,36 @@ class World:
 
     @classmethod
     def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> Self:
-        """Return the world of a snapshot.
+        """Return the world of a snapshot; it continues equal to the last bit.
 
         Args:
-            settings: those that it was taken with.
+            settings: those of the snapshot.
             data: the snapshot.
-            threads: that step clusters, the caller's included.
+            threads: that step clusters, including the caller's.
 
         Raises:
             MalformedMessage: not a snapshot, or of other settings.
         """
         world = cls(settings, threads)
-        world.step, casualties = state.read(settings, data, world.population)
-        world._casualties = list(casualties)
-        world._controllers.gather(world.population.everybody)
+        world.step, world._casualties = read_snapshot(settings, data, world.population)
+        world._controllers.gather(world.population.robots)
         return world
 
     # --- time -------------------------------------------------------------------
 
-    def _go(
-        self, moments: Sequence[int], watch: Callable[[bytes], None] | None
-    ) -> None:
-        """Let all clusters go through a stretch of time, then look at its moments."""
+    def _advance_interval(self, moments: Sequence[int]) -> None:
+        """Step all clusters through an interval, then handle its moments."""
         plan = [b - a for a, b in itertools.pairwise((self.step, *moments))]
         self._run(plan)
-        looks = [self._schedule.is_look(step) for step in moments]
-        rollout = self.population.begin(plan, looks)
+        is_merge = [self._schedule.is_merge(step) for step in moments]
+        rollout = self.population.begin(plan, is_merge)
         for moment, step in enumerate(moments):
             self.step, rollout.moment = step, moment
-            self._arrive(rollout, watch)
+            self._arrive(rollout)
             self.population.catch_up()
         self.population.end()
-        if self._schedule.is_parting(self.step):
-            self.population.part(rollout.state)
+        if self._schedule.is_split(self.step):
+            self.population.split(rollout.state)
 
     def _run(self, plan: Sequence[int]) -> None:
         clusters = self.population.by_cost
@@ -190,86 +179,81 @@ class World:
             return
         self._pool.run([partial(cluster.run, plan) for cluster in clusters])
 
-    def _arrive(self, rollout: Rollout, watch: Callable[[bytes], None] | None) -> None:
+    def _arrive(self, rollout: Rollout) -> None:
+        """Do everything that is due at the present moment."""
         step, on = self.step, self._schedule
-        is_tick, is_sample, is_look = (
-            on.is_tick(step),
-            on.is_sample(step),
-            on.is_look(step),
-        )
-        if not (is_tick or is_sample or is_look):
+        is_tick, is_sample = on.is_tick(step), on.is_sample(step)
+        is_merge = on.is_merge(step)
+        if not (is_tick or is_sample or is_merge):
             return
-        self._drop_diverged(rollout)
+        self._remove_diverged(rollout)
         if is_tick:
             self._tick(rollout.state)
         if is_sample:
-            self._sample(rollout.state, watch)
-        if is_look:
-            self._touches.count(self.population.clusters, rollout.moment)
-            self.population.look()
+            self._sample(rollout.state)
+        if is_merge:
+            if self._contacts is not None:
+                self._contacts.count(self.population.clusters, rollout.moment)
+            self.population.merge()
 
     def _tick(self, state: Floats) -> None:
-        batched_io = self._io
-        batched_io.settle(self.population.layout)
-        batched_io.feel(state)
-        light.shine(self.population, self.population.everybody)
-        batched_io.drive(state, self._controllers.tick(self.step, batched_io.readings))
+        self._io.settle(self.population.layout)
+        self._io.read(state)
+        self._read_light(self.population.robots)
+        outputs = self._controllers.tick(self.step, self._io.readings)
+        self._io.drive(state, outputs)
 
-    def _sample(self, state: Floats, watch: Callable[[bytes], None] | None) -> None:
+    def _read_light(self, robots: Sequence[ArenaRobot]) -> None:
+        if self._settings.arena.light is not None:
+            read_light(self._settings.arena.light, self.population, robots)
+
+    def _sample(self, state: Floats) -> None:
         layout = self.population.layout
         places = state[layout.roots[:, :3]].tolist()
-        for one, (x, y, z) in zip(self.population.everybody, places, strict=True):
-            one.place = (x, y, z)
-            one.window.add(self.step, one.place)
+        for robot, (x, y, z) in zip(self.population.robots, places, strict=True):
+            robot.place = (x, y, z)
+            robot.window.add(self.step, robot.place)
         self._poses.add(self.step, layout, state)
-        if watch is not None:
-            now = Poses(self._clock.timestep_s)
-            now.add(self.step, layout, state)
-            watch(now.columns())
 
     # --- births and deaths ------------------------------------------------------
 
     def _insert(self, insertions: Sequence[Insertion]) -> None:
-        newcomers: list[ArenaRobot] = []
+        robots: list[ArenaRobot] = []
         for insertion in insertions:
-            one = newborn(insertion, self.population, self.step)
-            if isinstance(one, Casualty):
-                self._casualties.append(one)
+            robot = newborn(insertion, self.population, self.step)
+            if isinstance(robot, Casualty):
+                self._casualties.append(robot)
             else:
-                newcomers.append(one)
-        self.population.add(newcomers)
-        light.shine(self.population, newcomers)
-        for one in newcomers:
-            self._controllers.first_tick(self.step, one)
+                robots.append(robot)
+        self.population.add(robots)
+        self._read_light(robots)
+        for robot in robots:
+            self._controllers.first_tick(self.step, robot)
         self.population.kinematics()
-        self.population.look()
+        self.population.merge()
 
-    def _drop_diverged(self, rollout: Rollout) -> None:
-        """Let the diverged go."""
-        is_parting = self._schedule.is_parting(self.step)
-        fallen = diverged(self.population, rollout, self.step, looks_closely=is_parting)
-        self._casualties += fallen
-        if fallen:
-            self._dismiss([casualty.birth for casualty in fallen])
+    def _remove_diverged(self, rollout: Rollout) -> None:
+        is_split = self._schedule.is_split(self.step)
+        found = diverged(self.population, rollout, self.step, reads_warnings=is_split)
+        self._remove(found)
 
-    def _dismiss(self, births: Sequence[BirthId]) -> None:
-        self.population.remove(births)
-        self._controllers.gather(self.population.everybody)
+    def _remove(self, casualties: Sequence[Casualty]) -> None:
+        """Remove robots, to be reported by the present advance."""
+        self._casualties += casualties
+        if casualties:
+            self.population.remove([casualty.birth for casualty in casualties])
+            self._controllers.gather(self.population.robots)
 
     def _report(self) -> Advance:
-        judgements, undefined = judge_all(
-            self.population.everybody, self.step, self._settings
-        )
-        self._casualties += undefined
-        if undefined:
-            self._dismiss([casualty.birth for casualty in undefined])
+        found = [r.judgement(self.step, self._settings) for r in self.population.robots]
+        self._remove([each for each in found if isinstance(each, Casualty)])
         casualties, self._casualties = tuple(self._casualties), []
-        poses, self._poses = self._poses, Poses(self._clock.timestep_s)
+        poses, self._poses = self._poses, Poses(self._settings.simulation.timestep_s)
         return Advance(
             step=self.step,
             digest=self.digest(),
-            judgements=tuple(judgements),
+            judgements=tuple(each for each in found if isinstance(each, Judgement)),
             casualties=casualties,
-            touches=self._touches.hand_over(),
+            touches=() if self._contacts is None else self._contacts.take(),
             poses=poses.columns(),
         )

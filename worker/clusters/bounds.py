@@ -1,7 +1,7 @@
-"""How far a robot reaches and how fast any point of it may move.
+"""Bounding spheres of a robot and bounds on the speed of its points.
 
-A robot's boxes are covered by few spheres, each fixed to one body. They, and
-bounds that hold at any joint angle, tell from below how far two robots are apart.
+A few spheres, each fixed to one body, cover a robot's boxes. With bounds that hold
+at any joint angle they give a lower bound on the distance of two robots.
 """
 
 import math
@@ -17,25 +17,27 @@ from schema.robot.results import Floats
 Indices = npt.NDArray[np.intp]
 
 SLENDERNESS = 1.6
-"""A box is cut where it is longer than this many times its middle width."""
+"""Boxes longer than this many times their middle width are divided."""
 GROWTH = 1.2
-"""Two spheres become one that is at most this many times the larger of them."""
+"""Two spheres merge into one of at most this many times the larger radius."""
+WIDE_M = 0.06
+"""Flat boxes wider than this are divided in four [m]."""
 
-_Ball = tuple[Floats, float]
+_Sphere = tuple[Floats, float]
 """Centre and radius [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class BoundingSpheres:
-    """What bounds one robot, whatever its joints do.
+    """Bounds of one robot that hold at any joint angle.
 
     Attributes:
         bodies: (B,) body of each sphere, counted from the robot's first.
-        centres: (B, 9) in the frames of their bodies, thrice over, to be
-            multiplied with the rows of rotations [m].
+        centres: (B, 9) in the frames of their bodies, three copies each, to be
+            multiplied by the rows of rotations [m].
         radii: (B,) [m].
-        hulls: (N, 4) centres, in the frames of its N bodies, and radii of spheres
-            that hold all spheres of a body each [m].
+        hulls: (N, 4) centre, in the body's frame, and radius of one sphere per body
+            that contains all spheres of the body [m].
         weights: (V,) of the absolute velocities of its degrees of freedom in a
             bound on the speed of its fastest point.
     """
@@ -48,20 +50,20 @@ class BoundingSpheres:
 
 
 def bounding_spheres(model: mujoco.MjModel) -> BoundingSpheres:
-    """Return what bounds the one robot of a model.
+    """Return the bounds of the one robot of a model.
 
     Args:
-        model: as ``schema.mjcf.model.solo_model`` makes it; static geoms do not count.
+        model: from ``schema.mjcf.model.solo_model``; static geoms do not count.
     """
     root = int(model.jnt_bodyid[0])
-    covers: list[list[_Ball]] = []
+    covers: list[list[_Sphere]] = []
     for body in range(root, model.nbody):
         first, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
-        balls: list[_Ball] = []
+        spheres: list[_Sphere] = []
         for geom in range(first, first + count):
-            balls += _cut(model, geom)
-        covers.append(_merged(balls))
-    # Of each body: how far anything beyond its joint may be from its origin.
+            spheres += _box_cover(model, geom)
+        covers.append(_merged(spheres))
+    # Greatest distance from each body's origin of anything beyond its joint.
     far = [max((_length(c) + r for c, r in cover), default=0.0) for cover in covers]
     for body in range(model.nbody - 1, root, -1):
         parent = int(model.body_parentid[body]) - root
@@ -73,18 +75,18 @@ def bounding_spheres(model: mujoco.MjModel) -> BoundingSpheres:
         body = int(model.jnt_bodyid[joint]) - root
         weights[int(model.jnt_dofadr[joint])] = far[body]
     counts = [len(cover) for cover in covers]
-    balls = [ball for cover in covers for ball in cover]
+    spheres = [sphere for cover in covers for sphere in cover]
     return BoundingSpheres(
         np.repeat(np.arange(len(covers)), counts),
-        np.tile([centre for centre, _ in balls], 3),
-        np.array([radius for _, radius in balls]),
+        np.tile([centre for centre, _ in spheres], 3),
+        np.array([radius for _, radius in spheres]),
         np.array([_hull(cover) for cover in covers]),
         weights,
     )
 
 
-def _hull(cover: list[_Ball]) -> list[float]:
-    """Return the centre and the radius of a sphere that holds some spheres."""
+def _hull(cover: list[_Sphere]) -> list[float]:
+    """Return centre and radius of a sphere that contains some spheres."""
     if not cover:
         return [0.0, 0.0, 0.0, 0.0]
     centres = np.array([centre for centre, _ in cover])
@@ -93,15 +95,15 @@ def _hull(cover: list[_Ball]) -> list[float]:
     return [*centre.tolist(), radius]
 
 
-def _cut(model: mujoco.MjModel, geom: int) -> list[_Ball]:
+def _box_cover(model: mujoco.MjModel, geom: int) -> list[_Sphere]:
     """Return spheres that cover a box, in its body's frame."""
     size = 2.0 * model.geom_size[geom]
     middle = sorted(size.tolist())[1]
     pieces = [max(1, math.ceil(edge / (SLENDERNESS * middle))) for edge in size]
     if min(pieces) == max(pieces) == 1 and float(np.min(size)) * 2 <= middle * 1.01:
-        # A flat box: its width is what makes its sphere large.
-        is_large = middle > LARGE
-        pieces = [2 if is_large and edge >= middle else 1 for edge in size]
+        # The width of a flat box determines the radius of its sphere.
+        is_wide = middle > WIDE_M
+        pieces = [2 if is_wide and edge >= middle else 1 for edge in size]
     cell = size / pieces
     rotation = np.empty(9)
     mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
@@ -113,18 +115,14 @@ def _cut(model: mujoco.MjModel, geom: int) -> list[_Ball]:
     return found
 
 
-LARGE = 0.06
-"""A flat box wider than this is cut in four [m]."""
-
-
-def _merged(balls: list[_Ball]) -> list[_Ball]:
-    """Return fewer spheres that cover the same, hardly larger ones."""
-    left = sorted(balls, key=lambda ball: -ball[1])
-    kept: list[_Ball] = []
+def _merged(spheres: list[_Sphere]) -> list[_Sphere]:
+    """Return fewer, at most slightly larger spheres that cover the same space."""
+    left = sorted(spheres, key=lambda sphere: -sphere[1])
+    kept: list[_Sphere] = []
     while left:
         centre, radius = left.pop(0)
         largest = GROWTH * radius
-        rest: list[_Ball] = []
+        rest: list[_Sphere] = []
         for other, other_radius in left:
             apart = _length(other - centre)
             if apart + other_radius <= radius:
@@ -141,5 +139,5 @@ def _merged(balls: list[_Ball]) -> list[_Ball]:
 
 
 def _length(vector: Floats) -> float:
-    """Return what ``np.linalg.norm`` does, sooner."""
+    """Return the norm; faster than ``np.linalg.norm`` for three numbers."""
     return math.sqrt(vector.dot(vector))

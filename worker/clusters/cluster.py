@@ -1,48 +1,133 @@
-"""Robots that share a model because they may touch: a cluster, of one or of many.
+"""Clusters of robots that share one engine model because they may touch.
 
-A robot alone has its own small model for life; those within each other's reach
-share one that is made when they meet. Clusters know nothing of each other, so each
-goes through a stretch of time at its own pace and keeps its state at the moments
-at which somebody will want to know it.
+A robot alone has its own small model for life. Robots that may touch share a model
+that is compiled when they meet. Clusters do not interact, so each is stepped through
+an interval independently and keeps its states at the interval's moments.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from schema.errors import one_line
+from schema.parts import BodySpace
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.clusters.bounds import Indices
-from worker.clusters.connected_components import Group, connected_components
-from worker.clusters.engine_view import EngineView, Rules
+from worker.robot.controller import Widths
+from worker.robot.motors import Servos
+from worker.robot.sensors import Sensors
 
 NEVER = 1 << 62
-"""A moment that does not come."""
+"""A moment later than all others."""
 
 
-class Track:
-    """A cluster's states at K moments of a stretch of time, one row each.
+@dataclass(frozen=True, slots=True)
+class ViewSettings:
+    """Settings that all engine views of one arena share.
 
     Attributes:
-        state: (K, W) all of a moment as ``Cluster.live`` has it.
+        types: that robots' parts may have.
+        width: of every network.
+        has_light: the arena writes the readings of light sensors.
+    """
+
+    types: BodySpace
+    width: Widths
+    has_light: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A robot in a shared model.
+
+    Attributes:
+        prefix: of its names in the model.
+        robot: the robot.
+        solo: the model in which it is alone, which has its sizes.
+    """
+
+    prefix: str
+    robot: Robot
+    solo: mujoco.MjModel
+
+
+class EngineView:
+    """A robot's slice of a cluster's model and state, its sensors and motors.
+
+    Attributes:
+        model, data: of the cluster.
+        joints, dofs: its slices of the cluster's qpos and qvel.
+        qpos, qvel, ctrl: its part of the state, live.
+        offsets: where its part of each of ``Cluster.live`` starts.
+        geoms: first and last + 1 of its geoms.
+        sensors, servos: of the robot.
+    """
+
+    def __init__(
+        self,
+        member: Member,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        settings: ViewSettings,
+    ) -> None:
+        """Find a robot in a cluster by the prefix of its names."""
+        self.model, self.data = model, data
+        prefix, solo = member.prefix, member.solo
+        free = model.joint(f"{prefix}free").id
+        body = model.body(f"{prefix}root").id
+        start, dof = int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free])
+        self.joints = slice(start, start + solo.nq)
+        self.dofs = slice(dof, dof + solo.nv)
+        self.offsets = (start, dof, 3 * body, 9 * body)
+        geom = int(model.body_geomadr[body])
+        own_geoms = solo.ngeom - int(solo.body_geomadr[solo.jnt_bodyid[0]])
+        self.geoms = (geom, geom + own_geoms)
+        self.sensors = Sensors(
+            member.robot,
+            settings.types,
+            model,
+            data,
+            width=settings.width.inputs,
+            prefix=prefix,
+            has_light=settings.has_light,
+        )
+        self.servos = Servos(member.robot, settings.types, model, data, prefix=prefix)
+        self.qpos: Floats = data.qpos[self.joints]
+        self.qvel: Floats = data.qvel[self.dofs]
+        self.ctrl: Floats = data.ctrl[self.servos.actuators]
+
+    def copy_from(self, other: "EngineView") -> None:
+        """Copy the robot's whole state from its view of another cluster."""
+        self.qpos[:], self.qvel[:] = other.qpos, other.qvel
+        self.ctrl[:] = other.ctrl
+        self.sensors.readings[:] = other.sensors.readings
+        self.sensors.velocities = list(other.sensors.velocities)
+
+
+class StateHistory:
+    """A cluster's states at K moments of an interval, one row each.
+
+    Attributes:
+        state: (K, W) all of ``Cluster.live``.
         qpos, qvel: positions and velocities of it, (K, Q) and (K, V).
-        warnings: how often the engine had given each of its own.
-        touching: the pairs of members in contact, if they are kept.
+        warnings: (K, N) the engine's counts of each of its warnings.
+        touching: pairs of members in contact, if they are recorded.
     """
 
     def __init__(self, cluster: "Cluster", count: int) -> None:
-        """Make room for moments of a cluster."""
+        """Allocate rows for ``count`` moments of a cluster."""
         self.state = np.zeros((count, sum(cluster.sizes)))
         ends = np.cumsum(cluster.sizes).tolist()
         parts = np.split(self.state, ends[:-1], axis=1)
         self.qpos, self.qvel = parts[:2]
-        self._complaints: Indices = cluster.data.warning.number
-        self.warnings = np.zeros((count, len(self._complaints)), dtype=np.intp)
+        self._warning_counts: Indices = cluster.data.warning.number
+        self.warnings = np.zeros((count, len(self._warning_counts)), dtype=np.intp)
         self.touching: list[list[tuple[int, int]]] = [[] for _ in range(count)]
-        # Views of bytes: what is copied many times a second is copied by them.
+        # Copies between views of bytes are faster than between arrays.
         self._live = [_bytes(array) for array in cluster.live]
         self._rows = [[_bytes(array[k]) for array in parts] for k in range(count)]
 
@@ -50,81 +135,74 @@ class Track:
         return len(self._rows)
 
     def keep(self, moment: int) -> None:
-        """Take the present state for that of a moment."""
+        """Copy the present state to the row of a moment."""
         qpos, qvel, xpos, xmat = self._rows[moment]
         qpos[:], qvel[:], xpos[:], xmat[:] = self._live
-        self.warnings[moment] = self._complaints
+        self.warnings[moment] = self._warning_counts
 
 
 class Cluster:
-    """A model, its state and who sits in it, by birth.
+    """A model, its state and its robots, by birth.
 
     Attributes:
-        members: whose seats they are, ascending.
-        views: in that order.
-        live: its state just now, views: positions, velocities, places of all
-            bodies and their rotations, as of the last step, each in one row.
+        members: births of its robots, ascending.
+        views: of the members, in that order.
+        live: live views of the state: positions, velocities, positions of all bodies
+            and their rotations, as of the last step, each in one row.
         sizes: of these four.
-        track: states at the moments of the last stretch of time.
-        cost: of a step, in arbitrary units; decides who is dealt first.
-        is_shared: by several robots.
-        failure: why the engine gave up on it; empty if it did not.
-        failed_at: moment of the stretch at which it did.
-        touched: geoms in contact in the last step; kept only if a member has pads.
+        history: states at the moments of the last interval.
+        cost: of a step, in arbitrary units; orders clusters for threads.
+        failure: the engine's error; empty if there was none.
+        failed_at: moment of the interval of that error.
+        touched: geoms in contact in the last step; kept only if a member has touch
+            sensors.
     """
 
     def __init__(
         self,
-        members: tuple[BirthId, ...],
-        prefixes: tuple[str, ...],
+        births: tuple[BirthId, ...],
+        members: Sequence[Member],
         model: mujoco.MjModel,
+        settings: ViewSettings,
         *,
-        tells_touches: bool = False,
+        records_contacts: bool = False,
     ) -> None:
-        """Make the state of a model; seats come later.
+        """Create the state of a model.
 
         Args:
-            members: by birth.
-            prefixes: of their names in the model.
+            births: of the members, ascending.
+            members: robots of the model.
             model: that holds them.
-            tells_touches: its track is to know who touched whom.
+            settings: of the arena's views.
+            records_contacts: the history records which members are in contact.
         """
-        self.members, self.prefixes = members, prefixes
+        self.members = births
         self.model, self.data = model, mujoco.MjData(model)
-        self.views: tuple[EngineView, ...] = ()
+        self.views = tuple(EngineView(m, model, self.data, settings) for m in members)
         self._owners = [-1] * model.ngeom
-        self.qpos: Floats = self.data.qpos
-        self.qvel: Floats = self.data.qvel
+        for number, view in enumerate(self.views):
+            first, end = view.geoms
+            self._owners[first:end] = [number] * (end - first)
         frames = self.data.xpos.reshape(-1), self.data.xmat.reshape(-1)
-        self.live: tuple[Floats, ...] = (self.qpos, self.qvel, *frames)
+        self.live: tuple[Floats, ...] = (self.data.qpos, self.data.qvel, *frames)
         self.sizes = tuple(len(array) for array in self.live)
-        self.track = Track(self, 0)
+        self.history = StateHistory(self, 0)
         self.cost = int(model.nv + 4 * model.ngeom)
         self.failure, self.failed_at = "", NEVER
         self.touched: frozenset[int] = frozenset()
-        self._has_pads = False
-        self.is_shared = len(members) > 1
-        self._tells_touches = tells_touches and self.is_shared
-
-    def view(self, robot: Robot, solo: mujoco.MjModel, rules: Rules) -> None:
-        """Find the next member's place."""
-        prefix = self.prefixes[len(self.views)]
-        view = EngineView(robot, solo, rules, (self.model, self.data, prefix))
-        for geom in range(*view.geoms):
-            self._owners[geom] = len(self.views)
-        self.views = (*self.views, view)
-        self._has_pads |= bool(view.senses.pads)
+        self._has_pads = any(view.sensors.pads for view in self.views)
+        self._records_contacts = records_contacts and len(births) > 1
 
     def run(self, plan: Sequence[int], first: int = 0) -> None:
-        """Let physics go on from moment to moment; the commands are held.
+        """Step the physics from moment to moment with constant commands.
 
         Args:
             plan: steps to each moment from the one before.
-            first: moment to begin with; those before are kept as they are.
+            first: moment to start with; the rows before it stay unchanged.
         """
-        if len(self.track) < len(plan):
-            self.track = Track(self, len(plan))
-        model, data, keep = self.model, self.data, self.track.keep
+        if len(self.history) < len(plan):
+            self.history = StateHistory(self, len(plan))
+        model, data, keep = self.model, self.data, self.history.keep
         for moment in range(first, len(plan)):
             try:
                 mujoco.mj_step(model, data, nstep=plan[moment])
@@ -133,48 +211,41 @@ class Cluster:
                 self.keep(range(moment, len(plan)))
                 return
             keep(moment)
-            if self._tells_touches:
-                self.track.touching[moment] = self.touching()
-        self._feel()
+            if self._records_contacts:
+                self.history.touching[moment] = self.touching()
+        self._read_touched()
 
     def keep(self, moments: range) -> None:
-        """Take the present state for that of some moments."""
-        if len(self.track) < moments.stop:
-            self.track = Track(self, moments.stop)
+        """Copy the present state to the rows of some moments."""
+        if len(self.history) < moments.stop:
+            self.history = StateHistory(self, moments.stop)
         for moment in moments:
-            self.track.keep(moment)
-            self.track.touching[moment] = self.touching()
-        self._feel()
+            self.history.keep(moment)
+            self.history.touching[moment] = self.touching()
+        self._read_touched()
 
     def rewind(self, moment: int) -> None:
-        """Go back to the state of a moment, from which its robots are to leave."""
-        self.qpos[:], self.qvel[:] = self.track.qpos[moment], self.track.qvel[moment]
+        """Set positions and velocities to those of a moment of the interval."""
+        self.data.qpos[:] = self.history.qpos[moment]
+        self.data.qvel[:] = self.history.qvel[moment]
 
     def touching(self) -> list[tuple[int, int]]:
         """Return the pairs of members in contact in the last step, ascending."""
-        if not self.is_shared or not self.data.ncon:
+        if len(self.members) == 1 or not self.data.ncon:
             return []
         owners = self._owners
-        # Plain numbers: contacts are few, and most of them with the ground.
+        # Plain numbers, as contacts are few and most of them with the ground.
         geoms: list[list[int]] = self.data.contact.geom.tolist()
         pairs = {(owners[first], owners[second]) for first, second in geoms}
         return sorted({(min(p), max(p)) for p in pairs if p[0] != p[1] and min(p) >= 0})
 
-    def parts(self) -> list[Group]:
-        """Return the groups of members that hold together by contact."""
-        if not self.is_shared:
-            return [self.members]
-        links = [(self.members[a], self.members[b]) for a, b in self.touching()]
-        return connected_components([(birth,) for birth in self.members], links)
-
-    def _feel(self) -> None:
-        """Note what pads may feel while the engine's contacts are at hand."""
+    def _read_touched(self) -> None:
         if self._has_pads:
             geoms: list[int] = self.data.contact.geom.ravel().tolist()
             self.touched = frozenset(geoms)
 
     def reset(self) -> None:
-        """Be as new, in an undefined place."""
+        """Reset the state to the model's initial one."""
         mujoco.mj_resetData(self.model, self.data)
         self.failure, self.failed_at = "", NEVER
 

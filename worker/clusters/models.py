@@ -1,4 +1,4 @@
-"""Where robots become models: alone at birth, together when they meet."""
+"""Engine models of an arena: one per robot at birth, shared ones on demand."""
 
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -15,75 +15,74 @@ from schema.mjcf.world import add_ring_wall
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from worker.clusters.bounds import BoundingSpheres, bounding_spheres
-from worker.clusters.cluster import Cluster
-from worker.clusters.engine_view import Rules
+from worker.clusters.cluster import Cluster, Member, ViewSettings
 from worker.robot.controller import widths
 
 CACHE_SIZE = 64
-"""Models of clusters that are kept in case their members meet again."""
+"""Shared clusters that are cached in case their members meet again."""
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A robot as the engine knows it, whoever it lives with.
+    """Engine models of one robot.
 
     Attributes:
-        robot: the robot; its brain is another's business.
-        reach: what bounds it.
+        robot: the robot; its brain is not used.
+        bounds: bounding spheres.
         home: the cluster in which it is alone.
     """
 
     robot: Robot
-    reach: BoundingSpheres
+    bounds: BoundingSpheres
     home: Cluster
 
 
 class ModelCache:
-    """Makes models of one arena, and keeps a few that may be wanted again."""
+    """Compiles the models of one arena and caches shared clusters.
+
+    Attributes:
+        settings: of the arena.
+        width: of every network.
+    """
 
     def __init__(self, settings: ArenaSettings) -> None:
-        """Start with an empty store.
-
-        Args:
-            settings: of the arena.
-        """
+        """Initialise an empty cache."""
         self.settings = settings
         self._simulation = replace(settings.simulation, drop_m=settings.arena.drop_m)
         self.width = widths(settings.space)
-        self._rules = Rules(
+        self._view_settings = ViewSettings(
             types=body_space(settings.space),
             width=self.width,
             has_light=settings.arena.light is not None,
         )
-        self._store: OrderedDict[tuple[BirthId, ...], Cluster] = OrderedDict()
+        self._clusters: OrderedDict[tuple[BirthId, ...], Cluster] = OrderedDict()
         self._specs: dict[BirthId, mujoco.MjSpec] = {}
 
     def body(self, birth: BirthId, robot: Robot) -> Body:
-        """Return a robot at the origin, as high as the arena drops it there.
+        """Return a robot's models; its state is at the origin, at drop height.
 
         Raises:
             ValueError: the engine cannot build it.
-            ExperimentError: a sensor that the arena has nothing for.
+            ExperimentError: a sensor that has no stimulus in the arena.
         """
-        types = self._rules.types
         model = solo_model(
             robot,
-            types,
+            self._view_settings.types,
             self._simulation,
             self.settings.environment,
             furnish=self._furnish,
         )
-        home = Cluster((birth,), ("",), model)
-        home.view(robot, model, self._rules)
+        members = [Member("", robot, model)]
+        home = Cluster((birth,), members, model, self._view_settings)
         return Body(robot, bounding_spheres(model), home)
 
     def height(self, body: Body, place: tuple[float, float], heading: float) -> float:
-        """Return how high a robot's core is when the arena drops it [m].
+        """Return the height of a robot's core when the arena drops it [m].
 
         Args:
-            body: the robot's.
+            body: of the robot.
             place: of the core's centre in the ground plane, world frame [m].
-            heading: turn about z [rad].
+            heading: rotation about z [rad].
         """
         environment, model = self.settings.environment, body.home.model
         if environment.is_even:
@@ -93,58 +92,55 @@ class ModelCache:
             boxes, self._simulation, environment, place, heading
         )
 
-    def cluster(self, births: Sequence[BirthId], bodies: Sequence[Body]) -> Cluster:
-        """Return a cluster for robots, in an undefined state.
+    def cluster(self, births: tuple[BirthId, ...], bodies: Sequence[Body]) -> Cluster:
+        """Return the cluster of some robots, in its initial state.
 
         Args:
-            births: who, ascending.
-            bodies: theirs.
+            births: of the robots, ascending.
+            bodies: of the robots.
         """
-        members = tuple(births)
-        if len(members) == 1:
+        if len(births) == 1:
             found = bodies[0].home
-        elif members in self._store:
-            self._store.move_to_end(members)
-            found = self._store[members]
+        elif births in self._clusters:
+            self._clusters.move_to_end(births)
+            found = self._clusters[births]
         else:
-            found = self._shared(members, bodies)
-            self._store[members] = found
-            if len(self._store) > CACHE_SIZE:
-                self._store.popitem(last=False)
+            found = self._shared(births, bodies)
+            self._clusters[births] = found
+            if len(self._clusters) > CACHE_SIZE:
+                self._clusters.popitem(last=False)
         found.reset()
         return found
 
     def forget(self, birth: BirthId) -> None:
-        """Drop all that was kept for a robot that is gone."""
+        """Drop all models of a robot that has died."""
         self._specs.pop(birth, None)
-        for members in [key for key in self._store if birth in key]:
-            del self._store[members]
+        for members in [key for key in self._clusters if birth in key]:
+            del self._clusters[members]
 
-    def _shared(self, members: tuple[BirthId, ...], bodies: Sequence[Body]) -> Cluster:
-        prefixes = tuple(f"{birth.island}.{birth.number}/" for birth in members)
-        specs = [
-            self._spec(birth, body.robot)
-            for birth, body in zip(members, bodies, strict=True)
-        ]
+    def _shared(self, births: tuple[BirthId, ...], bodies: Sequence[Body]) -> Cluster:
+        specs, members = [], []
+        for birth, body in zip(births, bodies, strict=True):
+            prefix = f"{birth.island}.{birth.number}/"
+            specs.append((prefix, self._spec(birth, body.robot)))
+            members.append(Member(prefix, body.robot, body.home.model))
         model = shared_model(
-            list(zip(prefixes, specs, strict=True)),
-            self._simulation,
-            self.settings.environment,
-            furnish=self._furnish,
+            specs, self._simulation, self.settings.environment, furnish=self._furnish
         )
-        tells = self.settings.arena.record_touches
-        made = Cluster(members, prefixes, model, tells_touches=tells)
-        for body in bodies:
-            made.view(body.robot, body.home.model, self._rules)
-        return made
+        records = self.settings.arena.record_touches
+        return Cluster(
+            births, members, model, self._view_settings, records_contacts=records
+        )
 
     def _spec(self, birth: BirthId, robot: Robot) -> mujoco.MjSpec:
         if birth not in self._specs:
-            types = self._rules.types
+            types = self._view_settings.types
             self._specs[birth] = robot_spec(robot, types, self._simulation).spec
         return self._specs[birth]
 
     @property
-    def _furnish(self) -> Furnish:
+    def _furnish(self) -> Furnish | None:
         arena, simulation = self.settings.arena, self._simulation
+        if not arena.wall_diameter_m:
+            return None
         return lambda spec: add_ring_wall(spec, arena, simulation)

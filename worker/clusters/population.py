@@ -1,8 +1,8 @@
-"""All robots of an arena and who of them lives together.
+"""The living robots of an arena and their clusters.
 
-A robot that may touch another before the next look moves into one cluster with
-it; a cluster of which parts have drifted apart falls into them. Everything goes by
-birth, so that it does not depend on who came into memory when.
+Robots that may touch before the next check are merged into one cluster; a cluster
+whose parts have drifted apart is split. Everything is ordered by birth, so results
+do not depend on the order of insertions.
 """
 
 from collections.abc import Iterable, Sequence
@@ -15,96 +15,98 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from worker.clusters.cluster import Cluster
 from worker.clusters.columns import Layout, RobotRows
-from worker.clusters.connected_components import Group, across, connected_components
 from worker.clusters.models import ModelCache
 from worker.clusters.proximity import Pairs, Proximity, Scene
 from worker.clusters.robot import ArenaRobot
 from worker.clusters.rollout import Rollout
 
+Group = tuple[BirthId, ...]
+"""Members of one cluster, ascending."""
+Links = list[tuple[BirthId, BirthId]]
+
 
 class ArenaPopulation:
-    """The living, by birth, and their clusters, by first member.
+    """The living robots, by birth, and their clusters, by first member.
 
     Attributes:
+        model_cache: engine models.
+        robot_rows: the living robots.
         clusters: of all of them.
-        by_cost: the same clusters, dearest first.
-        layout: where their numbers stand.
-        rollout: the stretch of time that is being looked at; nothing between two.
-        merges, splits: how often clusters were joined and parted.
+        by_cost: the same clusters, most expensive first.
+        layout: indices into the clusters' states.
+        rollout: the interval that is being handled; None between two intervals.
+        merges, splits: numbers of merges and splits of clusters.
     """
 
     def __init__(self, settings: ArenaSettings) -> None:
-        """Start with nobody."""
+        """Initialise without robots."""
         self.model_cache = ModelCache(settings)
-        self.proximity = Proximity(settings)
         self.robot_rows = RobotRows(())
         self.clusters: tuple[Cluster, ...] = ()
         self.by_cost: list[Cluster] = []
         self.layout = Layout((), self.robot_rows)
         self.rollout: Rollout | None = None
         self.merges = self.splits = 0
+        self._proximity = Proximity(settings)
         self._cluster_of: dict[BirthId, Cluster] = {}
         self._new: list[Cluster] = []
 
     @property
-    def everybody(self) -> tuple[ArenaRobot, ...]:
-        """All inhabitants, by birth."""
-        return self.robot_rows.everybody
+    def robots(self) -> tuple[ArenaRobot, ...]:
+        """All robots, by birth."""
+        return self.robot_rows.robots
 
     def __contains__(self, birth: BirthId) -> bool:
         return birth in self.robot_rows.rows
 
     def find(self, birth: BirthId) -> ArenaRobot:
-        """Return who has a name."""
-        return self.robot_rows.everybody[self.robot_rows.rows[birth]]
+        """Return the robot of a birth."""
+        return self.robot_rows.robots[self.robot_rows.rows[birth]]
 
     def cluster_of(self, birth: BirthId) -> Cluster:
-        """Return where somebody lives."""
+        """Return the cluster of a robot."""
         return self._cluster_of[birth]
 
-    def add(self, newcomers: Iterable[ArenaRobot]) -> None:
-        """Take robots in, each in its own home."""
-        added = sorted(newcomers, key=lambda one: one.birth)
-        everybody = sorted((*self.everybody, *added), key=lambda one: one.birth)
-        self.robot_rows = RobotRows(everybody)
-        homes = [one.body.home for one in added]
-        self._settle([*self.clusters, *homes])
+    def add(self, newborn: Iterable[ArenaRobot]) -> None:
+        """Add robots, each in its own cluster."""
+        added = sorted(newborn, key=lambda robot: robot.birth)
+        robots = sorted((*self.robots, *added), key=lambda robot: robot.birth)
+        self.robot_rows = RobotRows(robots)
+        self._settle([*self.clusters, *(robot.body.home for robot in added)])
 
     def remove(self, births: Iterable[BirthId]) -> None:
-        """Let robots go; those who lived with them stay together."""
-        gone = sorted(births)
+        """Remove robots; the other members of their clusters stay together."""
+        gone = set(births)
         if not gone:
             return
-        homes: dict[Group, Cluster] = {}
-        for birth in gone:
-            cluster = self._cluster_of[birth]
-            homes[cluster.members] = cluster
-        left = [one for one in self.everybody if one.birth not in gone]
-        kept = [cluster for cluster in self.clusters if cluster.members not in homes]
+        left = [robot for robot in self.robots if robot.birth not in gone]
         self.robot_rows = RobotRows(left)
-        for members in homes:
-            rest = tuple(birth for birth in members if birth not in gone)
-            if rest:
+        kept: list[Cluster] = []
+        for cluster in self.clusters:
+            rest = tuple(birth for birth in cluster.members if birth not in gone)
+            if rest == cluster.members:
+                kept.append(cluster)
+            elif rest:
                 home = self._move(rest)
                 mujoco.mj_kinematics(home.model, home.data)
                 kept.append(home)
-        for birth in gone:
+        for birth in sorted(gone):
             self.model_cache.forget(birth)
         self._settle(kept)
 
-    def begin(self, plan: Sequence[int], looks: Sequence[bool]) -> Rollout:
-        """Look, from now on, at a stretch that all clusters have gone through.
+    def begin(self, plan: Sequence[int], is_merge: Sequence[bool]) -> Rollout:
+        """Start to handle an interval that all clusters have been stepped through.
 
         Args:
             plan: steps to each moment from the one before.
-            looks: whether it is looked then who may touch whom.
+            is_merge: whether each moment is a check for merges.
         """
-        self.rollout = Rollout(tuple(plan), tuple(looks))
+        self.rollout = Rollout(tuple(plan), tuple(is_merge))
         self.rollout.read(self.layout)
         return self.rollout
 
     def catch_up(self) -> None:
-        """Let clusters that are new at this moment go through the rest, too."""
+        """Step clusters formed at the present moment to the end of the interval."""
         rollout = self.rollout
         if rollout is None or not self._new:
             return
@@ -114,76 +116,82 @@ class ArenaPopulation:
         rollout.read(self.layout)
 
     def end(self) -> None:
-        """Have looked at all of the stretch: now is its last moment."""
+        """Finish the interval."""
         self.rollout, self._new = None, []
 
-    def look(self) -> None:
-        """Join those who may touch before the next look."""
+    def merge(self) -> None:
+        """Merge the clusters of robots that may touch before the next check."""
         if self.rollout is None:
             scene = Scene(self.layout, self.layout.read()[np.newaxis])
-            pairs = self.proximity.meetings(scene)[0]
+            pairs = self._proximity.pairs_to_merge(scene)[0]
         else:
-            pairs = self._meetings(self.rollout)
+            pairs = self._merge_pairs(self.rollout)
         if pairs:
             old = [cluster.members for cluster in self.clusters]
             self.regroup(connected_components(old, self._links(pairs)))
 
-    def part(self, state: Floats) -> None:
-        """Let clusters fall into those parts that have drifted apart.
+    def split(self, state: Floats) -> None:
+        """Split clusters whose parts have drifted apart.
 
         Args:
-            state: what all are like now, (W,) as the layout puts them.
+            state: present state, (W,) in the order of the layout.
         """
+        rows = self.robot_rows.rows
         groups: list[Group] = []
         pairs: Pairs = []
         for cluster in self.clusters:
-            parts = cluster.parts()
+            members = cluster.members
+            links = [(members[a], members[b]) for a, b in cluster.touching()]
+            parts = connected_components([(birth,) for birth in members], links)
             groups += parts
-            if len(parts) > 1:
-                rows = self.robot_rows.rows
-                pairs += across([[rows[birth] for birth in part] for part in parts])
+            pairs += sorted(
+                (min(rows[a], rows[b]), max(rows[a], rows[b]))
+                for number, part in enumerate(parts)
+                for other in parts[number + 1 :]
+                for a in part
+                for b in other
+            )
         if pairs:
             scene = Scene(self.layout, state[np.newaxis])
-            near = self.proximity.near(scene, pairs)
+            near = self._proximity.pairs_to_keep(scene, pairs)
             self.regroup(connected_components(groups, self._links(near)))
 
     def regroup(self, groups: Iterable[Group]) -> None:
-        """Have exactly these groups live together, each ascending by birth."""
+        """Form exactly these clusters, each ascending by birth."""
         present = {cluster.members: cluster for cluster in self.clusters}
         settled: list[Cluster] = []
-        torn: list[Group] = []
-        changed = False
+        divided: list[Group] = []
         for members in groups:
             if members in present:
-                settled.append(present[members])
+                settled.append(present.pop(members))
                 continue
-            changed = True
             before = sorted({self._cluster_of[birth].members for birth in members})
             self.merges += len(before) - 1
-            torn += before if len(before) == 1 else ()
+            divided += before if len(before) == 1 else ()
             settled.append(self._move(members))
-        self.splits += len(torn) - len(set(torn))
-        if changed:
+        self.splits += len(divided) - len(set(divided))
+        if present:
             self._settle(settled)
 
     def kinematics(self) -> None:
-        """Bring the frames of all bodies up to the present state."""
+        """Compute the frames of all bodies from the present state."""
         for cluster in self.clusters:
             mujoco.mj_kinematics(cluster.model, cluster.data)
 
-    def _move(self, members: Group) -> Cluster:
+    def _move(self, births: Group) -> Cluster:
         """Return a cluster into which robots have moved with their states."""
-        people = [self.find(birth) for birth in members]
+        robots = [self.find(birth) for birth in births]
         if self.rollout is not None:
-            for birth in members:
+            for birth in births:
                 self._cluster_of[birth].rewind(self.rollout.moment)
-        cluster = self.model_cache.cluster(members, [one.body for one in people])
-        for one, view in zip(people, cluster.views, strict=True):
-            view.take(one.view)
-            one.view = view
+        cluster = self.model_cache.cluster(births, [robot.body for robot in robots])
+        for robot, view in zip(robots, cluster.views, strict=True):
+            view.copy_from(robot.view)
+            robot.view = view
         return cluster
 
     def _settle(self, clusters: Sequence[Cluster]) -> None:
+        """Replace the clusters; record the state of new ones from now on."""
         known = {id(cluster) for cluster in self.clusters}
         rows = self.robot_rows.rows
         self.clusters = tuple(sorted(clusters, key=lambda c: rows[c.members[0]]))
@@ -201,16 +209,36 @@ class ArenaPopulation:
                 self._new.append(cluster)
         self.rollout.read(self.layout)
 
-    def _meetings(self, rollout: Rollout) -> Pairs:
-        """Return who is to meet at this look; find it out for all that follow."""
-        if rollout.moment not in rollout.meetings:
-            looks = rollout.looks_ahead()
-            scene = Scene(self.layout, rollout.states[looks])
-            found = self.proximity.meetings(scene)
-            rollout.meetings = dict(zip(looks, found, strict=True))
-        return rollout.meetings[rollout.moment]
+    def _merge_pairs(self, rollout: Rollout) -> Pairs:
+        """Return the pairs to merge now; computes them for all checks ahead."""
+        if rollout.moment not in rollout.merge_pairs:
+            moments = rollout.merges_ahead()
+            scene = Scene(self.layout, rollout.states[moments])
+            found = self._proximity.pairs_to_merge(scene)
+            rollout.merge_pairs = dict(zip(moments, found, strict=True))
+        return rollout.merge_pairs[rollout.moment]
 
-    def _links(self, pairs: Pairs) -> list[tuple[BirthId, BirthId]]:
-        """Return the names of pairs of rows."""
-        births = [one.birth for one in self.everybody]
-        return [(births[here], births[there]) for here, there in pairs]
+    def _links(self, pairs: Pairs) -> Links:
+        """Return the births of pairs of rows."""
+        return [(self.robots[a].birth, self.robots[b].birth) for a, b in pairs]
+
+
+def connected_components(groups: Iterable[Group], links: Links) -> list[Group]:
+    """Return groups joined along links, each and all ascending."""
+    parent: dict[BirthId, BirthId] = {}
+    for group in groups:
+        for birth in group:
+            parent[birth] = group[0]
+
+    def root(birth: BirthId) -> BirthId:
+        while parent[birth] != birth:
+            birth = parent[birth]
+        return birth
+
+    for first, second in links:
+        ends = sorted((root(first), root(second)))
+        parent[ends[1]] = ends[0]
+    found: dict[BirthId, list[BirthId]] = {}
+    for birth in sorted(parent):
+        found.setdefault(root(birth), []).append(birth)
+    return [tuple(found[first]) for first in sorted(found)]

@@ -1,12 +1,13 @@
-"""Who may touch whom before anybody looks again.
+"""Proximity test: pairs of robots that may touch before the next check.
 
-Two robots are to meet when the distance between the spheres that cover them is less
-than ``merge_distance_m`` and what both may move until the next look: that grows with
-their speed, so that the falling meet in time. Boxes about robots tell of almost all
-pairs that they are too far apart; only the others are measured.
+Two robots are to be merged when the distance between their bounding spheres is less
+than ``merge_distance_m`` plus what both may move until the next check. That grows
+with their speed, so that falling robots merge in time. Bounding boxes exclude almost
+all pairs; only the others are measured.
 """
 
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
 import numpy.typing as npt
@@ -16,28 +17,28 @@ from schema.robot.results import Floats
 from worker.clusters.columns import Layout, runs
 
 FASTEST = 10.0
-"""What is faster has broken the physics, and does not gather others [m/s]."""
+"""Speed above which the physics is broken; bounds the margin of a robot [m/s]."""
 _ROUNDING_M = 1e-9
-"""What sums of distances may be off by, and more."""
+"""Upper bound on the rounding error of sums of distances."""
 
 Pairs = list[tuple[int, int]]
-"""Rows of robots, the lesser first."""
+"""Pairs of rows of robots, the lesser row first."""
 
 Mask = npt.NDArray[np.bool_]
 
 
 class Scene:
-    """Where R robots are at L moments, as far as it matters to who meets whom.
+    """Bounds of R robots at L moments.
 
     Attributes:
-        speeds: (L, R) of the fastest point of each at most [m/s].
+        speeds: (L, R) upper bound on the speed of each robot's points [m/s].
     """
 
     def __init__(self, layout: Layout, states: Floats) -> None:
-        """Look at some states.
+        """Compute the speeds.
 
         Args:
-            layout: where robots stand in them.
+            layout: of the states.
             states: (L, W).
         """
         self._layout, self._states = layout, states
@@ -47,25 +48,23 @@ class Scene:
     def _hulls(self) -> Floats:
         return self._layout.hulls(self._states)
 
-    def apart(self, pairs: Pairs) -> Floats:
-        """Return how far the spheres of P > 0 pairs of robots are apart, (L, P) [m].
+    def distances(self, pairs: Pairs) -> Floats:
+        """Return the distances of P > 0 pairs of robots, (L, P) [m].
 
-        Each sphere of the one is measured against each of the other.
+        The distance is the least one between a sphere of each.
         """
         robot_rows = self._layout.robot_rows
         rows = sorted({row for pair in pairs for row in pair})
-        counts = robot_rows.ball_counts[rows]
-        wanted = runs(robot_rows.first_balls[rows], counts)
-        balls, radii = (
-            self._layout.balls(self._states, wanted),
-            robot_rows.radii[wanted],
-        )
+        counts = robot_rows.sphere_counts[rows]
+        wanted = runs(robot_rows.first_spheres[rows], counts)
+        radii = robot_rows.radii[wanted]
+        spheres = self._layout.spheres(self._states, wanted)
         ends = np.cumsum(counts).tolist()
         spans = dict(zip(rows, map(slice, [0, *ends], ends), strict=False))
-        found = np.empty((len(balls), len(pairs)))
+        found = np.empty((len(spheres), len(pairs)))
         for number, (here, there) in enumerate(pairs):
             first, second = spans[here], spans[there]
-            difference = balls[:, :, first, None] - balls[:, :, None, second]
+            difference = spheres[:, :, first, None] - spheres[:, :, None, second]
             np.multiply(difference, difference, out=difference)
             distance = difference[:, 0] + difference[:, 1]
             distance += difference[:, 2]
@@ -76,28 +75,26 @@ class Scene:
         return found
 
     def is_near(self, here: int, there: int, within_m: float) -> bool:
-        """Return whether the spheres of two robots may be as near as that.
+        """Return whether the distance of two robots may fall below a limit.
 
-        At one of the moments, and as far as the hulls of their bodies tell from
-        above.
+        Tests the x-y distance of the hulls of their bodies, at all moments.
         """
         robot_rows = self._layout.robot_rows
         first, second = robot_rows.spans[here], robot_rows.spans[there]
         gaps = self._hulls[:, :, first, None] - self._hulls[:, :, None, second]
         gaps *= gaps
         radii = robot_rows.hulls[3]
-        reach = (radii[first, None] + within_m) + radii[second]
-        return bool((gaps[:, 0] + gaps[:, 1] <= reach * reach).any())
+        limit = (radii[first, None] + within_m) + radii[second]
+        return bool((gaps[:, 0] + gaps[:, 1] <= limit * limit).any())
 
     def neighbours(self, margins: Floats) -> tuple[list[int], list[int]]:
-        """Return those pairs that live apart and may be near each other.
+        """Return pairs of different clusters whose bounding boxes overlap.
 
         Args:
-            margins: (R,) within which each robot keeps at every moment, besides its
-                spheres [m].
+            margins: (R,) that each robot's box is extended by [m].
 
         Returns:
-            Rows of the first and of the second, ascending by both.
+            Rows of the first and of the second robots, ascending by both.
         """
         homes, robot_rows = self._layout.homes, self._layout.robot_rows
         if not len(homes):
@@ -119,20 +116,20 @@ class Scene:
 
 
 class Proximity:
-    """What an arena's settings say of when robots are to live together."""
+    """The proximity test of an arena, by its settings."""
 
     def __init__(self, settings: ArenaSettings) -> None:
-        """Take distances and intervals."""
+        """Read distances and intervals from the settings."""
         arena, clock = settings.arena, settings.simulation
         self._merge_m = arena.merge_distance_m
         self._split_m = max(arena.split_distance_m, arena.merge_distance_m)
-        # Frames of bodies are those before the last step: one step older.
+        # Frames of bodies are one step old.
         self._ahead_s = (arena.proximity_steps + 1) * clock.timestep_s
 
-    def meetings(self, scene: Scene) -> list[Pairs]:
-        """Return of each moment of a scene who is to live with whom from then on.
+    def pairs_to_merge(self, scene: Scene) -> list[Pairs]:
+        """Return, for each moment of a scene, the pairs whose clusters must merge.
 
-        What is found at one moment holds for later ones as long as nobody moves.
+        Valid as long as no robot changes its cluster.
         """
         margins = self._margins(scene)
         most = margins.max(axis=0, initial=0.0) + (0.5 * self._merge_m + _ROUNDING_M)
@@ -143,29 +140,28 @@ class Proximity:
         ]
         if not pairs:
             return [[] for _ in margins]
-        is_met = _are_near(scene, margins, pairs, self._merge_m)
-        return [
-            [pair for pair, is_one in zip(pairs, row, strict=True) if is_one]
-            for row in is_met.tolist()
-        ]
+        is_near = _are_near(scene, margins, pairs, self._merge_m)
+        return [list(compress(pairs, row)) for row in is_near.tolist()]
 
-    def near(self, scene: Scene, pairs: Pairs) -> Pairs:
-        """Return which of some pairs that live together are to go on doing so.
+    def pairs_to_keep(self, scene: Scene, pairs: Pairs) -> Pairs:
+        """Return which pairs of one cluster must stay in one cluster.
 
         Args:
-            scene: of one moment.
-            pairs: rows, one pair at least.
+            scene: at one moment.
+            pairs: at least one.
         """
         margins = self._margins(scene)
-        is_near = _are_near(scene, margins, pairs, self._split_m)[0].tolist()
-        return [pair for pair, is_one in zip(pairs, is_near, strict=True) if is_one]
+        is_near = _are_near(scene, margins, pairs, self._split_m)[0]
+        return list(compress(pairs, is_near.tolist()))
 
     def _margins(self, scene: Scene) -> Floats:
-        """Return how far each may move until the next look, (L, R) [m]."""
+        """Return how far each robot may move until the next check, (L, R) [m]."""
         return np.asarray(np.minimum(scene.speeds, FASTEST) * self._ahead_s)
 
 
 def _are_near(scene: Scene, margins: Floats, pairs: Pairs, gap_m: float) -> Mask:
-    """Return whether P pairs may come within a gap before the next look, (L, P)."""
+    """Return whether P pairs may come within a gap before the next check, (L, P)."""
     here, there = np.array(pairs, dtype=np.intp).reshape(-1, 2).T
-    return np.asarray(scene.apart(pairs) < margins[:, here] + margins[:, there] + gap_m)
+    return np.asarray(
+        scene.distances(pairs) < margins[:, here] + margins[:, there] + gap_m
+    )

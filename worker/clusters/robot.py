@@ -1,56 +1,131 @@
-"""A robot that lives in an arena: its seat, its mind, its window, its name."""
+"""Robots of an arena: engine view, network, sliding window, window fitness."""
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
+from schema.errors import FitnessUndefined
+from schema.experiment.document import Simulation
+from schema.experiment.settings import ArenaSettings
 from schema.parts import Vector
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats
+from schema.robot.results import Floats, Track
 from schema.robot.robot import Robot
-from worker.clusters.engine_view import EngineView
+from schema.wire.arena import Casualty, Judgement
+from worker.clusters.cluster import EngineView
 from worker.clusters.models import Body
-from worker.clusters.window import Window
+from worker.fitness import fitness_of, path_velocity, straight_velocity
 from worker.robot.controller import Network
+
+LEAST_SHARE = 0.25
+"""Share of the window that a robot must have lived to have a fitness."""
+
+
+class Window:
+    """The latest positions of one robot: the window of its fitness.
+
+    The first sample is taken after the warm-up, so that neither the fall nor the
+    position in the air counts (traps B2, B19 of the original). From then on the
+    window holds the last ``window_steps``, both ends included.
+
+    Attributes:
+        born: step of birth.
+        positions: of the core's centre, oldest first, world frame [m].
+    """
+
+    def __init__(self, simulation: Simulation, born: int) -> None:
+        """Initialise an empty window.
+
+        Args:
+            simulation: its clocks.
+            born: the arena's step at birth.
+        """
+        self.born = born
+        self._clock = simulation
+        self._intervals = simulation.window_steps // simulation.pose_steps
+        self.positions: deque[Vector] = deque(maxlen=self._intervals + 1)
+
+    def add(self, step: int, position: Vector) -> None:
+        """Add a sample, one every ``pose_steps`` of the arena.
+
+        Args:
+            step: of the arena.
+            position: of the core's centre, world frame [m].
+        """
+        if step - self.born >= self._clock.warmup_steps:
+            self.positions.append(position)
+
+    @property
+    def is_mature(self) -> bool:
+        """Whether it covers a whole window after the warm-up."""
+        return len(self.positions) > self._intervals
+
+    @property
+    def has_fitness(self) -> bool:
+        """Whether it covers enough of a window for a fitness."""
+        return len(self.positions) - 1 >= max(1, LEAST_SHARE * self._intervals)
+
+    def track(self) -> Track:
+        """Return the samples as a track for fitness functions; at least two."""
+        interval_s = self._clock.pose_steps * self._clock.timestep_s
+        return Track(interval_s, np.array(self.positions))
 
 
 @dataclass(slots=True)
 class ArenaRobot:
-    """A living robot; all that an arena knows of it.
+    """A living robot of an arena.
 
     Attributes:
-        birth: who.
-        robot: its body and its present brain.
-        encoded: the robot's bytes, for snapshots.
-        body: it as the engine knows it.
-        view: where its state is now.
+        birth: its name.
+        phenotype: its body and its present brain.
+        encoded: bytes of the phenotype, for snapshots.
+        body: its engine models.
+        view: its present slice of the engine's state.
         network: its brain as arrays.
-        states: (S,) of its neurons after the last tick; a row of the bank.
-        thinks_since: step from which its brain's clock counts.
-        window: where it was lately.
+        states: (S,) of its neurons after the last tick; a row of the batch.
+        brain_start: step from which the age of its brain counts.
+        window: its latest positions.
         place: of the core's centre at the last sample, world frame [m].
     """
 
     birth: BirthId
-    robot: Robot
+    phenotype: Robot
     encoded: bytes
     body: Body
     view: EngineView
     network: Network
     states: Floats
-    thinks_since: int
+    brain_start: int
     window: Window
     place: Vector
 
+    def judgement(self, step: int, settings: ArenaSettings) -> Judgement | Casualty:
+        """Return its window fitness, or a casualty if the fitness is undefined.
 
-def put(view: EngineView, place: Vector, heading: float) -> None:
-    """Move a robot at neutral pose to a place.
+        Velocities and fitness are 0 until the window is long enough for a fitness.
 
-    Args:
-        view: where its state is.
-        place: for the core's centre, world frame [m].
-        heading: turn about z [rad].
-    """
-    view.qpos[:3] = place
-    if heading:
-        view.qpos[3:7] = np.cos(0.5 * heading), 0.0, 0.0, np.sin(0.5 * heading)
+        Args:
+            step: of the arena.
+            settings: of the arena.
+        """
+        age_s = (step - self.window.born) * settings.simulation.timestep_s
+        x, y, z = self.view.qpos[:3].tolist()
+        path = straight = fitness = 0.0
+        if self.window.has_fitness:
+            track = self.window.track()
+            try:
+                fitness = fitness_of(track, settings.fitness)
+            except FitnessUndefined as error:
+                reason = f"fitness undefined: {error}"
+                return Casualty(self.birth, step, reason, (x, y, z))
+            path, straight = path_velocity(track), straight_velocity(track)
+        return Judgement(
+            self.birth,
+            age_s,
+            path,
+            straight,
+            fitness,
+            is_mature=self.window.is_mature,
+            place=(x, y, z),
+        )

@@ -1,1 +1,1 @@
-"""One robot: controller, sensors, noise and its off-line evaluation."""
+"""One robot: controller, sensors, motors, noise, off-line evaluation."""

@@ -1,9 +1,9 @@
-"""Noise of sensors and motors: drawn by whose it is and when, and by nothing else.
+"""Noise of sensors and motors, from counter-based random streams.
 
-A number that is drawn depends on the origin (seed, run, island), the birth, the trial,
-the number of the tick and the neuron; not on who else is there, on what was drawn
-before, or on either standard deviation. So robots can be drawn for in any order, and
-a snapshot has nothing to keep of it.
+Each draw depends only on the origin (seed, run, island), the birth, the trial, the
+number of the tick and the neuron; not on other robots, on earlier draws, or on either
+standard deviation. Robots can therefore be served in any order, and a snapshot needs
+no state of the generator.
 """
 
 from collections.abc import Sequence
@@ -19,43 +19,38 @@ from schema.robot.results import Floats
 from worker.robot.controller import Widths
 
 BLOCK_TICKS = 64
-"""Ticks that are drawn at once: starting a generator takes longer than a draw."""
+"""Ticks that are drawn at once, because starting a generator costs more than a draw."""
 _PURPOSE = 11
-"""Sets these streams apart from those of ``coordinator.evolution.seeding.Purpose``."""
+"""Keeps these streams distinct from ``coordinator.evolution.seeding.Purpose``."""
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
-    """What all noise of one place has in common.
+class NoiseSource:
+    """Parameters that all noise of one evaluation or arena shares.
 
     Attributes:
         simulation: holds the standard deviations.
         width: of every network.
-        origin: of the place.
+        origin: run and island of the evaluation or arena.
     """
 
     simulation: Simulation
     width: Widths
     origin: Origin
 
-    @property
-    def is_silent(self) -> bool:
-        """Whether nothing is ever drawn."""
-        return not (self.simulation.sensor_noise or self.simulation.actuator_noise)
-
 
 class Noise:
-    """What some robots' readings and outputs are changed by, tick by tick."""
+    """Additive Gaussian noise on the readings and outputs of R robots."""
 
     def __init__(
-        self, source: Source, births: Sequence[BirthId], trial: int = 0
+        self, source: NoiseSource, births: Sequence[BirthId], trial: int = 0
     ) -> None:
-        """Draw nothing yet.
+        """Initialise the streams.
 
         Args:
-            source: of the place.
-            births: whose, a row for each.
-            trial: which evaluation of theirs, from 0.
+            source: shared parameters.
+            births: of the robots, one per row.
+            trial: number of each robot's evaluation, from 0.
         """
         self._source = source
         self._births = births
@@ -63,12 +58,12 @@ class Noise:
         self._block = -1
         self._drawn: list[tuple[Floats, Floats]] = []
 
-    def blur(self, tick: int, readings: Floats) -> Floats:
-        """Return what the networks get for what the sensors read.
+    def perturb_readings(self, tick: int, readings: Floats) -> Floats:
+        """Return readings with sensor noise.
 
         Args:
-            tick: its number, counted from where the place's time begins.
-            readings: (R, N), the first N <= I; they stay as they are.
+            tick: its number, from the start of the evaluation or arena.
+            readings: (R, N), the first N <= I; not modified.
 
         Returns:
             (R, N); the readings themselves if sensors have no noise.
@@ -78,12 +73,12 @@ class Noise:
         added, _ = self._added(tick)
         return readings + added[:, : readings.shape[1]]
 
-    def shake(self, tick: int, outputs: Floats) -> Floats:
-        """Return what the motors get for what the networks put out.
+    def perturb_outputs(self, tick: int, outputs: Floats) -> Floats:
+        """Return network outputs with actuator noise.
 
         Args:
-            tick: its number.
-            outputs: (R, O), unclipped; they stay as they are.
+            tick: its number, from the start of the evaluation or arena.
+            outputs: (R, O), unclipped; not modified.
 
         Returns:
             (R, O), unclipped; the outputs themselves if motors have no noise.
@@ -94,7 +89,7 @@ class Noise:
         return outputs + added
 
     def _added(self, tick: int) -> tuple[Floats, Floats]:
-        """Return what is added at a tick: to readings (R, I), to outputs (R, O)."""
+        """Return the noise of a tick: on readings (R, I), on outputs (R, O)."""
         block, place = divmod(tick, BLOCK_TICKS)
         if block != self._block:
             self._draw(block)
@@ -118,8 +113,8 @@ def _stream(
 ) -> np.random.Generator:
     """Return the stream of one robot's block of ticks.
 
-    The origin is the key of a counter-based generator; the rest is where its counter
-    starts. The lowest of the counter's words is left to the draws.
+    The origin is the key of a counter-based generator. Birth, trial and block are the
+    start of its counter; the counter's lowest word belongs to the draws.
 
     Source: Salmon et al., Parallel random numbers: as easy as 1, 2, 3, 2011.
     """

@@ -61,7 +61,7 @@ def test_a_box_at_rest_on_a_slope_feels_that_it_leans(slope_deg: float) -> None:
         [Insertion(A, BOX, (0.5, 0.0))],
     )
     seconds(world, 2.0)
-    readings = world.population.find(A).view.senses.readings[0, :6].tolist()
+    readings = world.population.find(A).view.sensors.readings[0, :6].tolist()
     slope = math.radians(slope_deg)
     expected = [G * math.sin(slope), 0.0, G * math.cos(slope), 0.0, 0.0, 0.0]
     assert readings == pytest.approx(expected, abs=0.01)
@@ -88,10 +88,10 @@ def test_a_wall_stops_what_slides_and_pads_feel_it() -> None:
     world = populated(slippery, [Insertion(A, FEELER, (0.0, 0.0))])
     view = world.population.find(A).view
     seconds(world, 0.5)
-    assert view.senses.readings[0, 6:8].tolist() == [0.0, 0.0]
+    assert view.sensors.readings[0, 6:8].tolist() == [0.0, 0.0]
     assert -1.0 < view.qpos[0] < -0.3
     seconds(world, 3.0)
-    assert view.senses.readings[0, 6:8].tolist() == [1.0, 1.0]
+    assert view.sensors.readings[0, 6:8].tolist() == [1.0, 1.0]
     assert view.qpos[0] == pytest.approx(-1.0 + 0.0555, abs=2e-3)
     assert np.abs(view.qvel[:3]).max() < 1e-3
     free = populated(
@@ -206,5 +206,5 @@ def test_scenery_hides_the_light() -> None:
         settings = replace(settings, space=Space(part_types=types))
         world = populated(settings, [Insertion(A, robot, (0.0, 0.0))])
         world.advance(SECOND)
-        found.append(float(world.population.find(A).view.senses.readings[0, 6]))
+        found.append(float(world.population.find(A).view.sensors.readings[0, 6]))
     assert found == [pytest.approx((1.0 / 1.95) ** 2, abs=0.02), 0.0]

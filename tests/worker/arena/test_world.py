@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-import pyarrow as pa
 import pytest
 from msgspec.structs import replace
 
@@ -112,30 +111,20 @@ def test_changes_that_cannot_be_made_change_nothing(robot_of: Robots) -> None:
         world.advance(13)
 
 
-def test_a_reset_world_is_a_new_one(robot_of: Robots) -> None:
-    world = populated(SETTINGS, crowd(robot_of, 3, 0.4))
-    seconds(world, 1.0)
-    world.reset()
-    assert world.digest() == World(SETTINGS).digest()
-    assert (world.step, world.births) == (0, ())
-
-
 def test_poses_tell_where_all_were(turtle: Robot) -> None:
     world = populated(
         SETTINGS,
         [Insertion(A, turtle, (1.0, 2.0), 0.5), Insertion(B, turtle, (9.0, 2.0))],
     )
-    seen: list[bytes] = []
-    advance = world.advance(80, seen.append)
+    advance = world.advance(80)
     rows = read_columns("poses", advance.poses)
     assert rows["birth"].to_pylist() == [0, 1, 0, 1]
     assert rows["sim_time_s"].to_pylist() == [0.2, 0.2, 0.4, 0.4]
     assert rows["x"].to_pylist() == pytest.approx([1.0, 9.0] * 2, abs=0.01)
     assert rows["qz"][0].as_py() == pytest.approx(math.sin(0.25), abs=0.01)
     assert [len(angles) for angles in rows["angles"].to_pylist()] == [2] * 4
-    tables = [read_columns("poses", data) for data in seen]
-    assert pa.concat_tables(tables).equals(rows.combine_chunks())
-    assert read_columns("poses", world.poses()).equals(tables[-1])
+    present = read_columns("poses", world.poses())
+    assert present.equals(rows.slice(2).combine_chunks())
 
 
 def test_another_brain_starts_at_rest_with_its_own_clock(turtle: Robot) -> None:
@@ -224,9 +213,9 @@ def test_light_falls_off_and_can_be_hidden(
     if hider:
         newcomers.append(Insertion(B, turtle, (0.25, 0.0), 0.5 * math.pi))
     world = populated(settings, newcomers)
-    reading = world.population.find(A).view.senses.readings[0, 6]
+    reading = world.population.find(A).view.sensors.readings[0, 6]
     assert reading == pytest.approx(expected, abs=0.02)
     world.advance(SECOND)
-    reading = world.population.find(A).view.senses.readings[0, 6]
+    reading = world.population.find(A).view.sensors.readings[0, 6]
     assert reading == pytest.approx(expected, abs=0.1)
     assert World.restore(settings, world.snapshot()).digest() == world.digest()

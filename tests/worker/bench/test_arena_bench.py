@@ -14,7 +14,6 @@ from schema.parts import BUILT_IN
 from schema.robot.robot import check_robot
 from worker.bench import command as bench
 from worker.bench.arena_bench import RESULTS
-from worker.bench.arena_timing import Stopwatch
 from worker.bench.spider import grid, spider
 
 
@@ -62,25 +61,3 @@ def test_a_file_that_cannot_be_written_is_told_before_the_minutes(
     with pytest.raises(RevolveError, match="cannot be written: No such file"):
         bench.main(["bench", "arena", "--out", out])
     assert capsys.readouterr().out == ""
-
-
-class Sleeper:
-    """Takes a second for one thing and two for another that does it, too."""
-
-    now = 0.0
-
-    def short(self) -> None:
-        self.now += 1.0
-
-    def long(self) -> None:
-        self.now += 1.0
-        self.short()
-
-
-def test_a_stopwatch_counts_nested_calls_once() -> None:
-    sleeper = Sleeper()
-    watch = Stopwatch(lambda: sleeper.now)
-    watch.wrap(sleeper, "short", "long")
-    sleeper.long()
-    sleeper.short()
-    assert watch.total_s == 3.0

@@ -18,14 +18,15 @@ def measured(world: World, scene: Scene, gap_m: float) -> Pairs:
     population, settings = world.population, world.population.model_cache.settings
     steps = settings.arena.proximity_steps + 1
     moves = np.minimum(scene.speeds[0], FASTEST) * steps * 0.005
-    births = [one.birth for one in population.everybody]
+    births = [one.birth for one in population.robots]
     return [
         (first, second)
         for first, here in enumerate(births)
         for second, there in enumerate(births)
         if first < second
         and population.cluster_of(here) is not population.cluster_of(there)
-        and scene.apart([(first, second)])[0, 0] < moves[first] + moves[second] + gap_m
+        and scene.distances([(first, second)])[0, 0]
+        < moves[first] + moves[second] + gap_m
     ]
 
 
@@ -39,7 +40,7 @@ def test_nobody_is_spared_who_is_to_meet(robot_of: Robots, gap_m: float) -> None
         seconds(world, 0.125)
         layout = world.population.layout
         scene = Scene(layout, layout.read()[np.newaxis])
-        found = proximity.meetings(scene)[0]
+        found = proximity.pairs_to_merge(scene)[0]
         assert found == measured(world, scene, gap_m)
         pairs += len(found)
     assert pairs > 0 or gap_m < 0.1

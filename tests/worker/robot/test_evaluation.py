@@ -26,8 +26,8 @@ from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.results import Track
 from schema.robot.robot import Part, Robot
 from schema.wire.codec import decode_answer, encode_request, encode_robot
+from worker import fitness
 from worker.fitness import FitnessFunction, path_velocity, straight_velocity
-from worker.robot import evaluation
 from worker.robot.evaluation import evaluate, simulate
 from worker.serve.jobs import answer
 
@@ -223,7 +223,7 @@ def test_a_fitness_function_that_cannot_judge_is_a_result(
     function: FitnessFunction,
     told: str,
 ) -> None:
-    monkeypatch.setattr(evaluation, "fitness_function", lambda _fitness: function)
+    monkeypatch.setattr(fitness, "fitness_function", lambda _fitness: function)
     with pytest.raises(FitnessUndefined, match=told):
         evaluate(turtle, SETTINGS)
     request = encode_request(

@@ -29,8 +29,8 @@ from worker.arena.replay import alone
 from worker.arena.world import World
 from worker.robot.controller import widths
 from worker.robot.evaluation import evaluate, simulate
-from worker.robot.noise import BLOCK_TICKS, Noise, Source
-from worker.robot.sensors import HIGHEST_OUTPUT, LOWEST_OUTPUT
+from worker.robot.motors import HIGHEST_OUTPUT, LOWEST_OUTPUT
+from worker.robot.noise import BLOCK_TICKS, Noise, NoiseSource
 
 Robots = Callable[[int], Robot]
 A, B = BirthId(0, 0), BirthId(0, 1)
@@ -58,7 +58,9 @@ WIDTH = widths(Space())
 def noise_of(
     *births: BirthId, simulation: Simulation = LOUD, identity: Identity = IDENTITY
 ) -> Noise:
-    return Noise(Source(simulation, WIDTH, identity.origin), births, identity.trial)
+    return Noise(
+        NoiseSource(simulation, WIDTH, identity.origin), births, identity.trial
+    )
 
 
 def drawn(identity: Identity, ticks: int = 200) -> Floats:
@@ -68,7 +70,10 @@ def drawn(identity: Identity, ticks: int = 200) -> Floats:
     return np.array(
         [
             np.hstack(
-                [noise.blur(tick, silence[0])[0], noise.shake(tick, silence[1])[0]]
+                [
+                    noise.perturb_readings(tick, silence[0])[0],
+                    noise.perturb_outputs(tick, silence[1])[0],
+                ]
             )
             for tick in range(ticks)
         ]
@@ -101,12 +106,13 @@ def test_neither_company_nor_the_order_of_ticks_matters() -> None:
     population, own = noise_of(*births), [noise_of(birth) for birth in births]
     ticks = [0, BLOCK_TICKS - 1, BLOCK_TICKS, 5 * BLOCK_TICKS + 3, 1, 0]
     for tick in ticks:
-        whole = population.blur(tick, readings)
+        whole = population.perturb_readings(tick, readings)
         for row, noise in enumerate(own):
-            single = noise.blur(tick, readings[row : row + 1])
+            single = noise.perturb_readings(tick, readings[row : row + 1])
             assert np.array_equal(whole[row : row + 1], single)
     assert not np.array_equal(
-        population.blur(0, readings), population.blur(64, readings)
+        population.perturb_readings(0, readings),
+        population.perturb_readings(64, readings),
     )
 
 
@@ -115,10 +121,12 @@ def test_one_kind_of_noise_is_the_same_without_the_other() -> None:
     both = noise_of(A)
     deaf = noise_of(A, simulation=replace(LOUD, actuator_noise=0.0))
     shaky = noise_of(A, simulation=replace(LOUD, sensor_noise=0.0))
-    assert np.array_equal(deaf.blur(3, rows), both.blur(3, rows))
-    assert np.array_equal(shaky.shake(3, rows), both.shake(3, rows))
-    assert deaf.shake(3, rows) is rows
-    assert shaky.blur(3, rows) is rows
+    assert np.array_equal(
+        deaf.perturb_readings(3, rows), both.perturb_readings(3, rows)
+    )
+    assert np.array_equal(shaky.perturb_outputs(3, rows), both.perturb_outputs(3, rows))
+    assert deaf.perturb_outputs(3, rows) is rows
+    assert shaky.perturb_readings(3, rows) is rows
 
 
 # --- off-line ---------------------------------------------------------------------

@@ -14,7 +14,8 @@ from schema.mjcf.model import robot_spec, solo_model
 from schema.mjcf.world import add_ground, set_options
 from schema.parts import BUILT_IN, CORE, BodySpace, PartType, Sensor
 from schema.robot.robot import Part, Robot
-from worker.robot.sensors import Senses, Servos, find, free_joint
+from worker.robot.motors import Servos
+from worker.robot.sensors import Sensors
 
 GREY = (0.5, 0.5, 0.5)
 WORLD = Simulation()
@@ -53,71 +54,71 @@ def two(robots: tuple[Robot, Robot]) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 def ticks(
-    model: mujoco.MjModel, data: mujoco.MjData, senses: list[Senses], count: int
+    model: mujoco.MjModel, data: mujoco.MjData, sensors: list[Sensors], count: int
 ) -> Iterator[int]:
     """Step and read for some ticks, yielding after each."""
-    for sense in senses:
-        sense.start(model, data)
+    for each in sensors:
+        each.start()
     for tick in range(count):
         mujoco.mj_step(model, data, nstep=25)
-        for sense in senses:
-            sense.read(model, data, TICK_S)
+        for each in sensors:
+            each.read(TICK_S)
         yield tick
 
 
 def test_at_rest_the_accelerometer_reads_gravity_upward(turtle: Robot) -> None:
     model, data = alone(turtle)
-    senses = Senses(turtle, BUILT_IN, model, width=10)
-    assert senses.start(model, data)[0, :6] == pytest.approx([0, 0, 9.81, 0, 0, 0])
-    for _ in ticks(model, data, [senses], 16):
+    sensors = Sensors(turtle, BUILT_IN, model, data, width=10)
+    assert sensors.start()[0, :6] == pytest.approx([0, 0, 9.81, 0, 0, 0])
+    for _ in ticks(model, data, [sensors], 16):
         pass
-    assert senses.readings[0, :6] == pytest.approx([0, 0, 9.81, 0, 0, 0], abs=1e-3)
+    assert sensors.readings[0, :6] == pytest.approx([0, 0, 9.81, 0, 0, 0], abs=1e-3)
 
 
 def test_at_rest_both_of_two_robots_read_gravity_upward(turtle: Robot) -> None:
     model, data = two((turtle, HINGED))
-    senses = [
-        Senses(turtle, BUILT_IN, model, width=10, prefix="1:"),
-        Senses(HINGED, BUILT_IN, model, width=10, prefix="2:"),
+    sensors = [
+        Sensors(turtle, BUILT_IN, model, data, width=10, prefix="1:"),
+        Sensors(HINGED, BUILT_IN, model, data, width=10, prefix="2:"),
     ]
-    for _ in ticks(model, data, senses, 16):
+    for _ in ticks(model, data, sensors, 16):
         pass
-    for sense in senses:
-        assert sense.readings[0, :6] == pytest.approx([0, 0, 9.81, 0, 0, 0], abs=0.01)
+    for each in sensors:
+        assert each.readings[0, :6] == pytest.approx([0, 0, 9.81, 0, 0, 0], abs=0.01)
 
 
 def test_on_its_side_gravity_reads_along_the_side() -> None:
     """Turned a quarter about +x, the core's +y points up."""
     model, data = alone(HINGED, replace(WORLD, drop_m=1.0))
     data.qpos[3:7] = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
-    senses = Senses(HINGED, BUILT_IN, model, width=10)
-    assert senses.start(model, data)[0, :3] == pytest.approx([0, 9.81, 0], abs=1e-9)
+    sensors = Sensors(HINGED, BUILT_IN, model, data, width=10)
+    assert sensors.start()[0, :3] == pytest.approx([0, 9.81, 0], abs=1e-9)
 
 
 def test_a_falling_robot_reads_nothing() -> None:
     model, data = alone(HINGED, replace(WORLD, drop_m=5.0))
-    senses = Senses(HINGED, BUILT_IN, model, width=10)
-    for _ in ticks(model, data, [senses], 3):
-        assert senses.readings[0, :3] == pytest.approx([0, 0, 0], abs=1e-9)
+    sensors = Sensors(HINGED, BUILT_IN, model, data, width=10)
+    for _ in ticks(model, data, [sensors], 3):
+        assert sensors.readings[0, :3] == pytest.approx([0, 0, 0], abs=1e-9)
 
 
 def test_acceleration_is_the_mean_of_what_an_ideal_sensor_feels() -> None:
     """Pushed along +x at 2 m/s2 while turned by a half turn: -2 in its own frame."""
     model, data = alone(HINGED, replace(WORLD, drop_m=5.0, gravity=0.0))
     data.qpos[3:7] = (0.0, 0.0, 0.0, 1.0)
-    senses = Senses(HINGED, BUILT_IN, model, width=10)
-    senses.start(model, data)
+    sensors = Sensors(HINGED, BUILT_IN, model, data, width=10)
+    sensors.start()
     data.qvel[0] = 2.0 * TICK_S
-    assert senses.read(model, data, TICK_S)[0, :3] == pytest.approx([-2.0, 0.0, 0.0])
+    assert sensors.read(TICK_S)[0, :3] == pytest.approx([-2.0, 0.0, 0.0])
 
 
 def test_the_gyroscope_reads_in_the_core_s_own_frame() -> None:
     model, data = alone(HINGED, replace(WORLD, drop_m=5.0, gravity=0.0))
     data.qpos[3:7] = (math.cos(0.4), math.sin(0.4), 0.0, 0.0)
     data.qvel[3:6] = (0.1, -0.2, 0.3)
-    senses = Senses(HINGED, BUILT_IN, model, width=10)
-    senses.start(model, data)
-    assert senses.readings[0, 3:6] == pytest.approx([0.1, -0.2, 0.3], abs=1e-12)
+    sensors = Sensors(HINGED, BUILT_IN, model, data, width=10)
+    sensors.start()
+    assert sensors.readings[0, 3:6] == pytest.approx([0.1, -0.2, 0.3], abs=1e-12)
 
 
 def _imu_in_a_brick() -> BodySpace:
@@ -147,12 +148,12 @@ def test_an_imu_may_sit_in_a_limb() -> None:
     model = spec.compile()
     data = mujoco.MjData(model)
     data.qvel[:] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
-    senses = Senses(HINGED, space, model, width=6)
-    senses.start(model, data)
+    sensors = Sensors(HINGED, space, model, data, width=6)
+    sensors.start()
     before = data.sensor("v").data.copy()
     data.ctrl[0] = 1.0
     mujoco.mj_step(model, data, nstep=25)
-    found = senses.read(model, data, TICK_S)[0]
+    found = sensors.read(TICK_S)[0]
     mujoco.mj_forward(model, data)
     turn = data.site("2/imu").xmat.reshape(3, 3)
     change = (data.sensor("v").data - before) / TICK_S + (0, 0, 9.81)
@@ -169,28 +170,28 @@ def test_a_pad_feels_the_ground_and_nothing_else() -> None:
         )
     )
     model, data = alone(robot)
-    senses = Senses(robot, BUILT_IN, model, width=10)
-    assert senses.start(model, data)[0, 6:8].tolist() == [0.0, 0.0]
+    sensors = Sensors(robot, BUILT_IN, model, data, width=10)
+    assert sensors.start()[0, 6:8].tolist() == [0.0, 0.0]
     # Nose down: a quarter turn about +y sends +x to -z.
     data.qpos[2] = 0.045 + 0.0105 - 1e-4
     data.qpos[3:7] = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
-    assert senses.start(model, data)[0, 6:8].tolist() == [1.0, 1.0]
+    assert sensors.start()[0, 6:8].tolist() == [1.0, 1.0]
     # Tilted a little, only the lower pad is left on the ground.
     for angle in (0.05, -0.05):
         tilt = np.empty(4)
         turn = np.array([math.cos(angle), 0.0, math.sin(angle), 0.0])
         mujoco.mju_mulQuat(tilt, turn, np.array([0.5, 0.0, 0.5, 0.0]) * math.sqrt(2))
         data.qpos[3:7] = tilt
-        felt = senses.start(model, data)[0, 6:8].tolist()
+        felt = sensors.start()[0, 6:8].tolist()
         heights = [data.geom(f"1/{name}").xpos[2] for name in ("left", "right")]
         assert felt == [float(height == min(heights)) for height in heights]
 
 
 def test_readings_beyond_the_robot_s_own_stay_zero(turtle: Robot) -> None:
     model, data = alone(turtle)
-    senses = Senses(turtle, BUILT_IN, model, width=12)
-    for _ in ticks(model, data, [senses], 4):
-        assert senses.readings[0, 8:].tolist() == [0.0] * 4
+    sensors = Sensors(turtle, BUILT_IN, model, data, width=12)
+    for _ in ticks(model, data, [sensors], 4):
+        assert sensors.readings[0, 8:].tolist() == [0.0] * 4
 
 
 def test_the_servo_commands_what_is_left_of_the_way(
@@ -200,14 +201,14 @@ def test_the_servo_commands_what_is_left_of_the_way(
     robots = (robot_of(1), robot_of(2))
     model, data = two(robots)
     servos = [
-        Servos(robot, BUILT_IN, model, prefix=f"{number}:")
+        Servos(robot, BUILT_IN, model, data, prefix=f"{number}:")
         for number, robot in enumerate(robots, start=1)
     ]
     rng = np.random.default_rng(5)
     data.qpos[:] += rng.uniform(-0.3, 0.3, model.nq)
     outputs = [rng.uniform(-0.2, 1.2, 10) for _ in robots]
     for servo, output in zip(servos, outputs, strict=True):
-        servo.drive(data, output)
+        servo.drive(output)
     for number, (robot, output) in enumerate(
         zip(robots, outputs, strict=True), start=1
     ):
@@ -217,7 +218,7 @@ def test_the_servo_commands_what_is_left_of_the_way(
             angle = float(data.joint(name).qpos[0])
             target = -math.pi / 4 + min(max(value, 1e-5), 0.99999) * math.pi / 2
             assert data.actuator(name).ctrl == pytest.approx(0.9 * (target - angle))
-    assert servos[1].slots == slice(servos[0].slots.stop, model.nu)
+    assert servos[1].actuators == slice(servos[0].actuators.stop, model.nu)
 
 
 @pytest.mark.parametrize("turn", [0, 90])
@@ -238,11 +239,11 @@ def test_the_commanded_velocity_is_reached_and_held(turn: int) -> None:
 def test_a_joint_comes_to_its_target_in_about_a_second() -> None:
     """Time constant 1 / 0.9 = 1.11 s, seen through ticks of 0.125 s."""
     model, data = alone(HINGED)
-    servos = Servos(HINGED, BUILT_IN, model)
+    servos = Servos(HINGED, BUILT_IN, model, data)
     start, target = 0.0, math.pi / 4 * 0.99998
     angles = []
     for _ in range(80):
-        servos.drive(data, np.array([1.0]))
+        servos.drive(np.array([1.0]))
         mujoco.mj_step(model, data, nstep=25)
         angles.append(float(data.qpos[7]))
     left = np.log((target - np.array(angles[7:24])) / (target - start))
@@ -250,10 +251,3 @@ def test_a_joint_comes_to_its_target_in_about_a_second() -> None:
     # Held commands shrink the error by 1 - 0.9 * 0.125 a tick: 1.048 s.
     assert -1 / slope == pytest.approx(1.05, rel=0.05)
     assert angles[-1] == pytest.approx(target, abs=1e-3)
-
-
-def test_what_a_model_does_not_hold_is_named() -> None:
-    model, _ = alone(HINGED)
-    assert free_joint(model) == 0
-    with pytest.raises(KeyError, match="3:free"):
-        find(model, mujoco.mjtObj.mjOBJ_JOINT, "3:free")

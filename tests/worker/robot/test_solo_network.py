@@ -8,8 +8,7 @@ import pytest
 from schema.experiment.document import Space
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.robot import Robot
-from worker.robot.controller import STATE_LIMIT, Bank, pack, widths
-from worker.robot.solo import Solo
+from worker.robot.controller import STATE_LIMIT, Bank, SoloNetwork, pack, widths
 
 WIDTH = widths(Space())
 TICK_S = 0.125
@@ -21,7 +20,7 @@ SWINGING = Neuron("output", "Oscillator", 0, (1.7, 0.4, 0.8))
 def agree(brain: Brain, ticks: int, seed: int) -> np.ndarray[tuple[int], np.dtype]:
     """Compare all states after each tick and return the last ones."""
     network = pack(brain, WIDTH)
-    solo = Solo(network, WIDTH, TICK_S, ticks)
+    solo = SoloNetwork(network, WIDTH, TICK_S, ticks)
     bank = Bank([network], WIDTH, TICK_S)
     rng = np.random.default_rng(seed)
     for tick in range(ticks):

@@ -5,9 +5,8 @@ from msgspec.structs import replace
 
 from schema.experiment.document import Simulation
 from tests.worker.arena_cases import SETTINGS
-from worker.clusters.window import Window
-from worker.fitness import path_velocity, straight_velocity
-from worker.robot.evaluation import judge
+from worker.clusters.robot import Window
+from worker.fitness import fitness_of, path_velocity, straight_velocity
 
 CLOCK = Simulation(
     timestep_s=0.01, pose_steps=10, brain_steps=10, window_steps=80, warmup_steps=20
@@ -21,9 +20,9 @@ def test_the_fall_and_the_warm_up_do_not_count() -> None:
     assert not window.positions
     window.add(120, (0.0, 0.0, 0.0))
     window.add(130, (0.1, 0.0, 0.0))
-    judged = [window.is_judged]
+    judged = [window.has_fitness]
     window.add(140, (0.1, 0.1, 5.0))
-    judged.append(window.is_judged)
+    judged.append(window.has_fitness)
     assert judged == [False, True]
     track = window.track()
     assert path_velocity(track) == pytest.approx(1.0)
@@ -60,4 +59,4 @@ def test_fitness_is_the_experiment_s_own_over_the_window() -> None:
     for number in range(9):
         window.add(20 + 10 * number, (0.01 * number, 0.0, 0.0))
     fitness = replace(SETTINGS.fitness, path_weight=1.0, straight_weight=5.0)
-    assert judge(window.track(), fitness) == pytest.approx(0.6)
+    assert fitness_of(window.track(), fitness) == pytest.approx(0.6)

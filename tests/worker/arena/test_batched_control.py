@@ -14,13 +14,13 @@ def lonely(world: World) -> list[tuple[np.ndarray, list[float]]]:
     found = []
     tick_s = 25 * 0.005
     outputs = np.random.default_rng(3).uniform(-0.2, 1.2, (len(world.births), 40))
-    for one, own in zip(world.population.everybody, outputs, strict=True):
-        view, velocities = one.view, list(one.view.senses.velocities)
-        readings, commands = view.senses.readings.copy(), view.ctrl.copy()
-        view.feel(tick_s)
-        felt = view.senses.readings.copy()
-        view.senses.readings[:], view.senses.velocities = readings, velocities
-        view.drive(own)
+    for one, own in zip(world.population.robots, outputs, strict=True):
+        view, velocities = one.view, list(one.view.sensors.velocities)
+        readings, commands = view.sensors.readings.copy(), view.ctrl.copy()
+        view.sensors.read(tick_s)
+        felt = view.sensors.readings.copy()
+        view.sensors.readings[:], view.sensors.velocities = readings, velocities
+        view.servos.drive(own)
         told = view.ctrl.tolist()
         view.ctrl[:] = commands
         found.append((felt, told))
@@ -38,15 +38,15 @@ def test_a_batch_feels_and_commands_as_each_alone_would(
     assert any(len(cluster.members) > 1 for cluster in world.population.clusters)
     state = layout.read()
     batched_io.settle(layout)
-    batched_io.feel(state)
+    batched_io.read(state)
     outputs = np.random.default_rng(3).uniform(-0.2, 1.2, (len(world.births), 40))
     batched_io.drive(state, outputs)
     pads = 0
     for row, (one, (felt, told)) in enumerate(
-        zip(world.population.everybody, expected, strict=True)
+        zip(world.population.robots, expected, strict=True)
     ):
         assert batched_io.readings[row].tobytes() == felt.tobytes()
-        assert one.view.senses.readings is not felt
+        assert one.view.sensors.readings is not felt
         assert one.view.ctrl.tolist() == told
-        pads += len(one.view.senses.pads)
+        pads += len(one.view.sensors.pads)
     assert pads > 0

@@ -1,0 +1,220 @@
+"""Sensors, controllers and motors of all robots of an arena, in batches.
+
+The arithmetic is that of ``worker.robot``, equal to the last bit
+(tests/worker/arena/test_batched_control.py). Robots with imus elsewhere than at the
+core's centre are read one by one.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from schema.experiment.document import Simulation
+from schema.parts import Vector
+from schema.robot.results import Floats
+from worker.clusters.bounds import Indices
+from worker.clusters.cluster import EngineView
+from worker.clusters.columns import Layout
+from worker.clusters.robot import ArenaRobot
+from worker.robot.controller import Bank, Widths
+from worker.robot.motors import HIGHEST_OUTPUT, LOWEST_OUTPUT
+from worker.robot.noise import Noise, NoiseSource
+from worker.robot.sensors import into_frame
+
+
+class BatchedControllers:
+    """One bank of networks, a row per robot, by birth.
+
+    A robot's first tick is at its birth, as off-line. Births fall on ticks of the
+    arena, so from then on all networks tick together.
+    """
+
+    def __init__(self, source: NoiseSource) -> None:
+        """Initialise without robots.
+
+        Args:
+            source: parameters of noise, width of every network, and clocks.
+        """
+        simulation = source.simulation
+        self._source = source
+        self._is_noisy = bool(simulation.sensor_noise or simulation.actuator_noise)
+        self._tick_steps = simulation.brain_steps
+        self._tick_s = simulation.brain_steps * simulation.timestep_s
+        self.gather(())
+
+    def gather(self, robots: Sequence[ArenaRobot]) -> None:
+        """Rebuild the bank; each robot's states are moved to its row."""
+        self._bank, self._noise = self._rows_of(robots)
+        for robot, states in zip(robots, self._bank.states, strict=True):
+            states[:] = robot.states
+            robot.states = states
+        starts = [robot.brain_start for robot in robots]
+        self._starts = np.array(starts, dtype=np.float64)[:, None]
+
+    def tick(self, step: int, readings: Floats) -> Floats:
+        """Update all networks with the latest readings and return their outputs.
+
+        Args:
+            step: of the arena.
+            readings: (R, I) by birth.
+
+        Returns:
+            (R, O) unclipped; may be a view that the next tick overwrites.
+        """
+        ages = (step - self._starts) // self._tick_steps
+        return self._outputs(self._bank, self._noise, step, readings, ages)
+
+    def first_tick(self, step: int, robot: ArenaRobot) -> None:
+        """Update a newborn's network alone and command its motors.
+
+        Args:
+            step: of the arena.
+            robot: the newborn, not yet in the bank.
+        """
+        bank, noise = self._rows_of([robot])
+        readings = robot.view.sensors.readings
+        robot.view.servos.drive(self._outputs(bank, noise, step, readings, 0.0)[0])
+        robot.states = bank.states[0]
+
+    def _rows_of(self, robots: Sequence[ArenaRobot]) -> tuple[Bank, Noise | None]:
+        """Return a bank at rest and the noise of some robots."""
+        networks = [robot.network for robot in robots]
+        bank = Bank(networks, self._source.width, self._tick_s)
+        if not self._is_noisy:
+            return bank, None
+        return bank, Noise(self._source, [robot.birth for robot in robots])
+
+    def _outputs(
+        self,
+        bank: Bank,
+        noise: Noise | None,
+        step: int,
+        readings: Floats,
+        ages: Floats | float,
+    ) -> Floats:
+        if noise is None:
+            return bank.step(readings, ages)
+        tick = step // self._tick_steps
+        outputs = bank.step(noise.perturb_readings(tick, readings), ages)
+        return noise.perturb_outputs(tick, outputs)
+
+
+class BatchedIO:
+    """Sensor readings and motor commands of all robots, by birth.
+
+    Attributes:
+        readings: (R, I) latest readings; each robot's sensors write to its row.
+    """
+
+    def __init__(self, width: Widths, simulation: Simulation, gravity: Vector) -> None:
+        """Initialise without robots; call ``settle`` before anything else.
+
+        Args:
+            width: of every network.
+            simulation: its clocks.
+            gravity: of the world [m/s2].
+        """
+        self._width = width
+        self._tick_s = simulation.brain_steps * simulation.timestep_s
+        self._gravity = np.array(gravity)
+        self._layout: Layout | None = None
+
+    def settle(self, layout: Layout) -> None:
+        """Adapt to a layout; robots may have been born, died or changed cluster."""
+        before, self._layout = self._layout, layout
+        if layout is before:
+            return
+        views = [robot.view for robot in layout.robot_rows.robots]
+        if before is None or layout.robot_rows is not before.robot_rows:
+            self._gather(views)
+        for row, view in enumerate(views):
+            view.sensors.write_to(self.readings[row : row + 1])
+        self._controls = [view.ctrl for view in views]
+        self._read_alone = [views[row].sensors for row in self._others]
+        self._cores = [views[row].sensors for row in self._simple.tolist()]
+        self._orientations = layout.roots[self._simple, 3:]
+        self._motions = layout.motions[self._simple]
+        self._angles = layout.starts[self._motor_rows] + self._motor_offsets
+        homes = layout.homes.tolist()
+        self._pads = [
+            (row, views[row].sensors.pads, layout.clusters[homes[row]])
+            for row in self._padded
+        ]
+
+    def read(self, state: Floats) -> None:
+        """Read all sensors but light sensors.
+
+        Args:
+            state: present state of all clusters, in the order of the layout.
+        """
+        self._read_cores(state)
+        for sensors in self._read_alone:
+            sensors.read(self._tick_s)
+        for row, pads, cluster in self._pads:
+            for geom, place in pads:
+                self.readings[row, place] = geom in cluster.touched
+
+    def drive(self, state: Floats, outputs: Floats) -> None:
+        """Command all motors, until the next tick.
+
+        Args:
+            state: of all clusters, in the order of the layout.
+            outputs: (R, O) of all networks, unclipped.
+        """
+        share = outputs[self._motor_rows, self._motor_outputs]
+        np.maximum(share, LOWEST_OUTPUT, out=share)
+        np.minimum(share, HIGHEST_OUTPUT, out=share)
+        low, span, gain, fastest = self._motors
+        target = low + share * span
+        command = gain * (target - state[self._angles])
+        np.maximum(command, -fastest, out=command)
+        np.minimum(command, fastest, out=command)
+        start = 0
+        for controls in self._controls:
+            end = start + len(controls)
+            controls[:] = command[start:end]
+            start = end
+
+    def _gather(self, views: Sequence[EngineView]) -> None:
+        """Build the arrays of all robots."""
+        readings = [view.sensors.readings for view in views]
+        self.readings = np.concatenate([np.zeros((0, self._width.inputs)), *readings])
+        simple = [row for row, view in enumerate(views) if view.sensors.is_simple]
+        self._others = sorted(set(range(len(views))).difference(simple))
+        self._padded = [row for row in simple if views[row].sensors.pads]
+        self._simple = np.array(simple, dtype=np.intp)
+        before = [views[row].sensors.velocities[0] for row in simple]
+        self._velocities: Floats = np.array(before).reshape(-1, 3)
+        cores = [views[row].sensors.core_imu for row in simple]
+        self._places = self._simple * self._width.inputs + np.array(cores, np.intp)
+        counts = np.array([len(view.ctrl) for view in views], dtype=np.intp)
+        self._motor_rows = np.repeat(np.arange(len(views)), counts)
+        ends = np.cumsum(counts)
+        first = np.repeat(ends - counts, counts)
+        self._motor_outputs: Indices = np.arange(len(first)) - first
+        motors = [
+            (address - view.joints.start, *limits)
+            for view in views
+            for address, *limits in view.servos.motors
+        ]
+        table = np.array(motors, dtype=np.float64).reshape(-1, 5)
+        self._motor_offsets = table[:, 0].astype(np.intp)
+        self._motors = table.T[1:]
+
+    def _read_cores(self, state: Floats) -> None:
+        """Read the imus at cores' centres from the free joints' states."""
+        if not self._cores:
+            return
+        w, x, y, z = state[self._orientations].T
+        motions = state[self._motions]
+        velocities = motions[:, :3]
+        change = (velocities - self._velocities) / self._tick_s
+        ax, ay, az = (change - self._gravity).T
+        self._velocities = velocities
+        cells, places = self.readings.reshape(-1), self._places
+        acceleration = into_frame((w, x, y, z), (ax, ay, az))
+        for axis in range(3):
+            cells[places + axis] = acceleration[axis]
+            cells[places + 3 + axis] = motions[:, 3 + axis]
+        for sensors, (vx, vy, vz) in zip(self._cores, velocities.tolist(), strict=True):
+            sensors.velocities[0] = (vx, vy, vz)

@@ -1,0 +1,122 @@
+"""Records of an advance: samples of poses, and contact durations."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from schema.experiment.settings import ArenaSettings
+from schema.robot.ids import BirthId
+from schema.robot.results import Floats
+from schema.tables.columns import POSES
+from schema.wire.arena import Touch
+from worker.clusters.cluster import Cluster
+from worker.clusters.columns import Layout
+
+_SCHEMA = POSES.remove(0)
+
+
+class Poses:
+    """Samples of all robots' poses."""
+
+    def __init__(self, timestep_s: float) -> None:
+        """Initialise without samples; ``timestep_s`` is the length of a step."""
+        self._timestep_s = timestep_s
+        self._samples: list[tuple[int, Layout, Floats, Floats]] = []
+
+    def add(self, step: int, layout: Layout, state: Floats) -> None:
+        """Add a sample.
+
+        Args:
+            step: of the arena.
+            layout: of the state.
+            state: of all clusters.
+        """
+        if layout.robot_rows.robots:
+            roots, angles = state[layout.roots], state[layout.joints]
+            self._samples.append((step, layout, roots, angles))
+
+    def columns(self) -> bytes:
+        """Return all samples as an Arrow IPC stream; no bytes for no samples.
+
+        The columns name robots by birth only. The requester of the advance adds the
+        arena.
+        """
+        if not self._samples:
+            return b""
+        steps, layouts, roots, angles = zip(*self._samples, strict=True)
+        rows = [layout.robot_rows for layout in layouts]
+        batch = pose_batch(
+            islands=np.concatenate([each.islands for each in rows]),
+            numbers=np.concatenate([each.numbers for each in rows]),
+            times_s=np.repeat(
+                [step * self._timestep_s for step in steps],
+                [len(each.robots) for each in rows],
+            ),
+            roots=np.concatenate(roots),
+            joint_counts=np.concatenate([each.joint_counts for each in rows]),
+            angles=np.concatenate(angles),
+        )
+        sink = pa.BufferOutputStream()
+        with pa.ipc.new_stream(sink, _SCHEMA) as writer:
+            writer.write_batch(batch)
+        return bytes(sink.getvalue().to_pybytes())
+
+
+def pose_batch(
+    *,
+    islands: npt.NDArray[np.int32],
+    numbers: npt.NDArray[np.int64],
+    times_s: Floats,
+    roots: Floats,
+    joint_counts: npt.NDArray[np.int32],
+    angles: Floats,
+) -> pa.RecordBatch:
+    """Return N rows of the poses table, without ``record``.
+
+    Args:
+        islands: (N,) of the robots' births.
+        numbers: (N,) of the robots' births.
+        times_s: (N,) simulated time [s].
+        roots: (N, 7) position [m] and quaternion of the core.
+        joint_counts: (N,) joint angles of each row.
+        angles: of all joints, row by row [rad].
+    """
+    ends = np.concatenate([[0], np.cumsum(joint_counts)]).astype(np.int32)
+    columns = [
+        islands,
+        pa.nulls(len(times_s), pa.int32()),
+        numbers,
+        times_s,
+        *roots.astype(np.float32).T,
+        pa.ListArray.from_arrays(
+            pa.array(ends),
+            pa.array(angles.astype(np.float32)),
+            type=_SCHEMA.field("angles").type,
+        ),
+    ]
+    return pa.record_batch(columns, schema=_SCHEMA)
+
+
+class Contacts:
+    """Contact durations of an advance; each check counts one whole interval."""
+
+    def __init__(self, settings: ArenaSettings) -> None:
+        """Initialise without contacts."""
+        steps = settings.arena.proximity_steps
+        self._interval_s = steps * settings.simulation.timestep_s
+        self._counts: Counter[tuple[BirthId, BirthId]] = Counter()
+
+    def count(self, clusters: Sequence[Cluster], moment: int) -> None:
+        """Count the pairs in contact at a moment of the clusters' histories."""
+        for cluster in clusters:
+            for first, second in cluster.history.touching[moment]:
+                self._counts[cluster.members[first], cluster.members[second]] += 1
+
+    def take(self) -> tuple[Touch, ...]:
+        """Return the durations by pair and reset them."""
+        counts = sorted(self._counts.items())
+        self._counts.clear()
+        return tuple(Touch(*pair, count * self._interval_s) for pair, count in counts)
