@@ -1,4 +1,4 @@
-"""``revolve analyze``: from run folders to measures, figures and a report."""
+"""``revolve analyze``: run folders to measures, figures and a report."""
 
 import argparse
 import platform
@@ -15,13 +15,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemaining
 
 from analysis.comparison.comparison import Outcomes, comparison, findings
 from analysis.comparison.progression import progression
+from analysis.figures.catalogue import DrawnFigure
 from analysis.figures.figure_writer import draw_figures
-from analysis.figures.report import Drawn, Making, report
+from analysis.figures.report import Provenance, report
 from analysis.measures.benchmarks import read_benchmarks
-from analysis.measures.distinct_names import told_apart
+from analysis.measures.distinct_names import with_distinct_names
 from analysis.measures.load import LeftOut, Run, read_runs
 from analysis.measures.outputs import OUTPUTS, schema
-from analysis.measures.study import gathered, measure_runs
+from analysis.measures.study import concatenated, measure_runs
 from analysis.progress import bars
 from analysis.render.picture import Simulate
 from analysis.summary import show
@@ -29,32 +30,32 @@ from schema.errors import RunFolderError
 
 MEASURES, FIGURES, REPORT = "measures", "figures", "report.html"
 _ALWAYS = ("populations", "robots", "extremities")
-"""Measures that all that follows reads, whatever could be measured."""
+"""Measures that are read in any case; empty if they could not be measured."""
 _LIBRARIES = ("revolve-islands", "mujoco-core", "numpy", "pyarrow", "plotnine")
 
 
 def analyze(
     options: argparse.Namespace, words: Sequence[str], simulate: Callable[[], Simulate]
 ) -> int:
-    """Measure runs, draw what the measures allow, and write the report.
+    """Measure runs, draw figures, and write the report.
 
     Args:
         options: ``runs``, ``out``, ``slots``, ``processes``.
-        words: of the command line, for the report.
-        simulate: returns the worker's simulation, or raises what keeps pictures from
-            being drawn.
+        words: words of the command line, for the report.
+        simulate: returns the worker's simulation, or raises the reason why robots
+            cannot be rendered.
 
     Returns:
-        0 if done, whatever was left out.
+        0; measures and figures that are left out are no failure.
 
     Raises:
-        RunFolderError: no run, or nowhere to write.
+        RunFolderError: no run is found, or the output folder cannot be written.
     """
     folders = [path for path in options.runs if path.is_dir() or not path.is_file()]
     if not folders:
         raise RunFolderError(f"{options.runs[0]}: must be a folder, got a file")
     found, unread = read_runs(folders)
-    runs = told_apart(found)
+    runs = with_distinct_names(found)
     benchmark, not_benchmarks = read_benchmarks(options.runs)
     columns = ("{task.description}", BarColumn(), MofNCompleteColumn())
     try:
@@ -62,7 +63,7 @@ def analyze(
     except OSError as error:
         why = f"cannot be written: {error.strerror}"
         raise RunFolderError(f"{options.out}: {why}") from None
-    with bars(f"runs to measure: {len(runs)}", *columns, TimeRemainingColumn()) as bar:
+    with bars(f"measuring {len(runs)} runs", *columns, TimeRemainingColumn()) as bar:
         tables, left_out = _measured(runs, options, bar)
         drawn, undrawn = draw_figures(
             {**tables, "benchmark": benchmark},
@@ -77,33 +78,33 @@ def analyze(
     )
     (options.out / MEASURES).mkdir(parents=True, exist_ok=True)
     for name in OUTPUTS:
-        if name not in tables:  # of an analysis before
+        if name not in tables:  # written by an earlier analysis
             (options.out / MEASURES / f"{name}.parquet").unlink(missing_ok=True)
     for name, table in tables.items():
         pq.write_table(table, options.out / MEASURES / f"{name}.parquet")
-    page = report(tables, drawn, _making(words))
+    page = report(tables, drawn, _provenance(words))
     (options.out / REPORT).write_text(page, encoding="utf-8")
     show(tables, Console())
     print(f"{options.out / MEASURES}: {len(tables)} tables, {', '.join(tables)}")
-    print(f"{options.out / FIGURES}: {_told(drawn)}")
-    print(f"{options.out / REPORT}: all of it in one file")
+    print(f"{options.out / FIGURES}: {_listed(drawn)}")
+    print(f"{options.out / REPORT}: report with all figures in one file")
     return 0
 
 
 def _measured(
     runs: list[Run], options: argparse.Namespace, bar: Progress
 ) -> tuple[dict[str, pa.Table], list[LeftOut]]:
-    """Return all tables of all runs, and those over runs."""
-    task = bar.add_task("runs measured", total=len(runs))
+    """Return the tables of all runs, and what was left out."""
+    task = bar.add_task("measuring runs", total=len(runs))
     measured = measure_runs(
         runs,
         slots="own" if options.slots == "own" else "parent",
         processes=options.processes,
-        tell=lambda: bar.advance(task),
+        on_measured=lambda: bar.advance(task),
     )
-    comparing = bar.add_task("experiments compared", total=None)
+    comparing = bar.add_task("comparing experiments", total=None)
     empty = {name: schema(name).empty_table() for name in _ALWAYS}
-    tables = {**empty, **gathered(measured)}
+    tables = {**empty, **concatenated(measured)}
     tables["progression"] = progression(tables["populations"])
     outcomes = Outcomes(measured)
     tables["outcomes"] = outcomes.table()
@@ -113,15 +114,15 @@ def _measured(
     return tables, [one for run in measured for one in run.left_out]
 
 
-def _told(figures: Sequence[Drawn]) -> str:
-    """Return which figures there are, in words."""
+def _listed(figures: Sequence[DrawnFigure]) -> str:
+    """Return the numbers of the figures as text."""
     if not figures:
-        return "no figure could be drawn; the lines 'left out: figure' tell why"
-    numbers = ", ".join(one.number for one in figures)
+        return "no figure could be drawn; see the lines 'left out: figure'"
+    numbers = ", ".join(one.figure.number for one in figures)
     return f"figures {numbers} as PDF and PNG"
 
 
-def _making(words: Sequence[str]) -> Making:
+def _provenance(words: Sequence[str]) -> Provenance:
     versions = {"python": platform.python_version(), "system": platform.platform()}
     for name in _LIBRARIES:
         try:
@@ -129,4 +130,4 @@ def _making(words: Sequence[str]) -> Making:
         except PackageNotFoundError:
             versions[name] = "not installed as a package"
     now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return Making(shlex.join(["revolve", *words]), now, versions)
+    return Provenance(shlex.join(["revolve", *words]), now, versions)

@@ -32,7 +32,7 @@ def bars(what: str, *columns: str | ProgressColumn) -> Iterator[Progress]:
         yield progress
 
 
-class Course:
+class ProgressLine:
     """What goes on until it ends by itself; use it in a ``with``.
 
     On a terminal a line that changes, in a log one every ``SPAN_S``.

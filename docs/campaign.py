@@ -231,9 +231,9 @@ def measured_rows(one: Run, commit: str | None) -> dict[str, pa.Table]:
     """
     measured = measure_run(one, "parent")
     # Arenas of the thesis do not record touches.
-    lacking = [each for each in measured.left_out if each.what != "interactions"]
-    if lacking:
-        raise RunFolderError(f"{lacking[0].what}: {lacking[0].why}")
+    incomplete = [each for each in measured.left_out if each.what != "interactions"]
+    if incomplete:
+        raise RunFolderError(f"{incomplete[0].what}: {incomplete[0].why}")
     last = reach(measured)
     marks = sorted({last, *(births for births in MARKS if births < last)})
     outcomes = [outcome(measured.tables, births) for births in marks]

@@ -24,7 +24,7 @@ from analysis.comparison.statistics import (
 )
 from analysis.measures.outputs import OUTCOME, schema
 from analysis.measures.population_table import Numbers
-from analysis.measures.study import Measured, reach
+from analysis.measures.study import MeasuredRun, reach
 
 SURE = 0.05
 NEGLIGIBLE, LARGE = 0.147, 0.474
@@ -33,7 +33,7 @@ NEGLIGIBLE, LARGE = 0.147, 0.474
 Row = dict[str, object]
 
 
-class Compared(Protocol):
+class RunOutcomes(Protocol):
     """What is compared: outcomes of runs, wherever they come from."""
 
     @property
@@ -50,9 +50,9 @@ class Compared(Protocol):
 class Outcomes:
     """One number of each finished run for every measure, at any number of births."""
 
-    def __init__(self, measured: Sequence[Measured]) -> None:
+    def __init__(self, measured: Sequence[MeasuredRun]) -> None:
         """Take finished runs as they are measured; others are left out."""
-        self._runs: dict[str, list[Measured]] = {}
+        self._runs: dict[str, list[MeasuredRun]] = {}
         for one in measured:
             if one.run.is_finished and reach(one):
                 self._runs.setdefault(one.run.experiment, []).append(one)
@@ -103,7 +103,7 @@ class Outcomes:
         return pa.Table.from_pylist(rows, schema("outcomes"))
 
 
-def comparison(outcomes: Compared) -> pa.Table:
+def comparison(outcomes: RunOutcomes) -> pa.Table:
     """Return every measure of every pair of experiments.
 
     Args:
@@ -124,7 +124,7 @@ def comparison(outcomes: Compared) -> pa.Table:
     return pa.Table.from_pylist(_corrected(rows), schema("comparison"))
 
 
-def findings(outcomes: Compared, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
+def findings(outcomes: RunOutcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
     """Return what became of the thesis's findings.
 
     Args:
@@ -153,7 +153,7 @@ def findings(outcomes: Compared, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
     return pa.Table.from_pylist(rows, schema("findings"))
 
 
-def _tested(outcomes: Compared, claim: Claim) -> Row:
+def _tested(outcomes: RunOutcomes, claim: Claim) -> Row:
     """Return the numbers of a claim, or why there are none."""
     names = [name for name in (claim.a, claim.b) if name is not None]
     for name in names:

@@ -8,7 +8,7 @@ import pyarrow as pa
 
 from analysis.comparison.statistics import ranks
 from analysis.measures.outputs import BODY, POPULATION
-from analysis.measures.population_table import Numbers, Truths
+from analysis.measures.population_table import Booleans, Numbers
 
 FOUNDERS = 15
 """Births that are founders in the thesis's experiments."""
@@ -85,7 +85,7 @@ def _of_robots(
 
 
 def _changes(
-    robots: pa.Table, last: dict[str, float], is_born: Truths
+    robots: pa.Table, last: dict[str, float], is_born: Booleans
 ) -> dict[str, float]:
     """Return how far the last population is from robots that nobody begot."""
     is_random = is_born & (_column(robots, "ancestors") == 0)

@@ -1,32 +1,29 @@
-"""Measures over births, over the runs of an experiment."""
+"""Means of measures over the runs of an experiment, by number of births."""
 
 import numpy as np
 import pyarrow as pa
 
-from analysis.comparison.statistics import t_quantile
+from analysis.comparison.statistics import half_interval
 from analysis.measures.outputs import POPULATION, schema
-from analysis.measures.population_table import Numbers
-from analysis.measures.trees import Integers
 
 
 def progression(populations: pa.Table) -> pa.Table:
-    """Return how populations change as births go by, over runs.
+    """Return the means of measures over runs, by number of births.
 
-    A run of several islands counts with their mean, at numbers of births that all of
-    them have a value at: islands are not recorded equally often. A run counts at every
-    number of births that its own populations were recorded at.
+    A run of several islands contributes their mean, at numbers of births at which all
+    its islands have a value: islands are not recorded equally often. A run contributes
+    at every number of births at which its own populations were recorded.
 
     Args:
-        populations: of several runs, as ``outputs`` names its columns.
+        populations: populations of several runs, with the columns of ``outputs``.
 
     Returns:
         One row per ``experiment``, ``measure`` (a column of ``populations``) and
         ``births``, ascending: ``mean`` over runs, ``low`` and ``high`` (the mean's
-        95 % interval by Student's t; null of one run), ``least``, ``greatest``,
-        ``runs``. Where no run has a value there is no row.
+        95 % interval by Student's t; null for one run), ``least``, ``greatest``,
+        ``runs``. There is no row where no run has a value.
 
-    Source: Hupkes 2016, figures 6.3, 6.5 and 6.7; the intervals are ours, the thesis
-    omits them.
+    Source: Hupkes 2016, figures 6.3, 6.5 and 6.7; the intervals are our own.
     """
     keys = ["experiment", "births"]
     pieces = []
@@ -65,16 +62,8 @@ def _whole_runs(by_run: pa.Table, count: str) -> pa.Table:
 def _with_intervals(table: pa.Table) -> pa.Table:
     runs = np.asarray(table["runs"], np.int64)
     mean = np.asarray(table["mean"], np.float64)
-    # Arrow divides by the number of runs, an estimate by one less.
-    spread = np.asarray(table["sd"], np.float64) / np.sqrt(np.maximum(runs - 1, 1))
-    half = np.where(runs > 1, spread * _quantiles(runs), np.nan)
+    half = half_interval(np.asarray(table["sd"], np.float64), runs)
     ends = {"low": mean - half, "high": mean + half}
     for name, values in ends.items():
         table = table.append_column(name, pa.array(values, from_pandas=True))
     return table.select(schema("progression").names)
-
-
-def _quantiles(runs: Integers) -> Numbers:
-    different, where = np.unique(runs, return_inverse=True)
-    found = [t_quantile(max(count - 1, 1)) for count in different.tolist()]
-    return np.array(found, np.float64)[where]

@@ -1,7 +1,7 @@
-"""How sure a difference between experiments is: the unit is the run.
+"""Effect sizes and tests of the difference between experiments; the unit is the run.
 
-Two experiments are compared by ranks, without assuming a distribution; few runs are
-no obstacle, for every probability is exact.
+Experiments are compared by ranks, without assuming a distribution. Probabilities are
+exact, also for few runs.
 """
 
 import math
@@ -14,15 +14,15 @@ from analysis.measures.population_table import Numbers
 from analysis.measures.trees import Integers
 
 LEVEL = 0.95
-"""Of all intervals."""
+"""Confidence level of all intervals."""
 
 
 def cliffs_delta(a: Numbers, b: Numbers) -> float:
-    """Return how much more often a run of ``a`` is above one of ``b`` than below.
+    """Return Cliff's delta: how much more often ``a`` is above ``b`` than below.
 
     Args:
-        a: (N,) one number of each run.
-        b: (M,) the other experiment's.
+        a: (N,) one number per run.
+        b: (M,) one number per run of the other experiment.
 
     Returns:
         P(a > b) - P(a < b), in [-1, 1].
@@ -35,13 +35,13 @@ def cliffs_delta(a: Numbers, b: Numbers) -> float:
 def delta_interval(delta: float, first: int, second: int) -> tuple[float, float]:
     """Return the ends of the 95 % interval of Cliff's delta.
 
-    Unlike the bootstrap's it does not shrink to a point where all runs of one
-    experiment are above all of the other.
+    Unlike a bootstrap interval, it does not shrink to a point if all runs of one
+    experiment are above all runs of the other.
 
     Args:
-        delta: of two experiments.
-        first: runs of one.
-        second: runs of the other.
+        delta: Cliff's delta of two experiments.
+        first: number of runs of one experiment.
+        second: number of runs of the other.
 
     Source: Newcombe, *Confidence intervals for an effect size measure based on the
     Mann-Whitney statistic*, part 2, method 5, Statistics in Medicine 25, 2006.
@@ -61,7 +61,7 @@ def delta_interval(delta: float, first: int, second: int) -> tuple[float, float]
 
 
 def _edge(is_inside: Callable[[float], bool], inner: float, outer: float) -> float:
-    """Return where one leaves an interval on the way from within to without."""
+    """Return the edge of an interval between a point inside and a point outside."""
     for _ in range(60):
         middle = (inner + outer) / 2
         inner, outer = (middle, outer) if is_inside(middle) else (inner, middle)
@@ -69,15 +69,15 @@ def _edge(is_inside: Callable[[float], bool], inner: float, outer: float) -> flo
 
 
 def rank_sum_p(a: Numbers, b: Numbers) -> float:
-    """Return how probable ranks so far apart are if runs were dealt out by chance.
+    """Return the two-sided p of the Wilcoxon-Mann-Whitney test.
 
     Args:
-        a: (N,) one number of each run.
-        b: (M,) the other experiment's.
+        a: (N,) one number per run.
+        b: (M,) one number per run of the other experiment.
 
     Returns:
-        Two-sided p of the Wilcoxon-Mann-Whitney test: the share of all ways to deal
-        out the N + M numbers, ties included, whose rank sum is as far from its mean.
+        Share of all ways to divide the N + M numbers, ties included, whose rank sum
+        is at least as far from its mean.
 
     Source: Wilcoxon, 1945; Mann and Whitney, 1947; counted exactly.
     """
@@ -90,14 +90,14 @@ def rank_sum_p(a: Numbers, b: Numbers) -> float:
 
 
 def signed_rank(values: Numbers) -> tuple[float, float]:
-    """Return how far one number per run is from nothing, and how sure that is.
+    """Return effect and p of Wilcoxon's signed-rank test.
 
     Args:
-        values: (N,) differences of each run from a reference; zeros do not count.
+        values: (N,) difference of each run from a reference; zeros are ignored.
 
     Returns:
         Matched-pairs rank-biserial correlation, in [-1, 1], and the two-sided p of
-        Wilcoxon's signed-rank test, ties included; 0 and 1 if all are zero.
+        the test, ties included; 0 and 1 if all differences are zero.
 
     Source: Wilcoxon, 1945, counted exactly; Kerby, *The simple difference formula*,
     Comprehensive Psychology 3, 2014.
@@ -115,13 +115,13 @@ def signed_rank(values: Numbers) -> tuple[float, float]:
 
 
 def ranks(values: Numbers) -> Numbers:
-    """Return the rank of each number, (N,), from 1; equal ones share theirs."""
+    """Return the rank of each number, (N,), from 1; equal numbers share their mean."""
     found: Numbers = _doubled_ranks(values) / 2
     return found
 
 
 def _doubled_ranks(values: Numbers) -> Integers:
-    """Return twice the rank of each number; equal ones share theirs."""
+    """Return twice the rank of each number; equal numbers share their mean."""
     _, where, counts = np.unique(values, return_inverse=True, return_counts=True)
     doubled = 2 * np.cumsum(counts) - counts + 1
     found: Integers = doubled[where]
@@ -129,7 +129,7 @@ def _doubled_ranks(values: Numbers) -> Integers:
 
 
 def _tails(ways: Numbers, found: int) -> float:
-    """Return the share of sums that are as far from their mean as the one found."""
+    """Return the share of sums at least as far from their mean as the one found."""
     sums = np.arange(len(ways))
     total = ways.sum()
     mean = float((ways * sums).sum() / total)
@@ -138,10 +138,10 @@ def _tails(ways: Numbers, found: int) -> float:
 
 
 def false_discovery(p: Numbers) -> Numbers:
-    """Return p values corrected for their number, in their order.
+    """Return p values corrected for multiple tests, in their order.
 
-    Of the tests whose corrected value is below 0.05, at most 5 % are expected to be
-    chance.
+    At most 5 % of the tests with a corrected value below 0.05 are expected to be
+    false discoveries.
 
     Source: Benjamini and Hochberg, *Controlling the false discovery rate*, J. R.
     Statist. Soc. B 57(1), 1995.
@@ -157,8 +157,9 @@ def mean_difference(a: Numbers, b: Numbers) -> tuple[float, float, float]:
     """Return the difference of two means and the ends of its 95 % interval.
 
     Args:
-        a: (N,) one number of each run.
-        b: (M,) the other experiment's; one number is a reference without spread.
+        a: (N,) one number per run.
+        b: (M,) one number per run of the other experiment; a single number is a
+            reference without spread.
 
     Returns:
         mean(a) - mean(b) and the interval's ends; NaN where a spread is unknown.
@@ -179,8 +180,22 @@ def mean_difference(a: Numbers, b: Numbers) -> tuple[float, float, float]:
     return difference, difference - half, difference + half
 
 
+def half_interval(deviation: Numbers, runs: Integers) -> Numbers:
+    """Return half the width of means' 95 % intervals, (N,); NaN for one run.
+
+    Args:
+        deviation: (N,) standard deviations over runs, divided by the number of runs
+            as Arrow does.
+        runs: (N,) numbers of runs.
+    """
+    known = {count: t_quantile(max(count - 1, 1)) for count in set(runs.tolist())}
+    quantiles = np.array([known[count] for count in runs.tolist()], np.float64)
+    half = deviation / np.sqrt(np.maximum(runs - 1, 1)) * quantiles
+    return np.where(runs > 1, half, np.nan)
+
+
 def t_quantile(freedom: float) -> float:
-    """Return what Student's t exceeds with a chance of 2.5 %.
+    """Return the 97.5 % quantile of Student's t.
 
     Args:
         freedom: degrees of freedom, >= 1.

@@ -1,4 +1,4 @@
-"""Figures of the arena's speed: of random robots, and of spiders."""
+"""Figures of the speed of an arena: random robots and spiders."""
 
 import numpy as np
 import plotnine as p9
@@ -6,7 +6,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.figures.forms import NothingToDraw, Tables
-from analysis.figures.style import paper
+from analysis.figures.style import theme_of_size
 
 _THESIS = (-0.26, 34.78, 20.41)
 """Real-time factor a + b / p + c / p^2 on an i7-4790K. Source: Hupkes 2016, 6.1."""
@@ -20,7 +20,7 @@ def arena_speed(tables: Tables) -> p9.ggplot:
         tables: ``benchmark``, rows of ``revolve bench arena --out``.
 
     Raises:
-        NothingToDraw: there are none.
+        NothingToDraw: no benchmark was read.
 
     Source: Hupkes 2016, figure 6.1.
     """
@@ -41,10 +41,9 @@ def spider_speed(tables: Tables) -> p9.ggplot:
         tables: ``benchmark``, rows of ``revolve bench spider --out``.
 
     Raises:
-        NothingToDraw: there are none.
+        NothingToDraw: no benchmark was read.
 
-    Source: Hupkes 2016, figure 7.1; RoboGen, which it is held against there, is not
-    run here.
+    Source: Hupkes 2016, figure 7.1, without its comparison with RoboGen.
     """
     return _speed(_rows(tables, "spider"))
 
@@ -55,8 +54,8 @@ def _rows(tables: Tables, kind: str) -> pa.Table:
         rows = rows.filter(pc.field("benchmark") == kind)
     if not rows:
         raise NothingToDraw(
-            f"no benchmark is among what is read: revolve bench {kind} --out "
-            f"RUNS/{kind}.parquet makes one"
+            f"no benchmark file was read; create one with: revolve bench {kind} --out "
+            f"RUNS/{kind}.parquet"
         )
     return rows
 
@@ -85,6 +84,6 @@ def _speed(rows: pa.Table) -> p9.ggplot:
         + p9.scale_colour_manual({_OURS: "#0072B2", _THEIRS: "#7F7F7F"}, name="")
         + p9.scale_linetype_manual({_OURS: "-", _THEIRS: "--"}, name="")
         + p9.expand_limits(y=0)
-        + p9.labs(x="robots", y="simulated by wall time")
-        + paper(3.6)
+        + p9.labs(x="robots", y="real-time factor")
+        + theme_of_size(3.6)
     )

@@ -1,8 +1,9 @@
-"""The figures, in the order of the thesis; each a function of tables of measures."""
+"""Catalogue of the figures: number, title, caption and drawing function."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from analysis.figures.bench import arena_speed, spider_speed
@@ -15,38 +16,44 @@ from analysis.figures.robots import (
     variability,
 )
 
-Draw = Callable[[Tables], Any]
-
 _SPREAD = (
-    "Points are finished runs, boxes (of fewer than five runs: bars at the median) sum "
-    "them up, and violins show the robots of all their last populations."
+    "Each point is a finished run. Boxes summarise five or more runs, bars show the "
+    "median of fewer. Violins show the robots of all last populations."
 )
-THE_BIRTHS = "the runs' births"
-"""A source that is no table of measures."""
-_BENCHMARK = "the benchmark's file"
+BIRTHS = "the births tables of the runs"
+"""A source that is not a table of measures."""
+_BENCHMARK = "the benchmark file"
 _COURSE = (
-    "Lines are means over runs, bands their 95 % intervals where there are three runs, "
-    "as far as the axis goes."
+    "Lines are means over runs. Bands are 95 % intervals of the mean, shown for three "
+    "or more runs and clipped at the axis limits."
 )
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure that can be drawn if the tables allow it.
+    """A figure of the catalogue.
 
     Attributes:
-        number: of the thesis; of figures of our own, "A" and on.
-        title: what it is about.
-        caption: what is seen.
-        source: the tables whose rows it shows.
-        draw: returns it, or raises ``NothingToDraw`` with the reason.
+        number: number in the thesis; a letter for a figure of our own.
+        title: subject of the figure.
+        caption: description of what the figure shows.
+        source: tables whose rows it shows.
+        draw: returns the drawing, or raises ``NothingToDraw`` with the reason.
     """
 
     number: str
     title: str
     caption: str
     source: tuple[str, ...]
-    draw: Draw
+    draw: Callable[[Tables], Any]
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnFigure:
+    """A figure that was drawn, and its PNG file."""
+
+    figure: Figure
+    picture: Path
 
 
 def _spread(number: str, title: str, *panels: Panel) -> Figure:
@@ -66,9 +73,10 @@ def _course(number: str, title: str, measure: str, text: str) -> Figure:
 
 FIGURES: tuple[Figure, ...] = (
     Figure("6.1", "Speed of an arena by its population",
-           "Simulated over wall time of random robots in one arena: points are "
-           "repetitions, the line joins their means, the dashed one is the thesis's "
-           "fit of its own machine; above the thin line is faster than real time.",
+           "Real-time factor (simulated time by wall-clock time) of random robots in "
+           "one arena. Points are repetitions, the solid line joins their means, the "
+           "dashed line is the thesis's fit for its own machine. Values above the thin "
+           "line are faster than real time.",
            (_BENCHMARK,), arena_speed),
     _spread("6.2", "Fitness at the end", Panel("fitness", "fitness [m/s]")),
     _course("6.3", "Fitness over births", "fitness", "mean fitness [m/s]"),
@@ -81,8 +89,8 @@ FIGURES: tuple[Figure, ...] = (
     _course("6.7", "Retention over births", "retention",
             "share alive 120 births later"),
     Figure("6.8", "Variability of fitness on-line",
-           "Density over robots of the range of a robot's fitness by the range of all "
-           "its contemporaries'; thin lines are single runs.",
+           "Density over robots of the range of a robot's fitness divided by the range "
+           "of fitness in the population during its life. Thin lines are single runs.",
            ("variability",), variability),
     _spread("6.9", "Parts at the end", Panel("parts", "parts")),
     _spread("6.11", "Joints at the end",
@@ -96,48 +104,50 @@ FIGURES: tuple[Figure, ...] = (
             Panel("extremities", "extremities"),
             Panel("extremities_per_part", "extremities per part")),
     Figure("6.14a", "Fitness by the number of extremities",
-           "Points are means over the runs that have such robots, bars their 95 % "
-           "intervals where there are three runs, as far as the axis goes; left the "
-           "last populations, right all who were ever judged.",
+           "Points are means over the runs that have such robots. Bars are 95 % "
+           "intervals of the mean, shown for three or more runs and clipped at the "
+           "axis limits. Left: the last populations. Right: all robots ever evaluated.",
            ("extremities",), partial(extremities_and_fitness, by="count")),
     Figure("6.14b", "Fitness by extremities per part",
-           "As before, in bins of 0.1 whose middles the points are at.",
+           "As figure 6.14a, in bins of 0.1; each point is at the middle of its bin.",
            ("extremities",), partial(extremities_and_fitness, by="per_part")),
     _spread("6.15", "Touch sensors at the end",
             Panel("touch_sensors", "touch sensors"),
-            Panel("without_touch", "share of robots without")),
+            Panel("without_touch", "share of robots without any")),
     _spread("6.16", "Hidden neurons at the end",
             Panel("hidden", "hidden neurons"),
             Panel("hidden_per_part", "hidden neurons per part")),
     Figure("6.17", "All ancestors of the best robots",
            "Each point is an ancestor of the fittest robot of an experiment's last "
-           "populations, by its number of birth on its island; each line leads to a "
-           "parent.",
-           (THE_BIRTHS,), lineages),
+           "populations; the horizontal axis is its number of birth on its island. "
+           "Each line leads to a parent.",
+           (BIRTHS,), lineages),
     Figure("7.1", "Speed of an arena of spiders by its population",
-           "Simulated over wall time of equal spiders on a grid: points are "
-           "repetitions, the line joins their means.",
+           "Real-time factor (simulated time by wall-clock time) of identical spiders "
+           "on a grid. Points are repetitions, the line joins their means.",
            (_BENCHMARK,), spider_speed),
     _spread("A", "Connections at the end",
             Panel("connections", "connections"),
             Panel("connections_per_part", "connections per part")),
     Figure("B", "Fitness of islands",
-           "Each line is an island's mean fitness, of all runs that have islands.",
+           "Each line is the mean fitness of one island, for all runs with several "
+           "islands.",
            ("populations",), fitness_by_island),
     Figure("C", "Migration between islands",
-           "An arrow is as thick as migrants were many; its colour says for how many "
-           "of them a descendant, or the migrant itself, lives at the end.",
+           "The width of an arrow is the number of migrants. Its colour is the share "
+           "of migrants that are alive, or have a living descendant, at the end.",
            ("migrants",), migration_graph),
     Figure("D", "Diversity within and between islands",
-           "Mean tree edit distance of pairs on one island, and of pairs on two.",
+           "Mean tree edit distance of pairs of robots on the same island, and of "
+           "pairs on different islands.",
            ("between",), between),
-    Figure("E", "Robots that touched another",
+    Figure("E", "Robots that touched another robot",
            _SPREAD, ("outcomes",),
            lambda tables: over_runs(tables, Panel("touched", "share of robots"))),
     Figure("F", "The thesis's findings as effects",
-           "Cliff's delta of a over b with its 95 % interval, or where one experiment "
-           "is held against a number the rank-biserial correlation, beside what "
-           "the thesis says: > more, < less, = alike.",
+           "Cliff's delta of a over b with its 95 % interval, or the rank-biserial "
+           "correlation where an experiment is compared with a number. In brackets: "
+           "the thesis's finding (> greater, < smaller, = no large difference).",
            ("findings",), effects),
 )  # fmt: skip
-"""In the order of the thesis, then ours."""
+"""Figures of the thesis in its order, then our own."""

@@ -1,20 +1,17 @@
-"""Draws all figures that the data allows, and says of the others why not."""
+"""Draws all figures that the data allows; records why the others are left out."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 from rich.progress import Progress
 
-from analysis.figures.catalogue import FIGURES, THE_BIRTHS
-from analysis.figures.family_tree import LINEAGE, Best, best_robots, ordered
-from analysis.figures.forms import NothingToDraw
-from analysis.figures.graphviz import NoDot, ordered_by_dot
+from analysis.figures.catalogue import BIRTHS, FIGURES, DrawnFigure, Figure
+from analysis.figures.family_tree import LINEAGE, Best, best_robots
+from analysis.figures.forms import NothingToDraw, Tables
 from analysis.figures.pictures import FOUNDERS, family_tree, gaits
-from analysis.figures.report import Drawn
 from analysis.figures.robot_pictures import RobotPicture, robot_picture
 from analysis.figures.style import PICTURE_ENDING, in_order, label, save
 from analysis.measures.load import LeftOut, Run
@@ -27,57 +24,59 @@ from schema.tables.files import read_table
 
 _TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
 _BASELINES = ("no-reproduction", "no-selection")
-"""Their robots have no ancestry that selection made."""
+"""Experiments without an ancestry that selection made."""
+_SOURCE = ("robots", BIRTHS)
 
 
 class FigureWriter:
-    """The figures drawn so far, and those that could not be."""
+    """Writes figures into a folder.
+
+    Attributes:
+        drawn: the figures that were written, in the order of writing.
+        left_out: the figures that cannot be drawn, with the reason.
+    """
 
     def __init__(self, folder: Path) -> None:
-        """Draw into a folder that is there; of before are its trees of experiments."""
+        """Remove the family trees that an earlier analysis left in the folder.
+
+        Args:
+            folder: an existing folder.
+        """
         self._folder = folder
-        for path in folder.glob(f"figure-{_tree_of('*')}.p??"):
-            path.unlink()
-        self._drawn: list[Drawn] = []
+        self._remove(_tree_number("*"))
+        self.drawn: list[DrawnFigure] = []
         self.left_out: list[LeftOut] = []
 
-    def add(
-        self,
-        number: str,
-        title: str,
-        caption: str,
-        source: tuple[str, ...],
-        draw: Callable[[], Any],
-    ) -> None:
-        """Draw a figure and write it, or note why not."""
+    def add(self, figure: Figure, tables: Tables) -> None:
+        """Draw a figure and write it, or record why it cannot be drawn."""
         try:
-            figure = draw()
+            drawn = figure.draw(tables)
         except NothingToDraw as error:
-            self.leave_out(number, str(error))
+            self.leave_out(figure.number, str(error))
             return
-        stem = self._folder / f"figure-{number}"
-        save(figure, stem)
+        stem = self._folder / f"figure-{figure.number}"
+        save(drawn, stem)
         picture = stem.with_name(stem.name + PICTURE_ENDING)
-        self._drawn.append(Drawn(number, title, caption, source, picture))
+        self.drawn.append(DrawnFigure(figure, picture))
 
     def leave_out(self, number: str, why: str) -> None:
-        """Note that there is no such figure, and take away one of before."""
-        for path in self._folder.glob(f"figure-{number}.p??"):
-            path.unlink()
+        """Record why there is no such figure, and remove one of an earlier analysis."""
+        self._remove(number)
         self.left_out.append(LeftOut("", f"figure {number}", why))
 
-    @property
-    def drawn(self) -> list[Drawn]:
-        """The figures in the order of the thesis, then ours."""
-        return sorted(self._drawn, key=lambda one: _place(one.number))
+    def _remove(self, number: str) -> None:
+        for path in self._folder.glob(f"figure-{number}.p??"):
+            path.unlink()
 
 
-def _tree_of(name: str) -> str:
-    """Return the number of the tree of an experiment that the thesis has not."""
-    return f"G-{name}"
+def _tree_number(experiment: str) -> str:
+    """Return the number of an experiment's family tree."""
+    return _TREES.get(experiment, f"G-{experiment}")
 
 
-def _place(number: str) -> tuple[bool, list[int], str]:
+def _place(one: DrawnFigure) -> tuple[bool, list[int], str]:
+    """Return the sort key that puts the figures of the thesis before ours."""
+    number = one.figure.number
     digits = [int(part.rstrip("abc")) for part in number.split(".") if part[0] < "A"]
     return not digits, digits, number
 
@@ -88,39 +87,39 @@ def draw_figures(
     folder: Path,
     simulate: Callable[[], Simulate],
     bar: Progress,
-) -> tuple[list[Drawn], list[LeftOut]]:
+) -> tuple[list[DrawnFigure], list[LeftOut]]:
     """Draw all figures into a folder, as PDF and PNG.
 
     Args:
-        tables: as ``outputs`` names them, and ``benchmark``.
+        tables: by the names of ``outputs``, and ``benchmark``.
         runs: by their folders.
-        folder: is there.
-        simulate: returns the worker's simulation, or raises what keeps pictures from
-            being drawn.
-        bar: shows how far it is.
+        folder: an existing folder.
+        simulate: returns the worker's simulation, or raises the reason why robots
+            cannot be rendered.
+        bar: shows progress.
 
     Returns:
-        What was drawn, in order, and what was left out and why.
+        The figures that were drawn, in order, and those that were left out.
     """
     writer = FigureWriter(folder)
-    robot_pictures, problems = _robot_pictures(tables["robots"], runs, simulate, bar)
-    lineages = [one.lineage for one in robot_pictures if one.family is not None]
+    pictures, problems = _robot_pictures(tables["robots"], runs, simulate, bar)
+    lineages = [one.lineage for one in pictures.values() if one.family is not None]
     given = {**tables, "lineage": pa.concat_tables([LINEAGE.empty_table(), *lineages])}
-    task = bar.add_task("figures drawn", total=len(FIGURES) + len(robot_pictures) + 1)
-    for one in FIGURES:
-        writer.add(
-            one.number, one.title, one.caption, one.source, partial(one.draw, given)
-        )
+    trees = dict.fromkeys((*_TREES, *pictures))
+    task = bar.add_task("drawing figures", total=len(FIGURES) + 1 + len(trees))
+    for figure in FIGURES:
+        writer.add(figure, given)
         bar.advance(task)
-    _add_gaits(writer, robot_pictures, problems)
+    _add_gaits(writer, list(pictures.values()), problems)
     bar.advance(task)
-    for name in dict.fromkeys(
-        (*_TREES, *(one.best.experiment for one in robot_pictures))
-    ):
-        found = [one for one in robot_pictures if one.best.experiment == name]
-        _add_tree(writer, name, found, problems, tables["robots"])
-        bar.advance(task, len(found))
-    return writer.drawn, writer.left_out
+    for name in trees:
+        if name in pictures:
+            _add_tree(writer, pictures[name], tables["robots"])
+        else:
+            why = problems.get(name, f"no robot of {name} was evaluated")
+            writer.leave_out(_tree_number(name), why)
+        bar.advance(task)
+    return sorted(writer.drawn, key=_place), writer.left_out
 
 
 def _robot_pictures(
@@ -128,31 +127,30 @@ def _robot_pictures(
     runs: Mapping[Path, Run],
     simulate: Callable[[], Simulate],
     bar: Progress,
-) -> tuple[list[RobotPicture], dict[str, str]]:
-    """Return portraits of the best robots, and of the others why there is none."""
+) -> tuple[dict[str, RobotPicture], dict[str, str]]:
+    """Return pictures of the best robots by experiment, and why others have none."""
     best = {one.experiment: one for one in best_robots(robots)}
     try:
         simulation = simulate()
     except RevolveError as error:
-        return [], dict.fromkeys(best, str(error))
-    robot_pictures: list[RobotPicture] = []
+        return {}, dict.fromkeys(best, str(error))
+    pictures: dict[str, RobotPicture] = {}
     problems: dict[str, str] = {}
-    for name in bar.track(in_order(best), description="robots pictured"):
+    for name in bar.track(in_order(best), description="rendering robots"):
         try:
-            robot_pictures.append(_robot_picture(best[name], runs, simulation))
+            pictures[name] = _robot_picture(best[name], runs, simulation)
         except RevolveError as error:
             problems[name] = str(error)
-    return robot_pictures, problems
+    return pictures, problems
 
 
 def _robot_picture(
     best: Best, runs: Mapping[Path, Run], simulate: Simulate
 ) -> RobotPicture:
     run = runs[best.folder]
-    births = read_table(best.folder, "births")
     return robot_picture(
         best,
-        births,
+        read_table(best.folder, "births"),
         experiment_from_text(run.document),
         simulate,
         FOUNDERS,
@@ -163,64 +161,49 @@ def _robot_picture(
 
 def _add_gaits(
     writer: FigureWriter,
-    robot_pictures: Sequence[RobotPicture],
+    pictures: Sequence[RobotPicture],
     problems: Mapping[str, str],
 ) -> None:
-    number, title = "6.10", "Gaits of the best robots"
+    number = "6.10"
     for name, why in problems.items():
         writer.leave_out(number, f"{name}: {why}")
-    if not robot_pictures:
-        if not problems:
-            writer.leave_out(number, "nobody was judged")
+    if not pictures and not problems:
+        writer.leave_out(number, "no robot was evaluated")
+    if not pictures:
         return
     caption = (
-        "The fittest robot of each experiment's last populations, alone, from the "
-        "middle of its evaluation on. Colours tell from which founder a part comes; "
-        "white parts came by mutation."
+        "The fittest robot of each experiment's last populations, simulated alone and "
+        "shown from the middle of its evaluation on. A part's colour shows the founder "
+        "that the part descends from; white parts were added by mutation."
     )
-    source = ("robots", THE_BIRTHS)
-    writer.add(number, title, caption, source, partial(gaits, robot_pictures))
+    title = "Gaits of the best robots"
+    writer.add(Figure(number, title, caption, _SOURCE, lambda _: gaits(pictures)), {})
 
 
-def _add_tree(
-    writer: FigureWriter,
-    name: str,
-    robot_pictures: Sequence[RobotPicture],
-    problems: Mapping[str, str],
-    robots: pa.Table,
-) -> None:
-    """Draw one experiment's best robot and its family, or note why not."""
-    number = _TREES.get(name, _tree_of(name))
-    if not robot_pictures:
-        why = problems.get(name, f"no robot of {name} was judged")
+def _add_tree(writer: FigureWriter, one: RobotPicture, robots: pa.Table) -> None:
+    """Draw one experiment's best robot and its family, or record why not."""
+    best, family = one.best, one.family
+    if family is None:
+        return
+    number = _tree_number(best.experiment)
+    if len(family.levels) == 1:
+        why = f"the best robot of {best.experiment} is a founder"
         writer.leave_out(number, why)
         return
-    (one,) = robot_pictures
-    if one.family is None:
-        return
-    if len(one.family.levels) == 1:
-        writer.leave_out(number, f"the best robot of {name} is a founder")
-        return
-    mine = robots.filter(pc.field("folder") == str(one.best.folder))
+    mine = robots.filter(pc.field("folder") == str(best.folder))
     known = mine.select(["birth_island", "birth", "fitness"]).to_pylist()
     fitness = {
         BirthId(row["birth_island"], row["birth"]): row["fitness"] for row in known
     }
-    try:
-        levels = ordered_by_dot(one.family.levels, one.family.edges)
-    except NoDot:
-        levels = ordered(one.family.levels, one.family.edges)
     caption = (
-        f"Robot {one.best.birth} of {one.best.folder.name}, the fittest of the last "
-        "populations, its parents above it, and so on for five levels (dotted: to a "
-        "parent that stands where it is nearest); above the dashed line the founders "
-        "whose parts live on in them, whose colours the parts have. White parts came "
-        f"by mutation. It has {one.lineage.num_rows - 1} ancestors in all."
+        f"Robot {best.birth} of {best.folder.name}, the fittest robot of the last "
+        "populations, at the bottom, and its ancestors over five levels of "
+        "reproduction: parents are drawn above their children. A dotted line leads to "
+        "a parent that is drawn on another level. Above the dashed line are the "
+        "founders whose parts survive in these robots; a part has the colour of its "
+        "founder, and white parts were added by mutation. The robot has "
+        f"{one.lineage.num_rows - 1} ancestors in total."
     )
-    writer.add(
-        number,
-        f"Ancestry of the best robot of {label(name)}",
-        caption,
-        ("robots", THE_BIRTHS),
-        partial(family_tree, one, levels, fitness),
-    )
+    title = f"Ancestry of the best robot of {label(best.experiment)}"
+    draw = partial(family_tree, one, family, fitness)
+    writer.add(Figure(number, title, caption, _SOURCE, lambda _: draw()), {})

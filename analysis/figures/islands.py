@@ -8,7 +8,14 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.figures.forms import NothingToDraw, Tables
-from analysis.figures.style import OTHERS, in_order, label, paper, scales, whole
+from analysis.figures.style import (
+    OTHERS,
+    in_order,
+    integer_breaks,
+    label,
+    scales,
+    theme_of_size,
+)
 
 _PAIRS = {"within islands": "within", "between islands": "between"}
 _IN_A_ROW = 12
@@ -16,7 +23,7 @@ _NO_ISLANDS = "no run has several islands"
 
 
 def fitness_by_island(tables: Tables) -> p9.ggplot:
-    """Return the mean fitness of each island over births.
+    """Return the mean fitness of each island by number of births.
 
     Args:
         tables: ``runs`` and ``populations``.
@@ -46,13 +53,13 @@ def fitness_by_island(tables: Tables) -> p9.ggplot:
         + p9.guides(colour=p9.guide_legend(nrow=-(-len(names) // _IN_A_ROW)))
         + p9.expand_limits(y=0)
         + p9.labs(x="births on the island", y="mean fitness [m/s]", colour="island ")
-        + paper(3.8)
+        + theme_of_size(3.8)
         + p9.theme(legend_title=p9.element_text())
     )
 
 
 def between(tables: Tables) -> p9.ggplot:
-    """Return how different bodies are within and between islands, over runs.
+    """Return the mean distances of bodies within and between islands, over runs.
 
     Args:
         tables: ``between``.
@@ -64,11 +71,11 @@ def between(tables: Tables) -> p9.ggplot:
     if not rows:
         raise NothingToDraw(_NO_ISLANDS)
     pieces = []
-    for said, name in _PAIRS.items():
+    for text, name in _PAIRS.items():
         known = rows.filter(rows[name].is_valid())
         grouped = known.group_by(["experiment", "births"]).aggregate([(name, "mean")])
         renamed = grouped.rename_columns(["experiment", "births", "distance"])
-        pairs = pa.repeat(pa.scalar(said), renamed.num_rows)
+        pairs = pa.repeat(pa.scalar(text), renamed.num_rows)
         pieces.append(renamed.append_column("pairs", pairs))
     shown = pa.concat_tables(pieces)
     return (
@@ -78,22 +85,22 @@ def between(tables: Tables) -> p9.ggplot:
         + scales(rows["experiment"].to_pylist(), is_filled=False)
         + p9.expand_limits(y=0)
         + p9.labs(x="births on each island", y="mean tree edit distance", linetype="")
-        + paper(3.8)
+        + theme_of_size(3.8)
     )
 
 
 def migration_graph(tables: Tables) -> p9.ggplot:
-    """Return who sent how many to whom, and what share of them left a line.
+    """Return the numbers of migrants between islands, and the share that survives.
 
     Args:
         tables: ``migrants``.
 
     Raises:
-        NothingToDraw: nobody migrated.
+        NothingToDraw: no robot migrated.
     """
     rows = tables.get("migrants")
     if not rows:
-        raise NothingToDraw(f"{_NO_ISLANDS} between which somebody went")
+        raise NothingToDraw(f"{_NO_ISLANDS} with migrants")
     left = pc.greater(rows["living"], 0).cast(pa.float64())
     edges = (
         rows.append_column("line", left)
@@ -121,11 +128,12 @@ def migration_graph(tables: Tables) -> p9.ggplot:
         + p9.geom_point(p9.aes("x", "y"), data=nodes, size=9, fill="white", stroke=0.6)
         + p9.geom_text(p9.aes("x", "y", label="island"), data=nodes, size=9)
         + p9.facet_wrap("experiment", labeller=label)
-        + p9.scale_size_continuous(range=(0.5, 2.0), breaks=whole, name="migrants")
+        + p9.scale_size_continuous(range=(0.5, 2.0), breaks=integer_breaks,
+                                   name="migrants")
         + p9.scale_colour_gradient("#C6DBEF", "#084594", limits=(0, 1),
-                                   name="share that\nleft a line")
+                                   name="share with\nliving line")
         + p9.coord_fixed(xlim=(-1.25, 1.25), ylim=(-1.25, 1.25))
-        + paper(4.6)
+        + theme_of_size(4.6)
         + p9.theme_void()
         + p9.theme(figure_size=(7.0, 4.6), legend_position="right")
     )  # fmt: skip
@@ -135,7 +143,7 @@ Spot = tuple[float, float]
 
 
 def _spots(rows: pa.Table, experiment: str) -> dict[int, Spot]:
-    """Return where an experiment's islands stand: on a circle, from its top."""
+    """Return the places of an experiment's islands: on a circle, from its top."""
     mine = rows.filter(pc.field("experiment") == experiment)
     islands = sorted({*mine["island"].to_pylist(), *mine["to"].to_pylist()})
     angles = 2 * math.pi * np.arange(len(islands)) / len(islands)
@@ -146,7 +154,7 @@ def _spots(rows: pa.Table, experiment: str) -> dict[int, Spot]:
 
 
 def _arrow(start: Spot, end: Spot) -> dict[str, float]:
-    """Return an arrow that ends short of both, a little to the right of the middle."""
+    """Return an arrow with a gap at both ends, shifted to its right."""
     along = np.subtract(end, start)
     along = along / (np.linalg.norm(along) or 1.0)
     aside = 0.04 * np.array([along[1], -along[0]])

@@ -1,4 +1,4 @@
-"""Figures that are made of pictures: gaits, and families of robots."""
+"""Figures that consist of rendered robots: gaits and family trees."""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import ConnectionPatch, Rectangle
 
-from analysis.figures.family_tree import Family
+from analysis.figures.family_tree import Family, ordered
 from analysis.figures.robot_pictures import Colour, RobotPicture
 from analysis.figures.style import label
 from schema.robot.ids import BirthId
@@ -16,22 +16,22 @@ FOUNDERS: tuple[Colour, ...] = (
     (0.00, 0.45, 0.70), (0.90, 0.62, 0.00), (0.00, 0.62, 0.45), (0.80, 0.47, 0.65),
     (0.84, 0.37, 0.00), (0.34, 0.71, 0.91), (0.94, 0.89, 0.26), (0.45, 0.45, 0.45),
 )  # fmt: skip
-"""Colours of founders, by their share in a family; the last is of all others.
+"""Colours of founders, those with the most parts first; all others share the last.
 
 Source: Okabe and Ito, 2008.
 """
 _HEIGHT = 0.53
-"""Of a picture in a tree where somebody has a width of 1."""
+"""Height of a picture in a family tree in which each robot has a width of 1."""
 _WIDTH = 0.94
 _STEP = 1.0
-"""From one level to the next."""
+"""Distance of two levels."""
 
 
 def gaits(robot_pictures: Sequence[RobotPicture]) -> Figure:
-    """Return how robots move: a row of consecutive pictures each.
+    """Return one row of consecutive pictures per robot.
 
     Args:
-        robot_pictures: of the best robots; at least one.
+        robot_pictures: pictures of the best robots; at least one.
 
     Source: Hupkes 2016, figure 6.10.
     """
@@ -47,32 +47,30 @@ def gaits(robot_pictures: Sequence[RobotPicture]) -> Figure:
         for axis, picture, time_s in zip(row, one.gait, one.times_s, strict=False):
             axis.imshow(picture)
             axis.set_title(f"{time_s:.1f} s", fontsize=7, color=_FAINT, pad=2)
-        said = f"{label(one.best.experiment)}, {one.best.fitness:.3f} m/s"
-        row[0].set_title(said, loc="left", fontsize=8, color=_INK, pad=2)
-    for row in axes:
-        if row[0].get_title() and row[0].get_title(loc="left"):
-            row[0].set_title("")
+        text = f"{label(one.best.experiment)}, {one.best.fitness:.3f} m/s"
+        row[0].set_title("")
+        row[0].set_title(text, loc="left", fontsize=8, color=_INK, pad=2)
     return figure
 
 
 def family_tree(
-    one: RobotPicture, levels: Sequence[Sequence[int]], fitness: Mapping[BirthId, float]
+    one: RobotPicture, relatives: Family, fitness: Mapping[BirthId, float]
 ) -> Figure:
     """Return a robot, its parents above it, and so on, and the founders on top.
 
     Args:
-        one: of the robot.
-        levels: of its family, as they are to stand from left to right.
-        fitness: of its relatives [m/s].
+        one: pictures of the robot and its family.
+        relatives: its family.
+        fitness: fitness of its relatives [m/s].
 
     Source: Hupkes 2016, figures 6.18 to 6.20.
     """
-    relatives = one.family or Family((), (), (), {})
+    levels = ordered(relatives.levels, relatives.edges)
     width = float(max(5, *map(len, levels), len(relatives.founders)))
     spots = {
-        who: ((at + 0.5) * width / len(level), _STEP * height)
+        row: ((at + 0.5) * width / len(level), _STEP * height)
         for height, level in enumerate(levels)
-        for at, who in enumerate(level)
+        for at, row in enumerate(level)
     }
     top = _STEP * (len(levels) - 1) + _HEIGHT
     figure = Figure(figsize=(8.0, 8.0 / width * (top + 1.75)))
@@ -80,45 +78,46 @@ def family_tree(
     axes.set_axis_off()
     for child, parent in relatives.edges:
         _line(axes, spots[child], spots[parent])
-    for who, spot in spots.items():
-        said = fitness.get(one.births[who])
-        worth = "" if said is None else f"{said:.3f} m/s"
-        _hang(axes, one, who, spot, said=f"{_name(one, who)}  {worth}")
+    for row, spot in spots.items():
+        known = fitness.get(one.births[row])
+        text = "" if known is None else f"{known:.3f} m/s"
+        _add_picture(axes, one, row, spot, text=f"{_name(one, row)}  {text}")
     line = top + 0.35
     axes.plot([0, width], [line, line], "--", color=_FAINT, linewidth=0.8)
-    for at, who in enumerate(relatives.founders):
+    for at, row in enumerate(relatives.founders):
         spot = ((at + 0.5) * width / len(relatives.founders), line + 0.35)
         colour = FOUNDERS[min(at, len(FOUNDERS) - 1)]
-        _hang(axes, one, who, spot, said=f"founder {_name(one, who)}", colour=colour)
+        text = f"founder {_name(one, row)}"
+        _add_picture(axes, one, row, spot, text=text, colour=colour)
     axes.set_xlim(0, width)
     axes.set_ylim(-0.25, line + 0.35 + _HEIGHT + 0.1)
     axes.set_aspect("equal")
     return figure
 
 
-def _name(one: RobotPicture, who: int) -> str:
-    """Return a number of birth, and the island's of those of other islands."""
-    island, number = one.births[who]
+def _name(one: RobotPicture, row: int) -> str:
+    """Return a robot's number of birth, after its island if that is another one."""
+    island, number = one.births[row]
     return f"{number}" if island == one.best.birth_island else f"{island}:{number}"
 
 
 Spot = tuple[float, float]
-"""The middle of a picture's lower edge."""
+"""Middle of a picture's lower edge."""
 
 
-def _hang(
+def _add_picture(
     axes: Axes,
     one: RobotPicture,
-    who: int,
+    row: int,
     spot: Spot,
     *,
-    said: str,
+    text: str,
     colour: Colour | None = None,
 ) -> None:
-    """Put somebody's picture into a figure, with its name below."""
+    """Put a robot's picture into a figure, with a text below."""
     x, y = spot
     edges = (x - _WIDTH / 2, x + _WIDTH / 2, y, y + _HEIGHT)
-    axes.imshow(one.pictures[who], extent=edges, zorder=2, interpolation="antialiased")
+    axes.imshow(one.pictures[row], extent=edges, zorder=2, interpolation="antialiased")
     axes.add_patch(
         Rectangle(
             (edges[0], edges[2]), edges[1] - edges[0], edges[3] - edges[2],
@@ -127,26 +126,20 @@ def _hang(
         )
     )  # fmt: skip
     axes.text(
-        x, y - 0.03, said, ha="center", va="top", fontsize=6.5, color=_INK, zorder=4,
+        x, y - 0.03, text, ha="center", va="top", fontsize=6.5, color=_INK, zorder=4,
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6},
     )  # fmt: skip
 
 
 def _line(axes: Axes, child: Spot, parent: Spot) -> None:
-    """Draw a line from a child up to its parent; around, if that is not above it."""
+    """Draw a line from a child to its parent; dotted if the parent is not above it."""
     start = (child[0], child[1] + _HEIGHT)
     if parent[1] > child[1]:
         end = (parent[0], parent[1] - 0.18)
-        axes.plot(
-            [start[0], end[0]],
-            [start[1], end[1]],
-            color=_FAINT,
-            linewidth=0.9,
-            zorder=1,
-        )
+        axes.plot(*zip(start, end, strict=True), color=_FAINT, linewidth=0.9, zorder=1)
         return
     end = (parent[0], parent[1] + _HEIGHT)
-    # Flat enough to stay below the row above.
+    # Flat enough to stay below the next level.
     away = max(abs(end[0] - start[0]), abs(end[1] - start[1]))
     bend = min(0.25, 0.45 / max(away, 1.0)) * (1 if end[0] < start[0] else -1)
     axes.add_patch(

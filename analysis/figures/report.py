@@ -1,13 +1,13 @@
-"""The report: one HTML file that holds all it shows and asks nothing of the network."""
+"""The report: one self-contained HTML file, without links to the network."""
 
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from pathlib import Path
 
 import pyarrow as pa
 
+from analysis.figures.catalogue import DrawnFigure
 from analysis.figures.style import in_order, label
 from analysis.measures.outputs import OUTPUTS
 
@@ -43,27 +43,8 @@ code { overflow-wrap: anywhere; }
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
-    """A figure that was drawn.
-
-    Attributes:
-        number: of the thesis, or a letter of ours.
-        title: what it is about.
-        caption: what is seen.
-        source: the tables whose rows it shows.
-        picture: the PNG file.
-    """
-
-    number: str
-    title: str
-    caption: str
-    source: tuple[str, ...]
-    picture: Path
-
-
-@dataclass(frozen=True, slots=True)
-class Making:
-    """How a report came about: the command, when, and versions by name."""
+class Provenance:
+    """The command that made a report, its time, and the versions of the software."""
 
     command: str
     when: str
@@ -71,21 +52,23 @@ class Making:
 
 
 def report(
-    tables: Mapping[str, pa.Table], figures: Sequence[Drawn], making: Making
+    tables: Mapping[str, pa.Table],
+    figures: Sequence[DrawnFigure],
+    provenance: Provenance,
 ) -> str:
     """Return the report as HTML.
 
     Args:
-        tables: as ``outputs`` names them; ``left_out`` names figures too.
-        figures: in order.
-        making: of the report.
+        tables: by the names of ``outputs``; ``left_out`` contains figures, too.
+        figures: in the order of the report.
+        provenance: command, time and versions.
     """
     runs = tables["runs"].to_pylist()
     names = [label(name) for name in in_order(row["experiment"] for row in runs)]
     title = f"Revolve Islands: {', '.join(names)}" if names else "Revolve Islands"
     lead = (
         f"{len(runs)} runs, {sum(row['births'] for row in runs)} births; "
-        f"written {making.when}"
+        f"written {provenance.when}"
     )
     sections = [
         f"<h1>{escape(title)}</h1>",
@@ -95,7 +78,7 @@ def report(
         *_section("Figures", *map(_figure, figures)),
         *_section("Left out", _left_out(tables["left_out"].to_pylist())),
         *_section("Tables", _contents(tables)),
-        *_section("How this was made", _making(making)),
+        *_section("How this was made", _provenance(provenance)),
     ]
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -110,7 +93,7 @@ def _section(title: str, *content: str) -> list[str]:
 
 
 def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table of cells that are HTML already."""
+    """Return an HTML table of cells that are HTML already."""
     head = "".join(f"<th>{escape(name)}</th>" for name in heads)
     body = "\n".join(f"<tr>{''.join(row)}</tr>" for row in rows)
     return (
@@ -120,7 +103,7 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _cell(value: object, kind: str = "") -> str:
-    """Return a cell; numbers stand right, with three digits that count."""
+    """Return a table cell; numbers are right-aligned, with 3 significant digits."""
     if isinstance(value, bool | str):
         return f"<td{kind}>{escape(str(value))}</td>"
     if value is None:
@@ -135,30 +118,26 @@ def _runs(runs: Sequence[Mapping[str, object]]) -> str:
     rows = []
     for name in in_order(str(row["experiment"]) for row in runs):
         mine = [row for row in runs if row["experiment"] == name]
-        # Whether somebody still works on the others, their folders do not tell.
-        states = [
-            "finished" if row["state"] == "finished" else "not finished" for row in mine
-        ]
-        counts = [
-            f"{states.count(state)} {state}" for state in dict.fromkeys(sorted(states))
-        ]
+        # A folder does not say whether its run is still being executed.
+        finished = [row["state"] == "finished" for row in mine].count(True)
+        counts = {"finished": finished, "not finished": len(mine) - finished}
+        states = ", ".join(f"{n} {state}" for state, n in counts.items() if n)
         births = sorted({int(str(row["births"])) for row in mine})
         reach = f"{births[0]}" if len(births) == 1 else f"{births[0]} to {births[-1]}"
         islands = max(int(str(row["islands"])) for row in mine)
-        cells = (label(name), ", ".join(counts), f"{reach}", islands, _seeds(mine))
-        whole = (*cells, mine[0]["differs"] or "")
-        rows.append([_cell(value) for value in whole[: len(heads)]])
+        cells = (label(name), states, reach, islands, _seeds(mine), mine[0]["differs"])
+        rows.append([_cell(value or "") for value in cells[: len(heads)]])
     return _table(heads, rows) if rows else ""
 
 
 def _seeds(runs: Sequence[Mapping[str, object]]) -> str:
-    """Return the seeds of an experiment's runs, and which repeats of each."""
-    said = []
+    """Return the seeds of an experiment's runs, and the repeats of each."""
+    texts = []
     for seed in dict.fromkeys(row["seed"] for row in runs):
         repeats = sorted(int(str(row["run"])) for row in runs if row["seed"] == seed)
         which = f": repeats {', '.join(map(str, repeats))}" if any(repeats) else ""
-        said.append(f"{seed}{which}")
-    return "; ".join(said)
+        texts.append(f"{seed}{which}")
+    return "; ".join(texts)
 
 
 def _findings(rows: Sequence[Mapping[str, object]]) -> str:
@@ -188,39 +167,40 @@ def _findings(rows: Sequence[Mapping[str, object]]) -> str:
                 _cell(row["why"]),
             ]
         )
-    heads = ("figure", "finding", "a ? b", "runs", "mean a", "mean b", "effect",
+    heads = ("figure", "finding", "expected", "runs", "mean a", "mean b", "effect",
              "low", "high", "q", "verdict", "why")  # fmt: skip
     note = (
-        "The unit is the run. Effects are Cliff's delta of a over b with its 95 % "
-        "interval, or of one experiment against a number the rank-biserial "
-        "correlation; q is p, corrected for all tests of the table."
+        "The unit is the run. The effect is Cliff's delta of a over b with its 95 % "
+        "interval, or the rank-biserial correlation where one experiment is compared "
+        "with a number. q is the p value, corrected for all tests of the table."
     )
     return f"<p><b>{counts}.</b> <span class=note>{escape(note)}</span></p>" + _table(
         heads, lines
     )
 
 
-def _figure(one: Drawn) -> str:
-    picture = base64.b64encode(one.picture.read_bytes()).decode()
+def _figure(drawn: DrawnFigure) -> str:
+    one = drawn.figure
+    picture = base64.b64encode(drawn.picture.read_bytes()).decode()
     tables = ", ".join(map(_source, one.source))
     name = f"Figure {one.number}. {one.title}."
     return (
         f'<figure id="figure-{escape(one.number)}">'
         f'<img alt="{escape(name)}" src="data:image/png;base64,{picture}">'
         f"<figcaption><b>{escape(name)}</b> {escape(one.caption)} "
-        f"Rows of {tables}.</figcaption></figure>"
+        f"Source: {tables}.</figcaption></figure>"
     )
 
 
 def _source(name: str) -> str:
-    """Return a source: measures by their file's name, others in words."""
-    said = escape(name)
-    return f"<code>{said}</code>" if name in OUTPUTS else said
+    """Return a source; the name of a table of measures is set as code."""
+    text = escape(name)
+    return f"<code>{text}</code>" if name in OUTPUTS else text
 
 
 def _left_out(rows: Sequence[Mapping[str, object]]) -> str:
     lines = [[_cell(row[name]) for name in ("what", "folder", "why")] for row in rows]
-    return _table(("what", "of", "why"), lines) if lines else ""
+    return _table(("what", "run or file", "why"), lines) if lines else ""
 
 
 def _contents(tables: Mapping[str, pa.Table]) -> str:
@@ -236,8 +216,9 @@ def _contents(tables: Mapping[str, pa.Table]) -> str:
     return _table(("file", "rows", "columns"), rows)
 
 
-def _making(making: Making) -> str:
-    versions = [[_cell(name), _cell(text)] for name, text in making.versions.items()]
-    return f"<pre>{escape(making.command)}</pre>" + _table(
-        ("what", "version"), versions
-    )
+def _provenance(provenance: Provenance) -> str:
+    versions = [
+        [_cell(name), _cell(text)] for name, text in provenance.versions.items()
+    ]
+    command = f"<pre>{escape(provenance.command)}</pre>"
+    return command + _table(("software", "version"), versions)

@@ -1,8 +1,9 @@
-"""Pictures of the best robots and their families."""
+"""Renders the best robots, their gaits and their families."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pyarrow as pa
 from msgspec.structs import replace
 
 from analysis.figures.family_tree import Best, Family, family, lineage, row_of
-from analysis.render.picture import Picture, Simulate, Studio
+from analysis.render.picture import Picture, RobotRenderer, Simulate
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment, body_space, island_experiment
 from schema.experiment.identity import Identity, Origin
@@ -22,31 +23,29 @@ from schema.wire.codec import decode_genome
 
 FRAMES = 6
 EVERY_S = 0.5
-"""Pictures of a gait, and from one to the next [s]."""
+"""Pictures of a gait, and the time between two of them [s]."""
 _LARGE, _SMALL = (400, 300), (300, 225)
 _WIDE, _CLOSE = (0.15, 0.15, 0.0), (0.26, 0.14, 0.1)
-"""What is cut off: of the height above and below, of the width at each side.
-
-Robots are flat, and what is near stands below the middle.
-"""
-NOBODYS = (0.93, 0.93, 0.93)
-"""Colour of parts that came by mutation."""
+"""Shares of a picture that are cut off: of the height above and below, of the width at
+each side. Robots are flat, and the near side is below the middle."""
+MUTATED = (0.93, 0.93, 0.93)
+"""Colour of parts that were added by mutation."""
 
 Colour = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
 class RobotPicture:
-    """What pictures show of an experiment's best robot.
+    """Pictures and ancestry of an experiment's best robot.
 
     Attributes:
-        best: which.
-        gait: consecutive pictures, as it moves alone.
-        times_s: when they were taken [s].
-        family: its nearest ancestors; None if they are not wanted.
-        pictures: of everybody in the family, by births row.
-        births: name of each of those.
-        lineage: itself and all its ancestors, as ``family_tree.LINEAGE``.
+        best: the robot.
+        gait: consecutive pictures of the robot moving alone.
+        times_s: time of each of these pictures [s].
+        family: its nearest ancestors; None if they are not shown.
+        pictures: pictures of the family, by births row.
+        births: birth ids of the family, by births row.
+        lineage: the robot and all its ancestors, as ``family_tree.LINEAGE``.
     """
 
     best: Best
@@ -68,22 +67,22 @@ def robot_picture(
     origin: Origin,
     has_family: bool,
 ) -> RobotPicture:
-    """Return pictures of a robot, of how it moves, and of its family.
+    """Return pictures of a robot, of its gait, and of its family.
 
     Args:
         best: the robot.
-        births: of its run; its birth is among them.
-        experiment: of the run.
-        simulate: the worker's.
-        colours: of founders, those with the most parts first; the last is of all
-            others.
-        origin: the run, as what noise was drawn by.
-        has_family: whether its family is pictured, too.
+        births: births table of its run.
+        experiment: experiment of the run.
+        simulate: the worker's simulation.
+        colours: colours of founders, those with the most parts first; all others
+            share the last.
+        origin: seed and run, which determine the noise.
+        has_family: render the family, too.
 
     Raises:
-        RunFolderError: its birth is not recorded.
-        NoPictures: nothing here can draw.
-        SimulationDiverged: the physics did.
+        RunFolderError: the robot's birth is not recorded.
+        NoPictures: this machine cannot render.
+        SimulationDiverged: the physics diverged.
     """
     row = row_of(best, births)
     if row < 0:
@@ -93,11 +92,11 @@ def robot_picture(
     paint = dict(zip(relatives.founders, colours, strict=False))
 
     def colour(gene: int) -> Colour:
-        founder = relatives.paint.get(gene)
-        return NOBODYS if founder is None else paint.get(founder, colours[-1])
+        founder = relatives.founder_of.get(gene)
+        return MUTATED if founder is None else paint.get(founder, colours[-1])
 
-    def painted(who: int) -> Robot:
-        genome = decode_genome(births["genome"][who].as_py())
+    def painted(member: int) -> Robot:
+        genome = decode_genome(births["genome"][member].as_py())
         robot = develop(genome, body_space(settings.space))
         parts = tuple(
             replace(part, parameters=(*part.parameters[:-3], *colour(part.gene)))
@@ -105,14 +104,13 @@ def robot_picture(
         )
         return Robot(parts, robot.brain)
 
-    people = [
-        *relatives.founders,
-        *(one for level in relatives.levels for one in level),
-    ]
-    pictures = {}
-    for who in sorted(set(people)) if has_family else ():
-        with _studio(painted(who), settings, _SMALL) as studio:
-            pictures[who] = _cut(studio.picture(), _CLOSE)
+    members = {*relatives.founders, *chain.from_iterable(relatives.levels)}
+    pictures, names = {}, {}
+    for member in sorted(members) if has_family else ():
+        with _renderer_of(painted(member), settings, _SMALL) as renderer:
+            pictures[member] = _cut(renderer.picture(), _CLOSE)
+        columns = (births["island"], births["birth"])
+        names[member] = BirthId(*(column[member].as_py() for column in columns))
     island = best.birth_island
     own = Identity(replace(origin, island=island), BirthId(island, best.birth), 0)
     gait, times = _gait(painted(row), settings, partial(simulate, identity=own))
@@ -122,17 +120,18 @@ def robot_picture(
         times,
         relatives if has_family else None,
         pictures,
-        {
-            who: BirthId(births["island"][who].as_py(), births["birth"][who].as_py())
-            for who in pictures
-        },
+        names,
         lineage(births, best.experiment, row),
     )
 
 
-def _studio(robot: Robot, settings: Experiment, size: tuple[int, int]) -> Studio:
+def _renderer_of(
+    robot: Robot, settings: Experiment, size: tuple[int, int]
+) -> RobotRenderer:
     space = body_space(settings.space)
-    return Studio(robot, space, settings.simulation, settings.environment, size=size)
+    return RobotRenderer(
+        robot, space, settings.simulation, settings.environment, size=size
+    )
 
 
 def _cut(picture: Picture, share: tuple[float, float, float]) -> Picture:
@@ -145,7 +144,7 @@ def _cut(picture: Picture, share: tuple[float, float, float]) -> Picture:
 def _gait(
     robot: Robot, settings: Experiment, simulate: Simulate
 ) -> tuple[tuple[Picture, ...], tuple[float, ...]]:
-    """Return how a robot moves from the middle of its life on, by a standing camera."""
+    """Return pictures from the middle of a robot's life on, by a fixed camera."""
     poses: list[Floats] = []
     watch: Callable[[Any], None] = lambda data: poses.append(data.qpos.copy())  # noqa: E731
     world = settings.environment
@@ -155,8 +154,8 @@ def _gait(
     first = len(poses) // 2
     chosen = range(first, len(poses), step)[:FRAMES]
     middle = np.mean([poses[at][:3] for at in chosen], axis=0)
-    with _studio(robot, settings, _LARGE) as studio:
+    with _renderer_of(robot, settings, _LARGE) as renderer:
         pictures = tuple(
-            _cut(studio.picture(poses[at], look_at=middle), _WIDE) for at in chosen
+            _cut(renderer.picture(poses[at], look_at=middle), _WIDE) for at in chosen
         )
     return pictures, tuple((at - first) * tick_s for at in chosen)

@@ -1,18 +1,23 @@
-"""Figures of single robots, their ancestors, and of what is held against the thesis."""
+"""Figures of single robots, their ancestors, and the findings of the thesis."""
 
 import numpy as np
 import plotnine as p9
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.comparison.statistics import t_quantile
+from analysis.comparison.statistics import half_interval
 from analysis.figures.forms import BAND_RUNS, NothingToDraw, Tables
-from analysis.figures.style import in_order, label, paper, scales, whole
-from analysis.measures.population_table import Numbers
+from analysis.figures.style import (
+    in_order,
+    integer_breaks,
+    label,
+    scales,
+    theme_of_size,
+)
 
-_MEANT = {"final": "last populations", "born": "all ever judged"}
-_ASIDE = 0.13
-"""From one experiment to the next, by the distance of two numbers of extremities."""
+_POPULATIONS = {"final": "last populations", "born": "all robots ever evaluated"}
+_DODGE = 0.13
+"""Distance of two experiments' points, by that of two numbers of extremities."""
 _VERDICTS = {
     "reproduced": "#0072B2",
     "undecided": "#9A9A9A",
@@ -21,13 +26,13 @@ _VERDICTS = {
 
 
 def variability(tables: Tables) -> p9.ggplot:
-    """Return how far robots' fitness ranges while they live in an arena.
+    """Return the density of the variability of robots' fitness in arenas.
 
     Args:
         tables: ``variability``.
 
     Raises:
-        NothingToDraw: no arena, or no two robots whose ranges differ.
+        NothingToDraw: no run has an arena, or no two robots differ in variability.
 
     Source: Hupkes 2016, figure 6.8.
     """
@@ -36,7 +41,7 @@ def variability(tables: Tables) -> p9.ggplot:
         raise NothingToDraw("no run has an arena")
     rows = rows.filter(pc.field("variability").is_valid())
     if len(set(rows["variability"].to_pylist())) <= 1:
-        raise NothingToDraw("no two robots of an arena that were judged twice")
+        raise NothingToDraw("no two robots of an arena were evaluated twice")
     frame = rows.to_pandas()
     return (
         p9.ggplot(frame, p9.aes("variability"))
@@ -51,45 +56,45 @@ def variability(tables: Tables) -> p9.ggplot:
         + scales(rows["experiment"].to_pylist())
         + p9.coord_cartesian(xlim=(0, 1))
         + p9.labs(
-            x="range of a robot's fitness / range of its contemporaries'", y="density"
+            x="range of a robot's fitness / range of the population's", y="density"
         )
-        + paper(3.6)
+        + theme_of_size(3.6)
     )
 
 
 def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
-    """Return how fit robots are by their extremities, over runs.
+    """Return the mean fitness of robots by their extremities, over runs.
 
     Args:
         tables: ``extremities``.
         by: "count" or "per_part".
 
     Raises:
-        NothingToDraw: nobody was judged.
+        NothingToDraw: no robot was evaluated.
 
     Source: Hupkes 2016, figure 6.14.
     """
     rows = tables["extremities"].filter(pc.field("by") == by)
     if not rows.num_rows:
-        raise NothingToDraw("nobody was judged")
+        raise NothingToDraw("no robot was evaluated")
     keys = ["experiment", "population", "bin"]
     made = rows.group_by(keys).aggregate(
         [("fitness", "mean"), ("fitness", "stddev"), ("fitness", "count")]
     )
     runs = np.asarray(made["fitness_count"], np.int64)
     mean = np.asarray(made["fitness_mean"], np.float64)
-    # Arrow divides by the number of runs, an estimate by one less.
-    error = np.asarray(made["fitness_stddev"]) / np.sqrt(np.maximum(runs - 1, 1))
-    half = error * np.array([t_quantile(max(count - 1, 1)) for count in runs.tolist()])
+    half = half_interval(np.asarray(made["fitness_stddev"], np.float64), runs)
     half[runs < BAND_RUNS] = np.nan
     width = 1.0 if by == "count" else 0.1
     places = np.asarray(made["bin"], np.float64) + (0.0 if by == "count" else 0.05)
     experiments = made["experiment"].to_pylist()
-    places += _ASIDE * width * _aside(experiments)
-    titles = [_MEANT[name] for name in made["population"].to_pylist()]
+    names = in_order(experiments)
+    # Points of different experiments must not hide each other.
+    spots = [names.index(name) - (len(names) - 1) / 2 for name in experiments]
+    places += _DODGE * width * np.array(spots)
     panel = pa.DictionaryArray.from_arrays(
-        pc.index_in(pa.array(titles), pa.array(list(_MEANT.values()))),
-        list(_MEANT.values()),
+        pc.index_in(made["population"].combine_chunks(), pa.array(list(_POPULATIONS))),
+        list(_POPULATIONS.values()),
     )
     shown = pa.table(
         {
@@ -117,35 +122,27 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
         + scales(experiments, is_filled=False)
         + p9.coord_cartesian(ylim=(0, 1.3 * float(mean.max()) or 1.0))
         + p9.labs(x=axis, y="mean fitness [m/s]")
-        + paper(3.6)
+        + theme_of_size(3.6)
     )
 
 
-def _aside(experiments: list[str]) -> Numbers:
-    """Return how far from the middle each row stands, so that none hides another."""
-    names = in_order(experiments)
-    spots = [names.index(name) - (len(names) - 1) / 2 for name in experiments]
-    return np.array(spots, np.float64)
-
-
 def lineages(tables: Tables) -> p9.ggplot:
-    """Return all ancestors of the best robots, by when they were born and their rank.
+    """Return all ancestors of the best robots, by number of birth and rank.
 
     Args:
         tables: ``lineage``, as ``analysis.figures.family_tree.LINEAGE``.
 
     Raises:
-        NothingToDraw: nobody who lives has parents.
+        NothingToDraw: no best robot has parents.
 
     Source: Hupkes 2016, 6.17 and on, and the rank of eq. 6.1.
     """
     rows = tables.get("lineage")
     if not rows or not any(rows["parents"].to_pylist()):
-        raise NothingToDraw("nobody who lives at the end has parents")
+        raise NothingToDraw("no best robot has parents")
     lines: list[dict[str, object]] = []
-    people = rows.to_pylist()
-    known = {(row["experiment"], row["order"]): row for row in people}
-    for row in people:
+    known = {(row["experiment"], row["order"]): row for row in rows.to_pylist()}
+    for row in known.values():
         for parent in row["parents"]:
             above = known[row["experiment"], parent]
             ends = {"to": above["number"], "to_rank": above["rank"]}
@@ -166,14 +163,14 @@ def lineages(tables: Tables) -> p9.ggplot:
             show_legend=len(names) > 1,
         )
         + scales(rows["experiment"].to_pylist(), is_filled=False)
-        + p9.scale_y_continuous(breaks=whole)
+        + p9.scale_y_continuous(breaks=integer_breaks)
         + p9.labs(x="number of birth", y="rank")
-        + paper(4.2)
+        + theme_of_size(4.2)
     )
 
 
 def effects(tables: Tables) -> p9.ggplot:
-    """Return the effects that the thesis's findings are judged by.
+    """Return the effects by which the thesis's findings are tested.
 
     Args:
         tables: ``findings``.
@@ -183,7 +180,7 @@ def effects(tables: Tables) -> p9.ggplot:
     """
     rows = tables["findings"].filter(pc.field("effect").is_valid())
     if not rows.num_rows:
-        raise NothingToDraw("no two experiments of a finding have two finished runs")
+        raise NothingToDraw("no finding has two finished runs of each experiment")
     claims = [
         f"{row['figure']}  {row['claim']}  ({row['expected']})"
         for row in rows.to_pylist()
@@ -198,7 +195,7 @@ def effects(tables: Tables) -> p9.ggplot:
         + p9.scale_colour_manual(_VERDICTS, name="")
         + p9.coord_flip(ylim=(-1, 1))
         + p9.labs(x="", y="effect")
-        + paper(1.2 + 0.16 * len(claims), 9.0)
+        + theme_of_size(1.2 + 0.16 * len(claims), 9.0)
         + p9.theme(axis_text_y=p9.element_text(size=8))
     )
     if not sure.num_rows:

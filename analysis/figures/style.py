@@ -1,6 +1,7 @@
-"""How all figures look: one theme, one colour per experiment, one way into files."""
+"""Style of all figures: theme, colour and label of each experiment, file formats."""
 
 from collections.abc import Iterable
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +24,9 @@ _THESIS = {
     "no-selection": "#CC79A7",
 }
 OTHERS = ("#D55E00", "#56B4E9", "#8C6D31", "#5254A3", "#000000", "#B2DF8A", "#E7298A")
-"""Colours of what has none of its own."""
+"""Colours of experiments that are not in the thesis."""
 _INK, _FAINT = "#333333", "#E6E6E6"
-# Numbers of glyphs, not outlines, so that text in a PDF stays text.
+# TrueType fonts instead of outlines, so that text in a PDF stays text.
 _SETTINGS: dict[Any, Any] = {"pdf.fonttype": 42, "savefig.facecolor": "white"}
 PICTURE_ENDING = ".png"
 _ENDINGS = (PICTURE_ENDING, ".pdf")
@@ -33,7 +34,7 @@ _BROAD = 12
 
 
 def in_order(experiments: Iterable[str]) -> list[str]:
-    """Return experiments, each once: the thesis's first, in its order."""
+    """Return each experiment once, those of the thesis first, in its order."""
     names = set(experiments)
     known = [name for name in _THESIS if name in names]
     return known + sorted(names.difference(_THESIS))
@@ -42,60 +43,58 @@ def in_order(experiments: Iterable[str]) -> list[str]:
 def colours(experiments: Iterable[str]) -> dict[str, str]:
     """Return each experiment's colour, in order.
 
-    Those of the thesis have the same in every figure of every report.
+    Experiments of the thesis have the same colour in every figure of every report.
 
-    Source: Okabe and Ito, *Color universal design*, 2008: told apart by the
+    Source: Okabe and Ito, *Color universal design*, 2008: distinguishable for the
     colour-blind.
     """
-    names = in_order(experiments)
-    others = [name for name in names if name not in _THESIS]
-    spare = {name: OTHERS[i % len(OTHERS)] for i, name in enumerate(others)}
-    return {name: _THESIS.get(name) or spare[name] for name in names}
+    spare = cycle(OTHERS)
+    return {name: _THESIS.get(name) or next(spare) for name in in_order(experiments)}
 
 
 def label(experiment: str) -> str:
-    """Return an experiment's name as figures say it."""
+    """Return the label of an experiment in figures."""
     name, mark, number = experiment.partition(MARK)
     if name.startswith("scenario") and name[8:].isdigit():
-        said = f"scenario {name[8:]}"
+        text = f"scenario {name[8:]}"
     else:
-        said = name.replace("-", " ")
-    return f"{said} {mark}{number}" if mark else said
+        text = name.replace("-", " ")
+    return f"{text} {mark}{number}" if mark else text
 
 
-def broken(experiment: str) -> str:
-    """Return the same for the foot of a column: on two lines if it is long."""
-    said = label(experiment)
-    if MARK in said:
-        return said.replace(f" {MARK}", f"\n{MARK}")
-    return said if len(said) < _BROAD else said.replace(" ", "\n", 1)
+def two_line_label(experiment: str) -> str:
+    """Return the label of an experiment, on two lines if it is long."""
+    text = label(experiment)
+    if MARK in text:
+        return text.replace(f" {MARK}", f"\n{MARK}")
+    return text if len(text) < _BROAD else text.replace(" ", "\n", 1)
 
 
 def scales(experiments: Iterable[str], *, is_filled: bool = True) -> list[Any]:
-    """Return the scales that give experiments their colours, names and order.
+    """Return the colour scales of experiments, with labels and order.
 
     Args:
-        experiments: that are shown.
-        is_filled: whether anything has their colour inside.
+        experiments: experiments of the figure.
+        is_filled: add a scale of fill colours.
     """
     chosen = colours(experiments)
-    said = {
+    settings = {
         "limits": list(chosen),
         "labels": [label(name) for name in chosen],
         "values": list(chosen.values()),
         "name": "",
     }
-    lines = [p9.scale_colour_manual(**said)]
-    return [*lines, p9.scale_fill_manual(**said)] if is_filled else lines
+    lines = [p9.scale_colour_manual(**settings)]
+    return [*lines, p9.scale_fill_manual(**settings)] if is_filled else lines
 
 
-def whole(limits: tuple[float, float]) -> list[float]:
-    """Return where a scale has its numbers if only whole ones mean something."""
+def integer_breaks(limits: tuple[float, float]) -> list[float]:
+    """Return the breaks of a scale of integers."""
     return list(MaxNLocator(nbins=6, integer=True).tick_values(*limits))
 
 
-def paper(height_in: float, width_in: float = WIDTH_IN) -> Any:  # noqa: ANN401 - untyped
-    """Return the theme, for a figure of this size."""
+def theme_of_size(height_in: float, width_in: float = WIDTH_IN) -> Any:  # noqa: ANN401 - untyped
+    """Return the theme for a figure of this size."""
     return p9.theme_bw(base_size=10) + p9.theme(
         figure_size=(width_in, height_in),
         text=p9.element_text(colour=_INK),
@@ -115,16 +114,16 @@ def paper(height_in: float, width_in: float = WIDTH_IN) -> Any:  # noqa: ANN401 
 
 
 def save(figure: p9.ggplot | Figure, stem: Path) -> None:
-    """Write a figure as PNG and PDF; draw it once.
+    """Write a figure as PNG and PDF.
 
     Args:
-        figure: of plotnine, or drawn by matplotlib already.
+        figure: a plotnine or matplotlib figure.
         stem: path without an ending.
     """
     drawn = figure.draw() if isinstance(figure, p9.ggplot) else figure
     with rc_context(_SETTINGS):
         for ending in _ENDINGS:
-            # No date: the same tables give the same bytes.
+            # Without a date, the same tables give the same bytes.
             dated = {"CreationDate": None} if ending == ".pdf" else {}
             path = stem.with_name(stem.name + ending)
             drawn.savefig(path, dpi=DPI, metadata=dated, bbox_inches="tight")

@@ -1,13 +1,13 @@
-"""Who descends from whom."""
+"""Ancestry of individuals, and the descendants of migrants."""
 
 import numpy as np
 import pyarrow as pa
 
+from analysis.measures.outputs import run_schema
 from analysis.measures.population_table import (
     Numbers,
     PopulationTable,
-    Truths,
-    names,
+    individual_ids,
     rows_of,
 )
 from analysis.measures.trees import Integers
@@ -18,17 +18,16 @@ def parents_of(births: pa.Table) -> list[list[int]]:
     """Return the births rows of each individual's parents.
 
     Args:
-        births: of one run: ``island``, ``birth``, ``parents``. Of several islands a
-            parent's row may stand behind its child's.
+        births: births of one run: ``island``, ``birth``, ``parents``. In a run of
+            several islands a parent's row may come after its child's.
 
     Raises:
-        RunFolderError: a parent whose birth is not recorded.
+        RunFolderError: a parent's birth is not recorded.
     """
     lists = births["parents"].combine_chunks()
-    named = pa.table(
-        {name: lists.flatten().field(name) for name in ("island", "birth")}
-    )
-    found = rows_of(names(named, "island", "birth"), births)
+    parents = lists.flatten()
+    named = pa.table({name: parents.field(name) for name in ("island", "birth")})
+    found = rows_of(individual_ids(named, "island"), births)
     ends = np.cumsum(lists.value_lengths().to_numpy())
     child = np.repeat(np.arange(len(lists)), np.diff(ends, prepend=0))
     orphans = child[found < 0]
@@ -40,24 +39,24 @@ def parents_of(births: pa.Table) -> list[list[int]]:
 
 
 def parents_first(parents: list[list[int]]) -> list[int]:
-    """Return all births rows in an order in which parents stand before children.
+    """Return all births rows, sorted so that parents come before their children.
 
     Raises:
-        RunFolderError: somebody who is an ancestor of itself.
+        RunFolderError: an individual is its own ancestor.
     """
     children: list[list[int]] = [[] for _ in parents]
-    waits_for = [len(couple) for couple in parents]
+    missing = [len(couple) for couple in parents]
     for child, couple in enumerate(parents):
         for parent in couple:
             children[parent].append(child)
-    order = [row for row, count in enumerate(waits_for) if not count]
-    for row in order:  # grows while it is walked
+    order = [row for row, count in enumerate(missing) if not count]
+    for row in order:  # grows during the loop
         for child in children[row]:
-            waits_for[child] -= 1
-            if not waits_for[child]:
+            missing[child] -= 1
+            if not missing[child]:
                 order.append(child)
     if len(order) < len(parents):
-        own = next(row for row, count in enumerate(waits_for) if count)
+        own = next(row for row, count in enumerate(missing) if count)
         raise RunFolderError(f"births: row {own} descends from itself")
     return order
 
@@ -69,8 +68,8 @@ def ancestors(parents: list[list[int]]) -> list[int]:
         parents: as ``parents_of`` returns them.
 
     Returns:
-        One number per individual: bit r is set if births row r is an ancestor. Nobody
-        is an ancestor of itself.
+        One number per individual: bit r is set if births row r is an ancestor. An
+        individual is not its own ancestor.
     """
     found = [0] * len(parents)
     for row in parents_first(parents):
@@ -79,63 +78,86 @@ def ancestors(parents: list[list[int]]) -> list[int]:
     return found
 
 
-def unique_ancestors(population_table: PopulationTable, lines: list[int]) -> Integers:
-    """Return how many different ancestors the judged of each population have, (G,).
+def unique_ancestors(table: PopulationTable, lines: list[int]) -> Integers:
+    """Return the number of different ancestors of each population, (G,).
+
+    Only members whose fitness counts are considered.
 
     Args:
-        population_table: of a run.
+        table: populations of a run.
         lines: as ``ancestors`` returns them.
 
     Source: Hupkes 2016, table 6.2 and figure 6.4.
     """
-    is_judged, members = (
-        population_table.is_judged.tolist(),
-        population_table.members.tolist(),
-    )
-    counts = []
-    for start, end in zip(
-        population_table.starts[:-1], population_table.starts[1:], strict=True
-    ):
-        union = 0
-        for index in range(start, end):
-            if is_judged[index]:
-                union |= lines[members[index]]
-        counts.append(union.bit_count())
-    return np.array(counts, np.int64)
-
-
-def origins(births: pa.Table, parents: list[list[int]]) -> list[int]:
-    """Return on which islands an individual and its ancestors were born, as bits."""
-    found = [1 << home for home in births["island"].to_pylist()]
-    for row in parents_first(parents):
-        for parent in parents[row]:
-            found[row] |= found[parent]
-    return found
+    unions = [0] * len(table)
+    counted = table.is_judged
+    pairs = zip(table.group_of[counted], table.members[counted], strict=True)
+    for group, member in pairs:
+        unions[group] |= lines[member]
+    return np.array([union.bit_count() for union in unions], np.int64)
 
 
 def foreign_share(
-    population_table: PopulationTable, births: pa.Table, parents: list[list[int]]
+    table: PopulationTable, births: pa.Table, parents: list[list[int]]
 ) -> Numbers:
-    """Return the share of the living that is not of its island's own line, (G,).
+    """Return the share of each population with an origin on another island, (G,).
 
-    It was born elsewhere, or has an ancestor that was. NaN in a run of one island.
+    An individual counts if it was born on another island or has an ancestor that was.
+    NaN in a run of one island.
 
-    Source: own; how far migrants' descendants spread.
+    Source: own; spread of the migrants' descendants.
     """
-    if len(np.unique(population_table.islands)) <= 1:
-        return np.full(len(population_table), np.nan)
-    lines = origins(births, parents)
-    here = population_table.islands[population_table.group_of].tolist()
-    pairs = zip(population_table.members.tolist(), here, strict=True)
-    is_foreign = [lines[member] != 1 << island for member, island in pairs]
-    return population_table.mean(np.array(is_foreign, np.float64))
+    if len(np.unique(table.islands)) <= 1:
+        return np.full(len(table), np.nan)
+    # Islands on which an individual and its ancestors were born, as bits.
+    origins = [1 << home for home in births["island"].to_pylist()]
+    for row in parents_first(parents):
+        for parent in parents[row]:
+            origins[row] |= origins[parent]
+    here = table.islands[table.group_of].tolist()
+    pairs = zip(table.members.tolist(), here, strict=True)
+    is_foreign = [origins[member] != 1 << island for member, island in pairs]
+    return table.mean(np.array(is_foreign, np.float64))
 
 
-def descends(lines: list[int], ancestor: int) -> Truths:
-    """Return who descends from an individual, (B,); not itself.
+def migrants(
+    migrations: pa.Table, births: pa.Table, table: PopulationTable, lines: list[int]
+) -> pa.Table:
+    """Return the descendants of each migrant.
 
     Args:
+        migrations: migrations of one run: ``epoch``, ``birth_island`` and ``birth`` (id
+            of the migrant), ``island`` (origin), ``to``, ``fitness`` [m/s].
+        births: births of the same run: ``island``, ``birth``.
+        table: populations of the same run.
         lines: as ``ancestors`` returns them.
-        ancestor: its births row.
+
+    Returns:
+        One row per migration, in order: its columns, ``descendants`` (born on the
+        island ``to``), ``living`` (members of that island's last population, the
+        migrant included) and ``reached`` (islands whose last population contains the
+        migrant or a descendant).
+
+    Source: own.
     """
-    return np.array([line >> ancestor & 1 for line in lines], np.bool_)
+    is_last = table.is_last[table.group_of]
+    members = table.members[is_last]
+    where = table.islands[table.group_of][is_last]
+    homes = np.asarray(births["island"], np.int64)
+    found = []
+    for row, migrant in zip(
+        rows_of(individual_ids(migrations), births).tolist(),
+        migrations.to_pylist(),
+        strict=True,
+    ):
+        line = np.array([row >= 0 and up >> row & 1 for up in lines], np.bool_)
+        is_own = line[members] | (members == row)
+        found.append(
+            migrant
+            | {
+                "descendants": int((line & (homes == migrant["to"])).sum()),
+                "living": int((is_own & (where == migrant["to"])).sum()),
+                "reached": len(np.unique(where[is_own])),
+            }
+        )
+    return pa.Table.from_pylist(found, run_schema("migrants"))

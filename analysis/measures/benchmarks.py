@@ -1,4 +1,4 @@
-"""Reads what benchmarks of the arena left: `revolve bench arena|spider --out FILE`."""
+"""Reads the files of `revolve bench arena|spider --out FILE`."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,19 +16,19 @@ _COLUMNS = {
 }
 _ENDING = ".parquet"
 _RUNS = "experiment="
-"""How folders with tables of runs start."""
+"""Prefix of folders that contain tables of runs."""
 
 
 def read_benchmarks(roots: Iterable[Path]) -> tuple[pa.Table, list[LeftOut]]:
-    """Return the timings of arenas in some files or below some folders.
+    """Return the benchmarks in some files and folders.
 
     Args:
-        roots: files or folders; tables of runs and other files are passed over, but
-            not if they are named as a root.
+        roots: files or folders. Files below a folder that are no benchmarks are
+            ignored; a file that is given itself is reported.
 
     Returns:
         One row per repetition: ``benchmark`` ("arena" or "spider"), ``population``,
-        ``factor`` (simulated over wall time); and files that cannot be read.
+        ``factor`` (simulated by wall-clock time); and files that could not be read.
     """
     pieces = [pa.schema(list(_COLUMNS.items())).empty_table()]
     left_out = []
@@ -39,14 +39,14 @@ def read_benchmarks(roots: Iterable[Path]) -> tuple[pa.Table, list[LeftOut]]:
                 table = pq.read_table(path, columns=list(_COLUMNS))
                 pieces.append(table.replace_schema_metadata().cast(pieces[0].schema))
             elif is_named:
-                left_out.append(LeftOut(str(path), "benchmark", "is none"))
+                left_out.append(LeftOut(str(path), "benchmark", "not a benchmark file"))
         except (OSError, pa.ArrowException, ValueError) as error:
             left_out.append(LeftOut(str(path), "benchmark", str(error)))
     return pa.concat_tables(pieces), left_out
 
 
 def _files(roots: Iterable[Path]) -> list[tuple[Path, bool]]:
-    """Return the files that may be benchmarks, each once, and which are roots."""
+    """Return the files that may be benchmarks, and whether each is a root."""
     found: dict[Path, bool] = {}
     for root in roots:
         if root.is_file():

@@ -1,4 +1,4 @@
-"""How large robots are, part by part."""
+"""Sizes of robots."""
 
 import numpy as np
 import pyarrow as pa
@@ -8,23 +8,23 @@ from analysis.measures.outputs import BODY, PER_PART
 from analysis.measures.population_table import Numbers
 
 TOUCH = ("TouchSensor",)
-"""Part types that feel touch."""
+"""Part types that are touch sensors."""
 
 
 def body_sizes(births: pa.Table, touch: tuple[str, ...] = TOUCH) -> dict[str, Numbers]:
-    """Return the sizes of every individual, absolute and by its number of parts.
+    """Return the sizes of every individual, absolute and per part.
 
     Args:
-        births: of one run: ``parts``, ``joints``, ``motors``, ``extremities``,
+        births: births of one run: ``parts``, ``joints``, ``motors``, ``extremities``,
             ``hidden``, ``connections``, ``body``.
-        touch: names of the part types that feel touch.
+        touch: names of the part types that are touch sensors.
 
     Returns:
-        Arrays (B,) by the names of ``outputs.BODY`` and ``PER_PART``. A
-        joint with a motor is active, any other passive.
+        Arrays (B,) by the names of ``outputs.BODY`` and ``PER_PART``. Joints with a
+        motor are active, all others passive.
 
     Source: Hupkes 2016, figures 6.9 to 6.16. Touch sensors are counted as parts; the
-    axis of figure 6.15 seems to count their inputs, two of each.
+    axis of figure 6.15 seems to count their inputs, two per sensor.
     """
     found = {
         name: np.asarray(births[name], np.float64)
@@ -35,8 +35,8 @@ def body_sizes(births: pa.Table, touch: tuple[str, ...] = TOUCH) -> dict[str, Nu
     lists = births["body"].combine_chunks()
     owners = np.asarray(pc.list_parent_indices(lists), np.int64)
     kinds = lists.flatten().field("kind")
-    feels = np.asarray(pc.is_in(kinds, pa.array(touch, pa.string())), np.bool_)
-    count = np.bincount(owners[feels], minlength=births.num_rows)
+    is_touch = np.asarray(pc.is_in(kinds, pa.array(touch, pa.string())), np.bool_)
+    count = np.bincount(owners[is_touch], minlength=births.num_rows)
     found["touch_sensors"] = count.astype(np.float64)
     for name in PER_PART:
         found[name] = found[name.removesuffix("_per_part")] / found["parts"]
@@ -44,20 +44,20 @@ def body_sizes(births: pa.Table, touch: tuple[str, ...] = TOUCH) -> dict[str, Nu
 
 
 def extremity_bins(robots: pa.Table) -> pa.Table:
-    """Return how fit robots are by how many extremities they have.
+    """Return the mean fitness of robots by their extremities.
 
     Args:
         robots: ``is_last``, ``parts``, ``extremities``, ``fitness`` [m/s].
 
     Returns:
         One row per ``population`` ("final" or "born"), ``by`` ("count", or "per_part"
-        in bins of 0.1) and ``bin`` (the count, or the bin's lower end): ``robots`` and
-        ``fitness``, their mean [m/s].
+        in bins of 0.1) and ``bin`` (the count, or the bin's lower end): number of
+        ``robots`` and their mean ``fitness`` [m/s].
 
     Source: Hupkes 2016, figure 6.14.
     """
     count = np.asarray(robots["extremities"], np.int64)
-    # Whole numbers, so that 3 of 10 falls into the bin that starts with 0.3.
+    # Integers, so that 3 of 10 is in the bin that starts at 0.3.
     tenths = count * 10 // np.maximum(np.asarray(robots["parts"], np.int64), 1)
     born = pa.table(
         {

@@ -1,10 +1,10 @@
-"""How far apart two bodies are: tree edit distance, compiled.
+"""Distance of two bodies: tree edit distance, compiled by Numba.
 
-Inserting or deleting a part costs 1; turning one into another costs 1 if their
-types differ and 1 if their slots differ, the latter only where both have a parent.
-As only a core has none, and no other part is of its type, this is a metric.
+Inserting or deleting a part costs 1. Replacing a part costs 1 if the types differ and 1
+if the slots differ, the latter only if both parts have a parent. This is a metric,
+because only cores have no parent and no other part is a core.
 
-The loops are compiled when first called, and kept on disk from then on.
+The functions are compiled at the first call and cached on disk.
 """
 
 import numba
@@ -18,8 +18,8 @@ def tree_distances(trees: Trees, first: Integers, second: Integers) -> Integers:
 
     Args:
         trees: as ``analysis.measures.trees.encode`` returns them.
-        first: (P,) numbers of trees.
-        second: (P,) the others of the pairs.
+        first: (P,) index of the first tree of each pair.
+        second: (P,) index of the second.
 
     Returns:
         (P,) least total cost of edits that turn one tree into the other; >= 0.
@@ -28,7 +28,7 @@ def tree_distances(trees: Trees, first: Integers, second: Integers) -> Integers:
     between trees and related problems*, SIAM J. Comput. 18(6), 1989; costs: Hupkes
     2016, section 6.2.1.
     """
-    # Small numbers, few bytes: a pair's arrays stay in the nearest cache.
+    # Small integers, so that the arrays of a pair stay in the L1 cache.
     kinds, slots, lefts = (
         np.ascontiguousarray(column, np.int32)
         for column in (trees.kinds, trees.slots, trees.lefts)
@@ -70,9 +70,9 @@ def _distances(starts, nodes, pairs):  # type: ignore[no-untyped-def] # noqa: AN
 
 @numba.njit(cache=True, nogil=True)
 def _fill(costs, a, b, subtrees, forests):  # type: ignore[no-untyped-def] # noqa: ANN001, ANN202
-    """Fill in the distances of the subtrees that end with two key roots.
+    """Compute the distances of the subtrees that end with two key roots.
 
-    Unsigned indices spare the loop a test for counting from the end.
+    Unsigned indices save the loop a check for negative indices.
     """
     (a_lefts, i), (b_lefts, j) = a, b
     one = np.uint32(1)

@@ -1,8 +1,8 @@
-"""Tells apart experiments of one name whose settings differ.
+"""Distinct names for experiments of the same name with different settings.
 
-Two experiments that bear one name are two, and a mean over both would be of neither.
-How many births were planned makes no difference: what is compared is compared where
-all have come to.
+A mean over runs with different settings would describe neither experiment. The number
+of planned births is not compared: experiments are compared at births that all runs
+reach.
 """
 
 import json
@@ -17,21 +17,21 @@ from schema.errors import ExperimentError
 from schema.experiment.file import experiment_from_text, experiment_text
 
 MARK = "~"
-"""Between a name and the number of those who also bear it."""
+"""Separator of a name and a number that makes it distinct."""
 _NOT_SETTINGS = frozenset({"name", "births"})
-_SAID = 3
-"""Differences that are told one by one."""
+_LISTED = 3
+"""Differences that are listed; others are only counted."""
 
 
-def told_apart(runs: Sequence[Run]) -> list[Run]:
-    """Return runs in their order, experiments of one name and other settings renamed.
+def with_distinct_names(runs: Sequence[Run]) -> list[Run]:
+    """Return runs in their order, with distinct names for different settings.
 
-    The settings that most runs of a name have (of several, those of the first run)
-    keep it; the next become ``name~2``, or the next that no experiment has, and say
-    in ``differs`` what sets them apart.
+    The settings that most runs of a name have (the first of equally many) keep the
+    name. The next settings become ``name~2``, or the next free number, and ``differs``
+    lists how they differ.
 
     Args:
-        runs: of any experiments.
+        runs: runs of any experiments.
     """
     groups: dict[str, dict[str, list[Run]]] = {}
     for run in runs:
@@ -42,22 +42,22 @@ def told_apart(runs: Sequence[Run]) -> list[Run]:
         first, *others = sorted(by_settings.values(), key=len, reverse=True)
         free = (each for n in count(2) if (each := f"{name}{MARK}{n}") not in groups)
         for experiment, group in zip(free, others, strict=False):
-            differs = _told(group[0].document, first[0].document)
+            differs = _compared(group[0].document, first[0].document)
             for run in group:
                 renamed[id(run)] = replace(run, experiment=experiment, differs=differs)
     return [renamed.get(id(run), run) for run in runs]
 
 
 def _settings(document: str) -> dict[str, Any]:
-    """Return a document's settings, those of an older one with today's defaults."""
-    with suppress(ExperimentError):  # else it is compared as it stands
+    """Return a document's settings, with current defaults for an older document."""
+    with suppress(ExperimentError):  # otherwise it is compared unchanged
         document = experiment_text(experiment_from_text(document))
     entries: dict[str, Any] = json.loads(document)
     return _without(entries)
 
 
 def _without(entries: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a section without what is no setting, and its islands by their place."""
+    """Return a section without the keys that are no settings, and islands by index."""
     found = {key: value for key, value in entries.items() if key not in _NOT_SETTINGS}
     if "islands" in found:
         islands = enumerate(found["islands"])
@@ -65,11 +65,11 @@ def _without(entries: Mapping[str, Any]) -> dict[str, Any]:
     return found
 
 
-def _told(mine: str, others: str) -> str:
-    """Return how an experiment differs from another of its name, in words."""
+def _compared(mine: str, others: str) -> str:
+    """Return the differences of two documents as text."""
     found = list(_differences(_settings(mine), _settings(others), ""))
-    more = [f"and {len(found) - _SAID} more"] if len(found) > _SAID else []
-    return ", ".join(found[:_SAID] + more)
+    more = [f"and {len(found) - _LISTED} more"] if len(found) > _LISTED else []
+    return ", ".join(found[:_LISTED] + more)
 
 
 def _differences(mine: object, other: object, where: str) -> Iterator[str]:
@@ -78,10 +78,10 @@ def _differences(mine: object, other: object, where: str) -> Iterator[str]:
             place = f"{where}.{key}" if where else key
             yield from _differences(mine.get(key), other.get(key), place)
     elif mine != other:
-        yield f"{where}: {_said(mine)} instead of {_said(other)}"
+        yield f"{where}: {_text(mine)} instead of {_text(other)}"
 
 
-def _said(value: object) -> str:
+def _text(value: object) -> str:
     if value is None:
         return "none"
     return "settings" if isinstance(value, dict) else json.dumps(value)

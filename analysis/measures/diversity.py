@@ -1,4 +1,4 @@
-"""How different the bodies of a population are from each other."""
+"""Diversity: mean distance of the bodies of a population."""
 
 from collections.abc import Iterator
 
@@ -6,55 +6,56 @@ import numpy as np
 import pyarrow as pa
 
 from analysis.measures.distance import tree_distances
+from analysis.measures.outputs import run_schema
 from analysis.measures.population_table import Numbers, PopulationTable
 from analysis.measures.trees import Integers, Trees
 
 _BLOCK = 2_000_000
-"""Pairs that are held at a time."""
+"""Pairs that are held in memory at a time."""
 
 
-def diversity(population_table: PopulationTable, trees: Trees) -> Numbers:
+def diversity(table: PopulationTable, trees: Trees) -> Numbers:
     """Return the mean tree edit distance of the pairs of each population, (G,).
 
-    All the living count, mature or not, each unordered pair once; brains do not.
-    NaN where less than two live.
+    All members count, mature or not, each unordered pair once. Brains are ignored.
+    NaN for populations of less than two members.
 
     Args:
-        population_table: of a run.
-        trees: of the bodies of the run's births table, row by row.
+        table: populations of a run.
+        trees: bodies of the run's births table, row by row.
 
     Source: Hupkes 2016, section 6.2.1 and figure 6.5.
     """
-    found = np.full(len(population_table), np.nan)
-    for groups, first, second in _pairs(population_table, trees):
+    found = np.full(len(table), np.nan)
+    for groups, first, second in _pairs(table, trees):
         distances = distances_of(trees, first.ravel(), second.ravel())
         found[groups] = distances.reshape(first.shape).mean(axis=1)
     return found
 
 
 def _pairs(
-    population_table: PopulationTable, trees: Trees
+    table: PopulationTable, trees: Trees
 ) -> Iterator[tuple[Integers, Integers, Integers]]:
     """Yield populations of one size, and the trees of all their pairs, (g, pairs)."""
-    sizes = population_table.sizes
+    sizes = table.sizes
     for size in np.unique(sizes[sizes > 1]).tolist():
         first, second = np.triu_indices(size, 1)
         step = max(1, _BLOCK // len(first))
         every = np.flatnonzero(sizes == size)
         for begin in range(0, len(every), step):
             groups = every[begin : begin + step]
-            rows = population_table.starts[groups][:, None] + np.arange(size)
-            living = trees.tree_of[population_table.members[rows]]
+            rows = table.starts[groups][:, None] + np.arange(size)
+            living = trees.tree_of[table.members[rows]]
             yield groups, living[:, first], living[:, second]
 
 
 def distances_of(trees: Trees, first: Integers, second: Integers) -> Integers:
-    """Return the distances of pairs of trees, each different pair computed once, (P,).
+    """Return the distances of pairs of trees, (P,); equal pairs are computed once.
 
     Args:
-        trees: that the numbers stand for.
-        first: (P,) numbers of trees.
-        second: (P,) the others.
+        trees: all trees.
+        first: (P,) index of the first tree of each pair.
+        second: (P,) index of the second.
     """
     count = len(trees.starts)
     keys = np.minimum(first, second) * count + np.maximum(first, second)
@@ -63,35 +64,29 @@ def distances_of(trees: Trees, first: Integers, second: Integers) -> Integers:
     return found
 
 
-def mean_distances(
-    population_table: PopulationTable, trees: Trees, step: int = 15
-) -> pa.Table:
-    """Return how different the bodies of islands are, within and between them.
+def mean_distances(table: PopulationTable, trees: Trees, step: int = 15) -> pa.Table:
+    """Return the mean distances of bodies within and between islands.
 
     Args:
-        population_table: of a run.
-        trees: of the bodies of its births table, row by row.
+        table: populations of a run.
+        trees: bodies of the run's births table, row by row.
         step: births on each island from one row to the next.
 
     Returns:
-        One row per ``births``, ascending: ``islands`` that have a population by then
-        (each one's latest counts), ``within`` (mean of their diversities) and
-        ``between`` (mean distance of all pairs of different islands); null where
-        there is none.
+        One row per ``births``, ascending: ``islands`` that have a population so far
+        (the latest of each is used), ``within`` (mean of their diversities) and
+        ``between`` (mean distance of all pairs on different islands); null if there
+        are no pairs.
 
     Source: own, after Hupkes 2016, section 6.2.1.
     """
-    within = diversity(population_table, trees)
+    within = diversity(table, trees)
     rows = []
-    last = int(population_table.births.max(initial=0))
+    last = int(table.births.max(initial=0))
     for births in range(step, last + 1, step):
-        latest = _latest(population_table, births)
+        latest = _latest(table, births)
         living = [
-            trees.tree_of[
-                population_table.members[
-                    population_table.starts[g] : population_table.starts[g + 1]
-                ]
-            ]
+            trees.tree_of[table.members[table.starts[g] : table.starts[g + 1]]]
             for g in latest
         ]
         grids = [
@@ -115,15 +110,13 @@ def mean_distances(
                 "between": between,
             }
         )
-    kinds = [pa.int64(), pa.int64(), pa.float64(), pa.float64()]
-    names = ["births", "islands", "within", "between"]
-    return pa.Table.from_pylist(rows, pa.schema(list(zip(names, kinds, strict=True))))
+    return pa.Table.from_pylist(rows, run_schema("between"))
 
 
-def _latest(population_table: PopulationTable, births: int) -> Integers:
-    """Return each island's last population at or before so many births."""
-    before = np.flatnonzero(population_table.births <= births)
-    islands = population_table.islands[before]
+def _latest(table: PopulationTable, births: int) -> Integers:
+    """Return each island's last population at or before a number of births."""
+    before = np.flatnonzero(table.births <= births)
+    islands = table.islands[before]
     is_last = np.append(islands[1:] != islands[:-1], True)[: len(islands)]
     latest: Integers = before[is_last]
     return latest

@@ -1,6 +1,6 @@
-"""Reads what runs left behind: finished, unfinished, damaged or of another version.
+"""Reads run folders: finished, unfinished, damaged or of another version.
 
-What can be read is read. What cannot is named, with its folder and the reason.
+Everything readable is read; everything else is reported with its folder and the reason.
 """
 
 import json
@@ -19,7 +19,7 @@ from schema.tables.columns import TABLES, VERSION
 from schema.tables.files import FINISHED, has_rows, read_table
 
 TABLE = "table "
-"""How what was left out starts if it is a table, before its name."""
+"""Prefix of the name of a table that was left out."""
 
 _DETAILS = "run.json"
 _STATE = "state"
@@ -30,7 +30,7 @@ _NEEDED = (
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """What could not be read or measured: whose, what, why."""
+    """Something that could not be read, measured or drawn."""
 
     folder: str
     what: str
@@ -38,8 +38,8 @@ class LeftOut:
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
-    """What an analysis asks of an island's settings."""
+class IslandSettings:
+    """Settings of an island that an analysis needs."""
 
     births: int
     is_online: bool
@@ -48,17 +48,17 @@ class Settings:
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A run that was found.
+    """A run folder.
 
     Attributes:
-        folder: where.
-        experiment: its name.
-        number: of the repeat.
-        seed: of the run.
-        state: finished, stopped or running, which may have died since.
-        document: the experiment, as JSON.
+        folder: path of the folder.
+        experiment: name of the experiment.
+        number: number of the repeat.
+        seed: seed of the run.
+        state: finished, stopped or running (also if it was killed).
+        document: the experiment as JSON.
         islands: settings of each island.
-        differs: how, if the name is not its own: others have it, with other settings.
+        differs: settings that differ from other runs of the same experiment name.
     """
 
     folder: Path
@@ -67,25 +67,24 @@ class Run:
     seed: int
     state: str
     document: str
-    islands: tuple[Settings, ...]
+    islands: tuple[IslandSettings, ...]
     differs: str = ""
 
     @property
     def is_finished(self) -> bool:
-        """Whether all its births are there."""
+        """Whether the run is finished."""
         return self.state == "finished"
 
 
 def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
-    """Return the runs at or below some folders, by path, and what is no run.
+    """Return the runs in or below some folders, by path, and what was left out.
 
-    Two folders that hold the same run (experiment, repeat, seed, settings) count as
-    one: the one of which most tables can be read; of several the finished, else the
-    longest, else the first.
+    Of several folders with the same run (experiment, repeat, seed, settings) one is
+    kept: that with the most readable tables, then the finished one, then the longest,
+    then the first.
 
     Raises:
-        RunFolderError: a folder that is not there, or no run in any of them that can
-            be read.
+        RunFolderError: a folder does not exist, or no readable run is found.
     """
     folders: set[Path] = set()
     for root in roots:
@@ -96,7 +95,7 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
         folders |= {path.parents[2] for path in finished}
     if not folders:
         names = ", ".join(map(str, roots))
-        raise RunFolderError(f"{names}: no run is there or below")
+        raise RunFolderError(f"{names}: no run in or below this folder")
     runs: list[Run] = []
     left_out: list[LeftOut] = []
     for folder in sorted(folders):
@@ -111,14 +110,14 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
 
 
 def _different(runs: list[Run], left_out: list[LeftOut]) -> list[Run]:
-    """Return runs, each once; add to ``left_out`` the others."""
+    """Return each run once; add its other folders to ``left_out``."""
     copies: dict[tuple[str, int, int, str], list[Run]] = {}
     for run in runs:
         name = (run.experiment, run.number, run.seed, run.document)
         copies.setdefault(name, []).append(run)
     kept = []
     for group in copies.values():
-        if len(group) == 1:  # nothing to choose: its tables are not read yet
+        if len(group) == 1:  # without reading its tables
             kept += group
             continue
         (_, best), *others = sorted(
@@ -127,14 +126,14 @@ def _different(runs: list[Run], left_out: list[LeftOut]) -> list[Run]:
         )
         kept.append(best)
         for (unread, *_), run in others:
-            broken = ", and not all of it can be read" if unread else ""
-            why = f"the same run as {best.folder}{broken}"
+            damaged = ", and not completely readable" if unread else ""
+            why = f"the same run as {best.folder}{damaged}"
             left_out.append(LeftOut(str(run.folder), "run", why))
     return sorted(kept, key=lambda run: run.folder)
 
 
 def _flaws(run: Run) -> tuple[int, bool, int]:
-    """Return what of several copies the best has least of, the gravest first."""
+    """Return the sort key of folders of the same run, the best first."""
     tables, unread = read_tables(run)
     return len(unread), not run.is_finished, -tables["births"].num_rows
 
@@ -146,8 +145,8 @@ def _read_run(folder: Path) -> Run:
         islands = tuple(_settings(document))
         name, number, seed = details["name"], details["run"], details["seed"]
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        story = f"{type(error).__name__}: {error}"
-        raise RunFolderError(f"{_DETAILS}: cannot be understood: {story}") from None
+        cause = f"{type(error).__name__}: {error}"
+        raise RunFolderError(f"{_DETAILS}: cannot be read: {cause}") from None
     run = Run(
         folder=folder,
         experiment=str(name),
@@ -158,12 +157,12 @@ def _read_run(folder: Path) -> Run:
         islands=islands,
     )
     if run.is_finished and not any(has_rows(folder, each) for each in TABLES):
-        raise RunFolderError("is finished, but its tables are gone: none is there")
+        raise RunFolderError("the run is finished, but its tables are missing")
     return run
 
 
 def _details(folder: Path) -> dict[str, Any]:
-    """Return what is run in a folder: from its own file, or else from its tables."""
+    """Return the description of a run: from ``run.json``, or else from its tables."""
     try:
         entries = json.loads((folder / _DETAILS).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
@@ -186,27 +185,26 @@ def _state(folder: Path, details: dict[str, Any]) -> str:
         return str(details.get("state", "running"))
 
 
-def _settings(document: dict[str, Any]) -> Iterable[Settings]:
-    """Yield each island's settings; older documents do not know of islands."""
+def _settings(document: dict[str, Any]) -> Iterable[IslandSettings]:
+    """Yield each island's settings; older documents have no islands."""
     for entry in document.get("islands") or [{}]:
         arena = entry.get("arena") or document.get("arena")
         births = int(entry.get("births") or document["births"])
         touches = bool(arena and arena.get("record_touches"))
         for _ in range(int(entry.get("count", 1))):
-            yield Settings(births, arena is not None, touches)
+            yield IslandSettings(births, arena is not None, touches)
 
 
 def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:
-    """Return the tables of a run that its measures are made of.
+    """Return the tables of a run that its measures need.
 
     Args:
-        run: which.
+        run: the run.
 
     Returns:
-        Tables by name; one that cannot be read is empty, and named in the list. One
-        that such a run has no rows for may be lacking: it is empty, too.
-        ``birth_island`` says of everybody where it was born, and ``is_online`` in
-        ``population`` whether it lives in an arena.
+        Tables by name, and the tables that could not be read. An unreadable table, or
+        one that such a run does not have, is empty. ``birth_island`` is never null,
+        and ``population`` has ``is_online``: whether the individual lives in an arena.
     """
     tables: dict[str, pa.Table] = {}
     left_out: list[LeftOut] = []
@@ -220,14 +218,14 @@ def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:
             left_out.append(LeftOut(str(run.folder), TABLE + name, str(error)))
     online = np.array([island.is_online for island in run.islands], np.bool_)
     islands = np.asarray(tables["population"]["island"], np.int64)
-    # An island that the document does not know of is like the last that it does.
+    # An island that is not in the document has the settings of the last one.
     here = online[np.minimum(islands, len(online) - 1)]
     tables["population"] = tables["population"].append_column("is_online", [here])
     return tables, left_out
 
 
 def _named(table: pa.Table) -> pa.Table:
-    """Return a table that names everybody by where it was born, natives too."""
+    """Return a table with the island of birth filled in, also for natives."""
     if "birth_island" not in table.column_names:
         return table
     index = table.schema.get_field_index("birth_island")
@@ -236,7 +234,7 @@ def _named(table: pa.Table) -> pa.Table:
 
 
 def _check_there(run: Run, name: str) -> None:
-    """Raise if a finished run has lost a table: no rows would be taken for none."""
+    """Raise if a table of a finished run is missing."""
     online = [island.is_online for island in run.islands]
     expected = {
         "evaluations": not all(online),
@@ -247,16 +245,16 @@ def _check_there(run: Run, name: str) -> None:
     }
     is_expected = run.is_finished and expected.get(name, True)
     if is_expected and not has_rows(run.folder, name):
-        raise RunFolderError("is not there, though the run is finished")
+        raise RunFolderError("missing, although the run is finished")
 
 
 def _check_version(folder: Path, name: str) -> None:
-    """Raise if a finished table is of another version than ours."""
+    """Raise if a finished table has another schema version than this program."""
     for path in (folder / FINISHED).glob(f"*/*/{name}.parquet"):
         metadata = read_schema(path).metadata or {}
         version = metadata.get(b"revolve.schema_version", b"none").decode()
         if version != str(VERSION):
             raise RunFolderError(
-                f"is of version {version}, and this program reads {VERSION}: read it "
-                "with the one that wrote it"
+                f"has version {version}, but this program reads version {VERSION}; "
+                "use the release that wrote it"
             )

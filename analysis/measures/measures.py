@@ -1,29 +1,76 @@
-"""What one run's tables say: all measures, and the tables they make.
+"""All measures of one run, as tables.
 
-Everything is a function of the run's own tables. What a damaged table keeps from
-being measured is left out and named; all else is measured.
+Everything is a function of the run's own tables. A measure that needs a damaged table
+is left out, with the reason; all others are measured.
 """
 
 from collections.abc import Callable
 
+import numpy as np
 import pyarrow as pa
 
+from analysis.measures.ancestry import migrants
 from analysis.measures.bodies import extremity_bins
 from analysis.measures.diversity import mean_distances
 from analysis.measures.interactions import interactions
-from analysis.measures.migrants import migrants
+from analysis.measures.population_table import (
+    Booleans,
+    Numbers,
+    individual_ids,
+    rows_of,
+)
 from analysis.measures.populations import populations
-from analysis.measures.robots import robots
-from analysis.measures.run_tables import Refusals, RunTables
-from analysis.measures.variability import variability
+from analysis.measures.run_tables import Problems, RunTables
+from analysis.measures.variability import last_fitness, variability
 from schema.errors import RevolveError
 
+_OF_ROBOTS = ("births", "population", "evaluations", "fitness")
+
+
+def robots(run: RunTables) -> pa.Table:
+    """Return all robots that were evaluated, with sizes, rank and fitness.
+
+    Returns:
+        One row per robot, in the order of birth, with the columns of
+        ``outputs.OUTPUTS["robots"]`` except the run's.
+    """
+    fitness, is_last = _evaluated(run)
+    chosen = np.flatnonzero(~np.isnan(fitness))
+    births = run.births.take(chosen)
+    return pa.table(
+        {
+            "birth_island": births["island"],
+            "birth": births["birth"],
+            "is_last": is_last[chosen],
+            "fitness": fitness[chosen],
+            "rank": births["rank"],
+            "ancestors": [run.lines[row].bit_count() for row in chosen.tolist()],
+            **{name: values[chosen] for name, values in run.sizes.items()},
+        }
+    )
+
+
+def _evaluated(run: RunTables) -> tuple[Numbers, Booleans]:
+    """Return each individual's last fitness, NaN if none, and if it is alive last."""
+    fitness = np.full(run.births.num_rows, np.nan)
+    evaluations = run.tables["evaluations"]
+    rows = rows_of(individual_ids(evaluations), run.births)
+    outcome = np.asarray(evaluations["fitness"].to_numpy(), np.float64)
+    fitness[rows[rows >= 0]] = np.nan_to_num(outcome[rows >= 0], nan=0.0)
+    ids, sampled = last_fitness(run.tables["fitness"])
+    rows = rows_of(ids, run.births)
+    fitness[rows[rows >= 0]] = sampled[rows >= 0]
+    table = run.population_table
+    chosen = table.is_last[table.group_of] & table.is_judged
+    fitness[table.members[chosen]] = table.fitness[chosen]
+    is_last = np.zeros(len(fitness), np.bool_)
+    is_last[table.members[chosen]] = True
+    return fitness, is_last
+
+
 _OTHERS: dict[str, tuple[Callable[[RunTables], pa.Table], tuple[str, ...]]] = {
-    "robots": (robots, ("births", "population", "evaluations", "fitness")),
-    "extremities": (
-        lambda run: extremity_bins(robots(run)),
-        ("births", "population", "evaluations", "fitness"),
-    ),
+    "robots": (robots, _OF_ROBOTS),
+    "extremities": (lambda run: extremity_bins(robots(run)), _OF_ROBOTS),
     "variability": (lambda run: variability(run.tables["fitness"]), ("fitness",)),
     "interactions": (
         lambda run: interactions(
@@ -42,34 +89,35 @@ _OTHERS: dict[str, tuple[Callable[[RunTables], pa.Table], tuple[str, ...]]] = {
         ("births", "population", "migrations"),
     ),
 }
-"""Measures and the tables that they need, beside those of populations."""
+"""Measures other than those of populations, and the tables that they need."""
 
 
 def measure(
     run: RunTables, wanted: frozenset[str], unread: frozenset[str] = frozenset()
-) -> tuple[dict[str, pa.Table], Refusals]:
+) -> tuple[dict[str, pa.Table], Problems]:
     """Return all measures of a run.
 
     Args:
-        run: its tables.
-        wanted: which of variability, interactions, between and migrants have sense.
-        unread: tables that could not be read: nothing is made of half a run's rows.
+        run: the run's tables.
+        wanted: which of variability, interactions, between and migrants apply to the
+            run.
+        unread: tables that could not be read; measures that need them are left out.
 
     Returns:
-        Tables by name, each with the columns of ``outputs.schema`` less the
-        run's name; and the measures that could not be had, with the reason.
+        Tables by name, with the columns of ``outputs.run_schema``; and the measures
+        that were left out, with the reason.
     """
     found = {}
-    found["populations"], refusals = populations(run)
+    found["populations"], problems = populations(run)
     for name, (function, needed) in _OTHERS.items():
         if name not in {"robots", "extremities"} | wanted:
             continue
         missing = [table for table in needed if table in unread]
         if missing:
-            refusals[name] = f"needs table {missing[0]}"
+            problems[name] = f"needs table {missing[0]}"
             continue
         try:
             found[name] = function(run)
         except RevolveError as error:
-            refusals[name] = str(error)
-    return found, refusals
+            problems[name] = str(error)
+    return found, problems

@@ -1,7 +1,7 @@
-"""What `revolve analyze` writes: its tables, their columns, units and meanings.
+"""The tables that `revolve analyze` writes: columns, units and meanings.
 
-A run is named by ``experiment`` and ``folder``: two folders may both hold the
-experiment's run 0, of different seeds. Births count each island's own.
+A run is identified by ``experiment`` and ``folder``: two folders may both contain the
+experiment's run 0, with different seeds. Births are counted per island.
 """
 
 import pyarrow as pa
@@ -20,25 +20,25 @@ _KINDS = {
 }
 _RUN = {
     "experiment": "name of the experiment",
-    "folder": "of the run, as it was found",
+    "folder": "path of the run folder",
 }
-_ISLAND = {**_RUN, "island": "number of the island", "births": "born there by then"}
-_ROBOT = {"birth_island": "island of birth", "birth": "number of the birth there"}
+_ISLAND = {**_RUN, "island": "number of the island", "births": "births there so far"}
+_ROBOT = {"birth_island": "island of birth", "birth": "number of birth there"}
 
 BODY = {
     "parts": "nodes of the body tree",
     "active_joints": "joints with a motor",
-    "passive_joints": "joints without one",
-    "joints": "both",
-    "extremities": "leaves of the body tree; a lone core counts 1",
-    "touch_sensors": "parts that feel touch",
+    "passive_joints": "joints without a motor",
+    "joints": "active and passive joints",
+    "extremities": "leaves of the body tree; 1 for a single core",
+    "touch_sensors": "touch sensor parts",
     "hidden": "hidden neurons",
-    "connections": "of the genome, unresolvable ones included",
+    "connections": "connections of the genome, including unresolvable ones",
 }
 """Sizes of a robot, in the order of the thesis."""
 
 PER_PART = {
-    f"{name}_per_part": f"{name} by parts"
+    f"{name}_per_part": f"{name} divided by parts"
     for name in (
         "active_joints",
         "passive_joints",
@@ -48,138 +48,138 @@ PER_PART = {
         "connections",
     )
 }
-"""The same, relative to the size of the body."""
+"""Sizes of a robot divided by its number of parts."""
 
 POPULATION = {
-    "size": "alive",
-    "judged": "alive whose fitness counts: off-line all, on-line the mature",
-    "fitness": "mean of the judged [m/s]",
-    "fitness_best": "greatest of the judged [m/s]",
-    "rank": "mean of the judged (thesis eq. 6.1)",
-    "ancestors": "different ancestors of all judged together",
-    "ancestors_per_robot": "the same by the number of judged",
-    "diversity": "mean tree edit distance of the pairs alive",
-    "retention": "share of the living that still live 120 births later",
-    "foreign": "share of the living with an ancestor, or a birth, elsewhere",
-    **{name: f"mean of the judged: {what}" for name, what in BODY.items()},
-    **{name: f"mean of the judged: {what}" for name, what in PER_PART.items()},
-    "without_touch": "share of the judged without touch sensors",
+    "size": "living robots",
+    "judged": "living robots whose fitness counts: off-line all, on-line mature ones",
+    "fitness": "mean of judged robots [m/s]",
+    "fitness_best": "maximum of judged robots [m/s]",
+    "rank": "mean of judged robots (thesis eq. 6.1)",
+    "ancestors": "different ancestors of all judged robots together",
+    "ancestors_per_robot": "ancestors divided by judged",
+    "diversity": "mean tree edit distance of pairs of living robots",
+    "retention": "share of living robots that are still alive 120 births later",
+    "foreign": "share of living robots that, or whose ancestors, were born elsewhere",
+    **{name: f"mean of judged robots: {what}" for name, what in BODY.items()},
+    **{name: f"mean of judged robots: {what}" for name, what in PER_PART.items()},
+    "without_touch": "share of judged robots without touch sensors",
 }
-"""What is measured of a population at a number of births."""
+"""Measures of a population at a number of births."""
 
 OUTCOME = {
-    "births": "compared at: the greatest that all runs of both experiments reach",
+    "births": "births of the comparison: the most that all compared runs reach",
     **POPULATION,
     "retention": "mean over the run's births",
-    "late_gain": "share of the fitness gained that the second half of births brought",
-    "early_drop": "share of the diversity lost that the first tenth of births took",
-    "diversity_change": "diversity, last population less founders",
-    "parts_change": "parts, last population less random robots",
-    "touch_sensors_change": "touch sensors, last population less random robots",
-    "hidden_change": "hidden neurons, last population less random robots",
-    "extremities_fitness": "rank correlation of fitness and extremities, all judged",
-    "extremities_per_part_fitness": "the same of extremities per part",
+    "late_gain": "share of the gain in fitness in the second half of births",
+    "early_drop": "share of the loss of diversity in the first tenth of births",
+    "diversity_change": "diversity of the last population minus that of the founders",
+    "parts_change": "parts of the last population minus those of random robots",
+    "touch_sensors_change": "touch sensors, last population minus random robots",
+    "hidden_change": "hidden neurons, last population minus random robots",
+    "extremities_fitness": "rank correlation of fitness and extremities, all robots",
+    "extremities_per_part_fitness": "the same for extremities per part",
     "variability": "median of the robots' variability (on-line)",
-    "touched": "share of robots that ever touched another (on-line)",
+    "touched": "share of robots that ever touched another robot (on-line)",
     "between": "mean tree edit distance between islands",
 }
-"""One number of each run: what experiments are compared by."""
+"""Outcome of a run: one number per measure, by which experiments are compared."""
 
 _SPREAD = {
     "low": "lower end of the mean's 95 % interval (Student's t over runs)",
-    "high": "upper end",
-    "least": "least run",
-    "greatest": "greatest run",
-    "runs": "that have a value there",
+    "high": "upper end of that interval",
+    "least": "minimum over runs",
+    "greatest": "maximum over runs",
+    "runs": "number of runs with a value at these births",
 }
 _TWO_SAMPLES = {
-    "runs_a": "runs of a",
-    "runs_b": "runs of b",
+    "runs_a": "number of runs of a",
+    "runs_b": "number of runs of b",
     "mean_a": "mean over runs of a",
-    "mean_b": "mean over runs of b; of one experiment alone: the reference",
+    "mean_b": "mean over runs of b; the reference if there is no b",
     "median_a": "median over runs of a",
-    "median_b": "median over runs of b; of one experiment alone: the reference",
+    "median_b": "median over runs of b; the reference if there is no b",
     "difference": "mean_a - mean_b",
     "difference_low": "lower end of its 95 % interval (Welch's t over runs)",
-    "difference_high": "upper end",
+    "difference_high": "upper end of that interval",
     "effect": "-1..1; Cliff's delta of a and b, or rank-biserial correlation of a",
     "effect_low": "lower end of delta's 95 % interval (Newcombe's score)",
-    "effect_high": "upper end",
-    "p": "two-sided, exact",
-    "q": "the same, corrected for all tests of the table (Benjamini-Hochberg)",
+    "effect_high": "upper end of that interval",
+    "p": "two-sided exact p value",
+    "q": "p value corrected for all tests of the table (Benjamini-Hochberg)",
 }
 
 OUTPUTS: dict[str, dict[str, str]] = {
     "runs": {
         **_RUN,
         "run": "number of the repeat",
-        "seed": "of the run",
-        "state": "finished, stopped or running, which may have died since",
-        "births": "recorded, of all islands",
-        "planned": "births of the experiment, of all islands",
-        "islands": "of the experiment",
-        "differs": "from the settings that most runs of its name have, if it does",
+        "seed": "seed of the run",
+        "state": "finished, stopped or running (also if it was killed)",
+        "births": "recorded births of all islands",
+        "planned": "births of all islands in a finished run",
+        "islands": "number of islands",
+        "differs": "settings that differ from most runs of the same experiment name",
     },
     "populations": {**_ISLAND, **POPULATION},
     "robots": {
         **_RUN,
         **_ROBOT,
-        "is_last": "among the judged of an island's last population",
-        "fitness": "as last judged; off-line 0 if that failed [m/s]",
-        "rank": "thesis eq. 6.1",
-        "ancestors": "different ones",
+        "is_last": "whether it is judged in an island's last population",
+        "fitness": "last fitness; off-line 0 if the evaluation failed [m/s]",
+        "rank": "rank (thesis eq. 6.1)",
+        "ancestors": "number of different ancestors",
         **BODY,
         **PER_PART,
     },
     "extremities": {
         **_RUN,
-        "population": "'final': the last judged; 'born': all who were ever judged",
-        "by": "'count': extremities; 'per_part': in bins of 0.1",
-        "bin": "count, or the bin's lower end",
-        "robots": "in it",
-        "fitness": "their mean [m/s]",
+        "population": "'final': last populations; 'born': all robots ever evaluated",
+        "by": "'count': by extremities; 'per_part': by extremities_per_part",
+        "bin": "number of extremities, or lower end of a bin of width 0.1",
+        "robots": "number of robots in the bin",
+        "fitness": "mean fitness of the bin [m/s]",
     },
     "variability": {
         **_RUN,
-        "island": "where it lived",
+        "island": "island that it lived on",
         **_ROBOT,
-        "samples": "recorded while mature",
-        "fitness_range": "greatest less least of its fitness [m/s]",
-        "population_range": "of all fitness recorded while it was alive [m/s]",
-        "variability": "the first by the second",
+        "samples": "fitness samples of the mature robot",
+        "fitness_range": "greatest minus least of its fitness [m/s]",
+        "population_range": "range of all fitness samples during its life [m/s]",
+        "variability": "fitness_range divided by population_range",
     },
     "interactions": {
         **_RUN,
         "island": "number of the island",
-        "robots": "that lived there",
-        "lived_s": "by all of them together [s]",
-        "pairs": "that ever touched there",
-        "touched": "share of robots that ever touched another",
-        "touching": "time of touch, counted for both, by time lived",
+        "robots": "robots that lived there",
+        "lived_s": "sum of their lifetimes [s]",
+        "pairs": "pairs of robots that ever touched",
+        "touched": "share of robots that ever touched another robot",
+        "touching": "contact time, counted for both robots, divided by lived_s",
     },
     "between": {
         **_RUN,
-        "births": "on each island",
-        "islands": "that had a population then",
+        "births": "births on each island",
+        "islands": "number of islands with a population",
         "within": "mean over islands of their diversity",
-        "between": "mean tree edit distance of pairs of different islands",
+        "between": "mean tree edit distance of pairs on different islands",
     },
     "migrants": {
         **_RUN,
-        "epoch": "of the exchange",
+        "epoch": "migration epoch",
         **_ROBOT,
-        "island": "where it came from",
-        "to": "where it went",
-        "fitness": "when it left [m/s]",
-        "descendants": "born on the island it went to",
-        "living": "in that island's last population, itself included",
-        "reached": "islands in whose last population it or a descendant lives",
+        "island": "island that it left",
+        "to": "island that it went to",
+        "fitness": "fitness when it left [m/s]",
+        "descendants": "descendants born on island 'to'",
+        "living": "descendants in that island's last population, itself included",
+        "reached": "islands whose last population contains it or a descendant",
     },
     "progression": {
         "experiment": _RUN["experiment"],
         "measure": "column of populations",
-        "births": "on each island",
-        "mean": "over runs",
+        "births": "births on each island",
+        "mean": "mean over runs",
         **_SPREAD,
     },
     "outcomes": {**_RUN, **OUTCOME},
@@ -191,21 +191,25 @@ OUTPUTS: dict[str, dict[str, str]] = {
         **_TWO_SAMPLES,
     },
     "findings": {
-        "finding": "number of the claim",
-        "figure": "of the thesis",
-        "claim": "in words",
+        "finding": "number of the finding",
+        "figure": "figure of the thesis",
+        "claim": "the finding in words",
         "measure": "column of outcomes",
         "a": "experiment",
-        "b": "experiment; empty where a is held against a reference",
+        "b": "experiment; empty if a is compared with a number",
         "expected": "'>', '<' or '=' (no large difference) of a against b",
         "births": OUTCOME["births"],
         **_TWO_SAMPLES,
         "verdict": "reproduced, not reproduced or undecided",
-        "why": "the rule that decided",
+        "why": "the rule of the verdict",
     },
-    "left_out": {"folder": "of the run", "what": "table or measure", "why": "reason"},
+    "left_out": {
+        "folder": "path of the run folder; empty for figures",
+        "what": "run, table, measure or figure",
+        "why": "reason",
+    },
 }
-"""Columns and their meanings, by table; each is one Parquet file."""
+"""Columns and their meanings, by table; each table is one Parquet file."""
 
 _INTEGERS = {"size", "judged", "ancestors", "planned", "islands", "robots", "samples",
              "pairs", "epoch", "to", "descendants", "living", "reached", "runs",
@@ -216,7 +220,7 @@ _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 
 def schema(table: str) -> pa.Schema:
-    """Return the Arrow schema of an output; ``meaning`` is in each field's metadata.
+    """Return the Arrow schema of a table, with ``meaning`` in each field's metadata.
 
     Args:
         table: a key of ``OUTPUTS``.
@@ -227,6 +231,11 @@ def schema(table: str) -> pa.Schema:
             for name, meaning in OUTPUTS[table].items()
         ]
     )
+
+
+def run_schema(table: str) -> pa.Schema:
+    """Return the columns of a table of one run, without those that name the run."""
+    return pa.schema([field for field in schema(table) if field.name not in _RUN])
 
 
 def _kind(table: str, name: str) -> pa.DataType:

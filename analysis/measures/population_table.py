@@ -1,4 +1,4 @@
-"""Who is alive when: the population table as arrays, individuals as births rows."""
+"""The population table as arrays, with individuals as rows of the births table."""
 
 from dataclasses import dataclass
 
@@ -9,23 +9,25 @@ import pyarrow as pa
 from analysis.measures.trees import Integers
 
 Numbers = npt.NDArray[np.float64]
-Truths = npt.NDArray[np.bool_]
+Booleans = npt.NDArray[np.bool_]
 
 _BITS, _PLACE = 38, 50
-"""Where, in a number that names somebody, the island of birth and the island stand."""
+"""Bits at which the island of birth and the island of residence start in an id."""
 
 
 @dataclass(frozen=True, slots=True)
 class PopulationTable:
     """The recorded populations of a run, by island and births.
 
+    G is the number of populations, N that of their members together.
+
     Attributes:
-        islands: (G,) whose population it is.
-        births: (G,) born there by then.
-        starts: (G + 1,) where each population starts in what follows.
+        islands: (G,) island of each population.
+        births: (G,) births on the island so far.
+        starts: (G + 1,) index of each population's first member.
         members: (N,) row of each living individual in the births table.
-        fitness: (N,) what counts of it [m/s]; NaN where it is not judged.
-        lacking: populations that were left out, for want of a member's birth.
+        fitness: (N,) fitness [m/s]; NaN if it does not count.
+        incomplete: number of populations skipped because a member's birth is missing.
     """
 
     islands: Integers
@@ -33,36 +35,36 @@ class PopulationTable:
     starts: Integers
     members: Integers
     fitness: Numbers
-    lacking: int
+    incomplete: int
 
     @property
     def sizes(self) -> Integers:
-        """How many are alive in each population, (G,)."""
+        """Size of each population, (G,)."""
         return np.diff(self.starts)
 
     @property
     def group_of(self) -> Integers:
-        """Number of the population that each row belongs to, (N,)."""
+        """Index of each member's population, (N,)."""
         return np.repeat(np.arange(len(self.births)), self.sizes)
 
     @property
-    def is_judged(self) -> Truths:
-        """Whose fitness counts, (N,)."""
+    def is_judged(self) -> Booleans:
+        """Whether each member's fitness counts, (N,)."""
         return ~np.isnan(self.fitness)
 
     @property
-    def is_last(self) -> Truths:
-        """Which populations are their island's last recorded, (G,)."""
+    def is_last(self) -> Booleans:
+        """Whether a population is the last one recorded of its island, (G,)."""
         return np.append(self.islands[1:] != self.islands[:-1], True)[: len(self)]
 
     def __len__(self) -> int:
         return len(self.births)
 
     def mean(self, values: Numbers) -> Numbers:
-        """Return the mean of each population, (G,); NaN where nobody has a value.
+        """Return the mean of each population, (G,); NaN if no member has a value.
 
         Args:
-            values: (N,) of its members; NaN is left out.
+            values: (N,) value of each member; NaN is ignored.
         """
         is_known = ~np.isnan(values)
         total = self.sum(np.where(is_known, values, 0.0))
@@ -72,53 +74,52 @@ class PopulationTable:
         return found
 
     def sum(self, values: Numbers) -> Numbers:
-        """Return the sum of each population, (G,), of (N,) values."""
+        """Return the sum of each population, (G,), of its members' values, (N,)."""
         total = np.bincount(self.group_of, values, minlength=len(self))
         return total.astype(np.float64)
 
 
-def names(
+def individual_ids(
     table: pa.Table, island: str = "birth_island", birth: str = "birth"
 ) -> Integers:
-    """Return one number per row that names an individual, (N,).
+    """Return the id of each row's individual as one number, (N,).
 
     Args:
-        table: with a column of islands and one of births.
-        island: name of the column of the island of birth, below 4096.
-        birth: name of the column of the number of birth there.
+        table: any table with an island and a number of birth.
+        island: column of the island of birth, < 4096.
+        birth: column of the number of birth there.
     """
     islands = np.asarray(table[island], np.int64)
     return islands << _BITS | np.asarray(table[birth], np.int64)
 
 
-def stays(table: pa.Table) -> Integers:
-    """Return one number per row that names an individual on one island, (N,).
+def residence_ids(table: pa.Table) -> Integers:
+    """Return the id of each row's individual and the island that it lives on, (N,).
 
     Args:
-        table: ``island`` (where it lives, below 4096), ``birth_island``, ``birth``.
+        table: ``island`` (where it lives, < 4096), ``birth_island``, ``birth``.
     """
-    return np.asarray(table["island"], np.int64) << _PLACE | names(table)
+    return np.asarray(table["island"], np.int64) << _PLACE | individual_ids(table)
 
 
-def unnamed(stays: Integers) -> dict[str, pa.Array]:
-    """Return the columns that ``stays`` were made of: where, and who."""
+def residence_columns(ids: Integers) -> dict[str, pa.Array]:
+    """Return the columns that ``residence_ids`` combines, by name."""
+    births = ids >> _BITS & 2 ** (_PLACE - _BITS) - 1
     return {
-        "island": pa.array(stays >> _PLACE, pa.int32()),
-        "birth_island": pa.array(
-            stays >> _BITS & 2 ** (_PLACE - _BITS) - 1, pa.int32()
-        ),
-        "birth": pa.array(stays & 2**_BITS - 1, pa.int64()),
+        "island": pa.array(ids >> _PLACE, pa.int32()),
+        "birth_island": pa.array(births, pa.int32()),
+        "birth": pa.array(ids & 2**_BITS - 1, pa.int64()),
     }
 
 
 def rows_of(wanted: Integers, births: pa.Table) -> Integers:
-    """Return the births rows of named individuals, (N,); -1 where there is none.
+    """Return the births rows of individuals, (N,); -1 if the birth is missing.
 
     Args:
-        wanted: (N,) as ``names`` returns them.
+        wanted: (N,) ids as ``individual_ids`` returns them.
         births: births table of a run.
     """
-    known = names(births, "island", "birth")
+    known = individual_ids(births, "island", "birth")
     if not len(known):
         return np.full(len(wanted), -1, np.int64)
     order = np.argsort(known, kind="stable")
@@ -128,31 +129,31 @@ def rows_of(wanted: Integers, births: pa.Table) -> Integers:
 
 
 def population_table(population: pa.Table, births: pa.Table) -> PopulationTable:
-    """Return who is alive when.
+    """Return the populations of a run.
 
-    A population with a member that the births table lacks is left out: a killed run
-    may have recorded one and not the other.
+    A population with a member that is not in the births table is skipped: a killed
+    run may have recorded one and not the other.
 
     Args:
-        population: of one run: ``island``, ``births``, ``birth_island`` and ``birth``
-            (the individual's name), ``fitness``, ``is_online``. Without a fitness is
-            off-line who failed, and counts 0 as in selection; on-line it is who is
-            not mature yet, and does not count.
-        births: of the same run: ``island``, ``birth``.
+        population: ``island``, ``births``, ``birth_island`` and ``birth`` (id of the
+            individual), ``fitness``, ``is_online``. Off-line a null fitness means that
+            the evaluation failed, and counts as 0, as in selection; on-line it means
+            that the robot is not mature, and does not count.
+        births: births of the same run: ``island``, ``birth``.
     """
     islands = np.asarray(population["island"], np.int64)
     numbers = np.asarray(population["births"], np.int64)
     fitness = np.asarray(population["fitness"].to_numpy(), np.float64)
     is_failed = np.isnan(fitness) & ~np.asarray(population["is_online"], np.bool_)
     fitness = np.where(is_failed, 0.0, fitness)
-    members = rows_of(names(population), births)
+    members = rows_of(individual_ids(population), births)
     order = np.lexsort((numbers, islands))
     islands, numbers, members = islands[order], numbers[order], members[order]
     is_first = np.ones(len(order), np.bool_)
     is_first[1:] = (islands[1:] != islands[:-1]) | (numbers[1:] != numbers[:-1])
     group = np.cumsum(is_first) - 1
-    lacking = np.unique(group[members < 0])
-    kept = ~np.isin(group, lacking)
+    incomplete = np.unique(group[members < 0])
+    kept = ~np.isin(group, incomplete)
     islands, numbers, members = islands[kept], numbers[kept], members[kept]
     firsts = np.flatnonzero(is_first[kept])
     return PopulationTable(
@@ -161,5 +162,5 @@ def population_table(population: pa.Table, births: pa.Table) -> PopulationTable:
         np.append(firsts, len(members)),
         members,
         fitness[order][kept],
-        len(lacking),
+        len(incomplete),
     )

@@ -1,4 +1,4 @@
-"""What is measured of a population, at every number of births recorded."""
+"""Measures of each recorded population."""
 
 from collections.abc import Callable
 
@@ -8,34 +8,59 @@ import pyarrow as pa
 from analysis.measures.ancestry import foreign_share, unique_ancestors
 from analysis.measures.diversity import diversity
 from analysis.measures.outputs import POPULATION
-from analysis.measures.population_table import Numbers
-from analysis.measures.retention import retention
-from analysis.measures.run_tables import Refusals, RunTables
+from analysis.measures.population_table import Numbers, PopulationTable
+from analysis.measures.run_tables import Problems, RunTables
 from schema.errors import RevolveError
 
 Columns = dict[str, Numbers]
 
+RETENTION_BIRTHS = 120
+"""Births after which retention is measured: 8 generations of 15, as in the thesis."""
+
+
+def retention(table: PopulationTable, step: int = RETENTION_BIRTHS) -> Numbers:
+    """Return the share of each population that is still alive later, (G,).
+
+    All members count, mature or not. NaN if no population of the island is recorded
+    at exactly that number of births.
+
+    Args:
+        table: populations of a run.
+        step: births later.
+
+    Source: Hupkes 2016, table 6.2 and figure 6.7.
+    """
+    # Island, births and individual as one number each, smaller than 2^63.
+    width = int(table.members.max(initial=0)) + 1
+    height = int(table.births.max(initial=0)) + step + 1
+    group = table.group_of
+    base = table.islands * height + table.births
+    now = base[group] * width + table.members
+    later = (base[group] + step) * width + table.members
+    remains = table.mean(np.isin(later, now).astype(np.float64))
+    return np.where(np.isin(base + step, base), remains, np.nan)
+
 
 def _fitness(run: RunTables) -> Columns:
-    """Return how many there are, and how fit (Hupkes 2016, figures 6.2 and 6.3)."""
-    who = run.population_table
-    best = np.full(len(who), -np.inf)
-    np.fmax.at(best, who.group_of, who.fitness)
+    """Return sizes and fitness (Hupkes 2016, figures 6.2 and 6.3)."""
+    table = run.population_table
+    best = np.full(len(table), -np.inf)
+    np.fmax.at(best, table.group_of, table.fitness)
     return {
-        "size": who.sizes.astype(np.float64),
-        "judged": who.sum(who.is_judged.astype(np.float64)),
-        "fitness": who.mean(who.fitness),
+        "size": table.sizes.astype(np.float64),
+        "judged": table.sum(table.is_judged.astype(np.float64)),
+        "fitness": table.mean(table.fitness),
         "fitness_best": np.where(np.isfinite(best), best, np.nan),
     }
 
 
 def _rank(run: RunTables) -> Columns:
-    """Return the mean rank of the judged (Hupkes 2016, eq. 6.1, figure 6.6)."""
+    """Return the mean rank (Hupkes 2016, eq. 6.1, figure 6.6)."""
     return {"rank": _mean(run, np.asarray(run.births["rank"], np.float64))}
 
 
 def _ancestors(run: RunTables) -> Columns:
-    """Return unique ancestors, absolute and by robot (figure 6.4)."""
+    """Return unique ancestors, in total and per robot (figure 6.4)."""
     count = unique_ancestors(run.population_table, run.lines).astype(np.float64)
     judged = run.population_table.sum(run.population_table.is_judged.astype(np.float64))
     unknown = np.full(len(count), np.nan)
@@ -56,16 +81,16 @@ def _foreign(run: RunTables) -> Columns:
 
 
 def _sizes(run: RunTables) -> Columns:
-    """Return mean sizes of the judged (figures 6.9 to 6.16)."""
+    """Return mean sizes (figures 6.9 to 6.16)."""
     found = {name: _mean(run, values) for name, values in run.sizes.items()}
     no_touch = (run.sizes["touch_sensors"] == 0).astype(np.float64)
     return {**found, "without_touch": _mean(run, no_touch)}
 
 
 def _mean(run: RunTables, values: Numbers) -> Numbers:
-    """Return the mean of the judged of each population, of values per birth."""
-    who = run.population_table
-    return who.mean(np.where(who.is_judged, values[who.members], np.nan))
+    """Return each population's mean of one value per birth; unevaluated are ignored."""
+    table = run.population_table
+    return table.mean(np.where(table.is_judged, values[table.members], np.nan))
 
 
 _POPULATION: tuple[Callable[[RunTables], Columns], ...] = (
@@ -73,30 +98,24 @@ _POPULATION: tuple[Callable[[RunTables], Columns], ...] = (
 )  # fmt: skip
 
 
-def populations(run: RunTables) -> tuple[pa.Table, Refusals]:
-    """Return what is measured of each recorded population, and what could not be.
+def populations(run: RunTables) -> tuple[pa.Table, Problems]:
+    """Return the measures of each recorded population, and the measures left out.
 
     Returns:
         One row per ``island`` and ``births``, ascending, with the columns of
-        ``outputs.POPULATION``; a measure that could not be had is null.
+        ``outputs.POPULATION``, null for a measure that was left out; and the reasons.
     """
     found: Columns = {}
-    refusals: Refusals = {}
+    problems: Problems = {}
     for measure in _POPULATION:
         try:
             found |= measure(run)
         except RevolveError as error:
-            refusals[measure.__name__.strip("_")] = str(error)
-    nothing = np.full(len(run.population_table), np.nan)
-    columns = {name: found.get(name, nothing) for name in POPULATION}
-    table = pa.table(
-        {
-            "island": run.population_table.islands,
-            "births": run.population_table.births,
-            **{
-                name: pa.array(values, from_pandas=True)
-                for name, values in columns.items()
-            },
-        }
-    )
-    return table, refusals
+            problems[measure.__name__.strip("_")] = str(error)
+    table = run.population_table
+    unknown = np.full(len(table), np.nan)
+    columns = {"island": table.islands, "births": table.births} | {
+        name: pa.array(found.get(name, unknown), from_pandas=True)
+        for name in POPULATION
+    }
+    return pa.table(columns), problems

@@ -1,4 +1,4 @@
-"""A run's tables, and what several measures derive from them."""
+"""The tables of a run, with values that several measures share."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -14,17 +14,17 @@ from analysis.measures.population_table import (
 )
 from analysis.measures.trees import SlotRule, Trees, encode
 
-Refusals = dict[str, str]
-"""Why a measure could not be had, by its name."""
+Problems = dict[str, str]
+"""Reasons why measures were left out, by the name of the measure."""
 
 
 class RunTables:
-    """A run's tables, and what several measures derive from them, once.
+    """The tables of a run, with values that several measures share.
 
     Attributes:
         tables: by name, as ``analysis.measures.load.read_tables`` returns them: births,
             evaluations, population, fitness, deaths, touches, migrations.
-        slots: whose slot counts in tree edit distance.
+        slots: slot that labels a part in tree edit distance.
     """
 
     def __init__(
@@ -35,17 +35,17 @@ class RunTables:
 
     @property
     def births(self) -> pa.Table:
-        """The births table."""
+        """Births table."""
         return self.tables["births"]
 
     @cached_property
     def population_table(self) -> PopulationTable:
-        """Who is alive when."""
+        """Recorded populations."""
         return population_table(self.tables["population"], self.births)
 
     @cached_property
     def trees(self) -> Trees:
-        """The bodies as trees."""
+        """Bodies as trees."""
         return encode(self.births["body"], self.slots)
 
     @cached_property
@@ -55,7 +55,7 @@ class RunTables:
 
     @cached_property
     def lines(self) -> list[int]:
-        """Each individual's ancestors."""
+        """Ancestors of each individual, as bits."""
         return ancestors(self.parents)
 
     @cached_property

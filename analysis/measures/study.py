@@ -1,4 +1,4 @@
-"""Measures of many runs at a time, each in a process of its own."""
+"""Measures of many runs, computed in parallel processes."""
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -10,22 +10,22 @@ import pyarrow as pa
 
 from analysis.measures.load import TABLE, LeftOut, Run, read_tables
 from analysis.measures.measures import measure
-from analysis.measures.outputs import schema
+from analysis.measures.outputs import run_schema, schema
 from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import SlotRule
 
 _FEW = 3
-"""Runs that are measured before another process would have started."""
+"""Number of runs that are measured faster than another process starts."""
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
-    """What was measured of a run.
+class MeasuredRun:
+    """The measures of a run.
 
     Attributes:
-        run: which.
+        run: the run.
         tables: by name, with the columns of ``outputs``.
-        left_out: what could not be read or measured.
+        left_out: tables and measures that could not be read or measured.
     """
 
     run: Run
@@ -38,63 +38,63 @@ def measure_runs(
     *,
     slots: SlotRule = "parent",
     processes: int = 1,
-    tell: Callable[[], None] = lambda: None,
-) -> list[Measured]:
+    on_measured: Callable[[], None] = lambda: None,
+) -> list[MeasuredRun]:
     """Return the measures of runs, in their order.
 
     Args:
-        runs: which.
-        slots: whose slot counts in tree edit distance.
-        processes: how many runs at a time.
-        tell: called when a run is done.
+        runs: the runs.
+        slots: slot that labels a part in tree edit distance.
+        processes: number of runs measured in parallel.
+        on_measured: called after each run.
     """
     if processes == 1 or len(runs) <= _FEW:
         found = []
         for run in runs:
             found.append(measure_run(run, slots))
-            tell()
+            on_measured()
         return found
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
         futures = [pool.submit(measure_run, run, slots) for run in runs]
         try:
             for future in as_completed(futures):
                 future.result()
-                tell()
+                on_measured()
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
         return [future.result() for future in futures]
 
 
-def measure_run(run: Run, slots: SlotRule) -> Measured:
-    """Return the measures of one run: reads, measures, names what was left out."""
+def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
+    """Return the measures of one run, and what was left out."""
     tables, left_out = read_tables(run)
     folder = str(run.folder)
-    material = RunTables(tables, slots)
+    shared = RunTables(tables, slots)
     unread = frozenset(one.what.removeprefix(TABLE) for one in left_out)
-    found, refusals = measure(material, _wanted(run), unread)
-    if material.population_table.lacking:
-        why = f"{material.population_table.lacking} rows name a birth without a row"
+    found, problems = measure(shared, _wanted(run), unread)
+    if skipped := shared.population_table.incomplete:
+        why = f"{skipped} populations skipped: the birth of a member is not recorded"
         left_out.append(LeftOut(folder, "populations", why))
-    if not len(material.population_table):
+    if not len(shared.population_table):
         left_out.append(LeftOut(folder, "measures", "no population is recorded"))
     if any(island.is_online and not island.records_touches for island in run.islands):
-        why = "touches are not recorded (arena.record_touches is false)"
+        why = "contacts are not recorded (arena.record_touches is false)"
         left_out.append(LeftOut(folder, "interactions", why))
     left_out += [
-        LeftOut(folder, f"measure {name}", refusals[name]) for name in refusals
+        LeftOut(folder, f"measure {name}", problems[name]) for name in problems
     ]
     if not run.is_finished:
         born, planned = tables["births"].num_rows, planned_births(run)
-        why = f"the run is not finished: {born} of {planned} births are there"
+        why = f"the run is not finished: {born} of {planned} births are recorded"
         left_out.append(LeftOut(folder, "comparison", why))
     named = {name: _named(found[name], name, run) for name in found}
     named["runs"] = _named(_summary(run, tables["births"]), "runs", run)
-    return Measured(run, named, tuple(left_out))
+    return MeasuredRun(run, named, tuple(left_out))
 
 
 def planned_births(run: Run) -> int:
-    """Return how many births a run has when it is finished, of all islands."""
+    """Return the number of births of all islands in a finished run."""
     return sum(island.births for island in run.islands)
 
 
@@ -119,20 +119,20 @@ def _summary(run: Run, births: pa.Table) -> pa.Table:
         "islands": len(run.islands),
         "differs": run.differs,
     }
-    return pa.Table.from_pylist([row], schema("runs").remove(0).remove(0))
+    return pa.Table.from_pylist([row], run_schema("runs"))
 
 
 def _named(table: pa.Table, name: str, run: Run) -> pa.Table:
-    """Return a table that says whose rows it holds, with the types of its output."""
-    whose = {"experiment": run.experiment, "folder": str(run.folder)}
-    for column, value in whose.items():
+    """Return a table with the columns that name the run, in the types of the output."""
+    columns = {"experiment": run.experiment, "folder": str(run.folder)}
+    for column, value in columns.items():
         repeated = pa.repeat(pa.scalar(value), table.num_rows)
         table = table.append_column(column, repeated)
     return table.select(schema(name).names).cast(schema(name))
 
 
-def gathered(measured: Sequence[Measured]) -> dict[str, pa.Table]:
-    """Return the tables of several runs, by name, one behind the other."""
+def concatenated(measured: Sequence[MeasuredRun]) -> dict[str, pa.Table]:
+    """Return the tables of several runs, concatenated, by name."""
     names = dict.fromkeys(name for one in measured for name in one.tables)
     return {
         name: pa.concat_tables(
@@ -142,8 +142,8 @@ def gathered(measured: Sequence[Measured]) -> dict[str, pa.Table]:
     }
 
 
-def reach(measured: Measured) -> int:
-    """Return how many births every island of a run has a population for."""
+def reach(measured: MeasuredRun) -> int:
+    """Return the number of births that every island of a run reaches."""
     table = measured.tables["populations"].filter(
         measured.tables["populations"]["judged"].is_valid()
     )

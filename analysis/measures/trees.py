@@ -1,7 +1,7 @@
-"""Bodies as ordered, labelled trees: arrays that a compiled loop can walk.
+"""Bodies as ordered, labelled trees, in arrays for compiled loops.
 
-Every tree stands in postorder: children by ascending slot of their parent, then
-their parent. Equal trees are stored once, for evolution repeats itself.
+Every tree is stored in postorder: children by ascending slot of their parent, then
+their parent. Equal trees are stored once.
 """
 
 from dataclasses import dataclass
@@ -16,20 +16,20 @@ from schema.errors import InvalidRobot
 
 Integers = npt.NDArray[np.int64]
 SlotRule = Literal["parent", "own"]
-"""Whose slot labels a part: its parent's (thesis) or its own (published code)."""
+"""Slot that labels a part: its parent's (thesis) or its own (published code)."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trees:
-    """Different trees, one behind the other, and which of them each body is.
+    """The U different trees of B bodies, with M parts in total.
 
     Attributes:
-        tree_of: (B,) number of each body's tree.
-        starts: (U + 1,) where each of the U trees starts; below, M is the last.
+        tree_of: (B,) index of each body's tree.
+        starts: (U + 1,) index of each tree's first part.
         kinds: (M,) number of each part's type.
-        slots: (M,) slot that it is labelled with; -1 for the core.
-        lefts: (M,) its leftmost leaf, as postorder number within the tree.
-        key_roots: (M,) whether it is the core or has a sibling before it.
+        slots: (M,) slot that labels the part; -1 for the core.
+        lefts: (M,) leftmost leaf below the part, as postorder number in the tree.
+        key_roots: (M,) whether the part is the core or has a sibling before it.
     """
 
     tree_of: Integers
@@ -45,10 +45,10 @@ def encode(bodies: pa.ChunkedArray, slots: SlotRule = "parent") -> Trees:
 
     Args:
         bodies: (B,) lists of parts, as column ``body`` of the births table.
-        slots: whose slot labels a part.
+        slots: slot that labels a part.
 
     Raises:
-        InvalidRobot: a body that is no tree in depth-first order, children by
+        InvalidRobot: a body is not a tree in depth-first order with children by
             ascending slot.
     """
     lists = bodies.combine_chunks()
@@ -56,11 +56,10 @@ def encode(bodies: pa.ChunkedArray, slots: SlotRule = "parent") -> Trees:
     sizes = np.asarray(pc.list_value_length(lists), np.int64)
     starts = np.concatenate([[0], np.cumsum(sizes)])
     if not len(parts):
-        nothing = np.zeros(0, np.int64)
         if len(lists):
             raise InvalidRobot("body of birth row 0: has no parts")
-        nobody = nothing.astype(bool)
-        return Trees(nothing, starts, nothing, nothing, nothing, nobody)
+        empty = np.zeros(0, np.int64)
+        return Trees(empty, starts, empty, empty, empty, empty.astype(bool))
     own = np.asarray(parts.field("child_slot"), np.int64)
     places = np.asarray(parts.field("parent_slot"), np.int64)
     parents = np.asarray(parts.field("parent"), np.int64)
@@ -100,7 +99,7 @@ def _postorder(
     _check(
         bodies[tree],
         np.where(is_core, parents != -1, (parents < 0) | (parents >= index)),
-        "a part's parent must stand before it, and only the core has none",
+        "a part's parent must come before it, and only the core has none",
     )
     if not lengths.all():
         raise InvalidRobot(f"body of birth row {bodies[lengths == 0][0]}: has no parts")
@@ -114,7 +113,7 @@ def _postorder(
     _check(
         bodies[tree],
         (~is_core) & ((at + size > above + size[above]) | (places <= previous)),
-        "parts must stand depth first, children by ascending slot",
+        "parts must be in depth-first order, children by ascending slot",
     )
     leaf = np.where(size == 1, at, len(at))
     leftmost = np.minimum.accumulate(leaf[::-1])[::-1]
@@ -131,7 +130,7 @@ def _postorder(
 def _depth_and_size(
     above: Integers, is_core: npt.NDArray[np.bool_]
 ) -> tuple[Integers, Integers]:
-    """Return each part's depth, and how many parts it carries, itself included."""
+    """Return each part's depth and the size of its subtree, itself included."""
     depth = np.zeros(len(above), np.int64)
     size = np.ones(len(above), np.int64)
     walkers = np.flatnonzero(~is_core)
@@ -139,8 +138,8 @@ def _depth_and_size(
     while len(walkers):
         depth[walkers] += 1
         size += np.bincount(ancestors, minlength=len(size))
-        going = ~is_core[ancestors]
-        walkers, ancestors = walkers[going], above[ancestors[going]]
+        is_below = ~is_core[ancestors]
+        walkers, ancestors = walkers[is_below], above[ancestors[is_below]]
     return depth, size
 
 

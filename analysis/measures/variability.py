@@ -1,17 +1,22 @@
-"""How much a robot's fitness changes while it lives in an arena."""
+"""Variability: changes of a robot's fitness during its life in an arena."""
 
 import numpy as np
 import pyarrow as pa
 
-from analysis.measures.population_table import Numbers, names, stays, unnamed
+from analysis.measures.population_table import (
+    Numbers,
+    individual_ids,
+    residence_columns,
+    residence_ids,
+)
 from analysis.measures.trees import Integers
 
 
 def variability(fitness: pa.Table) -> pa.Table:
-    """Return how far each robot's fitness ranged, by that of its contemporaries.
+    """Return the range of each robot's fitness, relative to that of the population.
 
-    Only what was recorded while mature counts: before that a robot has no window to
-    be judged by. A robot with less than two such samples has no row.
+    Only samples of mature robots are used. A robot with less than two of them has no
+    row.
 
     Args:
         fitness: samples of one run's arenas: ``island``, ``birth_island`` and
@@ -19,17 +24,18 @@ def variability(fitness: pa.Table) -> pa.Table:
 
     Returns:
         One row per ``island`` and robot there (``birth_island``, ``birth``):
-        ``samples``, ``fitness_range`` [m/s], ``population_range`` (greatest less least
-        recorded on the island from its first sample there to its last) [m/s],
-        ``variability``, the first by the second; null where all were equal.
+        ``samples``, ``fitness_range`` [m/s], ``population_range`` (greatest minus
+        least fitness on the island from the robot's first sample there to its last)
+        [m/s], ``variability`` (``fitness_range`` divided by ``population_range``; null
+        if that is 0).
 
-    Source: Hupkes 2016, figure 6.8: defined after its caption, the code of the figure
-    was never published.
+    Source: Hupkes 2016, figure 6.8; defined by its caption, as the code of the figure
+    is not published.
     """
     mature = fitness.filter(fitness["is_mature"])
     times = np.asarray(mature["sim_time_s"], np.float64)
     values = np.asarray(mature["fitness"], np.float64)
-    robots = stays(mature)
+    robots = residence_ids(mature)
     order = np.lexsort((times, robots))
     found, firsts, samples = np.unique(
         robots[order], return_index=True, return_counts=True
@@ -51,7 +57,7 @@ def variability(fitness: pa.Table) -> pa.Table:
     ratio = np.divide(own, population, out=unknown, where=population > 0)
     table = pa.table(
         {
-            **unnamed(found),
+            **residence_columns(found),
             "samples": samples,
             "fitness_range": own,
             "population_range": population,
@@ -62,7 +68,7 @@ def variability(fitness: pa.Table) -> pa.Table:
 
 
 def _moments(times: Numbers, values: Numbers) -> tuple[Numbers, Numbers, Numbers]:
-    """Return when an island's mature were judged, the least and the greatest then."""
+    """Return the sample times, and the least and greatest fitness at each of them."""
     clock, where = np.unique(times, return_inverse=True)
     least, greatest = np.full(len(clock), np.inf), np.full(len(clock), -np.inf)
     np.minimum.at(least, where, values)
@@ -71,13 +77,16 @@ def _moments(times: Numbers, values: Numbers) -> tuple[Numbers, Numbers, Numbers
 
 
 def last_fitness(fitness: pa.Table) -> tuple[Integers, Numbers]:
-    """Return who was ever judged in an arena, (R,), and its last fitness, (R,) [m/s].
+    """Return the ids of robots evaluated in arenas, and their last fitness [m/s].
 
     Args:
         fitness: samples, as for ``variability``.
+
+    Returns:
+        Two arrays, (R,) each.
     """
     mature = fitness.filter(fitness["is_mature"])
-    robots = names(mature)
+    robots = individual_ids(mature)
     times = np.asarray(mature["sim_time_s"], np.float64)
     order = np.lexsort((times, robots))
     is_last = np.append(robots[order][1:] != robots[order][:-1], True)[: len(order)]

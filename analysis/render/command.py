@@ -10,10 +10,10 @@ import numpy as np
 from analysis.progress import bars
 from analysis.render.picture import (
     NoPictures,
+    RobotRenderer,
     Simulate,
-    Studio,
     gait_strip,
-    save_film,
+    save_animation,
     save_picture,
 )
 from schema.experiment.document import Simulation, body_space
@@ -57,13 +57,15 @@ def main(arguments: list[str], simulate: Simulate) -> int:
     _check_gait(options.gait, world)
     robot = read_robot(options.file, space)
     size = (options.width, options.width * 3 // 4)
-    with Studio(robot, space, world, settings.environment, size=size) as studio:
+    with RobotRenderer(
+        robot, space, world, settings.environment, size=size
+    ) as renderer:
         if not is_film and not options.gait:
-            save_picture(studio.picture(), out)
+            save_picture(renderer.picture(), out)
         else:
             live = partial(simulate, robot, settings.space, world, settings.environment)
             tick_s = world.brain_steps * world.timestep_s
-            _draw_motion(studio, live, options.gait, out, tick_s)
+            _draw_motion(renderer, live, options.gait, out, tick_s)
     print(f"{out}: written")
     return 0
 
@@ -80,7 +82,7 @@ def _check_gait(gait: int | None, world: Simulation) -> None:
 
 
 def _draw_motion(
-    studio: Studio,
+    renderer: RobotRenderer,
     live: Callable[..., object],
     gait: int | None,
     out: Path,
@@ -97,9 +99,9 @@ def _draw_motion(
             # A camera that stands still: the robot is seen to go.
             look_at = np.mean([pose[:3] for pose in poses], axis=0)
         shown = bar.track(poses, description="drawing")
-        pictures = [studio.picture(pose, look_at=look_at) for pose in shown]
+        pictures = [renderer.picture(pose, look_at=look_at) for pose in shown]
     if gait is None:
-        save_film(pictures, out, tick_s)
+        save_animation(pictures, out, tick_s)
     else:
         save_picture(gait_strip(pictures), out)
 

@@ -59,7 +59,7 @@ def choose_engine() -> str:
     )
 
 
-class Studio:
+class RobotRenderer:
     """One robot on a tiled floor, and a camera that looks at it.
 
     Attributes:
@@ -232,7 +232,7 @@ def save_picture(picture: Picture, path: Path) -> None:
     _write(path, lambda: Image.fromarray(picture).save(path))
 
 
-def save_film(pictures: Sequence[Picture], path: Path, interval_s: float) -> None:
+def save_animation(pictures: Sequence[Picture], path: Path, interval_s: float) -> None:
     """Write pictures as one that moves, over and over (.gif).
 
     Args:

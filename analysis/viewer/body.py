@@ -19,14 +19,14 @@ from schema.robot.frames import place_parts, shapes_of
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 
-Singles = npt.NDArray[np.float32]
+Float32s = npt.NDArray[np.float32]
 
 _PLATE_M = 0.002
 """What is thinner only closes gaps between parts."""
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class BoxModel:
     """A body to draw: B boxes on S segments, the core's first.
 
     Attributes:
@@ -42,7 +42,7 @@ class Figure:
         axes: (S, 3) of that joint; the angle is positive about it.
     """
 
-    half_sizes: Singles
+    half_sizes: Float32s
     colours: npt.NDArray[np.uint8]
     segments: npt.NDArray[np.intp]
     centres: Floats
@@ -54,7 +54,7 @@ class Figure:
     axes: Floats
 
 
-def figure(robot: Robot, space: BodySpace, *, is_plain: bool) -> Figure:
+def box_model(robot: Robot, space: BodySpace, *, is_plain: bool) -> BoxModel:
     """Return a robot as boxes.
 
     Args:
@@ -68,11 +68,13 @@ def figure(robot: Robot, space: BodySpace, *, is_plain: bool) -> Figure:
     return builder.done()
 
 
-def place(figure: Figure, roots: Floats, angles: Floats) -> tuple[Singles, Singles]:
+def place(
+    box_model: BoxModel, roots: Floats, angles: Floats
+) -> tuple[Float32s, Float32s]:
     """Return where a figure's boxes are.
 
     Args:
-        figure: the body.
+        box_model: the body.
         roots: (T, 7) position x, y, z [m] and attitude w, x, y, z of the core.
         angles: (T, J) of all joints, by ascending part [rad].
 
@@ -81,52 +83,56 @@ def place(figure: Figure, roots: Floats, angles: Floats) -> tuple[Singles, Singl
     """
     turns = [roots[:, [4, 5, 6, 3]]]
     places = [roots[:, :3]]
-    for joint, parent in enumerate(figure.parents[1:]):
+    for joint, parent in enumerate(box_model.parents[1:]):
         half = 0.5 * angles[:, joint : joint + 1]
-        turn = np.hstack([np.sin(half) * figure.axes[joint + 1], np.cos(half)])
-        offset = rotated(turns[parent], figure.anchors[joint + 1])
+        turn = np.hstack([np.sin(half) * box_model.axes[joint + 1], np.cos(half)])
+        offset = rotated(turns[parent], box_model.anchors[joint + 1])
         places.append(places[parent] + offset)
         turns.append(product(turns[parent], turn))
     turned, placed = np.stack(turns, axis=1), np.stack(places, axis=1)
-    centres = placed[:, figure.segments] + rotated(
-        turned[:, figure.segments], figure.centres
+    centres = placed[:, box_model.segments] + rotated(
+        turned[:, box_model.segments], box_model.centres
     )
-    attitudes = product(turned[:, figure.carried_by], figure.attitudes)
+    attitudes = product(turned[:, box_model.carried_by], box_model.attitudes)
     return (
         centres.astype(np.float32),
-        attitudes[:, figure.attitude_of].astype(np.float32),
+        attitudes[:, box_model.attitude_of].astype(np.float32),
     )
 
 
-def place_rows(figure: Figure, rows: pa.Table) -> tuple[Singles, Singles]:
+def place_rows(box_model: BoxModel, rows: pa.Table) -> tuple[Float32s, Float32s]:
     """Return where a figure's boxes are, as ``place`` does, from rows of poses."""
     axes = ("x", "y", "z", "qw", "qx", "qy", "qz")
     roots = np.stack([rows[axis].to_numpy() for axis in axes], axis=1)
     angles = rows["angles"].combine_chunks().flatten().to_numpy()
     return place(
-        figure,
+        box_model,
         roots.astype(np.float64),
         angles.astype(np.float64).reshape(len(roots), -1),
     )
 
 
-def standing(figure: Figure, spot: tuple[float, float]) -> tuple[Singles, Singles]:
+def neutral_pose(
+    box_model: BoxModel, spot: tuple[float, float]
+) -> tuple[Float32s, Float32s]:
     """Return where boxes are of a robot in neutral pose that touches the ground.
 
     Args:
-        figure: the body.
+        box_model: the body.
         spot: of the core's centre in the ground plane, world frame [m].
 
     Returns:
         Centres (1, B, 3) and attitudes (1, B, 4), as ``place`` does.
     """
     root = np.array([[*spot, 0.0, 1.0, 0.0, 0.0, 0.0]])
-    centres, attitudes = place(figure, root, np.zeros((1, len(figure.parents) - 1)))
+    centres, attitudes = place(
+        box_model, root, np.zeros((1, len(box_model.parents) - 1))
+    )
     # Of a turned box the sum over its axes' heights reaches deepest.
     axes = np.stack(
         [rotated(attitudes.astype(np.float64), axis) for axis in np.eye(3)], axis=-1
     )
-    reach = np.abs(axes[..., 2, :] * figure.half_sizes).sum(axis=-1)
+    reach = np.abs(axes[..., 2, :] * box_model.half_sizes).sum(axis=-1)
     centres[..., 2] -= (centres[..., 2] - reach).min()
     return centres, attitudes
 
@@ -185,12 +191,12 @@ class _Builder:
         self.attitudes.append((segment, matrix))
         return len(self.attitudes) - 1, np.eye(3)
 
-    def done(self) -> Figure:
+    def done(self) -> BoxModel:
         rows = sorted(self.rows, key=lambda row: row[:2])
         colours = np.array([row[4] for row in rows])
         origins = np.array(self.origins)
         parents = [max(parent, 0) for parent in self.parents]
-        return Figure(
+        return BoxModel(
             half_sizes=np.array([row[3] for row in rows], dtype=np.float32),
             colours=np.round(255.0 * colours).astype(np.uint8),
             segments=np.array([row[0] for row in rows], dtype=np.intp),

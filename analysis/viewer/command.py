@@ -8,10 +8,10 @@ from rich.progress import Progress
 
 from analysis.progress import bars
 from analysis.viewer.blueprint import layout
-from analysis.viewer.body import figure
+from analysis.viewer.body import box_model
 from analysis.viewer.live import LiveSource
-from analysis.viewer.motion import Motion, best_ever, chosen, name_of, show_motion
-from analysis.viewer.output import HOST, PORT, Output, Window, linger
+from analysis.viewer.motion import Motion, best_evaluated, chosen, name_of, show_motion
+from analysis.viewer.output import HOST, PORT, Output, Window, keep_serving
 from analysis.viewer.recording import Recording, ViewerError
 from analysis.viewer.replay import (
     CHUNK_S,
@@ -21,8 +21,8 @@ from analysis.viewer.replay import (
     read_news,
     read_poses,
 )
-from analysis.viewer.resimulate import Simulators, move_again
-from analysis.viewer.scene import stage
+from analysis.viewer.resimulate import Simulators, resimulate
+from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
 from analysis.viewer.watch import watch
 from schema.agent.command import add_network_flags, tls_of
@@ -72,7 +72,7 @@ def _replay(
 ) -> None:
     """Record a run from its tables, then keep it there for who looks."""
     folder: Path = options.run
-    scene = stage(read_experiment(folder))
+    scene = scene_of(read_experiment(folder))
     news = read_news(folder)
     born = {one.birth for one in news.births}
     _check(options, born, is_online=bool(scene.arenas))
@@ -87,7 +87,7 @@ def _replay(
     )
     name = f"{news.experiment}-{folder.name}"
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
-        recording.stage(scene)
+        recording.add_scene(scene)
         show = Show(recording, scene.space)
         span = _span(options, folder) if scene.arenas else None
         with bars(f"recording {name}") as bar:
@@ -102,11 +102,11 @@ def _replay(
         for lane, motion in enumerate(motions):
             body = bodies[motion.birth]
             assert body is not None
-            drawn = figure(body, scene.space, is_plain=False)
+            drawn = box_model(body, scene.space, is_plain=False)
             is_there = motion.birth.island in scene.arenas
             show_motion(recording, motion, drawn, None if is_there else lane)
         stop = stop_on_signals()
-        linger(output, Window(output), recording, stop)
+        keep_serving(output, Window(output), recording, stop)
 
 
 def _check(options: argparse.Namespace, born: set[BirthId], *, is_online: bool) -> None:
@@ -126,7 +126,7 @@ def _motions(options: argparse.Namespace, simulators: Simulators) -> list[Motion
         return []
     with bars(f"robots simulated again: {len(births)}") as bar:
         task = bar.add_task("simulating again", total=1.0)
-        motions = move_again(
+        motions = resimulate(
             folder,
             read_experiment(folder),
             births,
@@ -142,7 +142,7 @@ def _wanted(options: argparse.Namespace) -> list[BirthId]:
     """Return the robots that were asked for by name; tell who the best is."""
     if None not in options.robot:
         return list(options.robot)
-    best, fitness = best_ever(options.run)
+    best, fitness = best_evaluated(options.run)
     tell_user(f"best ever judged: {name_of(best)}, fitness {fitness:.4f}")
     return [best if who is None else who for who in options.robot]
 

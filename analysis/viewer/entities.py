@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from analysis.viewer.body import Singles
+from analysis.viewer.body import Float32s
 from schema.robot.ids import BirthId
 
 
 @dataclass(frozen=True, slots=True)
-class When:
+class TimePoint:
     """A moment: simulated time [s], None off-line, and births so far, if known."""
 
     sim_time_s: float | None = None
@@ -18,13 +18,13 @@ class When:
 
 
 @dataclass(frozen=True, slots=True)
-class Moves:
+class PoseBatch:
     """T poses of one robot, at times (T,) [s] and after so many births (T,), if any."""
 
     sim_time_s: npt.NDArray[np.float64]
     births: npt.NDArray[np.int64] | None
-    centres: Singles
-    attitudes: Singles
+    centres: Float32s
+    attitudes: Float32s
 
 
 @dataclass(frozen=True, slots=True)

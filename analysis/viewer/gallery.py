@@ -2,9 +2,9 @@
 
 from itertools import count
 
-from analysis.viewer.body import standing
-from analysis.viewer.entities import When, robot_path
-from analysis.viewer.looks import Figures
+from analysis.viewer.body import neutral_pose
+from analysis.viewer.entities import TimePoint, robot_path
+from analysis.viewer.looks import BoxModels
 from analysis.viewer.recording import Recording
 from schema.robot.ids import BirthId
 from schema.wire.news import Level
@@ -22,15 +22,15 @@ class Gallery:
         self._recording = recording
         self._spots: dict[int, dict[BirthId, int]] = {}
 
-    def hang(self, level: Level, figures: Figures) -> None:
+    def show(self, level: Level, models: BoxModels) -> None:
         """Show those who live, and no others.
 
         Args:
             level: with its members.
-            figures: of those that are known.
+            models: of those that are known.
         """
         spots = self._spots.setdefault(level.island, {})
-        when = When(None, level.births)
+        when = TimePoint(None, level.births)
         members = set(level.members)
         for birth in sorted(set(spots).difference(members)):
             self._recording.died(robot_path(level.island, birth), when)
@@ -38,13 +38,13 @@ class Gallery:
         taken = set(spots.values())
         free = (spot for spot in count() if spot not in taken)
         for birth in level.members:
-            if birth in spots or birth not in figures:
+            if birth in spots or birth not in models:
                 continue
             spots[birth] = next(free)
             path = robot_path(level.island, birth)
-            self._recording.born(path, figures[birth], when)
+            self._recording.born(path, models[birth], when)
             self._recording.stands(
-                path, *standing(figures[birth], spot_place(spots[birth]))
+                path, *neutral_pose(models[birth], spot_place(spots[birth]))
             )
 
 

@@ -6,7 +6,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from analysis.viewer.body import Singles
+from analysis.viewer.body import Float32s
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment, relief
 from schema.robot.results import Floats
@@ -28,14 +28,14 @@ class Surface:
         colour: red, green, blue, opacity, 0 to 1.
     """
 
-    corners: Singles
+    corners: Float32s
     colour: tuple[float, ...]
 
     @property
-    def normals(self) -> Singles:
+    def normals(self) -> Float32s:
         """Which way each triangle faces, (T, 3) of length 1; 0 if it is a line."""
         first, second, third = self.corners.transpose(1, 0, 2)
-        normals: Singles = np.cross(second - first, third - first)
+        normals: Float32s = np.cross(second - first, third - first)
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         np.divide(normals, lengths, out=normals, where=lengths > 0.0)
         return normals

@@ -3,7 +3,7 @@
 from collections import OrderedDict
 from dataclasses import dataclass
 
-from analysis.viewer.entities import FamilyTree, When
+from analysis.viewer.entities import FamilyTree, TimePoint
 from analysis.viewer.recording import Recording
 from schema.robot.ids import BirthId
 from schema.wire.news import Departed, Level, Newborn
@@ -15,7 +15,7 @@ _EVERY = 10
 
 
 @dataclass(slots=True)
-class _Person:
+class _Entry:
     newborn: Newborn
     order: int
     is_alive: bool = True
@@ -27,9 +27,9 @@ class Lineage:
     def __init__(self, recording: Recording) -> None:
         """Know nobody yet."""
         self._recording = recording
-        self._people: OrderedDict[BirthId, _Person] = OrderedDict()
+        self._entries: OrderedDict[BirthId, _Entry] = OrderedDict()
         self._known: set[BirthId] = set()
-        self._latest = When()
+        self._latest = TimePoint()
         self._undrawn = 0
 
     def add(self, one: Newborn) -> bool:
@@ -38,11 +38,11 @@ class Lineage:
             return False
         if self._undrawn >= _EVERY:
             self.draw()
-        self._people[one.birth] = _Person(one, len(self._known))
+        self._entries[one.birth] = _Entry(one, len(self._known))
         self._known.add(one.birth)
-        if len(self._people) > _MOST:
-            self._people.popitem(last=False)
-        self._latest = When(one.sim_time_s, one.births)
+        if len(self._entries) > _MOST:
+            self._entries.popitem(last=False)
+        self._latest = TimePoint(one.sim_time_s, one.births)
         self._undrawn += 1
         return True
 
@@ -53,31 +53,31 @@ class Lineage:
     def keep(self, level: Level) -> None:
         """Note that of an island's births only those of a level live."""
         members = set(level.members)
-        for birth, person in self._people.items():
+        for birth, entry in self._entries.items():
             is_here = birth.island == level.island
-            if is_here and person.newborn.births <= level.births:
-                person.is_alive = birth in members
+            if is_here and entry.newborn.births <= level.births:
+                entry.is_alive = birth in members
 
     def draw(self) -> None:
         """Draw what is new."""
         if not self._undrawn:
             return
         self._undrawn = 0
-        first = next(iter(self._people.values())).order
+        first = next(iter(self._entries.values())).order
         self._recording.ancestry(
             [
                 FamilyTree(
                     birth,
-                    person.order - first,
-                    person.newborn.rank,
-                    person.newborn.parents,
-                    person.is_alive,
+                    entry.order - first,
+                    entry.newborn.rank,
+                    entry.newborn.parents,
+                    entry.is_alive,
                 )
-                for birth, person in self._people.items()
+                for birth, entry in self._entries.items()
             ],
             self._latest,
         )
 
     def _die(self, birth: BirthId) -> None:
-        if birth in self._people:
-            self._people[birth].is_alive = False
+        if birth in self._entries:
+            self._entries[birth].is_alive = False

@@ -6,20 +6,20 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.viewer.body import Figure, figure
+from analysis.viewer.body import BoxModel, box_model
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 
 
-class Figures:
+class BoxModels:
     """The figures of a run's robots, each made when it is first asked for."""
 
     def __init__(self, space: BodySpace) -> None:
         """Know nobody yet, of part types that are known."""
         self._space = space
         self._bodies: dict[BirthId, Robot] = {}
-        self._made: dict[BirthId, Figure] = {}
+        self._made: dict[BirthId, BoxModel] = {}
 
     def add(self, birth: BirthId, body: Robot) -> None:
         """Learn what somebody looks like; nobody changes."""
@@ -28,10 +28,10 @@ class Figures:
     def __contains__(self, birth: BirthId) -> bool:
         return birth in self._bodies
 
-    def __getitem__(self, birth: BirthId) -> Figure:
+    def __getitem__(self, birth: BirthId) -> BoxModel:
         if birth not in self._made:
             body = self._bodies[birth]
-            self._made[birth] = figure(body, self._space, is_plain=True)
+            self._made[birth] = box_model(body, self._space, is_plain=True)
         return self._made[birth]
 
 

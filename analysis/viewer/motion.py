@@ -8,8 +8,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.viewer.body import Figure, place_rows
-from analysis.viewer.entities import Moves, When, motion_path
+from analysis.viewer.body import BoxModel, place_rows
+from analysis.viewer.entities import PoseBatch, TimePoint, motion_path
 from analysis.viewer.recording import Recording, ViewerError
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
@@ -61,7 +61,7 @@ def chosen(
     return list(found)
 
 
-def best_ever(folder: Path) -> tuple[BirthId, float]:
+def best_evaluated(folder: Path) -> tuple[BirthId, float]:
     """Return the fittest of all that a run ever judged, the first of equals.
 
     It may have died since: the best of the last population is another, then.
@@ -88,25 +88,25 @@ def best_ever(folder: Path) -> tuple[BirthId, float]:
 
 
 def show_motion(
-    recording: Recording, motion: Motion, figure: Figure, lane: int | None
+    recording: Recording, motion: Motion, box_model: BoxModel, lane: int | None
 ) -> None:
     """Show how a robot moved.
 
     Args:
         recording: to fill.
         motion: of the robot.
-        figure: its body.
+        box_model: its body.
         lane: which lane it is shown in, from 0; where it was if None.
     """
     path = motion_path(motion.birth)
     times = motion.poses["sim_time_s"].to_numpy()
-    centres, attitudes = place_rows(figure, motion.poses)
+    centres, attitudes = place_rows(box_model, motion.poses)
     if lane is not None:
         row, column = divmod(lane, LANES)
         centres[..., :2] += LANE_M * np.array([column, row], dtype=np.float32)
-    recording.born(path, figure, When(float(times[0])))
-    recording.moved(path, Moves(times, None, centres, attitudes))
-    recording.said(motion.verdict, When(float(times[0])), "INFO")
+    recording.born(path, box_model, TimePoint(float(times[0])))
+    recording.moved(path, PoseBatch(times, None, centres, attitudes))
+    recording.said(motion.verdict, TimePoint(float(times[0])), "INFO")
 
 
 def name_of(birth: BirthId) -> str:

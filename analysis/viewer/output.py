@@ -99,7 +99,7 @@ class Window:
         return ended is not None
 
 
-def linger(
+def keep_serving(
     output: Output, window: Window, recording: Recording, stop: threading.Event
 ) -> None:
     """Keep serving what is complete, for as long as somebody may look at it."""

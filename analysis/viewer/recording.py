@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 import rerun as rr
 
-from analysis.viewer.body import Figure, Singles
-from analysis.viewer.entities import FamilyTree, Moves, When, island_path
+from analysis.viewer.body import BoxModel, Float32s
+from analysis.viewer.entities import FamilyTree, PoseBatch, TimePoint, island_path
 from analysis.viewer.ground import Surface
-from analysis.viewer.scene import Stage
+from analysis.viewer.scene import Scene
 from schema.errors import RevolveError
 from schema.robot.ids import BirthId
 
@@ -98,20 +98,20 @@ class Recording:
 
     # --- arenas and robots --------------------------------------------------
 
-    def stage(self, stage: Stage) -> None:
+    def add_scene(self, scene: Scene) -> None:
         """Tell of all islands of a run, before anything happens there."""
-        is_alone = len(stage.islands) == 1
-        grounds = zip(stage.islands, stage.walls, stage.surfaces, strict=True)
+        is_alone = len(scene.islands) == 1
+        grounds = zip(scene.islands, scene.walls, scene.surfaces, strict=True)
         for island, walls, surfaces in grounds:
             self._island(island, walls, is_alone=is_alone)
             # Off-line populations hang side by side: no ground is below them.
-            if island in stage.arenas:
+            if island in scene.arenas:
                 self.ground(island_path(island), surfaces)
 
     def _island(
         self,
         island: int,
-        walls: Sequence[tuple[Singles, Singles]],
+        walls: Sequence[tuple[Float32s, Float32s]],
         *,
         is_alone: bool,
     ) -> None:
@@ -162,15 +162,15 @@ class Recording:
             )
             self._stream.log(f"{path}/ground/{number}", mesh, static=True)
 
-    def born(self, path: str, figure: Figure, when: When) -> None:
+    def born(self, path: str, box_model: BoxModel, when: TimePoint) -> None:
         """Give a robot its boxes, from a moment on."""
         self._at(when)
         boxes = rr.Boxes3D.from_fields(
-            half_sizes=figure.half_sizes, colors=figure.colours, fill_mode="solid"
+            half_sizes=box_model.half_sizes, colors=box_model.colours, fill_mode="solid"
         )
         self._stream.log(path, boxes)
 
-    def moved(self, path: str, moves: Moves) -> None:
+    def moved(self, path: str, moves: PoseBatch) -> None:
         """Add poses of a robot, all at once."""
         rows, count, _ = moves.centres.shape
         index = [rr.TimeColumn(SIMULATED, duration=_nanoseconds(moves.sim_time_s))]
@@ -186,12 +186,12 @@ class Recording:
             columns.partition([count] * rows),
         )
 
-    def stands(self, path: str, centres: Singles, attitudes: Singles) -> None:
+    def stands(self, path: str, centres: Float32s, attitudes: Float32s) -> None:
         """Put a robot where it stays, at the moment of what was logged before."""
         boxes = rr.Boxes3D.from_fields(centers=centres[0], quaternions=attitudes[0])
         self._stream.log(path, boxes)
 
-    def died(self, path: str, when: When) -> None:
+    def died(self, path: str, when: TimePoint) -> None:
         """Let a robot vanish."""
         self._at(when)
         self._stream.log(path, rr.Clear(recursive=True))
@@ -199,7 +199,7 @@ class Recording:
     # --- the rest -----------------------------------------------------------
 
     def level(
-        self, island: int, when: When, size: int, fitness: Sequence[float]
+        self, island: int, when: TimePoint, size: int, fitness: Sequence[float]
     ) -> None:
         """Add to an island's curves.
 
@@ -219,27 +219,27 @@ class Recording:
         """Tell that z is up there."""
         self._stream.log(path, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
-    def said(self, text: str, when: When, level: str) -> None:
+    def said(self, text: str, when: TimePoint, level: str) -> None:
         """Add a line to the log; "INFO" of what goes on, "WARN" of ends."""
         self._at(when)
         self._stream.log("log", rr.TextLog(text, level=level))
 
-    def ancestry(self, relatives: Iterable[FamilyTree], when: When) -> None:
+    def ancestry(self, relatives: Iterable[FamilyTree], when: TimePoint) -> None:
         """Draw who descends from whom, anew."""
         self._at(when)
-        people = list(relatives)
-        shown = {each.birth for each in people}
+        entries = list(relatives)
+        shown = {each.birth for each in entries}
         nodes = rr.GraphNodes(
-            [_name(each.birth) for each in people],
-            positions=[(30.0 * each.order, 90.0 * each.rank) for each in people],
-            colors=[_ALIVE if each.is_alive else _DEAD for each in people],
-            labels=[_name(each.birth) for each in people],
-            radii=[13.0 if each.is_alive else 8.0 for each in people],
+            [_name(each.birth) for each in entries],
+            positions=[(30.0 * each.order, 90.0 * each.rank) for each in entries],
+            colors=[_ALIVE if each.is_alive else _DEAD for each in entries],
+            labels=[_name(each.birth) for each in entries],
+            radii=[13.0 if each.is_alive else 8.0 for each in entries],
             show_labels=False,
         )
         edges = [
             (_name(parent), _name(each.birth))
-            for each in people
+            for each in entries
             for parent in each.parents
             if parent in shown
         ]
@@ -251,7 +251,7 @@ class Recording:
         document = rr.TextDocument(text, media_type="text/markdown")
         self._stream.log("workers", document, static=True)
 
-    def _at(self, when: When) -> None:
+    def _at(self, when: TimePoint) -> None:
         """Set the moment of what is logged next."""
         self._stream.reset_time()
         if when.sim_time_s is not None:

@@ -36,7 +36,7 @@ _TRACK = ("sim_time_s", "x", "y", "z", "qw", "qx", "qy", "qz", "angles")
 _COMPARED = ("fitness", "path_velocity", "straight_velocity", "simulated_s")
 
 
-class Scene(Protocol):
+class ReplayedStep(Protocol):
     """A step of an arena that is done again; see ``worker.arena.replay``."""
 
     @property
@@ -69,10 +69,10 @@ class Simulators:
 
     alone: Callable[[Robot, EvaluationSettings, Identity], tuple[Evaluation, pa.Table]]
     history: Callable[[Path, int, float], tuple[bytes, Rebuild]]
-    together: Callable[[bytes, Rebuild, frozenset[BirthId]], Iterator[Scene]]
+    together: Callable[[bytes, Rebuild, frozenset[BirthId]], Iterator[ReplayedStep]]
 
 
-def move_again(
+def resimulate(
     folder: Path,
     experiment: Experiment,
     births: list[BirthId],

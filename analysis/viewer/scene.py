@@ -6,7 +6,7 @@ from math import cos, pi, sin, tan
 
 import numpy as np
 
-from analysis.viewer.body import Singles
+from analysis.viewer.body import Float32s
 from analysis.viewer.ground import Surface, surfaces
 from schema.experiment.document import Arena, Experiment, body_space, island_count
 from schema.experiment.document import island_experiment as of_island
@@ -18,7 +18,7 @@ _GALLERY_M = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class Scene:
     """Where a run takes place.
 
     Attributes:
@@ -34,7 +34,7 @@ class Stage:
     arenas: frozenset[int]
     extent_m: float
     space: BodySpace
-    walls: tuple[tuple[tuple[Singles, Singles], ...], ...]
+    walls: tuple[tuple[tuple[Float32s, Float32s], ...], ...]
     surfaces: tuple[tuple[Surface, ...], ...]
 
     def below(self, births: Iterable[BirthId]) -> tuple[Surface, ...]:
@@ -49,7 +49,7 @@ class Stage:
         return self.surfaces[self.islands.index(islands[0])]
 
 
-def stage(experiment: Experiment) -> Stage:
+def scene_of(experiment: Experiment) -> Scene:
     """Return where an experiment takes place.
 
     Raises:
@@ -60,7 +60,7 @@ def stage(experiment: Experiment) -> Stage:
     settings = [of_island(experiment, each) for each in islands]
     arenas = [each.arena for each in settings]
     reaches = [_reach(arena) if arena else _GALLERY_M for arena in arenas]
-    return Stage(
+    return Scene(
         islands,
         frozenset(each for each in islands if arenas[each] is not None),
         max(reaches),
@@ -75,7 +75,7 @@ def _reach(arena: Arena) -> float:
     return _MARGIN * max(0.5 * arena.wall_diameter_m, arena.birth_radius_m)
 
 
-def _ring_wall(arena: Arena) -> tuple[tuple[Singles, Singles], ...]:
+def _ring_wall(arena: Arena) -> tuple[tuple[Float32s, Float32s], ...]:
     """Return the walls of an arena, as ``schema.mjcf.model`` puts them."""
     if not arena.wall_diameter_m:
         return ()

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from analysis.viewer.body import Singles, place_rows
-from analysis.viewer.entities import Moves, When, robot_path
+from analysis.viewer.body import Float32s, place_rows
+from analysis.viewer.entities import PoseBatch, TimePoint, robot_path
 from analysis.viewer.gallery import Gallery
 from analysis.viewer.lineage import Lineage
-from analysis.viewer.looks import Figures, rows_by_robot
+from analysis.viewer.looks import BoxModels, rows_by_robot
 from analysis.viewer.recording import Recording
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
@@ -40,16 +40,16 @@ class _Clock:
         after = np.searchsorted(self.times_s, times_s, side="right")
         return np.array([0, *self.births], dtype=np.int64)[after]
 
-    def when(self, births: int) -> When:
+    def when(self, births: int) -> TimePoint:
         """Return the moment of a birth by its number on the island, from 1."""
         index = int(np.searchsorted(self.births, births))
         if index < len(self.births) and self.births[index] == births:
-            return When(self.times_s[index], births)
-        return When(None, births)
+            return TimePoint(self.times_s[index], births)
+        return TimePoint(None, births)
 
 
 @dataclass(slots=True)
-class _Resident:
+class _ShownRobot:
     """A robot that is shown in an arena.
 
     ``drawn_s`` is when its boxes were told last, ``seen_s`` its last pose's time.
@@ -74,9 +74,9 @@ class Show:
         self._recording = recording
         self._lineage = Lineage(recording)
         self._gallery = Gallery(recording)
-        self._figures = Figures(space)
+        self._models = BoxModels(space)
         self._clocks: dict[int, _Clock] = {}
-        self._residents: dict[tuple[int, BirthId], _Resident] = {}
+        self._shown: dict[tuple[int, BirthId], _ShownRobot] = {}
         self._gone: dict[tuple[int, BirthId], Departed] = {}
         self._levels: set[tuple[int, int]] = set()
         self._moves: set[tuple[BirthId, int, int]] = set()
@@ -112,32 +112,32 @@ class Show:
         Returns:
             Whose poses were left out, for their births have not been told.
         """
-        strangers: list[BirthId] = []
+        unknown: list[BirthId] = []
         shown: set[BirthId] = set()
         for birth, rows in rows_by_robot(poses):
             shown.add(birth)
-            if birth not in self._figures:
-                strangers.append(birth)
+            if birth not in self._models:
+                unknown.append(birth)
                 continue
             times = rows["sim_time_s"].to_numpy()
             path = self._settle(arena, birth, times)
-            centres, attitudes = place_rows(self._figures[birth], rows)
+            centres, attitudes = place_rows(self._models[birth], rows)
             births = self._clock(arena).births_at(times)
-            moves = Moves(
+            moves = PoseBatch(
                 times, births, _coarse(centres, _PER_M), _coarse(attitudes, _PER_TURN)
             )
             self._recording.moved(path, moves)
         if has_all:
             self._take_away(arena, shown)
-        return strangers
+        return unknown
 
     def _clock(self, island: int) -> _Clock:
         return self._clocks.setdefault(island, _Clock())
 
-    def _at(self, island: int, time_s: float) -> When:
+    def _at(self, island: int, time_s: float) -> TimePoint:
         """Return a moment of an arena, with its births until then."""
         births = self._clock(island).births_at(np.array([time_s]))
-        return When(time_s, int(births[0]))
+        return TimePoint(time_s, int(births[0]))
 
     def _settle(
         self, arena: int, birth: BirthId, times_s: npt.NDArray[np.float64]
@@ -145,41 +145,41 @@ class Show:
         """See to it that a robot has its boxes in an arena; return its path."""
         key, path = (arena, birth), robot_path(arena, birth)
         first_s, last_s = float(times_s[0]), float(times_s[-1])
-        resident = self._residents.get(key)
-        if resident is None or first_s - resident.drawn_s >= _REPEAT_S:
+        robot = self._shown.get(key)
+        if robot is None or first_s - robot.drawn_s >= _REPEAT_S:
             when = self._at(arena, first_s)
-            self._recording.born(path, self._figures[birth], when)
-            was_gone = resident is not None and resident.is_gone
-            self._residents[key] = _Resident(path, first_s, last_s, was_gone)
-        self._residents[key].seen_s = last_s
+            self._recording.born(path, self._models[birth], when)
+            was_gone = robot is not None and robot.is_gone
+            self._shown[key] = _ShownRobot(path, first_s, last_s, was_gone)
+        self._shown[key].seen_s = last_s
         return path
 
     def _take_away(self, arena: int, shown: set[BirthId]) -> None:
         """Take the boxes of those away who died, or are not in the arena any more."""
-        here = [key for key in self._residents if key[0] == arena]
+        here = [key for key in self._shown if key[0] == arena]
         for key in here:
             if key in self._gone:
                 self._leave(self._gone[key])
             elif key[1] not in shown:
-                resident = self._residents.pop(key)
-                births = self._at(arena, resident.seen_s).births
-                when = When(resident.seen_s + _BLINK_S, births)
-                self._recording.died(resident.path, when)
-            if key in self._residents and key[1] not in shown:
-                del self._residents[key]
+                robot = self._shown.pop(key)
+                births = self._at(arena, robot.seen_s).births
+                when = TimePoint(robot.seen_s + _BLINK_S, births)
+                self._recording.died(robot.path, when)
+            if key in self._shown and key[1] not in shown:
+                del self._shown[key]
 
     def _leave(self, gone: Departed) -> None:
         """Take a robot's boxes away, once."""
-        resident = self._residents.get((gone.island, gone.birth))
-        if resident is not None and not resident.is_gone:
-            resident.is_gone = True
+        robot = self._shown.get((gone.island, gone.birth))
+        if robot is not None and not robot.is_gone:
+            robot.is_gone = True
             # As many births as its last pose has: who is born then counts already.
             when = self._at(gone.island, gone.sim_time_s)
-            self._recording.died(resident.path, when)
+            self._recording.died(robot.path, when)
 
     def _born(self, one: Newborn) -> None:
         if one.body is not None:
-            self._figures.add(one.birth, one.body)
+            self._models.add(one.birth, one.body)
         if not self._lineage.add(one):
             return
         clock = self._clock(one.birth.island)
@@ -188,7 +188,7 @@ class Show:
             clock.births.append(one.births)
         whose = " and ".join(f"{each.island}:{each.number}" for each in one.parents)
         text = f"{one.birth.island}:{one.birth.number} is born"
-        when = When(one.sim_time_s, one.births)
+        when = TimePoint(one.sim_time_s, one.births)
         self._recording.said(f"{text} to {whose}" if whose else text, when, "INFO")
 
     def _departed(self, gone: Departed) -> None:
@@ -198,7 +198,7 @@ class Show:
         self._leave(gone)
         self._lineage.remove(gone)
         text = f"{gone.birth.island}:{gone.birth.number} is gone: {gone.reason}"
-        self._recording.said(text, When(gone.sim_time_s, gone.births), "WARN")
+        self._recording.said(text, TimePoint(gone.sim_time_s, gone.births), "WARN")
 
     def _level(self, level: Level) -> None:
         if (level.island, level.births) in self._levels:
@@ -209,7 +209,7 @@ class Show:
         self._recording.level(level.island, when, level.size, fitness)
         if when.sim_time_s is None and level.members:
             self._lineage.keep(level)
-            self._gallery.hang(level, self._figures)
+            self._gallery.show(level, self._models)
 
     def _migrated(self, migrant: Migrant) -> None:
         key = (migrant.birth, migrant.to, migrant.epoch)
@@ -218,11 +218,11 @@ class Show:
         self._moves.add(key)
         name = f"{migrant.birth.island}:{migrant.birth.number}"
         text = f"{name} goes from island {migrant.island} to {migrant.to}"
-        when = When(migrant.sim_time_s, migrant.births)
+        when = TimePoint(migrant.sim_time_s, migrant.births)
         self._recording.said(text, when, "INFO")
 
 
-def _coarse(numbers: Singles, grains: float) -> Singles:
+def _coarse(numbers: Float32s, grains: float) -> Float32s:
     """Return numbers of which so many fit into 1; they take less room in a file."""
     return (np.round(numbers * grains) / grains).astype(np.float32)
 

@@ -6,12 +6,12 @@ from collections import deque
 
 import pyarrow as pa
 
-from analysis.progress import Course
+from analysis.progress import ProgressLine
 from analysis.viewer.blueprint import layout
 from analysis.viewer.live import Ended, LiveSource, Told
-from analysis.viewer.output import Output, Window, linger
+from analysis.viewer.output import Output, Window, keep_serving
 from analysis.viewer.recording import Recording
-from analysis.viewer.scene import stage
+from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
 from schema.agent.service import tell_user
 from schema.errors import MalformedMessage, NetworkError
@@ -51,7 +51,7 @@ def watch(
         if output.file is not None:
             tell_user(f"stopped before a run was told of: no {output.file} is written")
         return
-    scene = stage(experiment_from_text(news.document))
+    scene = scene_of(experiment_from_text(news.document))
     name = f"{news.experiment}-{news.run.rpartition('/')[2]}"
     blueprint = layout(
         scene.islands,
@@ -61,19 +61,19 @@ def watch(
     )
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         window = Window(output)
-        recording.stage(scene)
-        spectator = Spectator(Show(recording, scene.space), news.run)
-        spectator.tell([news, *rest])
-        with Course() as course:
-            while not (stop.is_set() or spectator.has_ended or window.was_closed):
+        recording.add_scene(scene)
+        view = LiveView(Show(recording, scene.space), news.run)
+        view.tell([news, *rest])
+        with ProgressLine() as course:
+            while not (stop.is_set() or view.has_ended or window.was_closed):
                 now_s = time.monotonic()
                 if not output.has_window:  # it shows all, and a run's bars may be here
-                    born = spectator.births
+                    born = view.births
                     course.tell(f"watching {name}: {born} births so far", now_s)
-                spectator.tell(source.receive(_POLL_S, now_s))
-        if spectator.has_ended:
+                view.tell(source.receive(_POLL_S, now_s))
+        if view.has_ended:
             tell_user("the run has ended")
-        linger(output, window, recording, stop)
+        keep_serving(output, window, recording, stop)
 
 
 def _first(source: LiveSource, stop: threading.Event) -> tuple[News | None, list[Told]]:
@@ -94,7 +94,7 @@ def _first(source: LiveSource, stop: threading.Event) -> tuple[News | None, list
     return None, []
 
 
-class Spectator:
+class LiveView:
     """Shows what is told of one run; poses wait until their robot is known.
 
     Attributes:
@@ -136,8 +136,8 @@ class Spectator:
 
     def _move(self, arena: int, poses: pa.Table, *, has_all: bool) -> None:
         """Show poses; put those aside whose robots have not been told of."""
-        if strangers := self._show.move(arena, poses, has_all=has_all):
-            self._unknown.append((arena, poses_of(poses, strangers)))
+        if unknown := self._show.move(arena, poses, has_all=has_all):
+            self._unknown.append((arena, poses_of(poses, unknown)))
 
 
 def poses_of(poses: pa.Table, births: list[BirthId]) -> pa.Table:

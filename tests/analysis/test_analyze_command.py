@@ -1,4 +1,4 @@
-"""``revolve analyze`` on runs that nothing can be drawn of."""
+"""Tests of ``revolve analyze`` on runs without drawable data."""
 
 import argparse
 from pathlib import Path
@@ -19,7 +19,7 @@ def no_pictures() -> NoReturn:
     raise NoPictures("nothing draws here")
 
 
-def test_that_no_figure_could_be_drawn_is_said(
+def test_an_analysis_without_figures_says_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     kind = TABLES["births"].field("body").type
@@ -33,7 +33,7 @@ def test_that_no_figure_could_be_drawn_is_said(
     assert analyze(options, ["analyze", "run"], no_pictures) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "no population could be measured"
-    told = "no figure could be drawn; the lines 'left out: figure' tell why"
-    assert f"{out / 'figures'}: {told}" in lines
+    text = "no figure could be drawn; see the lines 'left out: figure'"
+    assert f"{out / 'figures'}: {text}" in lines
     whys = [line for line in lines if line.startswith("left out: figure 6.2: ")]
     assert whys == ["left out: figure 6.2: no finished run could be measured"]

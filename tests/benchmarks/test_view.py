@@ -15,7 +15,7 @@ import pytest
 from analysis.viewer.blueprint import layout
 from analysis.viewer.recording import Recording
 from analysis.viewer.show import Show
-from analysis.viewer.watch import Spectator
+from analysis.viewer.watch import LiveView
 from schema.experiment.document import Space, body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.identity import NOBODY
@@ -106,11 +106,11 @@ def test_an_arena_of_thirty_costs_the_viewer_a_fifth_of_a_core_at_most(
     space = body_space(Space())
     blueprint = layout((0,), extent_m=2.6, arenas={0})
     with Recording("watched", blueprint, file=file) as recording:
-        spectator = Spectator(Show(recording, space), "run")
-        spectator.tell([told])
+        view = LiveView(Show(recording, space), "run")
+        view.tell([told])
         began = time.process_time()
         for data in messages:
-            spectator.tell([decode_live(data)])
+            view.tell([decode_live(data)])
         recording.flush()
         used_s = time.process_time() - began
     share = used_s / (60.0 * MINUTES)

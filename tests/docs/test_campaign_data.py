@@ -16,7 +16,7 @@ from analysis.comparison.comparison import Outcomes, comparison, findings
 from analysis.comparison.outcomes import outcome
 from analysis.comparison.progression import progression
 from analysis.measures.load import read_runs
-from analysis.measures.study import gathered, measure_runs
+from analysis.measures.study import concatenated, measure_runs
 from docs import campaign
 from docs.campaign_data import (
     DATA,
@@ -157,16 +157,16 @@ def test_the_last_population_is_kept_with_its_genomes(data: Path) -> None:
 def test_collecting_resumes_where_it_was_left(
     place: Path, parts: Parts, data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    whole = _files(data)
-    before = {name: (data / name).stat().st_mtime_ns for name in whole}
+    integer_breaks = _files(data)
+    before = {name: (data / name).stat().st_mtime_ns for name in integer_breaks}
     path_of(data, "runs", "scenario1-01").unlink()
     path_of(data, "final", "scenario3-00").write_bytes(b"PAR1")
     capsys.readouterr()
     assert campaign.collect(place, data, COMMIT, parts) == 0
     assert "2 repeats collected, 0 failed" in capsys.readouterr().out
-    assert _files(data) == whole
+    assert _files(data) == integer_breaks
     touched = {
-        name for name in whole if (data / name).stat().st_mtime_ns != before[name]
+        name for name in integer_breaks if (data / name).stat().st_mtime_ns != before[name]
     }
     assert {Path(name).stem for name in touched} == {"scenario1-01", "scenario3-00"}
 
@@ -183,7 +183,7 @@ def test_only_finished_runs_of_the_campaign_are_collected(
     assert {Path(name).stem for name in _files(tmp_path / "data")} == {"scenario1-00"}
     assert "scenario2-1: is no run of the campaign" in capsys.readouterr().out
     assert campaign.collect(tmp_path, tmp_path / "data", COMMIT, parts[:1]) == 1
-    assert "scenario2-01: table evaluations: is not there" in capsys.readouterr().out
+    assert "scenario2-01: table evaluations: missing" in capsys.readouterr().out
 
 
 def test_a_lost_run_is_made_again(
@@ -296,11 +296,11 @@ def test_experiments_are_compared_by_what_is_kept(
 
 def test_courses_are_those_of_the_runs(place: Path, parts: Parts, data: Path) -> None:
     runs, _ = read_runs([place / "runs" / part.folder for part in parts])
-    whole = progression(gathered(measure_runs(runs))["populations"])
+    integer_breaks = progression(concatenated(measure_runs(runs))["populations"])
     ours = progression(kept(data, "populations"))
-    is_kept = pc.is_in(whole["births"], pa.array([MARK, BIRTHS]))
-    assert ours == whole.filter(is_kept)
-    assert whole.num_rows > ours.num_rows > 40
+    is_kept = pc.is_in(integer_breaks["births"], pa.array([MARK, BIRTHS]))
+    assert ours == integer_breaks.filter(is_kept)
+    assert integer_breaks.num_rows > ours.num_rows > 40
 
 
 def test_committed_rows_are_whole() -> None:

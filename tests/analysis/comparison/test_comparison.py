@@ -10,9 +10,9 @@ import pytest
 from analysis.comparison.claims import CLAIMS, Claim
 from analysis.comparison.comparison import Outcomes, comparison, findings, verdict
 from analysis.comparison.outcomes import outcome
-from analysis.measures.load import Run, Settings
+from analysis.measures.load import IslandSettings, Run
 from analysis.measures.outputs import OUTCOME, OUTPUTS, schema
-from analysis.measures.study import Measured
+from analysis.measures.study import MeasuredRun
 
 Level = Mapping[str, float | None]
 ROBOT = dict.fromkeys(OUTPUTS["robots"], 0) | {"experiment": "", "folder": ""}
@@ -36,13 +36,13 @@ def tables(
 
 def measured(
     name: str, number: int, made: dict[str, pa.Table], state: str = "finished"
-) -> Measured:
-    settings = (Settings(100, is_online=False, records_touches=False),)
+) -> MeasuredRun:
+    settings = (IslandSettings(100, is_online=False, records_touches=False),)
     folder = Path(f"{name}-{number}")
-    return Measured(Run(folder, name, number, 1, state, "", settings), made, ())
+    return MeasuredRun(Run(folder, name, number, 1, state, "", settings), made, ())
 
 
-def runs(name: str, values: list[float], *, births: int = 100) -> list[Measured]:
+def runs(name: str, values: list[float], *, births: int = 100) -> list[MeasuredRun]:
     """Return finished runs that end with these fitnesses."""
     return [
         measured(name, number, tables([{"births": births, "fitness": value}]))

@@ -1,4 +1,4 @@
-"""What figures show, read back from what would be drawn."""
+"""Tests of the catalogue: data of the layers that each figure draws."""
 
 import pytest
 
@@ -54,17 +54,17 @@ def test_spread_shows_runs_as_points_and_robots_as_violins() -> None:
     )
     shown = layers(figure)
     assert shown["geom_point"]["value"] == [0.1, 0.4, 0.3, 1, 2, 3, 4, 9]
-    # Those who are dead do not count, and what does not vary has no shape.
+    # Dead robots are ignored; equal values have no violin.
     assert shown["geom_violin"]["value"] == [0.2, 0.6]
     assert set(shown["geom_violin"]["experiment"]) == {"scenario1"}
-    # Five runs have a box, three a bar at their median.
+    # Five runs have a box, three a bar at the median.
     assert set(shown["geom_boxplot"]["experiment"]) == {"b"}
     assert shown["geom_errorbar"]["value"] == [0.3]
     assert figure.labels.y == "fitness [m/s]"
     figure.draw()
 
 
-def test_panels_stand_in_their_order_whatever_their_names() -> None:
+def test_panels_keep_their_given_order() -> None:
     panels = [Panel("parts", "z"), Panel("hidden", "a")]
     rows = [{"experiment": "x", "parts": 7.0, "hidden": 1.0}]
     figure = over_runs({"outcomes": table("outcomes", rows)}, *panels)
@@ -73,7 +73,7 @@ def test_panels_stand_in_their_order_whatever_their_names() -> None:
     figure.draw()
 
 
-def test_who_is_shown_at_other_births_is_named() -> None:
+def test_different_births_of_experiments_are_labelled() -> None:
     rows = [
         {"experiment": name, "births": births, "parts": 7.0, "hidden": 1.0}
         for name, births in (("scenario1", 60), ("scenario3", 30), ("b", 60))
@@ -92,7 +92,7 @@ def test_who_is_shown_at_other_births_is_named() -> None:
     assert alone.labels.x == ""
 
 
-def test_an_interval_does_not_reach_below_what_is_possible() -> None:
+def test_an_interval_is_clipped_at_zero() -> None:
     rows = table("progression", course("b", 3, 0.05, 0.4))
     shown = layers(over_births({"progression": rows}, "fitness", "f"))
     assert shown["geom_ribbon"]["low"] == pytest.approx([0.0, 0.3])
@@ -108,7 +108,7 @@ def test_panels_of_zeros_begin_at_zero() -> None:
     assert lows[1] > -0.1
 
 
-def test_course_has_bands_only_where_runs_are_enough() -> None:
+def test_bands_are_drawn_for_three_or_more_runs() -> None:
     rows = [*course("a", 2, 0.1, 0.2), *course("b", 3, 0.3, 0.4)]
     shown = layers(
         over_births({"progression": table("progression", rows)}, "fitness", "f")
@@ -118,26 +118,26 @@ def test_course_has_bands_only_where_runs_are_enough() -> None:
     assert set(shown["geom_ribbon"]["experiment"]) == {"b"}
 
 
-def test_course_of_few_runs_is_drawn_without_bands() -> None:
+def test_progress_of_few_runs_is_drawn_without_bands() -> None:
     rows = table("progression", course("a", 1, 0.1, 0.2))
     figure = over_births({"progression": rows}, "fitness", "f")
     assert set(layers(figure)) == {"geom_line"}
     figure.draw()
 
 
-def test_what_is_missing_is_said() -> None:
+def test_missing_data_is_named() -> None:
     empty = {name: table(name, []) for name in ("outcomes", "progression")}
     with pytest.raises(NothingToDraw, match="no finished run could be measured"):
         over_runs(empty, FITNESS)
-    with pytest.raises(NothingToDraw, match="fitness at two births"):
+    with pytest.raises(NothingToDraw, match="fitness at two numbers of births"):
         over_births(empty, "fitness", "f")
     none = {"outcomes": table("outcomes", [{"experiment": "a", "rank": 1.0}])}
     with pytest.raises(NothingToDraw, match="has a value of fitness"):
         over_runs(none, FITNESS)
 
 
-def test_every_figure_has_its_place_or_a_reason() -> None:
-    # The thesis's, but for those of pictures; then ours by letters.
+def test_catalogue_has_all_figures_of_the_thesis_and_each_names_missing_data() -> None:
+    # Figures of the thesis except rendered ones, then our own.
     numbers = [one.number for one in FIGURES]
     thesis = [number.rstrip("ab") for number in numbers if number[0].isdigit()]
     assert list(dict.fromkeys(thesis)) == [
@@ -154,7 +154,7 @@ def test_every_figure_has_its_place_or_a_reason() -> None:
             one.draw(nothing)
 
 
-def test_an_experiment_has_its_colour_in_every_company() -> None:
+def test_an_experiment_has_the_same_colour_in_every_figure() -> None:
     assert in_order(["b", "no-selection", "scenario1", "b"]) == [
         "scenario1",
         "no-selection",
@@ -166,6 +166,6 @@ def test_an_experiment_has_its_colour_in_every_company() -> None:
     assert [label("scenario3"), label("no-selection")] == ["scenario 3", "no selection"]
 
 
-def test_values_of_no_run_are_no_rows() -> None:
+def test_null_values_have_no_rows() -> None:
     rows = table("outcomes", [*outcomes("a", 0.1), {"experiment": "b"}])
     assert stacked(rows, [FITNESS])["value"].to_pylist() == [0.1]

@@ -1,4 +1,4 @@
-"""Families by hand, and in the pictures that are made of them."""
+"""Families of robots, and the figures that show them."""
 
 from pathlib import Path
 
@@ -15,7 +15,6 @@ from analysis.figures.family_tree import (
     ordered,
     row_of,
 )
-from analysis.figures.graphviz import NoDot, ordered_by_dot
 from analysis.figures.pictures import FOUNDERS, family_tree, gaits
 from analysis.figures.robot_pictures import RobotPicture
 from analysis.figures.robots import lineages
@@ -32,8 +31,8 @@ def body(*genes: int) -> Body:
 
 
 @pytest.fixture
-def people() -> pa.Table:
-    """Return 0, 1, 2 (founders), 3 of 0 and 1, 4 of 3 and 1, 5 of 4 and 3."""
+def members() -> pa.Table:
+    """Return births 0, 1, 2 (founders), 3 of 0 and 1, 4 of 3 and 1, 5 of 4 and 3."""
     zero: tuple[int, int] = (0, 0)
     one, three, four = (0, 1), (0, 3), (0, 4)
     return births(
@@ -49,24 +48,26 @@ def people() -> pa.Table:
     )  # fmt: skip
 
 
-def test_each_stands_where_it_is_nearest(people: pa.Table) -> None:
-    found = family(people, 5, 3)
+def test_an_ancestor_is_on_its_nearest_level_only(members: pa.Table) -> None:
+    found = family(members, 5, 3)
     assert found.levels == ((5,), (4, 3), (1, 0))
     assert found.edges == ((5, 4), (5, 3), (4, 3), (4, 1), (3, 0), (3, 1))
-    assert family(people, 5, 2).edges == ((5, 4), (5, 3), (4, 3))
-    assert family(people, 2).levels == ((2,),)
+    assert family(members, 5, 2).edges == ((5, 4), (5, 3), (4, 3))
+    assert family(members, 2).levels == ((2,),)
 
 
-def test_founders_are_those_whose_parts_live_on(people: pa.Table) -> None:
-    found = family(people, 5, 2)
-    # In 5, 4 and 3: three parts are 1's, and its 21 once more; one is 0's. Gene 99
-    # came by mutation, 2 left nothing.
+def test_founders_are_robots_without_parents_whose_parts_survive(
+    members: pa.Table,
+) -> None:
+    found = family(members, 5, 2)
+    # In 5, 4 and 3 founder 1 has four parts, founder 0 one and founder 2 none. Gene 99
+    # was added by mutation.
     assert found.founders == (1, 0)
-    assert found.paint == {10: 0, 20: 1, 21: 1, 30: 2}
+    assert found.founder_of == {10: 0, 20: 1, 21: 1, 30: 2}
 
 
-def test_lineage_is_all_ancestors_parents_first(people: pa.Table) -> None:
-    found = lineage(people, "x", 4)
+def test_lineage_is_all_ancestors_parents_first(members: pa.Table) -> None:
+    found = lineage(members, "x", 4)
     assert found["order"].to_pylist() == [0, 1, 3, 4]
     assert found["rank"].to_pylist() == [1, 1, 2, 3]
     assert found["parents"].to_pylist() == [[], [], [0, 1], [3, 1]]
@@ -78,7 +79,7 @@ def test_lineage_is_all_ancestors_parents_first(people: pa.Table) -> None:
     assert sorted(ends) == [(3, 0), (3, 1), (4, 1), (4, 3)]
 
 
-def test_a_lineage_over_islands_has_those_whose_rows_stand_behind() -> None:
+def test_a_lineage_contains_migrants_whose_rows_come_later() -> None:
     # 0:1 is a child of 0:0 and of 1:0, a migrant whose row comes later.
     family = births(((0, 0), []), ((0, 1), [(0, 0), (1, 0)]), ((1, 0), []),
                     rank=[1, 2, 1])  # fmt: skip
@@ -93,7 +94,7 @@ def test_a_lineage_over_islands_has_those_whose_rows_stand_behind() -> None:
     shown.draw()
 
 
-def test_the_best_is_the_fittest_of_the_last() -> None:
+def test_the_best_robot_is_the_fittest_of_the_last_population() -> None:
     rows = [
         {"experiment": "b", "folder": "f", "birth_island": 0, "birth": n,
          "is_last": n != 1, "fitness": fitness}
@@ -103,12 +104,12 @@ def test_the_best_is_the_fittest_of_the_last() -> None:
     assert found == Best("b", Path("f"), 0, 2, 0.3)
 
 
-def test_a_robot_has_its_row(people: pa.Table) -> None:
-    assert row_of(Best("x", Path("f"), 0, 4, 0.0), people) == 4
-    assert row_of(Best("x", Path("f"), 1, 4, 0.0), people) == -1
+def test_row_of_a_robot_is_found_by_its_birth_id(members: pa.Table) -> None:
+    assert row_of(Best("x", Path("f"), 0, 4, 0.0), members) == 4
+    assert row_of(Best("x", Path("f"), 1, 4, 0.0), members) == -1
 
 
-def test_levels_follow_the_one_below() -> None:
+def test_a_level_is_sorted_by_the_level_below() -> None:
     # 3 is a parent of 2, 4 of 1: sorted by number their lines would cross.
     assert ordered([[0], [1, 2], [3, 4]], [(0, 1), (0, 2), (2, 3), (1, 4)]) == [
         [0],
@@ -117,72 +118,62 @@ def test_levels_follow_the_one_below() -> None:
     ]
 
 
-def test_dot_is_asked_where_it_is(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(NoDot, match="not installed"):
-        ordered_by_dot([[0], [1, 2]], [(0, 1), (0, 2)])
-    program = tmp_path / "dot"
-    plain = "graph 1 2 2\\nnode 0 1 0 1 1\\nnode 1 1.8 1 1 1\\nnode 2 0.5 1 1 1\\nstop"
-    program.write_text(f"#!/bin/sh\nread -r all\nprintf '{plain}'\n")
-    program.chmod(0o755)
-    assert ordered_by_dot([[0], [1, 2]], [(0, 1), (0, 2)]) == [[0], [2, 1]]
-    program.write_text("#!/bin/sh\nexit 1\n")
-    with pytest.raises(NoDot, match="does not answer"):
-        ordered_by_dot([[0], [1, 2]], [(0, 1), (0, 2)])
+def test_a_level_is_sorted_by_the_level_above_if_fewer_lines_cross() -> None:
+    # 6 is a parent of 3 and 5: their lines cross that of 4 if 4 is between them.
+    edges = [(0, 1), (0, 2), (1, 3), (1, 4), (2, 5), (3, 6), (5, 6), (4, 7)]
+    found = ordered([[0], [1, 2], [3, 4, 5], [6, 7]], edges)
+    assert found == [[0], [2, 1], [5, 3, 4], [6, 7]]
 
 
 @pytest.fixture
-def robot_picture(people: pa.Table) -> RobotPicture:
-    relatives = family(people, 5, 3)
-    pictures = {who: np.full((9, 16, 3), who, np.uint8) for who in range(6)}
+def robot_picture(members: pa.Table) -> RobotPicture:
+    relatives = family(members, 5, 3)
+    pictures = {row: np.full((9, 16, 3), row, np.uint8) for row in range(6)}
     return RobotPicture(
         Best("scenario1", Path("f"), 0, 5, 0.25),
         (pictures[0], pictures[1]),
         (0.0, 0.5),
         relatives,
         pictures,
-        {who: BirthId(0 if who else 1, who) for who in pictures},
-        lineage(people, "scenario1", 5),
+        {row: BirthId(0 if row else 1, row) for row in pictures},
+        lineage(members, "scenario1", 5),
     )
 
 
 def shade(image: AxesImage) -> int:
-    """Return the grey of a picture's corner, which is the robot's row."""
+    """Return the grey level of a picture's corner, which is the robot's row."""
     pixels = image.get_array()
     assert pixels is not None
     return int(pixels[0, 0, 0])
 
 
-def test_a_tree_shows_everybody_once_and_founders_on_top(
+def test_a_tree_shows_each_ancestor_once_and_founders_on_top(
     robot_picture: RobotPicture,
 ) -> None:
     assert robot_picture.family is not None
-    levels = ordered(robot_picture.family.levels, robot_picture.family.edges)
     fitness = {BirthId(0, 5): 0.25}
-    (axes,) = family_tree(robot_picture, levels, fitness).axes
+    (axes,) = family_tree(robot_picture, robot_picture.family, fitness).axes
     heights = [(shade(image), image.get_extent()[2]) for image in axes.images]
-    told = {
+    texts = {
         text.get_text().split("  ")[0]: text.get_text().split("  ")[-1]
         for text in axes.texts
     }
-    assert told["5"] == "0.250 m/s"
+    assert texts["5"] == "0.250 m/s"
     # 0 was born on another island.
-    assert set(told) == {"5", "4", "3", "1", "1:0", "founder 1", "founder 1:0"}
-    by_who: dict[int, list[float]] = {}
-    for who, height in heights:
-        by_who.setdefault(who, []).append(height)
-    assert by_who[5] < by_who[4] == by_who[3] < by_who[1]
-    # Founders that are near stand twice: in their level, and above the dashed line.
+    assert set(texts) == {"5", "4", "3", "1", "1:0", "founder 1", "founder 1:0"}
+    by_row: dict[int, list[float]] = {}
+    for row, height in heights:
+        by_row.setdefault(row, []).append(height)
+    assert by_row[5] < by_row[4] == by_row[3] < by_row[1]
+    # Near founders are shown twice: on their level, and above the dashed line.
     (line,) = [one for one in axes.lines if one.get_linestyle() == "--"]
     dashed = float(np.asarray(line.get_ydata())[0])
-    assert [sum(at > dashed for at in by_who[who]) for who in (0, 1, 4)] == [1, 1, 0]
+    assert [sum(at > dashed for at in by_row[row]) for row in (0, 1, 4)] == [1, 1, 0]
     frames = {tuple(patch.get_edgecolor()[:3]) for patch in axes.patches}
     assert {FOUNDERS[0], FOUNDERS[1]} <= frames
 
 
-def test_gaits_stand_in_rows_with_their_times(robot_picture: RobotPicture) -> None:
+def test_gaits_are_shown_in_rows_with_times(robot_picture: RobotPicture) -> None:
     figure = gaits([robot_picture, robot_picture])
     assert len(figure.axes) == 4
     assert figure.axes[0].get_title(loc="left") == "scenario 1, 0.250 m/s"

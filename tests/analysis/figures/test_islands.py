@@ -1,4 +1,4 @@
-"""Figures of islands, of extremities and of speed, by hand."""
+"""Tests of the figures of islands, extremities and speed."""
 
 import pyarrow as pa
 import pytest
@@ -11,7 +11,7 @@ from analysis.figures.robots import extremities_and_fitness
 from tests.analysis.drawn import layers, table
 
 
-def test_arrows_go_from_island_to_island_as_often_as_migrants_went() -> None:
+def test_arrows_count_migrants_between_islands() -> None:
     went = [(0, 1, 2), (0, 1, 0), (1, 0, 0), (2, 0, 1)]
     rows = [
         {"experiment": "ring", "island": island, "to": to, "living": living}
@@ -27,7 +27,7 @@ def test_arrows_go_from_island_to_island_as_often_as_migrants_went() -> None:
     figure.draw()
 
 
-def test_islands_have_their_lines() -> None:
+def test_each_island_has_a_line() -> None:
     rows = [
         {"experiment": "ring", "folder": "f", "island": island, "births": births,
          "fitness": 0.1 * island + births}
@@ -85,7 +85,7 @@ def test_fitness_by_extremities_has_bars_where_three_runs_are() -> None:
     figure.draw()
 
 
-def test_last_populations_stand_left_however_few_runs_there_are() -> None:
+def test_last_populations_are_left_for_any_number_of_runs() -> None:
     rows = [
         {"experiment": "a", "folder": "f", "population": population, "by": "count",
          "bin": extremities, "fitness": 0.1}
@@ -95,7 +95,7 @@ def test_last_populations_stand_left_however_few_runs_there_are() -> None:
     tables = {"extremities": table("extremities", rows)}
     drawn = extremities_and_fitness(tables, "count").draw()
     titles = [text.get_text() for text in drawn.findobj(Text)]
-    assert titles.index("last populations") < titles.index("all ever judged")
+    assert titles.index("last populations") < titles.index("all robots ever evaluated")
 
 
 def test_a_speed_is_drawn_beside_the_thesiss() -> None:

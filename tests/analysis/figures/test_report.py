@@ -1,4 +1,4 @@
-"""The report, as a reader of HTML finds it."""
+"""Tests of the report, read by an HTML parser."""
 
 import base64
 from html.parser import HTMLParser
@@ -7,7 +7,8 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
-from analysis.figures.report import Drawn, Making, report
+from analysis.figures.catalogue import DrawnFigure, Figure
+from analysis.figures.report import Provenance, report
 from analysis.measures.outputs import schema
 
 PICTURE = b"\x89PNG\r\n\x1a\nnothing more"
@@ -15,7 +16,7 @@ VOID = {"meta", "img", "br", "link"}
 
 
 class Reader(HTMLParser):
-    """Collects what a page shows and what it would load; tags must close."""
+    """Collects the text, images, links and ids of a page; tags must be closed."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -28,10 +29,10 @@ class Reader(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         if tag not in VOID:
             self.open.append(tag)
-        told = dict(attrs)
-        self.sources += [told["src"] or ""] if "src" in told else []
-        self.links += [told["href"] or ""] if "href" in told else []
-        self.names += [told["id"] or ""] if "id" in told else []
+        values = dict(attrs)
+        self.sources += [values["src"] or ""] if "src" in values else []
+        self.links += [values["href"] or ""] if "href" in values else []
+        self.names += [values["id"] or ""] if "id" in values else []
 
     def handle_endtag(self, tag: str) -> None:
         assert self.open.pop() == tag
@@ -73,12 +74,20 @@ def tables() -> dict[str, pa.Table]:
 def read(tmp_path: Path) -> Reader:
     (tmp_path / "one.png").write_bytes(PICTURE)
     figures = [
-        Drawn(number, f"Title {number}", "What & why.", ("outcomes", "<a> file"),
-              tmp_path / "one.png")
+        DrawnFigure(
+            Figure(
+                number,
+                f"Title {number}",
+                "What & why.",
+                ("outcomes", "<a> file"),
+                lambda _: None,
+            ),
+            tmp_path / "one.png",
+        )
         for number in ("6.2", "6.10")
-    ]  # fmt: skip
-    making = Making("revolve analyze runs", "2020-01-01", {"numpy": "9.9"})
-    page = report(tables(), figures, making)
+    ]
+    provenance = Provenance("revolve analyze runs", "2020-01-01", {"numpy": "9.9"})
+    page = report(tables(), figures, provenance)
     assert page.startswith("<!DOCTYPE html>")
     reader = Reader()
     reader.feed(page)
@@ -86,7 +95,7 @@ def read(tmp_path: Path) -> Reader:
     return reader
 
 
-def test_pictures_are_inside_and_nothing_is_loaded(read: Reader) -> None:
+def test_pictures_are_embedded_and_nothing_is_loaded(read: Reader) -> None:
     prefix = "data:image/png;base64,"
     assert len(read.sources) == 2
     for source in read.sources:
@@ -94,39 +103,39 @@ def test_pictures_are_inside_and_nothing_is_loaded(read: Reader) -> None:
     assert read.links == []
     assert read.names == ["figure-6.2", "figure-6.10"]
     assert (
-        "Figure 6.10. Title 6.10. What & why. Rows of outcomes , <a> file." in read.text
+        "Figure 6.10. Title 6.10. What & why. Source: outcomes , <a> file." in read.text
     )
 
 
-def test_findings_stand_with_numbers_and_count(read: Reader) -> None:
+def test_findings_are_shown_with_numbers_and_counts(read: Reader) -> None:
     assert "0 reproduced, 1 not reproduced, 1 undecided." in read.text
     assert "a <b> fitter > 2 / 3 0.25 – \u22121 – – 0.01 not reproduced so" in read.text
     assert "there is no finished run" in read.text
 
 
-def test_what_was_read_and_left_out_and_how_is_told(read: Reader) -> None:
+def test_runs_left_out_items_and_provenance_are_shown(read: Reader) -> None:
     assert "3 runs, 135 births; written 2020-01-01" in read.text
     assert (
         "scenario 1 1 finished, 1 not finished 45 to 60 1 7: repeats 0, 2" in read.text
     )
     assert "b 1 finished 30 1 8 Findings" in read.text
     assert "figure 6.1 no benchmark run runs/x broken & gone" in read.text
-    assert "revolve analyze runs what version numpy 9.9" in read.text
+    assert "revolve analyze runs software version numpy 9.9" in read.text
 
 
-def test_what_sets_namesakes_apart_stands_beside_their_runs() -> None:
+def test_differing_settings_of_equal_names_are_shown_beside_their_runs() -> None:
     rows = tables()["runs"].to_pylist()
     rows[2]["differs"] = "births & all: 1 instead of 2"
     runs = pa.Table.from_pylist(rows, schema("runs"))
     reader = Reader()
-    reader.feed(report({**tables(), "runs": runs}, [], Making("", "now", {})))
+    reader.feed(report({**tables(), "runs": runs}, [], Provenance("", "now", {})))
     assert "seeds settings scenario 1" in reader.text
     assert "b 1 finished 30 1 8 births & all: 1 instead of 2 Findings" in reader.text
 
 
-def test_no_runs_no_sections() -> None:
+def test_a_report_without_runs_has_no_empty_sections() -> None:
     empty = {name: table.slice(0, 0) for name, table in tables().items()}
-    page = report(empty, [], Making("revolve analyze", "now", {}))
+    page = report(empty, [], Provenance("revolve analyze", "now", {}))
     reader = Reader()
     reader.feed(page)
     assert reader.open == []

@@ -1,4 +1,4 @@
-"""What is asked of whoever simulates a robot whose picture is taken."""
+"""Tests of the simulation that a gait is rendered from."""
 
 from pathlib import Path
 from typing import NoReturn
@@ -21,7 +21,7 @@ from tests.analysis.tables import births
 EXPERIMENT = Experiment(name="x", islands=(Islands(count=3),))
 
 
-def test_a_robot_moves_by_the_noise_of_its_own_run_and_island() -> None:
+def test_gait_uses_noise_of_the_robots_run_and_island() -> None:
     asked: list[Identity] = []
 
     def simulate(*_: object, identity: Identity = NOBODY, **__: object) -> NoReturn:
@@ -29,13 +29,13 @@ def test_a_robot_moves_by_the_noise_of_its_own_run_and_island() -> None:
         raise SimulationDiverged("not simulated here")
 
     genome = generate(np.random.default_rng(1), EXPERIMENT, BirthId(2, 4))
-    people = births(
+    members = births(
         ((2, 4), []), genome=[encode_genome(genome)], body=[[part(0, -1, -1, "Core")]]
     )
     with pytest.raises(SimulationDiverged):
         robot_picture(
             Best("x", Path("f"), 2, 4, 0.1),
-            people,
+            members,
             EXPERIMENT,
             simulate,
             FOUNDERS,

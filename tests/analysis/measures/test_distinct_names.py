@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from analysis.figures.style import broken, colours, in_order, label
-from analysis.measures.distinct_names import told_apart
-from analysis.measures.load import Run, Settings
+from analysis.figures.style import colours, in_order, label, two_line_label
+from analysis.measures.distinct_names import with_distinct_names
+from analysis.measures.load import IslandSettings, Run
 from schema.experiment.document import Experiment, Islands, Selection
 from schema.experiment.file import experiment_text, read_experiment
 
@@ -36,7 +36,7 @@ def changed(**sections: Any) -> dict[str, Any]:  # noqa: ANN401 - of JSON
 
 
 def runs(*documents: Mapping[str, Any], name: str = "scenario1") -> list[Run]:
-    settings = (Settings(60, is_online=False, records_touches=False),)
+    settings = (IslandSettings(60, is_online=False, records_touches=False),)
     return [
         Run(Path(f"{number}"), name, 0, number, "finished", json.dumps(each), settings)
         for number, each in enumerate(documents)
@@ -44,7 +44,9 @@ def runs(*documents: Mapping[str, Any], name: str = "scenario1") -> list[Run]:
 
 
 def told(*documents: Mapping[str, Any]) -> list[tuple[str, str]]:
-    return [(run.experiment, run.differs) for run in told_apart(runs(*documents))]
+    return [
+        (run.experiment, run.differs) for run in with_distinct_names(runs(*documents))
+    ]
 
 
 def test_equal_settings_stay_one_experiment() -> None:
@@ -128,22 +130,28 @@ def test_documents_that_are_not_ours_are_compared_as_they_stand() -> None:
 def test_names_are_told_apart_each_for_itself() -> None:
     some = [*runs(SCENARIO), *runs(changed(births=5), name="mine")]
     some += runs(json.loads(experiment_text(Experiment("mine"))), name="mine")
-    assert [run.experiment for run in told_apart(some)] == ["scenario1", "mine", "mine"]
+    assert [run.experiment for run in with_distinct_names(some)] == [
+        "scenario1",
+        "mine",
+        "mine",
+    ]
     islands = Experiment("mine", selection=Selection(population=4))
     some += runs(json.loads(experiment_text(islands)), name="mine")
-    assert told_apart(some)[-1].experiment == "mine~2"
+    assert with_distinct_names(some)[-1].experiment == "mine~2"
 
 
 def test_a_name_that_an_experiment_has_is_given_to_no_other() -> None:
     taken = runs(SCENARIO, name="scenario1~2")
     others = [changed(simulation={"friction": each}) for each in (0.5, 0.7)]
-    names = [run.experiment for run in told_apart(runs(SCENARIO, *others) + taken)]
+    names = [
+        run.experiment for run in with_distinct_names(runs(SCENARIO, *others) + taken)
+    ]
     assert names == ["scenario1", "scenario1~3", "scenario1~4", "scenario1~2"]
 
 
 def test_figures_say_which_is_meant() -> None:
     assert label("scenario1~2") == "scenario 1 ~2"
-    assert broken("no-selection~2") == "no selection\n~2"
+    assert two_line_label("no-selection~2") == "no selection\n~2"
     names = ["scenario1~2", "scenario1", "scenario2"]
     assert in_order(names) == ["scenario1", "scenario2", "scenario1~2"]
     assert len(set(colours(names).values())) == 3

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from analysis.measures.load import Run, read_runs, read_tables
-from analysis.measures.study import Measured, measure_run, measure_runs
+from analysis.measures.study import MeasuredRun, measure_run, measure_runs
 from schema.errors import RunFolderError
 from schema.tables.files import parquet_path, segment_path
 from tests.analysis.tables import births, population, table
@@ -59,7 +59,7 @@ def made(tmp_path: Path) -> Maker:
     return make
 
 
-def whys(measured: Measured) -> dict[str, str]:
+def whys(measured: MeasuredRun) -> dict[str, str]:
     return {one.what: one.why for one in measured.left_out}
 
 
@@ -69,7 +69,7 @@ def found_in(folder: Path) -> Run:
     return run
 
 
-def fitness(measured: Measured) -> list[float]:
+def fitness(measured: MeasuredRun) -> list[float]:
     values: list[float] = measured.tables["populations"]["fitness"].to_pylist()
     return values
 
@@ -82,7 +82,7 @@ def test_finished_and_unfinished_runs_are_measured_alike(
     assert fitness(measured) == pytest.approx([0.2, 0.4])
     assert measured.tables["robots"].num_rows == 3
     expected = {} if state == "finished" else {
-        "comparison": "the run is not finished: 3 of 3 births are there"
+        "comparison": "the run is not finished: 3 of 3 births are recorded"
     }  # fmt: skip
     assert whys(measured) == expected
 
@@ -96,7 +96,7 @@ def test_runs_are_found_below_in_order(made: Maker, tmp_path: Path) -> None:
 
 
 def test_where_no_run_is_is_said(tmp_path: Path) -> None:
-    with pytest.raises(RunFolderError, match="no run is there or below"):
+    with pytest.raises(RunFolderError, match="no run in or below this folder"):
         read_runs([tmp_path])
     with pytest.raises(RunFolderError, match="nowhere: no such folder"):
         read_runs([tmp_path / "nowhere"])
@@ -154,7 +154,7 @@ def test_a_finished_run_without_tables_is_named(made: Maker, tmp_path: Path) -> 
     assert [run.folder.name for run in runs] == ["whole"]
     (one,) = left_out
     assert (Path(one.folder).name, one.what) == ("gone", "run")
-    assert one.why == "is finished, but its tables are gone: none is there"
+    assert one.why == "the run is finished, but its tables are missing"
 
 
 @pytest.mark.parametrize("name", ["births", "population", "evaluations"])
@@ -164,7 +164,7 @@ def test_a_table_that_a_finished_run_must_have_is_missed(
     folder = made("x")
     parquet_path(folder, "e", 0, name).unlink()
     measured = measure_run(found_in(folder), "parent")
-    why = "is not there, though the run is finished"
+    why = "missing, although the run is finished"
     assert whys(measured)[f"table {name}"] == why
     assert whys(measured)["measure robots"] == f"needs table {name}"
 
@@ -198,7 +198,7 @@ def test_of_a_run_in_two_folders_the_one_that_can_be_read_counts(
         parquet_path(tmp_path / name, "e", 0, damaged).write_bytes(b"")
     runs, left_out = read_runs([tmp_path])
     assert [run.folder.name for run in runs] == ["b"]
-    same = f"the same run as {tmp_path / 'b'}, and not all of it can be read"
+    same = f"the same run as {tmp_path / 'b'}, and not completely readable"
     assert [(Path(one.folder).name, one.why) for one in left_out] == [
         ("a", same),
         ("c", same),
@@ -223,7 +223,7 @@ def test_a_damaged_table_is_named_and_the_others_are_measured(made: Maker) -> No
     measured = measure_run(found_in(folder), "parent")
     assert fitness(measured) == pytest.approx([0.2, 0.4])
     assert "Parquet" in whys(measured)["table evaluations"]
-    # Nothing is told of robots that may not be all.
+    # Robots are left out, because some may be missing.
     assert whys(measured)["measure robots"] == "needs table evaluations"
     assert "robots" not in measured.tables
 
@@ -236,7 +236,7 @@ def test_another_version_s_table_is_named_not_guessed_at(made: Maker) -> None:
     measured = measure_run(found_in(folder), "parent")
     assert measured.tables["populations"].num_rows == 0
     assert (
-        "is of version 1, and this program reads 2"
+        "has version 1, but this program reads version 2"
         in whys(measured)["table population"]
     )
     assert whys(measured)["measures"] == "no population is recorded"
@@ -252,7 +252,7 @@ def test_another_version_s_segment_is_named(made: Maker) -> None:
         stream.write_table(rows)
     measured = measure_run(found_in(folder), "parent")
     assert "another version" in whys(measured)["table births"]
-    assert "2 rows name a birth without a row" in whys(measured)["populations"]
+    assert "2 populations skipped" in whys(measured)["populations"]
 
 
 def test_columns_that_an_older_run_lacks_are_filled(made: Maker) -> None:
@@ -278,10 +278,10 @@ def test_what_a_kill_cut_off_is_missing_and_nothing_else(
     known = tables["births"].num_rows
     assert known < 3
     measured = measure_run(found_in(folder), "parent")
-    # The founders' population needs two births, the next one three.
+    # The population of founders needs two births, the next one three.
     assert fitness(measured) == pytest.approx([0.2] if known == 2 else [])
     why = whys(measured)["populations"]
-    assert why.startswith("1 name" if known == 2 else "2 name")
+    assert why.startswith("1 population" if known == 2 else "2 population")
 
 
 def test_an_empty_run_is_named(made: Maker) -> None:
@@ -290,7 +290,7 @@ def test_an_empty_run_is_named(made: Maker) -> None:
     measured = measure_run(found_in(folder), "parent")
     assert whys(measured) == {
         "measures": "no population is recorded",
-        "comparison": "the run is not finished: 0 of 3 births are there",
+        "comparison": "the run is not finished: 0 of 3 births are recorded",
     }
 
 
@@ -330,7 +330,7 @@ def test_processes_measure_as_one_does(made: Maker, tmp_path: Path) -> None:
         made(f"run-{number}", seed=number)
     runs, _ = read_runs([tmp_path])
     done: list[int] = []
-    alone = measure_runs(runs, tell=lambda: done.append(1))
-    together = measure_runs(runs, processes=2, tell=lambda: done.append(1))
+    alone = measure_runs(runs, on_measured=lambda: done.append(1))
+    together = measure_runs(runs, processes=2, on_measured=lambda: done.append(1))
     assert len(done) == 8
     assert together == alone

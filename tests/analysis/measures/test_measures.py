@@ -8,16 +8,13 @@ import pyarrow as pa
 import pytest
 
 from analysis.comparison.progression import progression
-from analysis.measures.ancestry import ancestors, parents_of
+from analysis.measures.ancestry import ancestors, migrants, parents_of
 from analysis.measures.bodies import body_sizes, extremity_bins
 from analysis.measures.diversity import diversity, mean_distances
-from analysis.measures.measures import measure
-from analysis.measures.migrants import migrants
+from analysis.measures.measures import measure, robots
 from analysis.measures.outputs import OUTPUTS
 from analysis.measures.population_table import population_table
-from analysis.measures.populations import populations
-from analysis.measures.retention import retention
-from analysis.measures.robots import robots
+from analysis.measures.populations import populations, retention
 from analysis.measures.run_tables import RunTables
 from analysis.measures.trees import encode
 from analysis.measures.variability import variability
@@ -31,8 +28,8 @@ FAMILY = births((A, []), (B, []), (C, [A, B]), (D, [C, A]), (E, [D, C]))
 
 
 def column(tables: dict[str, pa.Table], name: str) -> list[Any]:
-    found, refusals = populations(RunTables(tables))
-    assert not refusals
+    found, problems = populations(RunTables(tables))
+    assert not problems
     values: list[Any] = found[name].to_pylist()
     return values
 
@@ -111,10 +108,10 @@ def test_a_parent_that_is_not_there_is_told_and_the_rest_is_measured() -> None:
     )
     with pytest.raises(RunFolderError, match="row 1 has a parent whose birth is not"):
         parents_of(tables["births"])
-    found, refusals = measure(RunTables(tables), frozenset())
+    found, problems = measure(RunTables(tables), frozenset())
     assert found["populations"]["fitness"].to_pylist() == [1.5]
     assert found["populations"]["ancestors"].to_pylist() == [None]
-    assert {"ancestors", "foreign", "robots"} <= set(refusals)
+    assert {"ancestors", "foreign", "robots"} <= set(problems)
 
 
 BRICK: Body = [*CORE, part(1, 0, 0, "FixedBrick")]
@@ -417,16 +414,16 @@ def test_a_population_with_somebody_unknown_is_left_out() -> None:
     born = births((A, []), (B, []))
     who = population_table(population((0, 1, {A: 1}), (0, 3, {B: 1, C: 2})), born)
     assert who.births.tolist() == [1]
-    assert who.lacking == 1
+    assert who.incomplete == 1
 
 
 def test_nothing_born_is_nothing_measured() -> None:
     tables = run(births=births(), population=population())
-    found, refusals = measure(
+    found, problems = measure(
         RunTables(tables),
         frozenset({"variability", "interactions", "between", "migrants"}),
     )
-    assert not refusals
+    assert not problems
     assert {name: rows.num_rows for name, rows in found.items()} == dict.fromkeys(
         found, 0
     )

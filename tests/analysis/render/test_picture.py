@@ -11,10 +11,10 @@ from PIL import Image
 from analysis.render.command import main
 from analysis.render.picture import (
     NoPictures,
-    Studio,
+    RobotRenderer,
     choose_engine,
     gait_strip,
-    save_film,
+    save_animation,
     save_picture,
 )
 from schema.experiment.document import Simulation
@@ -36,10 +36,10 @@ ROBOT = Robot(
 
 
 @pytest.fixture(scope="module")
-def studio() -> Iterator[Studio]:
+def renderer() -> Iterator[RobotRenderer]:
     try:
         choose_engine()
-        made = Studio(ROBOT, BUILT_IN, Simulation(), FLAT, size=(160, 120))
+        made = RobotRenderer(ROBOT, BUILT_IN, Simulation(), FLAT, size=(160, 120))
     except NoPictures as error:
         pytest.skip(str(error))
     with made:
@@ -52,8 +52,8 @@ def mostly(picture: np.ndarray, channel: int) -> np.ndarray:
     return np.argwhere(picture[..., channel].astype(int) > 2 * others + 20)
 
 
-def test_parts_show_their_colours_where_they_are(studio: Studio) -> None:
-    picture = studio.picture()
+def test_parts_show_their_colours_where_they_are(renderer: RobotRenderer) -> None:
+    picture = renderer.picture()
     assert picture.shape == (120, 160, 3)
     red, blue = mostly(picture, 0), mostly(picture, 2)
     assert len(red) > 100
@@ -67,15 +67,17 @@ def test_parts_show_their_colours_where_they_are(studio: Studio) -> None:
     assert (seen.max(axis=0) < (117, 157)).all()
 
 
-def test_a_pose_moves_the_robot_in_a_picture_that_stands_still(studio: Studio) -> None:
+def test_a_pose_moves_the_robot_in_a_picture_that_stands_still(
+    renderer: RobotRenderer,
+) -> None:
     pose = np.array([0.0, 0.0, 0.0225, 1.0, 0.0, 0.0, 0.0])
     there = pose.copy()
     there[0] += 0.05
     middle = np.array([0.05, 0.0, 0.02])
-    one = mostly(studio.picture(pose, look_at=middle), 0).mean(axis=0)
-    other = mostly(studio.picture(there, look_at=middle), 0).mean(axis=0)
+    one = mostly(renderer.picture(pose, look_at=middle), 0).mean(axis=0)
+    other = mostly(renderer.picture(there, look_at=middle), 0).mean(axis=0)
     assert other[1] > one[1] + 5
-    follows = [mostly(studio.picture(at), 0).mean(axis=0) for at in (pose, there)]
+    follows = [mostly(renderer.picture(at), 0).mean(axis=0) for at in (pose, there)]
     assert follows[0] == pytest.approx(follows[1], abs=1.5)
 
 
@@ -91,7 +93,7 @@ def test_files_open_again(tmp_path: Path) -> None:
     pictures = [np.full((4, 6, 3), 120 * number, np.uint8) for number in range(3)]
     save_picture(pictures[1], tmp_path / "one.png")
     assert np.array_equal(np.array(Image.open(tmp_path / "one.png")), pictures[1])
-    save_film(pictures, tmp_path / "film.gif", 0.12)
+    save_animation(pictures, tmp_path / "film.gif", 0.12)
     with Image.open(tmp_path / "film.gif") as film:
         assert getattr(film, "n_frames", 0) == 3
         assert film.info["duration"] == 120
@@ -127,7 +129,7 @@ def robot_file(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.usefixtures("studio")  # where nothing can draw, that is told
+@pytest.mark.usefixtures("renderer")  # where nothing can draw, that is told
 def test_a_strip_longer_than_there_are_ticks_is_refused(robot_file: Path) -> None:
     words = ["robot render", str(robot_file), str(robot_file.with_suffix(".png"))]
     said = r"--gait 49: must be <= 48, the ticks of the second half of its life"
@@ -138,7 +140,7 @@ def test_a_strip_longer_than_there_are_ticks_is_refused(robot_file: Path) -> Non
         main([*words, "--gait", "48"], simulate)
 
 
-@pytest.mark.usefixtures("studio")
+@pytest.mark.usefixtures("renderer")
 def test_a_log_is_told_at_the_beginning_what_is_drawn(
     robot_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

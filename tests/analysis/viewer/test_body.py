@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from analysis.viewer.body import figure, place, standing
+from analysis.viewer.body import box_model, neutral_pose, place
 from schema.experiment.document import Simulation
 from schema.mjcf.model import robot_spec
 from schema.parts import BUILT_IN
@@ -60,7 +60,7 @@ def test_boxes_are_where_the_engine_has_them(seed: int) -> None:
     root = rng.normal(size=7)
     root[3:] /= np.linalg.norm(root[3:])
     angles = rng.uniform(-0.7, 0.7, 3)
-    drawn = figure(ROBOT, BUILT_IN, is_plain=False)
+    drawn = box_model(ROBOT, BUILT_IN, is_plain=False)
     centres, attitudes = place(drawn, root[None], angles[None])
     found = [
         _own_corners(centre, attitude, half)
@@ -82,28 +82,28 @@ def _apart(first: Floats, second: Floats) -> float:
 
 
 def test_a_plain_figure_has_a_box_for_each_part_and_segment() -> None:
-    drawn = figure(ROBOT, BUILT_IN, is_plain=True)
+    drawn = box_model(ROBOT, BUILT_IN, is_plain=True)
     assert len(drawn.half_sizes) == len(ROBOT.parts) + 3
     assert len(drawn.parents) == 4
 
 
 def test_a_plain_figure_fills_the_room_of_the_whole_one() -> None:
     root, angles = np.array([[0.0, 0, 0, 1, 0, 0, 0]]), np.zeros((1, 3))
-    plain = figure(ROBOT, BUILT_IN, is_plain=True)
-    whole = figure(ROBOT, BUILT_IN, is_plain=False)
+    plain = box_model(ROBOT, BUILT_IN, is_plain=True)
+    whole = box_model(ROBOT, BUILT_IN, is_plain=False)
     near, far = place(plain, root, angles)[0], place(whole, root, angles)[0]
     for centre in near[0]:
         assert np.linalg.norm(far[0] - centre, axis=1).min() < 0.02
 
 
 def test_few_attitudes_serve_all_boxes() -> None:
-    drawn = figure(ROBOT, BUILT_IN, is_plain=False)
+    drawn = box_model(ROBOT, BUILT_IN, is_plain=False)
     # Four segments, and the tilts beyond the bar.
     assert len(np.unique(drawn.attitude_of)) <= 6
 
 
 def test_colours_are_the_parts() -> None:
-    drawn = figure(ROBOT, BUILT_IN, is_plain=True)
+    drawn = box_model(ROBOT, BUILT_IN, is_plain=True)
     assert {tuple(colour) for colour in drawn.colours.tolist()} == {
         (51, 102, 153),
         (255, 0, 128),
@@ -112,8 +112,8 @@ def test_colours_are_the_parts() -> None:
 
 def test_a_standing_robot_touches_the_ground() -> None:
     built = robot_spec(ROBOT, BUILT_IN, Simulation())
-    drawn = figure(ROBOT, BUILT_IN, is_plain=False)
-    centres, attitudes = standing(drawn, (2.0, -1.0))
+    drawn = box_model(ROBOT, BUILT_IN, is_plain=False)
+    centres, attitudes = neutral_pose(drawn, (2.0, -1.0))
     corners = np.concatenate(
         [
             _own_corners(*each)

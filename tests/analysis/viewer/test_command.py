@@ -12,14 +12,14 @@ import pyarrow as pa
 import pytest
 
 from analysis.viewer.blueprint import layout
-from analysis.viewer.entities import Moves, When
+from analysis.viewer.entities import PoseBatch, TimePoint
 from analysis.viewer.gallery import Gallery, spot_place
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.live import Sequel
-from analysis.viewer.looks import Figures
-from analysis.viewer.output import Output, Window, linger
+from analysis.viewer.looks import BoxModels
+from analysis.viewer.output import Output, Window, keep_serving
 from analysis.viewer.recording import ViewerError
-from analysis.viewer.scene import stage
+from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
 from schema.experiment.document import Arena, Experiment, Simulation
 from schema.experiment.file import read_experiment
@@ -89,7 +89,7 @@ def test_a_ring_wall_stands_where_the_engine_has_it() -> None:
     spec = mujoco.MjSpec()
     add_ring_wall(spec, arena, Simulation())
     model = spec.compile()
-    (walls,) = stage(Experiment(name="e", arena=arena)).walls
+    (walls,) = scene_of(Experiment(name="e", arena=arena)).walls
     assert len(walls) == model.ngeom == 5
     for geom, (place, half) in enumerate(walls):
         assert place[:3] == pytest.approx(model.geom_pos[geom], abs=1e-6)
@@ -98,13 +98,13 @@ def test_a_ring_wall_stands_where_the_engine_has_it() -> None:
 
 
 def test_who_lives_keeps_a_spot_and_who_dies_frees_it() -> None:
-    recorded, figures = Recorded(), Figures(BUILT_IN)
+    recorded, models = Recorded(), BoxModels(BUILT_IN)
     gallery = Gallery(recorded)  # type: ignore[arg-type]
     names = [BirthId(0, number) for number in range(4)]
     for name in names:
-        figures.add(name, CORE)
-    gallery.hang(Level(0, 3, 3, 3, 0.0, 0.0, tuple(names[:3])), figures)
-    gallery.hang(Level(0, 4, 3, 3, 0.0, 0.0, (names[0], names[2], names[3])), figures)
+        models.add(name, CORE)
+    gallery.show(Level(0, 3, 3, 3, 0.0, 0.0, tuple(names[:3])), models)
+    gallery.show(Level(0, 4, 3, 3, 0.0, 0.0, (names[0], names[2], names[3])), models)
     kinds = [told[0] for told in recorded.told]
     assert kinds == ["born", "stands"] * 3 + ["died", "born", "stands"]
     assert recorded.told[6][1] == "islands/0/robots/0-1"
@@ -144,15 +144,15 @@ def test_who_dies_vanishes_with_as_many_births_as_its_last_pose_has() -> None:
     ]  # fmt: skip
     show.move(0, pa.Table.from_pylist(rows, TABLES["poses"]))
     (moves,) = [told[2] for told in recorded.told if told[0] == "moved"]
-    assert isinstance(moves, Moves)
+    assert isinstance(moves, PoseBatch)
     assert moves.births is not None
     assert moves.births.tolist() == [1, 2]
     (gone,) = [told[2] for told in recorded.told if told[0] == "died"]
-    assert gone == When(10.0, 2)
+    assert gone == TimePoint(10.0, 2)
 
 
 def test_islands_of_a_mixed_archipelago_are_called_what_they_are() -> None:
-    scene = stage(read_experiment("archipelago-mixed"))
+    scene = scene_of(read_experiment("archipelago-mixed"))
     assert scene.islands == (0, 1, 2, 3, 4, 5)
     assert scene.arenas == {4, 5}
     blueprint: Any = layout(scene.islands, extent_m=2.0, arenas=scene.arenas)
@@ -191,7 +191,7 @@ def test_a_window_that_fails_late_is_told_of(
     (tmp_path / "go").write_text("now\n")
     recorded: Any = Recorded()
     with pytest.raises(ViewerError, match="cannot open a window"):
-        linger(output, window, recorded, threading.Event())
+        keep_serving(output, window, recorded, threading.Event())
 
 
 @pytest.mark.parametrize("text", ["9876", "127.0.0.1:", "127.0.0.1:99999", ":x"])

@@ -11,7 +11,7 @@ from rerun.chunk import RrdReader
 from analysis.viewer.blueprint import layout
 from analysis.viewer.ground import Surface, surfaces
 from analysis.viewer.recording import Recording
-from analysis.viewer.scene import stage
+from analysis.viewer.scene import scene_of
 from schema.experiment.document import Arena, Experiment, Islands, Simulation
 from schema.experiment.environment import FLAT, Environment, relief
 from schema.robot.ids import BirthId
@@ -91,7 +91,7 @@ def test_ground_is_below_those_who_are_shown_where_they_were() -> None:
     """All of an arena; of those who were alone one: two would stand side by side."""
     rough = Environment(roughness_m=0.1, patch_m=0.5, extent_m=1.0)
     islands = (Islands(environment=rough), Islands(environment=rough, arena=Arena()))
-    scene = stage(Experiment(name="a", islands=islands))
+    scene = scene_of(Experiment(name="a", islands=islands))
     hermit, other, here, there = (BirthId(k // 2, k % 2) for k in range(4))
     assert len(scene.below([hermit])) == len(scene.below([here, there])) == 1
     assert scene.below([hermit, other]) == scene.below([hermit, here]) == ()
@@ -109,10 +109,10 @@ def test_a_recording_has_the_ground_and_its_arena_shows_it(tmp_path: Path) -> No
     )
     # Island 0 is off-line: its robots hang side by side, with no ground below them.
     islands = (Islands(), Islands(arena=Arena()))
-    scene = stage(Experiment(name="a", environment=environment, islands=islands))
+    scene = scene_of(Experiment(name="a", environment=environment, islands=islands))
     plan = layout(scene.islands, extent_m=scene.extent_m, arenas=scene.arenas)
     with Recording("a", plan, file=tmp_path / "a.rrd") as recording:
-        recording.stage(scene)
+        recording.add_scene(scene)
     found = {
         str(chunk.entity_path): chunk.to_record_batch()
         for chunk in RrdReader(tmp_path / "a.rrd")

@@ -6,7 +6,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.viewer.motion import best_ever, chosen
+from analysis.viewer.motion import best_evaluated, chosen
 from analysis.viewer.recording import ViewerError
 from schema.robot.ids import BirthId
 from schema.tables.files import parquet_path
@@ -25,16 +25,16 @@ def test_the_best_is_the_first_of_the_fittest_ever_judged(tmp_path: Path) -> Non
     judged = [{"birth": n, "fitness": value} for n, value in enumerate(fitness)]
     young = {"birth": 7, "fitness": 0.9, "is_mature": False}
     write(tmp_path, evaluations=judged, fitness=[young])
-    assert best_ever(tmp_path) == (BirthId(0, 1), 0.5)
+    assert best_evaluated(tmp_path) == (BirthId(0, 1), 0.5)
     grown = {"birth": 8, "island": 1, "fitness": 0.8, "is_mature": True}
     write(tmp_path, evaluations=judged, fitness=[young, grown])
-    assert best_ever(tmp_path) == (BirthId(1, 8), 0.8)
+    assert best_evaluated(tmp_path) == (BirthId(1, 8), 0.8)
 
 
 def test_where_nobody_was_judged_there_is_no_best(tmp_path: Path) -> None:
     write(tmp_path)
     with pytest.raises(ViewerError, match="nobody has been judged yet"):
-        best_ever(tmp_path)
+        best_evaluated(tmp_path)
 
 
 def test_ancestry_goes_back_by_first_parents_each_once(tmp_path: Path) -> None:

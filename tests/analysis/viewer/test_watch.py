@@ -10,7 +10,7 @@ import pytest
 
 from analysis.viewer.live import Ended, Told
 from analysis.viewer.output import Output
-from analysis.viewer.watch import Spectator, watch
+from analysis.viewer.watch import LiveView, watch
 from schema.errors import NetworkError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId
@@ -94,6 +94,6 @@ def test_who_waits_for_a_run_is_told_so_once(
 
 def test_births_count_once_on_every_island() -> None:
     ignored: Any = type("Show", (), {"tell": lambda *_: None})()
-    spectator = Spectator(ignored, "a/run")
-    spectator.tell([WHOLE, news(2, (1, 0), (0, 2)), news(2, (1, 0), (0, 2)), news(3)])
-    assert spectator.births == 4
+    view = LiveView(ignored, "a/run")
+    view.tell([WHOLE, news(2, (1, 0), (0, 2)), news(2, (1, 0), (0, 2)), news(3)])
+    assert view.births == 4
