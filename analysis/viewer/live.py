@@ -23,8 +23,7 @@ from schema.agent.topics import (
 )
 from schema.errors import MalformedMessage, NetworkError
 from schema.wire.arena_codec import Live, decode_live
-from schema.wire.news import News
-from schema.wire.news_codec import decode_news
+from schema.wire.news import News, decode_news
 
 _MOST = 2000
 """Messages that wait at most."""

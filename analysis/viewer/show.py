@@ -18,6 +18,7 @@ from analysis.viewer.looks import Figures, rows_by_robot
 from analysis.viewer.recording import Recording
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
+from schema.wire.codec import decode_body
 from schema.wire.news import Crewman, Departed, Level, Migrant, Newborn, News
 
 _REPEAT_S = 10.0
@@ -179,7 +180,7 @@ class Show:
 
     def _born(self, one: Newborn) -> None:
         if one.body is not None:
-            self._figures.add(one.birth, one.body)
+            self._figures.add(one.birth, decode_body(one.body))
         if not self._lineage.add(one):
             return
         clock = self._clock(one.birth.island)

@@ -12,6 +12,7 @@ from schema.errors import InvalidRobot, NetworkError
 from schema.flags import Flags, number, whole_number
 from schema.formats.files import read_robot
 from schema.robot.ids import BirthId
+from schema.wire.codec import encode_robot
 from schema.wire.operator import (
     BrainWish,
     InsertWish,
@@ -99,11 +100,11 @@ def _wish(options: argparse.Namespace) -> Wish:
         return PLAIN[options.action]
     if options.action == "insert":
         place = tuple(options.place) if options.place else None
-        return InsertWish(read_robot(_file(options.file)), place)
+        return InsertWish(encode_robot(read_robot(_file(options.file))), place)
     birth = BirthId(options.island, options.birth)
     if options.action == "remove":
         return RemoveWish(birth)
-    return BrainWish(birth, read_robot(_file(options.file)))
+    return BrainWish(birth, encode_robot(read_robot(_file(options.file))))
 
 
 def _file(name: str) -> Path:

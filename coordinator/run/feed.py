@@ -4,8 +4,10 @@ Nothing waits for a viewer, and nobody who watches changes a row. What is told i
 remembered in short, so that one who comes late, or missed something, is told all.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
+
+from msgspec.structs import replace
 
 from coordinator.islands.events import Append, Record
 from coordinator.storage.folder import RunDetails

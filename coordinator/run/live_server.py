@@ -16,8 +16,7 @@ from coordinator.network.service import Network, Order
 from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
 from schema.agent.network import Tls
-from schema.wire.news import Crewman
-from schema.wire.news_codec import encode_news
+from schema.wire.news import Crewman, encode_news
 
 _NEWS_S = 0.25
 _WHOLE_S = 1.0

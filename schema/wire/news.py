@@ -1,128 +1,127 @@
-"""What the coordinator tells those who watch a run: its tables' rows, condensed.
+"""What a coordinator sends to viewers: rows of a run's tables, condensed.
 
-Live it comes as ``News`` over the network, in a replay from the tables; both pass
-through the functions of this file, so that a viewer shows the same of either.
+A live run sends an ``Update`` a few times per second. A replay builds the same from
+the tables, through the functions of this file, so that a viewer shows both alike.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 from math import fsum
 from typing import Any
 
-from schema.robot.ids import BirthId
+from msgspec.msgpack import Decoder, encode
+
+from schema.experiment.section import Count
+from schema.robot.ids import BirthId, IslandNumber
 from schema.robot.robot import Part, Robot
+from schema.wire.codec import decode_body, encode_body
+from schema.wire.packing import Finite, Message, unpack
 
 
-@dataclass(frozen=True, slots=True)
-class Newborn:
+class Newborn(Message, frozen=True):
     """A birth.
 
     Attributes:
-        birth: who.
-        parents: in order; none for a random robot.
-        rank: one more than the greatest of the parents'.
-        births: on its island so far, this one included.
-        sim_time_s: when, in an arena [s]; None off-line.
-        body: without a brain; None of those who do not live any more.
+        birth: id of the individual.
+        parents: ids, in order; empty for a random robot.
+        rank: one more than the greatest rank of the parents.
+        births: number of births on the island so far, this one included.
+        sim_time_s: simulated time of the birth in an arena [s]; None off-line.
+        body: bytes of the body (``encode_body``); None if the robot is dead.
     """
 
     birth: BirthId
     parents: tuple[BirthId, ...]
-    rank: int
-    births: int
-    sim_time_s: float | None
-    body: Robot | None
+    rank: Count
+    births: Count
+    sim_time_s: Finite | None
+    body: bytes | None
 
 
-@dataclass(frozen=True, slots=True)
-class Departed:
-    """A robot left an arena for good.
+class Departed(Message, frozen=True):
+    """A death in an arena.
 
     Attributes:
-        island: whose arena.
-        birth: who.
-        births: on the island so far.
-        sim_time_s: when [s].
+        island: number of the arena's island.
+        birth: id of the individual.
+        births: number of births on the island so far.
+        sim_time_s: simulated time of the death [s].
         reason: as in the deaths table.
     """
 
-    island: int
+    island: IslandNumber
     birth: BirthId
-    births: int
-    sim_time_s: float
+    births: Count
+    sim_time_s: Finite
     reason: str
 
 
-@dataclass(frozen=True, slots=True)
-class Level:
-    """How fit a population was when so many had been born on its island.
+class Level(Message, frozen=True):
+    """Fitness of a population after a number of births.
 
     Attributes:
-        island: whose population.
-        births: there, so far.
-        size: how many lived.
-        judged: how many of them had a fitness.
-        mean, best: of those; 0 of none.
-        members: who lived, ascending; told of an island's newest level only.
+        island: number of the population's island.
+        births: number of births on the island so far.
+        size: number of living individuals.
+        judged: number of living individuals that have a fitness.
+        mean, best: fitness of those; 0 if there is none.
+        members: living individuals, ascending; given for the newest level of an
+            island only.
     """
 
-    island: int
-    births: int
-    size: int
-    judged: int
-    mean: float
-    best: float
+    island: IslandNumber
+    births: Count
+    size: Count
+    judged: Count
+    mean: Finite
+    best: Finite
     members: tuple[BirthId, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Migrant:
-    """An individual went, or was copied, from one island to another.
+class Migrant(Message, frozen=True):
+    """A migration of an individual, moved or copied.
 
     Attributes:
-        birth: who.
-        island, to: from where, and where to.
-        epoch: of the exchange.
-        births: on the island that it left, so far.
-        sim_time_s: when, in an arena [s]; None off-line.
+        birth: id of the individual.
+        island, to: numbers of the islands that it left and reached.
+        epoch: number of the migration epoch.
+        births: number of births on the island that it left, so far.
+        sim_time_s: simulated time when it left an arena [s]; None off-line.
     """
 
     birth: BirthId
-    island: int
-    to: int
-    epoch: int
-    births: int
-    sim_time_s: float | None
+    island: IslandNumber
+    to: IslandNumber
+    epoch: Count
+    births: Count
+    sim_time_s: Finite | None
 
 
-@dataclass(frozen=True, slots=True)
-class Crewman:
-    """A worker that is there, its platform, and the arena shards that it holds."""
+class Crewman(Message, frozen=True):
+    """A connected worker, its platform and the arena shards that it holds."""
 
     name: str
     platform: str
-    shards: tuple[int, ...]
+    shards: tuple[IslandNumber, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class News:
-    """What happened in a run since the news before, or all of it.
+class News(Message, frozen=True):
+    """What happened in a run since the update before, or since its beginning.
 
     Attributes:
-        run: its name.
+        run: name of the run.
         epoch: of its coordinator.
-        sequence: number of these news; one that is missing was lost.
-        is_whole: all since the beginning; what was told before is to be forgotten.
-        experiment: its name.
+        sequence: number of the update; a viewer detects lost updates by a gap.
+        is_whole: holds everything since the beginning and replaces earlier updates.
+        experiment: name of the experiment.
         births, deaths, levels, migrants: in the order of their tables.
-        workers: all that are there now.
-        document: the experiment's JSON, if is_whole.
+        workers: all that are connected now.
+        document: JSON of the experiment, if is_whole.
     """
 
     run: str
-    epoch: int
-    sequence: int
+    epoch: Count
+    sequence: Count
     is_whole: bool
     experiment: str
     births: tuple[Newborn, ...] = ()
@@ -133,12 +132,34 @@ class News:
     document: str = ""
 
 
+_UPDATE = Decoder(News)
+
+
+def encode_news(news: News) -> bytes:
+    """Return the bytes of an update."""
+    return encode(news)
+
+
+def decode_news(data: bytes) -> News:
+    """Return the update of some bytes.
+
+    Raises:
+        MalformedMessage: not an update's bytes, a body that is not a tree of parts,
+            a number that is not finite.
+    """
+    update = unpack(_UPDATE, data)
+    for birth in update.births:
+        if birth.body is not None:
+            decode_body(birth.body)
+    return update
+
+
 def newborn(row: Mapping[str, Any], births: int) -> Newborn:
-    """Return what a row of the births table tells.
+    """Return the birth of a row of the births table.
 
     Args:
-        row: of the table; ``genome`` and the counts are not looked at.
-        births: on its island so far, this one included.
+        row: of the table; ``genome`` and the counts are not read.
+        births: number of births on its island so far, this one included.
     """
     return Newborn(
         BirthId(row["island"], row["birth"]),
@@ -146,18 +167,18 @@ def newborn(row: Mapping[str, Any], births: int) -> Newborn:
         row["rank"],
         births,
         row["sim_time_s"],
-        Robot(tuple(map(_part, row["body"]))),
+        encode_body(Robot(tuple(map(_part, row["body"])))),
     )
 
 
 def individual(row: Mapping[str, Any]) -> BirthId:
-    """Return whom a row is about: one born where it is, unless it says otherwise."""
+    """Return the individual of a row: by default one born on the row's island."""
     island = row.get("birth_island")
     return BirthId(row["island"] if island is None else island, row["birth"])
 
 
 def departed(row: Mapping[str, Any]) -> Departed:
-    """Return what a row of the deaths table tells."""
+    """Return the death of a row of the deaths table."""
     return Departed(
         row["island"],
         individual(row),
@@ -168,10 +189,10 @@ def departed(row: Mapping[str, Any]) -> Departed:
 
 
 def levels(rows: Iterable[Mapping[str, Any]]) -> list[Level]:
-    """Return what rows of the population table tell, each set of them as one level.
+    """Return the levels of rows of the population table, one per set of rows.
 
     Args:
-        rows: in the order of the table, so that those of one set stand together.
+        rows: in the order of the table, so that rows of one set are adjacent.
     """
     sets = groupby(rows, key=lambda row: (row["island"], row["births"]))
     return [_level(island, births, list(each)) for (island, births), each in sets]
@@ -191,7 +212,7 @@ def _level(island: int, births: int, rows: Sequence[Mapping[str, Any]]) -> Level
 
 
 def migrant(row: Mapping[str, Any]) -> Migrant:
-    """Return what a row of the migrations table tells."""
+    """Return the migration of a row of the migrations table."""
     return Migrant(
         individual(row),
         row["island"],

@@ -21,9 +21,9 @@ from schema.experiment.file import read_experiment
 from schema.experiment.identity import NOBODY
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.ids import BirthId
-from schema.robot.robot import Robot
 from schema.wire.arena import Advance
 from schema.wire.arena_codec import Live, decode_live, encode_live
+from schema.wire.codec import encode_body
 from schema.wire.news import Newborn, News
 from worker.arena.replay import alone
 from worker.bench.spider import spider
@@ -60,7 +60,7 @@ def crowd() -> tuple[News, list[pa.Table]]:
     rng = np.random.default_rng(1)
     starts = rng.integers(0, motion.num_rows, ROBOTS)
     places = rng.uniform(-2.0, 2.0, (ROBOTS, 2)).astype(np.float32)
-    body = Robot(robot.parts)
+    body = encode_body(robot)
     births = tuple(
         Newborn(BirthId(0, number), (), 1, number + 1, 0.0, body)
         for number in range(ROBOTS)

@@ -2,7 +2,6 @@
 
 import os
 import threading
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import mujoco
 import numpy as np
 import pyarrow as pa
 import pytest
+from msgspec.structs import replace
 
 from analysis.viewer.blueprint import layout
 from analysis.viewer.entities import Moves, When
@@ -28,6 +28,7 @@ from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import TABLES
+from schema.wire.codec import encode_body
 from schema.wire.news import Departed, Level, Newborn, News
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
@@ -132,7 +133,7 @@ def test_the_lineage_is_drawn_every_ten_births_and_knows_the_living() -> None:
 def test_who_dies_vanishes_with_as_many_births_as_its_last_pose_has() -> None:
     recorded: Any = Recorded()
     show = Show(recorded, BUILT_IN)
-    first, second = (Newborn(BirthId(0, n), (), 1, n + 1, 10.0 * n, CORE)
+    first, second = (Newborn(BirthId(0, n), (), 1, n + 1, 10.0 * n, encode_body(CORE))
                      for n in range(2))  # fmt: skip
     # At 10 s the second is born and the first dies: one birth, says the table.
     death = Departed(0, first.birth, 1, 10.0, "cull")

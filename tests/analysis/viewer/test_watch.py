@@ -1,12 +1,12 @@
 """Watching a run: how far it is, and where the recording went."""
 
 import threading
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from analysis.viewer.live import Ended, Told
 from analysis.viewer.output import Output

@@ -19,7 +19,7 @@ from coordinator.dispatch.events import DispatchEvent, Returned
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.run.loop import Loop
-from coordinator.run.operators import Desk
+from coordinator.run.operators import RunOperator
 from coordinator.run.requests import RunContext
 from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.compare import compare
@@ -34,6 +34,7 @@ from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.files import read_table
+from schema.wire.codec import encode_robot
 from schema.wire.operator import (
     InsertWish,
     ListWish,
@@ -43,8 +44,6 @@ from schema.wire.operator import (
     ResumeWish,
     SnapshotWish,
     Wish,
-    decode_operator_reply,
-    encode_operator_request,
 )
 from tests.coordinator.arena_world import experiment
 from tests.worker.fake_world import FakeWorld, OddWorld
@@ -128,11 +127,10 @@ class Run:
             **other,
         )
         self.loop.start(journal.replay())
-        self.desk = Desk(self.loop, EXPERIMENT)
+        self.operator = RunOperator(self.loop, EXPERIMENT)
 
     def ask(self, wish: Wish, name: str = "x") -> str:
-        request = encode_operator_request(OperatorRequest(name, 0, wish))
-        reply = decode_operator_reply(self.desk.answer(request))
+        reply = self.operator.reply_to(OperatorRequest(name, 0, wish))
         return f"refused: {reply.text}" if reply.is_refused else reply.text
 
 
@@ -270,7 +268,9 @@ def ordered(path: Path, point: Point) -> list[str]:
                 if one.arena.step == 12000 and not one.arena.is_paused:
                     guest = develop(one.arena.population[1].genome, BUILT_IN)
                     said.append(one.ask(RemoveWish(living[0]), "remove"))
-                    said.append(one.ask(InsertWish(guest, (0.5, 1.5)), "insert"))
+                    said.append(
+                        one.ask(InsertWish(encode_robot(guest), (0.5, 1.5)), "insert")
+                    )
                     said.append(one.ask(PauseWish(), "pause"))
                     said.append(one.ask(SnapshotWish()))
                 elif one.arena.is_paused:
@@ -307,8 +307,11 @@ def test_orders_are_obeyed_again_in_a_replay(tmp_path: Path, calm: Path) -> None
 @pytest.mark.parametrize(
     ("wish", "why"),
     [
-        (RemoveWish(BirthId(0, 999)), "birth 999: does not live"),
-        (InsertWish(Robot((Part("Barrow", -1, -1, -1, 0, ()),))), "Barrow"),
+        (RemoveWish(BirthId(0, 999)), "birth 999: is not alive"),
+        (
+            InsertWish(encode_robot(Robot((Part("Barrow", -1, -1, -1, 0, ()),)))),
+            "Barrow",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused_and_not_journalled(
@@ -322,12 +325,10 @@ def test_what_cannot_be_is_refused_and_not_journalled(
         assert (tmp_path / "run" / NAME).stat().st_size == before
 
 
-def test_other_islands_and_other_bytes_are_refused(tmp_path: Path) -> None:
+def test_request_for_an_unknown_island_is_refused(tmp_path: Path) -> None:
     with ExitStack() as stack:
-        desk = Run(tmp_path / "run", stack, lambda _: None).desk
-        other = encode_operator_request(OperatorRequest("x", 7, PauseWish()))
-        for data in (other, b"", b"\xff"):
-            assert decode_operator_reply(desk.answer(data)).is_refused
+        operator = Run(tmp_path / "run", stack, lambda _: None).operator
+        assert operator.reply_to(OperatorRequest("x", 7, PauseWish())).is_refused
 
 
 def test_snapshot_that_went_missing_is_named(tmp_path: Path) -> None:

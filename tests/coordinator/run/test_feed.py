@@ -1,6 +1,6 @@
 """What a run tells those who watch: numbered, complete, and no body of the dead."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from coordinator.islands.events import Record
 from coordinator.run.feed import Feed
@@ -8,9 +8,11 @@ from coordinator.storage.folder import RunDetails
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import Row, body_rows
+from schema.wire.codec import encode_body
 from schema.wire.news import Crewman, Newborn, News
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
+BODY = encode_body(CORE)
 WORKERS = (Crewman("w", "x", (0,)),)
 
 
@@ -63,7 +65,7 @@ def test_news_are_numbered_and_tell_each_row_once() -> None:
     assert (first.sequence, second.sequence) == (1, 2)
     assert [one.birth.number for one in first.births] == [0, 1]
     assert second.births == (
-        Newborn(BirthId(0, 2), (BirthId(0, 0), BirthId(0, 1)), 2, 3, None, CORE),
+        Newborn(BirthId(0, 2), (BirthId(0, 0), BirthId(0, 1)), 2, 3, None, BODY),
     )
     assert feed.news(()) is None
 
@@ -103,7 +105,7 @@ def test_the_dead_leave_no_body_on_line() -> None:
     feed.note(_death(0))
     news = _told(feed.news(()))
     assert [gone.birth for gone in news.deaths] == [BirthId(0, 0)]
-    assert [one.body for one in feed.whole().births] == [None, CORE]
+    assert [one.body for one in feed.whole().births] == [None, BODY]
 
 
 def test_who_is_not_selected_leaves_no_body_off_line() -> None:
@@ -113,4 +115,4 @@ def test_who_is_not_selected_leaves_no_body_off_line() -> None:
         feed.note(record)
     feed.news(())
     bodies = {one.birth.number: one.body for one in feed.whole().births}
-    assert bodies == {0: None, 1: CORE, 2: None, 3: CORE, 4: CORE}
+    assert bodies == {0: None, 1: BODY, 2: None, 3: BODY, 4: BODY}

@@ -1,4 +1,4 @@
-"""News survive their bytes; other bytes are refused."""
+"""Updates of viewers as bytes and from table rows."""
 
 import contextlib
 
@@ -10,8 +10,18 @@ from schema.errors import MalformedMessage
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import Row
-from schema.wire.news import Crewman, Departed, Level, Migrant, Newborn, News, levels
-from schema.wire.news_codec import decode_news, encode_news
+from schema.wire.codec import encode_body
+from schema.wire.news import (
+    Crewman,
+    Departed,
+    Level,
+    Migrant,
+    Newborn,
+    News,
+    decode_news,
+    encode_news,
+    levels,
+)
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
 NEWS = News(
@@ -22,8 +32,10 @@ NEWS = News(
     experiment="scenario3",
     births=(
         Newborn(BirthId(0, 0), (), 1, 1, 0.0, None),
-        Newborn(BirthId(0, 1), (BirthId(0, 0), BirthId(1, 4)), 2, 2, 12.5, CORE),
-        Newborn(BirthId(1, 4), (), 1, 5, None, CORE),
+        Newborn(
+            BirthId(0, 1), (BirthId(0, 0), BirthId(1, 4)), 2, 2, 12.5, encode_body(CORE)
+        ),
+        Newborn(BirthId(1, 4), (), 1, 5, None, encode_body(CORE)),
     ),
     deaths=(Departed(0, BirthId(0, 0), 2, 30.0, "cull"),),
     levels=(Level(0, 2, 2, 1, 0.25, 0.25, (BirthId(0, 0), BirthId(0, 1))),),
@@ -36,26 +48,35 @@ NEWS = News(
 )
 
 
-def test_news_come_back_from_their_bytes() -> None:
+def test_decoding_inverts_encoding() -> None:
     assert decode_news(encode_news(NEWS)) == NEWS
 
 
 @given(st.binary(max_size=200))
-def test_any_bytes_are_news_or_refused(data: bytes) -> None:
+def test_any_bytes_decode_or_are_malformed(data: bytes) -> None:
     with contextlib.suppress(MalformedMessage):
         decode_news(data)
 
 
-def test_a_body_that_is_no_tree_is_refused() -> None:
+@given(st.integers(0, 10**4), st.integers(0, 255))
+def test_updates_with_one_other_byte_decode_or_are_malformed(
+    index: int, value: int
+) -> None:
+    data = bytearray(encode_news(NEWS))
+    data[index % len(data)] = value
+    with contextlib.suppress(MalformedMessage):
+        decode_news(bytes(data))
+
+
+def test_body_that_is_not_a_tree_is_malformed() -> None:
     two_cores = Robot((CORE.parts[0], CORE.parts[0]))
-    bad = News(
-        "r", 0, 1, False, "e", (Newborn(BirthId(0, 0), (), 1, 1, None, two_cores),)
-    )
+    birth = Newborn(BirthId(0, 0), (), 1, 1, None, encode_body(two_cores))
+    bad = News("r", 0, 1, False, "e", (birth,))
     with pytest.raises(MalformedMessage):
         decode_news(encode_news(bad))
 
 
-def test_a_level_is_the_mean_of_those_who_are_judged() -> None:
+def test_level_averages_the_individuals_that_have_a_fitness() -> None:
     rows: list[Row] = [
         {"island": 0, "births": 2, "birth": 0, "fitness": 0.5},
         {"island": 0, "births": 2, "birth": 1, "fitness": None},
