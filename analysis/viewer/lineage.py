@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from analysis.viewer.entities import FamilyTree, When
 from analysis.viewer.recording import Recording
 from schema.robot.ids import BirthId
-from schema.wire.news import Departed, Level, Newborn
+from schema.wire.updates import Birth, Death, Level
 
 _MOST = 150
 """Births that are shown; more are neither seen nor drawn in time."""
@@ -16,7 +16,7 @@ _EVERY = 10
 
 @dataclass(slots=True)
 class _Person:
-    newborn: Newborn
+    birth: Birth
     order: int
     is_alive: bool = True
 
@@ -32,7 +32,7 @@ class Lineage:
         self._latest = When()
         self._undrawn = 0
 
-    def add(self, one: Newborn) -> bool:
+    def add(self, one: Birth) -> bool:
         """Add a birth; return whether it is new."""
         if one.birth in self._known:
             return False
@@ -46,7 +46,7 @@ class Lineage:
         self._undrawn += 1
         return True
 
-    def remove(self, gone: Departed) -> None:
+    def remove(self, gone: Death) -> None:
         """Note that somebody does not live any more."""
         self._die(gone.birth)
 
@@ -55,7 +55,7 @@ class Lineage:
         members = set(level.members)
         for birth, person in self._people.items():
             is_here = birth.island == level.island
-            if is_here and person.newborn.births <= level.births:
+            if is_here and person.birth.births <= level.births:
                 person.is_alive = birth in members
 
     def draw(self) -> None:
@@ -69,8 +69,8 @@ class Lineage:
                 FamilyTree(
                     birth,
                     person.order - first,
-                    person.newborn.rank,
-                    person.newborn.parents,
+                    person.birth.rank,
+                    person.birth.parents,
                     person.is_alive,
                 )
                 for birth, person in self._people.items()

@@ -23,7 +23,7 @@ from schema.agent.topics import (
 )
 from schema.errors import MalformedMessage, NetworkError
 from schema.wire.arena_codec import Live, decode_live
-from schema.wire.news import News, decode_news
+from schema.wire.updates import Update, decode_update
 
 _MOST = 2000
 """Messages that wait at most."""
@@ -43,7 +43,7 @@ class Sequel:
         self._run = ""
         self._last = (0, 0)
 
-    def take(self, news: News) -> bool:
+    def take(self, news: Update) -> bool:
         """Note news; return whether they are of the run that is watched."""
         place = (news.epoch, news.sequence)
         if news.is_whole:
@@ -65,7 +65,7 @@ class Ended:
     """The coordinator is gone."""
 
 
-Told = News | Live | Ended
+Told = Update | Live | Ended
 
 
 class LiveSource:
@@ -162,8 +162,8 @@ class LiveSource:
         data = message.payload.to_bytes()
         return self._news(data) if key.endswith("/events") else decode_live(data)
 
-    def _news(self, data: bytes) -> News | None:
-        news = decode_news(data)
+    def _news(self, data: bytes) -> Update | None:
+        news = decode_update(data)
         return news if self._sequel.take(news) else None
 
     def _token(self, key: str, is_there: bool) -> Ended | None:  # noqa: FBT001 - a word

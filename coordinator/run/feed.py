@@ -13,17 +13,17 @@ from coordinator.islands.events import Append, Record
 from coordinator.storage.folder import RunDetails
 from schema.robot.ids import BirthId
 from schema.tables.columns import Row
-from schema.wire.news import (
-    Crewman,
-    Departed,
+from schema.wire.updates import (
+    Birth,
+    Death,
     Level,
     Migrant,
-    Newborn,
-    News,
-    departed,
-    levels,
-    migrant,
-    newborn,
+    Update,
+    WorkerInfo,
+    read_birth,
+    read_death,
+    read_levels,
+    read_migrant,
 )
 
 
@@ -72,23 +72,23 @@ class Feed:
             epoch: of the coordinator.
             details: of the run.
         """
-        self._past = News(
+        self._past = Update(
             run, epoch, 0, is_whole=True, experiment=details.name,
             document=details.document,
         )  # fmt: skip
-        self._births: dict[BirthId, Newborn] = {}
+        self._births: dict[BirthId, Birth] = {}
         self._bodies: list[BirthId] = []
         self._dead: set[BirthId] = set()
         self._born: dict[int, int] = {}
-        self._deaths: list[Departed] = []
+        self._deaths: list[Death] = []
         self._levels: list[Level] = []
         self._newest: dict[int, Level] = {}
         self._migrants: list[Migrant] = []
-        self._new_births: list[Newborn] = []
-        self._new_deaths: list[Departed] = []
+        self._new_births: list[Birth] = []
+        self._new_deaths: list[Death] = []
         self._new_rows: list[Row] = []
         self._new_migrants: list[Migrant] = []
-        self._workers: tuple[Crewman, ...] = ()
+        self._workers: tuple[WorkerInfo, ...] = ()
 
     def note(self, record: Record) -> None:
         """Hear of a row."""
@@ -97,18 +97,18 @@ class Feed:
             case "births":
                 island = row["island"]
                 self._born[island] = self._born.get(island, 0) + 1
-                one = newborn(row, self._born[island])
+                one = read_birth(row, self._born[island])
                 self._new_births.append(one)
             case "population":
                 self._new_rows.append(dict(row))
             case "deaths":
-                self._new_deaths.append(departed(row))
+                self._new_deaths.append(read_death(row))
             case "migrations":
-                self._new_migrants.append(migrant(row))
+                self._new_migrants.append(read_migrant(row))
 
-    def news(self, workers: tuple[Crewman, ...]) -> News | None:
+    def news(self, workers: tuple[WorkerInfo, ...]) -> Update | None:
         """Return what is new since the last call; None if nothing is."""
-        fresh = levels(self._new_rows)
+        fresh = read_levels(self._new_rows)
         is_new = self._new_births or self._new_deaths or fresh or self._new_migrants
         if not is_new and workers == self._workers:
             return None
@@ -130,7 +130,7 @@ class Feed:
             heard.clear()
         return news
 
-    def whole(self) -> News:
+    def whole(self) -> Update:
         """Return all that ``news`` has told so far."""
         told = {(level.island, level.births): level for level in self._levels}
         for newest in self._newest.values():
@@ -144,7 +144,7 @@ class Feed:
             workers=self._workers,
         )
 
-    def _remember(self, news: News) -> None:
+    def _remember(self, news: Update) -> None:
         """Add to the past; of the dead no body is kept."""
         self._workers = news.workers
         self._migrants += news.migrants

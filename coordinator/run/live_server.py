@@ -16,7 +16,7 @@ from coordinator.network.service import Network, Order
 from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
 from schema.agent.network import Tls
-from schema.wire.news import Crewman, encode_news
+from schema.wire.updates import WorkerInfo, encode_update
 
 _NEWS_S = 0.25
 _WHOLE_S = 1.0
@@ -56,10 +56,10 @@ class LiveServer:
         self._told_s = now_s
         news = self._feed.news(self._workers())
         if news is not None and self._network.has_viewers:
-            self._network.tell(encode_news(news))
+            self._network.tell(encode_update(news))
         if is_whole_due:
             self._whole_s = now_s
-            data = encode_news(self._feed.whole())
+            data = encode_update(self._feed.whole())
             for order in self._waiting:
                 self._replies.put((order, data))
             self._waiting = []
@@ -69,14 +69,14 @@ class LiveServer:
         self.serve(inf)
         self._replies.put(None)
 
-    def _workers(self) -> tuple[Crewman, ...]:
+    def _workers(self) -> tuple[WorkerInfo, ...]:
         dispatch, advances = self._fleet.dispatch, self._loop.advances
         shards: dict[str, list[int]] = {}
         for number, island in sorted(self._loop.islands.items()):
             if isinstance(island, Arena):
                 shards.setdefault(advances.holder(number), []).append(number)
         return tuple(
-            Crewman(name, dispatch.platform(name), tuple(shards.get(name, ())))
+            WorkerInfo(name, dispatch.platform(name), tuple(shards.get(name, ())))
             for name in dispatch.names("worker")
         )
 

@@ -25,16 +25,16 @@ from schema.robot.inverse_development import genome_of
 from schema.robot.robot import check_robot
 from schema.wire.codec import decode_robot
 from schema.wire.operator import (
-    BrainWish,
-    InsertWish,
-    ListWish,
+    GetStatus,
+    InsertRobot,
+    ListRobots,
     OperatorReply,
     OperatorRequest,
-    PauseWish,
-    RemoveWish,
-    ResumeWish,
-    SnapshotWish,
-    StatusWish,
+    PauseArena,
+    RemoveRobot,
+    ResumeArena,
+    SaveSnapshot,
+    SetBrain,
     decode_operator_request,
     encode_operator_reply,
 )
@@ -62,13 +62,13 @@ class RunOperator:
             RunFolderError: the disk is full or failed.
         """
         event = None
-        assert not isinstance(request.action, StatusWish)  # OperatorServer replies
+        assert not isinstance(request.action, GetStatus)  # OperatorServer replies
         try:
             arena = self._arena(request.island)
             match request.action:
-                case ListWish():
+                case ListRobots():
                     text = self._list(arena, request.island)
-                case SnapshotWish():
+                case SaveSnapshot():
                     self._loop.advances.wish_snapshot(request.island)
                     text = "the state is saved at the end of the next advance"
                 case action:
@@ -94,7 +94,7 @@ class RunOperator:
 
     def _order(
         self,
-        action: PauseWish | ResumeWish | InsertWish | RemoveWish | BrainWish,
+        action: PauseArena | ResumeArena | InsertRobot | RemoveRobot | SetBrain,
         arena: Arena,
     ) -> Order:
         """Return the order of an action.
@@ -105,18 +105,18 @@ class RunOperator:
         """
         order: Order
         match action:
-            case PauseWish():
+            case PauseArena():
                 order = Pause()
-            case ResumeWish():
+            case ResumeArena():
                 order = Resume()
-            case InsertWish():
+            case InsertRobot():
                 robot = decode_robot(action.robot)
                 check_robot(robot, body_space(self._experiment.space))
                 order = Insert(genome_of(robot), action.place)
-            case RemoveWish():
+            case RemoveRobot():
                 _check_lives(action.birth, arena)
                 order = Remove(action.birth)
-            case BrainWish():
+            case SetBrain():
                 _check_lives(action.birth, arena)
                 order = ReplaceBrain(action.birth, decode_robot(action.robot).brain)
         check_order(order, self._experiment)
@@ -161,7 +161,7 @@ class OperatorServer:
         """
         try:
             request = decode_operator_request(data)
-            if isinstance(request.action, StatusWish):
+            if isinstance(request.action, GetStatus):
                 reply = OperatorReply("", status=self._scheduler.status(now_s))
             else:
                 reply = self._carry_out(request, self._run(request.run))

@@ -11,27 +11,27 @@ from schema.wire.packing import Finite, Message, unpack
 from schema.wire.status import Status
 
 
-class ListWish(Message, frozen=True, tag="list"):
+class ListRobots(Message, frozen=True, tag="list"):
     """List the living robots of the arena."""
 
 
-class StatusWish(Message, frozen=True, tag="status"):
+class GetStatus(Message, frozen=True, tag="status"):
     """Report the progress of all runs."""
 
 
-class PauseWish(Message, frozen=True, tag="pause"):
+class PauseArena(Message, frozen=True, tag="pause"):
     """Pause the arena."""
 
 
-class ResumeWish(Message, frozen=True, tag="resume"):
+class ResumeArena(Message, frozen=True, tag="resume"):
     """Resume the arena."""
 
 
-class SnapshotWish(Message, frozen=True, tag="snapshot"):
+class SaveSnapshot(Message, frozen=True, tag="snapshot"):
     """Save the state of the arena at the end of the next advance."""
 
 
-class InsertWish(Message, frozen=True, tag="insert"):
+class InsertRobot(Message, frozen=True, tag="insert"):
     """Insert a robot into the arena.
 
     Attributes:
@@ -43,13 +43,13 @@ class InsertWish(Message, frozen=True, tag="insert"):
     place: tuple[Finite, Finite] | None = None
 
 
-class RemoveWish(Message, frozen=True, tag="remove"):
+class RemoveRobot(Message, frozen=True, tag="remove"):
     """Remove a robot from the arena."""
 
     birth: BirthId
 
 
-class BrainWish(Message, frozen=True, tag="brain"):
+class SetBrain(Message, frozen=True, tag="brain"):
     """Replace the brain of a living robot.
 
     Attributes:
@@ -61,15 +61,15 @@ class BrainWish(Message, frozen=True, tag="brain"):
     robot: bytes
 
 
-Wish = (
-    ListWish
-    | StatusWish
-    | PauseWish
-    | ResumeWish
-    | SnapshotWish
-    | InsertWish
-    | RemoveWish
-    | BrainWish
+OperatorAction = (
+    ListRobots
+    | GetStatus
+    | PauseArena
+    | ResumeArena
+    | SaveSnapshot
+    | InsertRobot
+    | RemoveRobot
+    | SetBrain
 )
 """All actions that an operator can request."""
 
@@ -86,7 +86,7 @@ class OperatorRequest(Message, frozen=True):
 
     request_id: Annotated[str, Meta(min_length=1)]
     island: IslandNumber
-    action: Wish
+    action: OperatorAction
     run: str = ""
 
 
@@ -115,7 +115,7 @@ def decode_operator_request(data: bytes) -> OperatorRequest:
             action, a robot that breaks its rules, a place that is not finite.
     """
     request = unpack(_REQUEST, data)
-    if isinstance(request.action, InsertWish | BrainWish):
+    if isinstance(request.action, InsertRobot | SetBrain):
         decode_robot(request.action.robot)
     return request
 

@@ -9,11 +9,11 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import Row, body_rows
 from schema.wire.codec import encode_body
-from schema.wire.news import Crewman, Newborn, News
+from schema.wire.updates import Birth, Update, WorkerInfo
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
 BODY = encode_body(CORE)
-WORKERS = (Crewman("w", "x", (0,)),)
+WORKERS = (WorkerInfo("w", "x", (0,)),)
 
 
 def _birth(number: int, sim_time_s: float | None = None, *parents: int) -> Record:
@@ -52,7 +52,7 @@ def _feed(*records: Record) -> Feed:
     return feed
 
 
-def _told(news: News | None) -> News:
+def _told(news: Update | None) -> Update:
     assert news is not None
     return news
 
@@ -65,7 +65,7 @@ def test_news_are_numbered_and_tell_each_row_once() -> None:
     assert (first.sequence, second.sequence) == (1, 2)
     assert [one.birth.number for one in first.births] == [0, 1]
     assert second.births == (
-        Newborn(BirthId(0, 2), (BirthId(0, 0), BirthId(0, 1)), 2, 3, None, BODY),
+        Birth(BirthId(0, 2), (BirthId(0, 0), BirthId(0, 1)), 2, 3, None, BODY),
     )
     assert feed.news(()) is None
 

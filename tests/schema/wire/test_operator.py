@@ -14,17 +14,17 @@ from schema.robot.genome import Node, develop
 from schema.robot.ids import BirthId
 from schema.wire.codec import encode_robot
 from schema.wire.operator import (
-    BrainWish,
-    InsertWish,
-    ListWish,
+    GetStatus,
+    InsertRobot,
+    ListRobots,
+    OperatorAction,
     OperatorReply,
     OperatorRequest,
-    PauseWish,
-    RemoveWish,
-    ResumeWish,
-    SnapshotWish,
-    StatusWish,
-    Wish,
+    PauseArena,
+    RemoveRobot,
+    ResumeArena,
+    SaveSnapshot,
+    SetBrain,
     decode_operator_reply,
     decode_operator_request,
     encode_operator_reply,
@@ -45,18 +45,18 @@ STATUS = OperatorReply("", status=Status(RUNS, 2, 1, 1.5))
 @pytest.mark.parametrize(
     "action",
     [
-        ListWish(),
-        PauseWish(),
-        ResumeWish(),
-        SnapshotWish(),
-        StatusWish(),
-        InsertWish(CORE),
-        InsertWish(CORE, (0.0, -1.5)),
-        RemoveWish(BirthId(2**32 - 1, 2**64 - 1)),
-        BrainWish(BirthId(0, 3), CORE),
+        ListRobots(),
+        PauseArena(),
+        ResumeArena(),
+        SaveSnapshot(),
+        GetStatus(),
+        InsertRobot(CORE),
+        InsertRobot(CORE, (0.0, -1.5)),
+        RemoveRobot(BirthId(2**32 - 1, 2**64 - 1)),
+        SetBrain(BirthId(0, 3), CORE),
     ],
 )
-def test_decoding_inverts_encoding_of_requests(action: Wish) -> None:
+def test_decoding_inverts_encoding_of_requests(action: OperatorAction) -> None:
     request = OperatorRequest("id", 2, action, "a/run")
     assert decode_operator_request(encode_operator_request(request)) == request
 
@@ -124,7 +124,7 @@ def test_any_bytes_decode_or_are_malformed(data: bytes) -> None:
 def test_messages_with_one_other_byte_decode_or_are_malformed(
     index: int, value: int
 ) -> None:
-    request = OperatorRequest("id", 2, InsertWish(CORE, (0.0, -1.5)), "a/run")
+    request = OperatorRequest("id", 2, InsertRobot(CORE, (0.0, -1.5)), "a/run")
     data = bytearray(encode_operator_request(request))
     data[index % len(data)] = value
     with suppress(MalformedMessage):

@@ -18,7 +18,7 @@ from schema.wire.codec import decode_body, encode_body
 from schema.wire.packing import Finite, Message, unpack
 
 
-class Newborn(Message, frozen=True):
+class Birth(Message, frozen=True):
     """A birth.
 
     Attributes:
@@ -38,7 +38,7 @@ class Newborn(Message, frozen=True):
     body: bytes | None
 
 
-class Departed(Message, frozen=True):
+class Death(Message, frozen=True):
     """A death in an arena.
 
     Attributes:
@@ -97,7 +97,7 @@ class Migrant(Message, frozen=True):
     sim_time_s: Finite | None
 
 
-class Crewman(Message, frozen=True):
+class WorkerInfo(Message, frozen=True):
     """A connected worker, its platform and the arena shards that it holds."""
 
     name: str
@@ -105,7 +105,7 @@ class Crewman(Message, frozen=True):
     shards: tuple[IslandNumber, ...]
 
 
-class News(Message, frozen=True):
+class Update(Message, frozen=True):
     """What happened in a run since the update before, or since its beginning.
 
     Attributes:
@@ -124,23 +124,23 @@ class News(Message, frozen=True):
     sequence: Count
     is_whole: bool
     experiment: str
-    births: tuple[Newborn, ...] = ()
-    deaths: tuple[Departed, ...] = ()
+    births: tuple[Birth, ...] = ()
+    deaths: tuple[Death, ...] = ()
     levels: tuple[Level, ...] = ()
     migrants: tuple[Migrant, ...] = ()
-    workers: tuple[Crewman, ...] = ()
+    workers: tuple[WorkerInfo, ...] = ()
     document: str = ""
 
 
-_UPDATE = Decoder(News)
+_UPDATE = Decoder(Update)
 
 
-def encode_news(news: News) -> bytes:
+def encode_update(news: Update) -> bytes:
     """Return the bytes of an update."""
     return encode(news)
 
 
-def decode_news(data: bytes) -> News:
+def decode_update(data: bytes) -> Update:
     """Return the update of some bytes.
 
     Raises:
@@ -154,14 +154,14 @@ def decode_news(data: bytes) -> News:
     return update
 
 
-def newborn(row: Mapping[str, Any], births: int) -> Newborn:
+def read_birth(row: Mapping[str, Any], births: int) -> Birth:
     """Return the birth of a row of the births table.
 
     Args:
         row: of the table; ``genome`` and the counts are not read.
         births: number of births on its island so far, this one included.
     """
-    return Newborn(
+    return Birth(
         BirthId(row["island"], row["birth"]),
         tuple(BirthId(each["island"], each["birth"]) for each in row["parents"]),
         row["rank"],
@@ -177,9 +177,9 @@ def individual(row: Mapping[str, Any]) -> BirthId:
     return BirthId(row["island"] if island is None else island, row["birth"])
 
 
-def departed(row: Mapping[str, Any]) -> Departed:
+def read_death(row: Mapping[str, Any]) -> Death:
     """Return the death of a row of the deaths table."""
-    return Departed(
+    return Death(
         row["island"],
         individual(row),
         row["births"],
@@ -188,7 +188,7 @@ def departed(row: Mapping[str, Any]) -> Departed:
     )
 
 
-def levels(rows: Iterable[Mapping[str, Any]]) -> list[Level]:
+def read_levels(rows: Iterable[Mapping[str, Any]]) -> list[Level]:
     """Return the levels of rows of the population table, one per set of rows.
 
     Args:
@@ -211,7 +211,7 @@ def _level(island: int, births: int, rows: Sequence[Mapping[str, Any]]) -> Level
     )
 
 
-def migrant(row: Mapping[str, Any]) -> Migrant:
+def read_migrant(row: Mapping[str, Any]) -> Migrant:
     """Return the migration of a row of the migrations table."""
     return Migrant(
         individual(row),
