@@ -13,6 +13,7 @@ from typing import Self
 import zenoh
 
 from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
+from schema.agent.service import tell_user
 from schema.agent.topics import (
     Member,
     agents_alive,
@@ -141,8 +142,10 @@ class LiveSource:
         while self._waiting:
             try:
                 each = self._understood(self._waiting.popleft())
-            except MalformedMessage:
+            except MalformedMessage as error:
                 self.malformed += 1
+                if self.malformed == 1:
+                    tell_user(f"dropped a malformed message: {error}")
                 continue
             if each is not None:
                 told.append(each)

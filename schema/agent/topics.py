@@ -62,7 +62,7 @@ class Member:
 
     @property
     def state(self) -> str:
-        """Key that gives, to those who watch, an ``Update`` of everything since the beginning."""
+        """Key that gives viewers an ``Update`` of everything since the beginning."""
         return f"{self._prefix}/state"
 
     @property
