@@ -30,6 +30,7 @@ from schema.agent.service import tell_user
 from schema.agent.supervisor import stop_on_signals
 from schema.flags import Flags, number
 from schema.robot.ids import BirthId
+from schema.wire.codec import decode_body
 
 LAST_S = 600.0
 """Simulated time that is replayed unless told otherwise: the last so much [s]."""
@@ -102,7 +103,7 @@ def _replay(
         for lane, motion in enumerate(motions):
             body = bodies[motion.birth]
             assert body is not None
-            drawn = box_model(body, scene.space, is_plain=False)
+            drawn = box_model(decode_body(body), scene.space, is_plain=False)
             is_there = motion.birth.island in scene.arenas
             show_motion(recording, motion, drawn, None if is_there else lane)
         stop = stop_on_signals()

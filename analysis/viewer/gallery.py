@@ -7,7 +7,7 @@ from analysis.viewer.entities import TimePoint, robot_path
 from analysis.viewer.looks import BoxModels
 from analysis.viewer.recording import Recording
 from schema.robot.ids import BirthId
-from schema.wire.news import Level
+from schema.wire.updates import Level
 
 SPACING_M = 0.6
 COLUMNS = 5

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from analysis.viewer.entities import FamilyTree, TimePoint
 from analysis.viewer.recording import Recording
 from schema.robot.ids import BirthId
-from schema.wire.news import Departed, Level, Newborn
+from schema.wire.updates import Birth, Death, Level
 
 _MOST = 150
 """Births that are shown; more are neither seen nor drawn in time."""
@@ -16,7 +16,7 @@ _EVERY = 10
 
 @dataclass(slots=True)
 class _Entry:
-    newborn: Newborn
+    birth: Birth
     order: int
     is_alive: bool = True
 
@@ -32,7 +32,7 @@ class Lineage:
         self._latest = TimePoint()
         self._undrawn = 0
 
-    def add(self, one: Newborn) -> bool:
+    def add(self, one: Birth) -> bool:
         """Add a birth; return whether it is new."""
         if one.birth in self._known:
             return False
@@ -46,7 +46,7 @@ class Lineage:
         self._undrawn += 1
         return True
 
-    def remove(self, gone: Departed) -> None:
+    def remove(self, gone: Death) -> None:
         """Note that somebody does not live any more."""
         self._die(gone.birth)
 
@@ -55,7 +55,7 @@ class Lineage:
         members = set(level.members)
         for birth, entry in self._entries.items():
             is_here = birth.island == level.island
-            if is_here and entry.newborn.births <= level.births:
+            if is_here and entry.birth.births <= level.births:
                 entry.is_alive = birth in members
 
     def draw(self) -> None:
@@ -69,8 +69,8 @@ class Lineage:
                 FamilyTree(
                     birth,
                     entry.order - first,
-                    entry.newborn.rank,
-                    entry.newborn.parents,
+                    entry.birth.rank,
+                    entry.birth.parents,
                     entry.is_alive,
                 )
                 for birth, entry in self._entries.items()

@@ -13,6 +13,7 @@ from typing import Self
 import zenoh
 
 from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
+from schema.agent.service import tell_user
 from schema.agent.topics import (
     Member,
     agents_alive,
@@ -23,8 +24,7 @@ from schema.agent.topics import (
 )
 from schema.errors import MalformedMessage, NetworkError
 from schema.wire.arena_codec import Live, decode_live
-from schema.wire.news import News
-from schema.wire.news_codec import decode_news
+from schema.wire.updates import Update, decode_update
 
 _MOST = 2000
 """Messages that wait at most."""
@@ -44,7 +44,7 @@ class Sequel:
         self._run = ""
         self._last = (0, 0)
 
-    def take(self, news: News) -> bool:
+    def take(self, news: Update) -> bool:
         """Note news; return whether they are of the run that is watched."""
         place = (news.epoch, news.sequence)
         if news.is_whole:
@@ -66,7 +66,7 @@ class Ended:
     """The coordinator is gone."""
 
 
-Told = News | Live | Ended
+Told = Update | Live | Ended
 
 
 class LiveSource:
@@ -142,8 +142,10 @@ class LiveSource:
         while self._waiting:
             try:
                 each = self._understood(self._waiting.popleft())
-            except MalformedMessage:
+            except MalformedMessage as error:
                 self.malformed += 1
+                if self.malformed == 1:
+                    tell_user(f"dropped a malformed message: {error}")
                 continue
             if each is not None:
                 told.append(each)
@@ -163,8 +165,8 @@ class LiveSource:
         data = message.payload.to_bytes()
         return self._news(data) if key.endswith("/events") else decode_live(data)
 
-    def _news(self, data: bytes) -> News | None:
-        news = decode_news(data)
+    def _news(self, data: bytes) -> Update | None:
+        news = decode_update(data)
         return news if self._sequel.take(news) else None
 
     def _token(self, key: str, is_there: bool) -> Ended | None:  # noqa: FBT001 - a word

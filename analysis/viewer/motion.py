@@ -13,7 +13,7 @@ from analysis.viewer.entities import PoseBatch, TimePoint, motion_path
 from analysis.viewer.recording import Recording, ViewerError
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
-from schema.wire.news import individual
+from schema.wire.updates import individual
 
 LANE_M = 0.8
 LANES = 4

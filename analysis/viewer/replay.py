@@ -15,7 +15,13 @@ from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Origin
 from schema.tables.files import FINISHED, campaign, read_table
-from schema.wire.news import News, departed, levels, migrant, newborn
+from schema.wire.updates import (
+    Update,
+    read_birth,
+    read_death,
+    read_levels,
+    read_migrant,
+)
 
 CHUNK_S = 20.0
 """Simulated time that is read and shown at once [s]."""
@@ -32,7 +38,7 @@ class Span:
     end_s: float
 
 
-def read_news(folder: Path) -> News:
+def read_news(folder: Path) -> Update:
     """Return all that a run's tables tell, but for poses.
 
     Raises:
@@ -43,20 +49,20 @@ def read_news(folder: Path) -> News:
     births = []
     for row in read_table(folder, "births").select(_BORN).to_pylist():
         counts[row["island"]] = counts.get(row["island"], 0) + 1
-        births.append(newborn(row, counts[row["island"]]))
+        births.append(read_birth(row, counts[row["island"]]))
     if not births:
         raise RunFolderError(f"{folder}: nobody has been born yet")
     population = read_table(folder, "population").to_pylist()
-    return News(
+    return Update(
         run=str(folder),
         epoch=0,
         sequence=0,
         is_whole=True,
         experiment=details["name"],
         births=tuple(births),
-        deaths=tuple(map(departed, read_table(folder, "deaths").to_pylist())),
-        levels=tuple(levels(population)),
-        migrants=tuple(map(migrant, read_table(folder, "migrations").to_pylist())),
+        deaths=tuple(map(read_death, read_table(folder, "deaths").to_pylist())),
+        levels=tuple(read_levels(population)),
+        migrants=tuple(map(read_migrant, read_table(folder, "migrations").to_pylist())),
         document=details["document"],
     )
 

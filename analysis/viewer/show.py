@@ -18,7 +18,8 @@ from analysis.viewer.looks import BoxModels, rows_by_robot
 from analysis.viewer.recording import Recording
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
-from schema.wire.news import Crewman, Departed, Level, Migrant, Newborn, News
+from schema.wire.codec import decode_body
+from schema.wire.updates import Birth, Death, Level, Migrant, Update, WorkerInfo
 
 _REPEAT_S = 10.0
 """A server forgets its oldest; a robot's boxes are told again every so often [s]."""
@@ -77,20 +78,20 @@ class Show:
         self._models = BoxModels(space)
         self._clocks: dict[int, _Clock] = {}
         self._shown: dict[tuple[int, BirthId], _ShownRobot] = {}
-        self._gone: dict[tuple[int, BirthId], Departed] = {}
+        self._gone: dict[tuple[int, BirthId], Death] = {}
         self._levels: set[tuple[int, int]] = set()
         self._moves: set[tuple[BirthId, int, int]] = set()
-        self._workers: tuple[Crewman, ...] | None = None
+        self._workers: tuple[WorkerInfo, ...] | None = None
 
-    def tell(self, news: News) -> None:
+    def tell(self, news: Update) -> None:
         """Show what is new in some news."""
         for each in _in_order(news):
             match each:
-                case Newborn():
+                case Birth():
                     self._born(each)
                 case Level():
                     self._level(each)
-                case Departed():
+                case Death():
                     self._departed(each)
         for migrant in news.migrants:
             self._migrated(migrant)
@@ -168,7 +169,7 @@ class Show:
             if key in self._shown and key[1] not in shown:
                 del self._shown[key]
 
-    def _leave(self, gone: Departed) -> None:
+    def _leave(self, gone: Death) -> None:
         """Take a robot's boxes away, once."""
         robot = self._shown.get((gone.island, gone.birth))
         if robot is not None and not robot.is_gone:
@@ -177,9 +178,9 @@ class Show:
             when = self._at(gone.island, gone.sim_time_s)
             self._recording.died(robot.path, when)
 
-    def _born(self, one: Newborn) -> None:
+    def _born(self, one: Birth) -> None:
         if one.body is not None:
-            self._models.add(one.birth, one.body)
+            self._models.add(one.birth, decode_body(one.body))
         if not self._lineage.add(one):
             return
         clock = self._clock(one.birth.island)
@@ -191,7 +192,7 @@ class Show:
         when = TimePoint(one.sim_time_s, one.births)
         self._recording.said(f"{text} to {whose}" if whose else text, when, "INFO")
 
-    def _departed(self, gone: Departed) -> None:
+    def _departed(self, gone: Death) -> None:
         if (gone.island, gone.birth) in self._gone:
             return
         self._gone[gone.island, gone.birth] = gone
@@ -227,19 +228,19 @@ def _coarse(numbers: Float32s, grains: float) -> Float32s:
     return (np.round(numbers * grains) / grains).astype(np.float32)
 
 
-def _in_order(news: News) -> list[Newborn | Level | Departed]:
+def _in_order(news: Update) -> list[Birth | Level | Death]:
     """Return births and levels as they came, by births on their island, then deaths.
 
     Who is born at the instant of a death counts as born by then.
     """
     births = [((one.births, 0), one) for one in news.births]
     levels = [((level.births, 1), level) for level in news.levels]
-    keyed: list[tuple[tuple[int, int], Newborn | Level]] = [*births, *levels]
+    keyed: list[tuple[tuple[int, int], Birth | Level]] = [*births, *levels]
     came = [each for _, each in sorted(keyed, key=lambda pair: pair[0])]
     return [*came, *sorted(news.deaths, key=lambda gone: gone.births)]
 
 
-def _process_pool(workers: tuple[Crewman, ...]) -> str:
+def _process_pool(workers: tuple[WorkerInfo, ...]) -> str:
     """Return a table of who works, as Markdown."""
     lines = ["| worker | platform | arenas |", "|---|---|---|"]
     for man in workers:

@@ -19,7 +19,7 @@ from schema.experiment.file import experiment_from_text
 from schema.robot.ids import BirthId
 from schema.tables.columns import read_columns
 from schema.wire.arena_codec import Live
-from schema.wire.news import News
+from schema.wire.updates import Update
 
 _POLL_S = 0.2
 _PATIENCE_S = 15.0
@@ -76,7 +76,9 @@ def watch(
         keep_serving(output, window, recording, stop)
 
 
-def _first(source: LiveSource, stop: threading.Event) -> tuple[News | None, list[Told]]:
+def _first(
+    source: LiveSource, stop: threading.Event
+) -> tuple[Update | None, list[Told]]:
     """Wait for all that has happened so far; return it, and what came behind it."""
     since_s = time.monotonic()
     has_said = False
@@ -84,7 +86,7 @@ def _first(source: LiveSource, stop: threading.Event) -> tuple[News | None, list
         now_s = time.monotonic()
         told = source.receive(_POLL_S, now_s)
         for index, each in enumerate(told):
-            if isinstance(each, News) and each.is_whole:
+            if isinstance(each, Update) and each.is_whole:
                 return each, told[index + 1 :]
         if now_s > since_s + _PATIENCE_S:
             raise NetworkError("the coordinator does not tell of a run")
@@ -116,7 +118,7 @@ class LiveView:
 
     def tell(self, told: list[Told]) -> None:
         """Show what came, news before poses: births before their robots."""
-        news = [each for each in told if isinstance(each, News)]
+        news = [each for each in told if isinstance(each, Update)]
         for one in news:
             # What came twice counts once: each birth says how many there were.
             self._births |= {each.birth.island: each.births for each in one.births}

@@ -12,16 +12,17 @@ from schema.errors import InvalidRobot, NetworkError
 from schema.flags import Flags, number, whole_number
 from schema.formats.files import read_robot
 from schema.robot.ids import BirthId
+from schema.wire.codec import encode_robot
 from schema.wire.operator import (
-    BrainWish,
-    InsertWish,
-    ListWish,
+    InsertRobot,
+    ListRobots,
+    OperatorAction,
     OperatorRequest,
-    PauseWish,
-    RemoveWish,
-    ResumeWish,
-    SnapshotWish,
-    Wish,
+    PauseArena,
+    RemoveRobot,
+    ResumeArena,
+    SaveSnapshot,
+    SetBrain,
     decode_operator_reply,
     encode_operator_request,
 )
@@ -36,11 +37,11 @@ ACTIONS = {
     "snapshot": "keep its state in the run folder",
 }
 
-PLAIN: dict[str, Wish] = {
-    "list": ListWish(),
-    "pause": PauseWish(),
-    "resume": ResumeWish(),
-    "snapshot": SnapshotWish(),
+PLAIN: dict[str, OperatorAction] = {
+    "list": ListRobots(),
+    "pause": PauseArena(),
+    "resume": ResumeArena(),
+    "snapshot": SaveSnapshot(),
 }
 
 
@@ -58,9 +59,9 @@ def main(arguments: list[str]) -> int:
         InvalidRobot: a file that holds no robot.
     """
     options = _parser().parse_args(arguments[1:])
-    wish = _wish(options)
+    action = _action(options)
     coordinator = _coordinator(options)
-    request = OperatorRequest(uuid4().hex, options.island, wish, options.run)
+    request = OperatorRequest(uuid4().hex, options.island, action, options.run)
     data = ask_coordinators(
         encode_operator_request(request),
         connect=options.connect,
@@ -94,16 +95,16 @@ def _coordinator(options: argparse.Namespace) -> str:
     )
 
 
-def _wish(options: argparse.Namespace) -> Wish:
+def _action(options: argparse.Namespace) -> OperatorAction:
     if options.action in PLAIN:
         return PLAIN[options.action]
     if options.action == "insert":
         place = tuple(options.place) if options.place else None
-        return InsertWish(read_robot(_file(options.file)), place)
+        return InsertRobot(encode_robot(read_robot(_file(options.file))), place)
     birth = BirthId(options.island, options.birth)
     if options.action == "remove":
-        return RemoveWish(birth)
-    return BrainWish(birth, read_robot(_file(options.file)))
+        return RemoveRobot(birth)
+    return SetBrain(birth, encode_robot(read_robot(_file(options.file))))
 
 
 def _file(name: str) -> Path:

@@ -18,7 +18,7 @@ from coordinator.network.local import LocalAgents
 from coordinator.network.service import Network
 from coordinator.run.cross_checks import NO_CHECKS, Checks
 from coordinator.run.live_server import LiveServer, open_viewer
-from coordinator.run.operators import Reception
+from coordinator.run.operators import OperatorServer
 from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
 from coordinator.storage.campaign import (
@@ -344,13 +344,13 @@ def _servant(scheduler: RunScheduler, agents: Agents) -> Callable[[], None]:
     """Return what serves operators and viewers; a run without a network has none."""
     if not isinstance(agents, Network):
         return lambda: None
-    reception = Reception(scheduler)
+    operator_server = OperatorServer(scheduler)
     live_server: list[tuple[RunSession, LiveServer]] = []
 
     def serve() -> None:
         now_s = time.monotonic()
         for order in agents.orders():
-            order.reply(reception.answer(order.data, now_s))
+            order.reply(operator_server.answer(order.data, now_s))
         run = scheduler.watched
         if live_server and live_server[0][0] is not run:
             live_server.pop()[1].close()

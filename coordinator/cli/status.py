@@ -20,8 +20,8 @@ from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.flags import Flags
 from schema.tables.files import FINISHED, SEGMENTS
 from schema.wire.operator import (
+    GetStatus,
     OperatorRequest,
-    StatusWish,
     decode_operator_reply,
     encode_operator_request,
 )
@@ -65,7 +65,7 @@ def ask_status(options: argparse.Namespace) -> dict[str, Status]:
         NetworkError: none answers.
     """
     told = ask_coordinators(
-        encode_operator_request(OperatorRequest(uuid4().hex, 0, StatusWish())),
+        encode_operator_request(OperatorRequest(uuid4().hex, 0, GetStatus())),
         connect=options.connect,
         fleet=options.fleet,
         tls=tls_of(options),

@@ -1,117 +1,118 @@
-"""What a run tells those who watch: news of its rows, numbered, best effort.
+"""Updates for viewers of a run: its new rows, condensed and numbered.
 
-Nothing waits for a viewer, and nobody who watches changes a row. What is told is
-remembered in short, so that one who comes late, or missed something, is told all.
+No run waits for a viewer. The feed keeps a short form of everything that it sent,
+so that a viewer that connects late or lost an update gets the whole.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
+
+from msgspec.structs import replace
 
 from coordinator.islands.events import Append, Record
 from coordinator.storage.folder import RunDetails
 from schema.robot.ids import BirthId
 from schema.tables.columns import Row
-from schema.wire.news import (
-    Crewman,
-    Departed,
+from schema.wire.updates import (
+    Birth,
+    Death,
     Level,
     Migrant,
-    Newborn,
-    News,
-    departed,
-    levels,
-    migrant,
-    newborn,
+    Update,
+    WorkerInfo,
+    read_birth,
+    read_death,
+    read_levels,
+    read_migrant,
 )
 
 
 class Rows(Protocol):
-    """Where a run's rows go."""
+    """Sink of a run's rows."""
 
     def write(self, record: Record) -> None:
-        """Take one row."""
+        """Write one row."""
 
     def store(self, rows: Append) -> None:
-        """Bring bulk rows to disk."""
+        """Store bulk rows on disk."""
 
     def append(self, rows: Append) -> None:
-        """Take bulk rows."""
+        """Append bulk rows."""
 
 
 @dataclass(frozen=True, slots=True)
 class TeeRows:
-    """Passes rows on, and lets a feed hear of those that come one by one."""
+    """Forwards rows to a sink, and single rows to a feed, too."""
 
     rows: Rows
     feed: "Feed"
 
     def write(self, record: Record) -> None:
-        """Pass a row on; then tell of it."""
+        """Write a row, then note it in the feed."""
         self.rows.write(record)
         self.feed.note(record)
 
     def store(self, rows: Append) -> None:
-        """Pass bulk rows on."""
+        """Store bulk rows on disk."""
         self.rows.store(rows)
 
     def append(self, rows: Append) -> None:
-        """Pass bulk rows on."""
+        """Append bulk rows."""
         self.rows.append(rows)
 
 
 class Feed:
-    """What there is to tell of one run; a replay of its journal fills it, too."""
+    """Updates of one run; a replay of its journal fills it, too."""
 
     def __init__(self, run: str, epoch: int, details: RunDetails) -> None:
-        """Know of nothing yet.
+        """Initialise without rows.
 
         Args:
-            run: its name.
+            run: name of the run.
             epoch: of the coordinator.
             details: of the run.
         """
-        self._past = News(
+        self._past = Update(
             run, epoch, 0, is_whole=True, experiment=details.name,
             document=details.document,
         )  # fmt: skip
-        self._births: dict[BirthId, Newborn] = {}
+        self._births: dict[BirthId, Birth] = {}
         self._bodies: list[BirthId] = []
         self._dead: set[BirthId] = set()
         self._born: dict[int, int] = {}
-        self._deaths: list[Departed] = []
+        self._deaths: list[Death] = []
         self._levels: list[Level] = []
         self._newest: dict[int, Level] = {}
         self._migrants: list[Migrant] = []
-        self._new_births: list[Newborn] = []
-        self._new_deaths: list[Departed] = []
+        self._new_births: list[Birth] = []
+        self._new_deaths: list[Death] = []
         self._new_rows: list[Row] = []
         self._new_migrants: list[Migrant] = []
-        self._workers: tuple[Crewman, ...] = ()
+        self._workers: tuple[WorkerInfo, ...] = ()
 
     def note(self, record: Record) -> None:
-        """Hear of a row."""
+        """Add a row."""
         row = record.row
         match record.table:
             case "births":
                 island = row["island"]
                 self._born[island] = self._born.get(island, 0) + 1
-                one = newborn(row, self._born[island])
-                self._new_births.append(one)
+                self._new_births.append(read_birth(row, self._born[island]))
             case "population":
                 self._new_rows.append(dict(row))
             case "deaths":
-                self._new_deaths.append(departed(row))
+                self._new_deaths.append(read_death(row))
             case "migrations":
-                self._new_migrants.append(migrant(row))
+                self._new_migrants.append(read_migrant(row))
 
-    def news(self, workers: tuple[Crewman, ...]) -> News | None:
-        """Return what is new since the last call; None if nothing is."""
-        fresh = levels(self._new_rows)
+    def update(self, workers: tuple[WorkerInfo, ...]) -> Update | None:
+        """Return what is new since the last call; None if nothing is new."""
+        fresh = read_levels(self._new_rows)
         is_new = self._new_births or self._new_deaths or fresh or self._new_migrants
         if not is_new and workers == self._workers:
             return None
         self._past = replace(self._past, sequence=self._past.sequence + 1)
-        news = replace(
+        update = replace(
             self._past,
             is_whole=False,
             document="",
@@ -121,38 +122,38 @@ class Feed:
             migrants=tuple(self._new_migrants),
             workers=workers,
         )
-        self._remember(news)
-        for heard in (
+        self._remember(update)
+        for sent in (
             self._new_births, self._new_deaths, self._new_rows, self._new_migrants
         ):  # fmt: skip
-            heard.clear()
-        return news
+            sent.clear()
+        return update
 
-    def whole(self) -> News:
-        """Return all that ``news`` has told so far."""
-        told = {(level.island, level.births): level for level in self._levels}
+    def whole(self) -> Update:
+        """Return everything that ``update`` has returned so far, as one update."""
+        all_levels = {(level.island, level.births): level for level in self._levels}
         for newest in self._newest.values():
-            told[newest.island, newest.births] = newest
+            all_levels[newest.island, newest.births] = newest
         return replace(
             self._past,
             births=tuple(self._births.values()),
             deaths=tuple(self._deaths),
-            levels=tuple(told.values()),
+            levels=tuple(all_levels.values()),
             migrants=tuple(self._migrants),
             workers=self._workers,
         )
 
-    def _remember(self, news: News) -> None:
-        """Add to the past; of the dead no body is kept."""
-        self._workers = news.workers
-        self._migrants += news.migrants
-        self._deaths += news.deaths
-        self._dead.update(gone.birth for gone in news.deaths)
-        for level in news.levels:
+    def _remember(self, update: Update) -> None:
+        """Add an update to the past; drop the bodies of dead robots."""
+        self._workers = update.workers
+        self._migrants += update.migrants
+        self._deaths += update.deaths
+        self._dead.update(gone.birth for gone in update.deaths)
+        for level in update.levels:
             self._levels.append(replace(level, members=()))
             self._newest[level.island] = level
-        self._births.update((one.birth, one) for one in news.births)
-        self._bodies += [one.birth for one in news.births]
+        self._births.update((one.birth, one) for one in update.births)
+        self._bodies += [one.birth for one in update.births]
         members = {birth for level in self._newest.values() for birth in level.members}
         kept: list[BirthId] = []
         for birth in self._bodies:

@@ -1,7 +1,7 @@
-"""What operators want of a run's arenas: checked, journalled, carried out.
+"""Operator requests: checked, journalled, carried out.
 
-An order takes effect at the arena's next decision and stands in the journal with
-that step before the operator is told, so that a replay obeys it, too.
+An order takes effect at the arena's next decision. The journal holds the order with
+that step before the operator gets a reply, so that a replay carries it out too.
 """
 
 from coordinator.arena.arena import Arena
@@ -23,63 +23,66 @@ from schema.experiment.document import Experiment, body_space, island_experiment
 from schema.robot.ids import BirthId
 from schema.robot.inverse_development import genome_of
 from schema.robot.robot import check_robot
+from schema.wire.codec import decode_robot
 from schema.wire.operator import (
-    BrainWish,
-    InsertWish,
-    ListWish,
+    GetStatus,
+    InsertRobot,
+    ListRobots,
     OperatorReply,
-    PauseWish,
-    RemoveWish,
-    ResumeWish,
-    SnapshotWish,
-    StatusWish,
+    OperatorRequest,
+    PauseArena,
+    RemoveRobot,
+    ResumeArena,
+    SaveSnapshot,
+    SetBrain,
     decode_operator_request,
     encode_operator_reply,
 )
 
 
 class Refused(RevolveError):  # noqa: N818 - reads as what it says
-    """A wish that cannot be granted: the operator is told why."""
+    """A request that cannot be carried out; the reply says why."""
 
 
-class Desk:
-    """Where operators of one run are served."""
+class RunOperator:
+    """Carries out the operator requests of one run."""
 
     def __init__(self, loop: Loop, experiment: Experiment) -> None:
-        """Serve the arenas of a loop that has started."""
+        """Initialise for a loop that has started."""
         self._loop = loop
         self._experiment = experiment
 
-    def answer(self, data: bytes) -> bytes:
-        """Return the encoded reply to an encoded request.
+    def reply_to(self, request: OperatorRequest) -> OperatorReply:
+        """Carry out a request and return the reply.
 
-        On return the journal has what was ordered. Whatever is wrong with the
-        request is told to the operator and changes nothing.
+        On return the journal holds the order. A faulty request is refused and
+        changes nothing.
 
         Raises:
             RunFolderError: the disk is full or failed.
         """
+        event = None
+        assert not isinstance(request.action, GetStatus)  # OperatorServer replies
         try:
-            request = decode_operator_request(data)
             arena = self._arena(request.island)
-            wish = request.wish
-            assert not isinstance(wish, StatusWish)  # the reception's
-            if isinstance(wish, ListWish):
-                text = self._list(arena, request.island)
-            elif isinstance(wish, SnapshotWish):
-                self._loop.advances.wish_snapshot(request.island)
-                text = "the state is kept at the end of the next advance"
-            else:
-                order = self._order(wish, arena)
-                event = Commanded(
-                    request.island, request.request_id, arena.next_step, order
-                )
-                text = self._effect(event)
+            match request.action:
+                case ListRobots():
+                    text = self._list(arena, request.island)
+                case SaveSnapshot():
+                    self._loop.advances.wish_snapshot(request.island)
+                    text = "the state is saved at the end of the next advance"
+                case action:
+                    order = self._order(action, arena)
+                    event = Commanded(
+                        request.island, request.request_id, arena.next_step, order
+                    )
+                    step_s = self._own(request.island).simulation.timestep_s
+                    text = f"takes effect at {event.step * step_s:g} s"
         except RevolveError as error:
-            return encode_operator_reply(OperatorReply(str(error), is_refused=True))
-        if not isinstance(wish, ListWish | SnapshotWish):
+            return OperatorReply(str(error), is_refused=True)
+        if event is not None:
             self._loop.order(event)
-        return encode_operator_reply(OperatorReply(text))
+        return OperatorReply(text)
 
     def _arena(self, number: int) -> Arena:
         arena = self._loop.islands.get(number)
@@ -91,43 +94,39 @@ class Desk:
 
     def _order(
         self,
-        wish: PauseWish | ResumeWish | InsertWish | RemoveWish | BrainWish,
+        action: PauseArena | ResumeArena | InsertRobot | RemoveRobot | SetBrain,
         arena: Arena,
     ) -> Order:
-        """Return the order that a wish comes to.
+        """Return the order of an action.
 
         Raises:
-            Refused: nobody of that name lives there.
+            Refused: no living robot has the given birth number.
             InvalidRobot: a robot that breaks the rules of the experiment.
         """
-        space = body_space(self._experiment.space)
         order: Order
-        match wish:
-            case PauseWish():
+        match action:
+            case PauseArena():
                 order = Pause()
-            case ResumeWish():
+            case ResumeArena():
                 order = Resume()
-            case InsertWish():
-                check_robot(wish.robot, space)
-                order = Insert(genome_of(wish.robot), wish.place)
-            case RemoveWish():
-                _check_lives(wish.birth, arena)
-                order = Remove(wish.birth)
-            case BrainWish():
-                _check_lives(wish.birth, arena)
-                order = ReplaceBrain(wish.birth, wish.robot.brain)
+            case InsertRobot():
+                robot = decode_robot(action.robot)
+                check_robot(robot, body_space(self._experiment.space))
+                order = Insert(genome_of(robot), action.place)
+            case RemoveRobot():
+                _check_lives(action.birth, arena)
+                order = Remove(action.birth)
+            case SetBrain():
+                _check_lives(action.birth, arena)
+                order = ReplaceBrain(action.birth, decode_robot(action.robot).brain)
         check_order(order, self._experiment)
         return order
-
-    def _effect(self, event: Commanded) -> str:
-        step_s = self._own(event.island).simulation.timestep_s
-        return f"takes effect at {event.step * step_s:g} s"
 
     def _own(self, island: int) -> Experiment:
         return island_experiment(self._experiment, island)
 
     def _list(self, arena: Arena, island: int) -> str:
-        """Return a line on the arena and one on each of the living."""
+        """Return a line about the arena and one about each living robot."""
         state = "paused" if arena.is_paused else "running"
         own = self._own(island)
         now_s, births = arena.step * own.simulation.timestep_s, own.births
@@ -143,15 +142,14 @@ class Desk:
 def _check_lives(birth: BirthId, arena: Arena) -> None:
     living = [one.birth for one in arena.population]
     if birth not in living:
-        numbers = ", ".join(str(each.number) for each in living) or "nobody"
-        raise Refused(f"birth {birth.number}: does not live; alive are {numbers}")
+        numbers = ", ".join(str(each.number) for each in living) or "none"
+        raise Refused(f"birth {birth.number}: is not alive; alive are {numbers}")
 
 
-class Reception:
-    """Tells how far all runs are; leads operators to the desk of theirs."""
+class OperatorServer:
+    """Answers operator requests of all runs of a coordinator."""
 
     def __init__(self, scheduler: RunScheduler) -> None:
-        """Receive for all runs of a process."""
         self._scheduler = scheduler
 
     def answer(self, data: bytes, now_s: float) -> bytes:
@@ -163,25 +161,28 @@ class Reception:
         """
         try:
             request = decode_operator_request(data)
-            if isinstance(request.wish, StatusWish):
-                status = self._scheduler.status(now_s)
-                return encode_operator_reply(OperatorReply("", status=status))
-            run = self._run(request.run)
+            if isinstance(request.action, GetStatus):
+                reply = OperatorReply("", status=self._scheduler.status(now_s))
+            else:
+                reply = self._carry_out(request, self._run(request.run))
         except (MalformedMessage, Refused) as error:
-            return encode_operator_reply(OperatorReply(str(error), is_refused=True))
-        replies: list[bytes] = []
-        desk = Desk(run.loop, run.experiment)
-        self._scheduler.guard(run, lambda: replies.append(desk.answer(data)))
+            reply = OperatorReply(str(error), is_refused=True)
+        return encode_operator_reply(reply)
+
+    def _carry_out(self, request: OperatorRequest, run: RunSession) -> OperatorReply:
+        """Return the reply of a run; a run that fails here is stopped."""
+        replies: list[OperatorReply] = []
+        operator = RunOperator(run.loop, run.experiment)
+        self._scheduler.guard(run, lambda: replies.append(operator.reply_to(request)))
         if replies:
             return replies[0]
-        failed = OperatorReply("the run cannot go on", is_refused=True)
-        return encode_operator_reply(failed)
+        return OperatorReply("the run cannot go on", is_refused=True)
 
     def _run(self, name: str) -> RunSession:
-        """Return whose operator asks.
+        """Return the run whose folder's name ends with a name.
 
         Raises:
-            Refused: not exactly one run is meant.
+            Refused: no running run with an arena has such a name, or several have.
         """
         runs = [
             run
@@ -192,4 +193,6 @@ class Reception:
         if len(runs) == 1:
             return runs[0]
         names = ", ".join(sorted(run.held.path.name for run in runs)) or "none"
-        raise Refused(f"one run with an arena must be meant; running are {names}")
+        raise Refused(
+            f"the name must match one running run with an arena; matching: {names}"
+        )

@@ -8,7 +8,9 @@ them, the other on its way to or from the analyzers and this process.
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+
+from msgspec.structs import replace
 
 from coordinator.dispatch.fleet import Fleet, JobClient, ShardClient
 from coordinator.run.rate import RateMeter

@@ -1,10 +1,10 @@
 """How far a run is by its folder alone, whoever has it in hand."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.compute as pc
+from msgspec.structs import replace
 
 from coordinator.storage.folder import RunDetails, read_details, read_holder, read_state
 from coordinator.storage.hints import command

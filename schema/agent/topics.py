@@ -62,12 +62,12 @@ class Member:
 
     @property
     def state(self) -> str:
-        """Key that gives, to those who watch, a ``News`` of all since the beginning."""
+        """Key that gives viewers an ``Update`` of everything since the beginning."""
         return f"{self._prefix}/state"
 
     @property
     def events(self) -> str:
-        """Key on which a ``News`` appears when something has happened."""
+        """Key on which an ``Update`` appears when something has happened."""
         return f"{self._prefix}/events"
 
     def poses(self, shard: int) -> str:

@@ -1,4 +1,4 @@
-"""Whether the sections of an experiment fit each other."""
+"""Checks that the sections of an experiment are consistent."""
 
 from collections.abc import Callable
 from math import isclose, lcm
@@ -20,23 +20,23 @@ _LONGEST_NAME = 200
 
 
 def check_experiment(experiment: Experiment, where: str) -> None:
-    """Raise unless the sections of an experiment fit each other.
+    """Raise unless the sections of an experiment are consistent.
 
     Raises:
-        ExperimentError: a name that no folder can have, a restriction that no robot
-            can meet, a selection that cannot draw its parents, a window that ends
-            between two samples, an arena too small or with clocks that do not
-            meet, rules that an arena has no use for, rough ground that cannot be
-            laid out, scenery that is none, a plug-in that does not exist, a
+        ExperimentError: a name that no folder can have; limits that no robot can
+            meet; a population too small to choose parents; a window that ends
+            between two samples; an arena too small, or with intervals that are not
+            multiples of its clocks; off-line keys in an arena; an extent that is
+            not a whole number of patches; invalid scenery; an unknown plug-in; a
             migration that can never happen.
     """
     checks: list[Callable[[Experiment], str]] = [
         _limits_problem,
         _selection_problem,
-        culling_problem,
-        reevaluation_problem,
+        _culling_problem,
+        _reevaluation_problem,
         _clock_problem,
-        duration_problem,
+        _duration_problem,
         _environment_problem,
         _arena_problem,
         _arena_clock_problem,
@@ -62,11 +62,13 @@ def check_experiment(experiment: Experiment, where: str) -> None:
             f"{core.name}, got {experiment.space.max_inputs}"
         )
     if not any(kind.outputs for kind in types.values()):
-        raise ExperimentError(f"{where}: space.part_types: none of them has a motor")
+        raise ExperimentError(
+            f"{where}: space.part_types: at least one type must have a motor"
+        )
 
 
 def _name_problem(name: str) -> str:
-    """The name becomes a folder's, percent-encoded, below which its tables lie."""
+    """Return what is wrong with a name: it becomes the name of a folder."""
     if not name.strip():
         return f"name: must not be empty, got {name!r}"
     if not name.isprintable():
@@ -74,8 +76,8 @@ def _name_problem(name: str) -> str:
     length = len(quote(name, safe=""))
     if length > _LONGEST_NAME:
         return (
-            f"name: must be <= {_LONGEST_NAME} bytes long where whatever no path may "
-            f"hold is percent-encoded, got {length}"
+            f"name: must be <= {_LONGEST_NAME} bytes long after percent-encoding, "
+            f"got {length}"
         )
     return ""
 
@@ -103,7 +105,7 @@ def _selection_problem(experiment: Experiment) -> str:
     if not selection.keep_parents and selection.children < selection.population:
         return (
             "selection.children: must be >= selection.population = "
-            f"{selection.population} where parents are not kept, "
+            f"{selection.population} if parents are not kept, "
             f"got {selection.children}"
         )
     if experiment.births < selection.population:
@@ -135,10 +137,14 @@ def _environment_problem(experiment: Experiment) -> str:
         return problem
     if not environment.scenery:
         return ""
-    # The engine is loaded for scenery only: a coordinator has no other use.
-    from schema.experiment.scenery import scenery_problem  # noqa: PLC0415
+    # MuJoCo is imported only if needed: it is slow to load.
+    from schema.experiment.scenery import scenery_model  # noqa: PLC0415
 
-    return scenery_problem(environment.scenery, experiment.simulation)
+    try:
+        scenery_model(environment.scenery, experiment.simulation)
+    except ExperimentError as error:
+        return str(error)
+    return ""
 
 
 def _arena_problem(experiment: Experiment) -> str:
@@ -147,7 +153,7 @@ def _arena_problem(experiment: Experiment) -> str:
         return ""
     if selection.survivors != "best" or not selection.keep_parents:
         return (
-            "selection: the survivors of an arena are those that are fit enough; "
+            "selection: survival in an arena depends on fitness; "
             'survivors must be "best" and keep_parents true'
         )
     needed = selection.parents_needed
@@ -171,7 +177,7 @@ def _arena_problem(experiment: Experiment) -> str:
 
 
 def _arena_clock_problem(experiment: Experiment) -> str:
-    """Decisions fall on brain ticks and on poses; all else would be half a state."""
+    """Return which interval does not end on both a brain tick and a pose."""
     arena, clock = experiment.arena, experiment.simulation
     if arena is None:
         return ""
@@ -183,8 +189,8 @@ def _arena_clock_problem(experiment: Experiment) -> str:
         if not (steps and is_whole) or steps % tick:
             return (
                 f"arena.{name}_interval_s: must be a whole multiple of "
-                f"{tick * clock.timestep_s:g} s, where simulation.brain_steps and "
-                f"pose_steps meet, got {seconds:g}"
+                f"{tick * clock.timestep_s:g} s, the common multiple of "
+                f"simulation.brain_steps and pose_steps, got {seconds:g}"
             )
     if clock.warmup_steps % clock.pose_steps:
         return (
@@ -194,26 +200,27 @@ def _arena_clock_problem(experiment: Experiment) -> str:
     return ""
 
 
-def culling_problem(experiment: Experiment) -> str:
-    """Return why a population cannot be culled as a document says, or nothing."""
+def _culling_problem(experiment: Experiment) -> str:
+    """Return what is wrong with ``selection.culling``, or nothing."""
     selection = experiment.selection
     rules = selection.culling
     if rules is None:
         return ""
     where = "selection.culling"
     if experiment.arena is not None:
-        return f"{where}: an arena has these rules in [arena]; leave one of them out"
+        return f"{where}: arenas have these keys in [arena]; remove one of the two"
     if selection.survivors != "best" or not selection.keep_parents:
         return (
-            f"{where}: who is fit enough survives; selection.survivors must be "
+            f"{where}: survival depends on fitness; selection.survivors must be "
             '"best" and selection.keep_parents true'
         )
     if problem := _floor_problem(selection):
         return f"{where}.{problem}"
     if round(rules.full_cull_share * rules.population_limit) < 1:
         return (
-            f"{where}.full_cull_share: must make room for one of population_limit = "
-            f"{rules.population_limit}, got {rules.full_cull_share:g}"
+            f"{where}.full_cull_share: must remove at least one robot of "
+            f"population_limit = {rules.population_limit}, "
+            f"got {rules.full_cull_share:g}"
         )
     return ""
 
@@ -237,31 +244,31 @@ def _floor_problem(selection: Selection) -> str:
     return ""
 
 
-def reevaluation_problem(experiment: Experiment) -> str:
-    """Return why nobody can be judged anew, or nothing."""
+def _reevaluation_problem(experiment: Experiment) -> str:
+    """Return what is wrong with ``selection.reevaluation``, or nothing."""
     selection = experiment.selection
     if selection.reevaluation is None:
         return ""
     where = "selection.reevaluation"
     if experiment.arena is not None:
-        return f"{where}: an arena judges all the time; leave one of them out"
+        return f"{where}: arenas re-evaluate all the time; remove one of the two"
     if not selection.keep_parents:
         return (
-            f"{where}: nobody lives beyond a brood where selection.keep_parents is "
+            f"{where}: no individual outlives its brood if selection.keep_parents is "
             "false"
         )
     return ""
 
 
-def duration_problem(experiment: Experiment) -> str:
-    """Return why evaluations cannot last as a document says, or nothing."""
+def _duration_problem(experiment: Experiment) -> str:
+    """Return what is wrong with ``simulation.evaluation_s``, or nothing."""
     clock = experiment.simulation
     if clock.evaluation_s is None:
         return ""
     where = "simulation.evaluation_s"
     shortest, longest = clock.evaluation_s
     if experiment.arena is not None:
-        return f"{where}: an arena's robots have no set time; leave it out"
+        return f"{where}: not for arenas, which evaluate all the time; remove it"
     least = (clock.warmup_steps + clock.window_steps) * clock.timestep_s
     if steps_of(shortest, clock) < clock.warmup_steps + clock.window_steps:
         return (

@@ -1,4 +1,4 @@
-"""Whether a migration can happen: one that cannot is an error, never silence."""
+"""Checks that the migration of an experiment can happen."""
 
 from math import ceil
 
@@ -6,25 +6,26 @@ from schema.experiment.document import Experiment, island_count, island_experime
 from schema.experiment.migration import Migration, migrant_count
 
 _UNCONNECTED = (
-    "migration.topology: nobody can migrate between unconnected islands; name another "
-    "topology, or leave out the rest of [migration]"
+    "migration.topology: unconnected islands cannot exchange migrants; choose another "
+    "topology, or remove the other keys of [migration]"
 )
 
 
 def migration_problem(experiment: Experiment) -> str:
-    """Return why an experiment's migration cannot be, or nothing.
+    """Return what is wrong with an experiment's migration, or nothing.
 
-    Each island's other sections have been found to fit each other.
+    Args:
+        experiment: its other sections are consistent.
     """
     migration, count = experiment.migration, island_count(experiment)
     if migration is None:
         if not any(islands.migration for islands in experiment.islands):
             return ""
-        return "migration: must say how the islands of [[islands]] are connected"
+        return "migration: is missing; [[islands]] with a migration need it"
     if migration.topology == "unconnected":
         return "" if migration == Migration() else _UNCONNECTED
     if count == 1:
-        return "migration: one island has nobody to migrate to; add [[islands]]"
+        return "migration: needs at least two islands; add [[islands]]"
     problems = [
         _edges_problem(migration, count),
         _degree_problem(migration, count),
@@ -49,7 +50,7 @@ def _edges_problem(migration: Migration, count: int) -> str:
         if edge[0] == edge[1]:
             return f"migration.edges: must be two islands, got {list(edge)}"
         if edges.count(edge) > 1:
-            return f"migration.edges: must stand there once, got {list(edge)} twice"
+            return f"migration.edges: must not repeat a pair, got {list(edge)} twice"
     return ""
 
 
@@ -65,7 +66,7 @@ def _degree_problem(migration: Migration, count: int) -> str:
         )
     if migration.topology == "random-regular" and degree * count % 2:
         return (
-            f"migration.degree: must be even where the islands are odd, {count}, "
+            f"migration.degree: must be even for an odd number of islands, {count}, "
             f"got {degree}"
         )
     if migration.topology == "small-world" and degree % 2:
@@ -74,14 +75,14 @@ def _degree_problem(migration: Migration, count: int) -> str:
 
 
 def _island_problem(experiment: Experiment, number: int) -> str:
-    """Return why one island of several could not migrate, or nothing."""
+    """Return what is wrong with the migration of one island, or nothing."""
     connected, own = experiment.migration, island_experiment(experiment, number)
     migration = own.migration
     assert connected is not None
     assert migration is not None
     for name in ("topology", "degree", "p_rewire", "edges"):
         if getattr(migration, name) != getattr(connected, name):
-            return f"migration.{name}: is the archipelago's, not that of some islands"
+            return f"migration.{name}: must be the same on all islands"
     if connected.topology == "edges" and not any(
         number in edge for edge in connected.edges
     ):
@@ -94,7 +95,7 @@ def _island_problem(experiment: Experiment, number: int) -> str:
 
 
 def _epoch_problem(own: Experiment, migration: Migration) -> str:
-    """Off-line an epoch ends with a brood; the last brood ends all."""
+    """Return whether the first epoch would end after the last birth."""
     founders, epoch = own.selection.population, migration.epoch
     first = max(epoch, founders)
     if own.arena is None:
@@ -115,19 +116,19 @@ def _migrants_problem(own: Experiment, migration: Migration) -> str:
     living = selection.population if arena is None else arena.population_limit
     if migrant_count(migration, living) == 0:
         return (
-            f"migration.migrants: a share of {migration.migrants:g} of {living} is "
-            "nobody"
+            f"migration.migrants: a share of {migration.migrants:g} of {living} rounds "
+            "to 0"
         )
     if isinstance(migration.migrants, int) and migration.migrants > living:
         return (
-            f"migration.migrants: must be <= {living}, those who live there at most, "
-            f"got {migration.migrants}"
+            f"migration.migrants: must be <= {living}, the population of the "
+            f"island, got {migration.migrants}"
         )
     stay = selection.parents_needed
     if migration.handling == "evict" and living <= stay:
         return (
-            f'migration.handling: "evict" leaves at least {stay} on their island, and '
-            f"no more than {living} live there"
+            f'migration.handling: "evict" keeps at least {stay} robots on an island, '
+            f"and at most {living} live there"
         )
     return ""
 
@@ -137,8 +138,8 @@ def _replaced_problem(own: Experiment, migration: Migration) -> str:
     if varies or migration.replaced != "none":
         return ""
     return (
-        'migration.replaced: "none" is for islands where the number of the living '
-        "varies; off-line, without selection.culling, it is selection.population"
+        'migration.replaced: "none" needs a population of varying size; '
+        "off-line it varies only with selection.culling"
     )
 
 
@@ -146,4 +147,4 @@ def _seconds_problem(experiment: Experiment, migration: Migration, count: int) -
     arenas = [island_experiment(experiment, number).arena for number in range(count)]
     if migration.epoch_s is None or any(arena is not None for arena in arenas):
         return ""
-    return "migration.epoch_s: simulated seconds pass in arenas only, and there is none"
+    return "migration.epoch_s: applies to arenas only, and the experiment has none"

@@ -1,8 +1,8 @@
-"""The experiment document: everything that may change a birth.
+"""The experiment document: all settings that can change a birth.
 
-A TOML file; every key has the thesis's value as its default, and a key that does
-not exist is refused with the nearest name that does. What may not change a birth
-(workers, folders, addresses) is a flag of the command, not a key.
+It is a TOML file. Each key has the thesis's value as its default. An unknown key is
+refused with the nearest known one. Settings that cannot change a birth (workers,
+folders, addresses) are flags of the commands, not keys.
 """
 
 from dataclasses import replace
@@ -28,7 +28,14 @@ from schema.parts import BodySpace, Parameter, PartType
 
 
 class Space(Section, frozen=True):
-    """What a robot may be: part types and limits (thesis tables 4.1, 5.1)."""
+    """Part types and limits of robots (thesis tables 4.1, 5.1).
+
+    Attributes:
+        part_types: ``module:attribute`` of each; exactly one is a core.
+        min_parts, max_parts: allowed number of parts, core included.
+        max_inputs, max_outputs, max_hidden: allowed number of neurons.
+        planar: keep all parts in the plane of the core.
+    """
 
     part_types: tuple[str, ...] = (
         "schema.parts:CORE",
@@ -47,7 +54,16 @@ class Space(Section, frozen=True):
 
 
 class Generation(Section, frozen=True):
-    """How a random robot is made (thesis section 4.4.2)."""
+    """Generation of random robots (thesis section 4.4.2).
+
+    Attributes:
+        parts_mean, parts_sd: mean and standard deviation of the normal distribution
+            of the number of parts.
+        p_connect_neurons: probability of each possible connection.
+        hidden_on: parts that get hidden neurons: ``any``, or those that are
+            ``wired`` (have a sensor or a motor).
+        max_tries: attempts per robot; after these the run stops with an error.
+    """
 
     parts_mean: float = 12.0
     parts_sd: NotNegative = 5.0
@@ -57,7 +73,20 @@ class Generation(Section, frozen=True):
 
 
 class Variation(Section, frozen=True):
-    """How offspring differ (thesis section 4.4.6)."""
+    """Mutation of offspring (thesis section 4.4.6).
+
+    Attributes:
+        p_delete_subtree, p_duplicate_subtree, p_swap_subtree, p_delete_hidden_neuron,
+            p_remove_brain_connection: probability of each step.
+        body_epsilon, brain_epsilon: step size of parameters, as a share of the way
+            to a random value.
+        add_parts: ``loop`` may add several parts, ``once`` at most one; the expected
+            number is what deletion removes, less what duplication adds.
+        duplicable_size: size of subtrees in that number: their ``mean`` or ``sum``.
+        hidden_rounding: rounding of the number of hidden neurons to add.
+        check_min_parts: refuse a crossover that leaves fewer than
+            ``space.min_parts``.
+    """
 
     p_delete_subtree: Probability = 0.05
     p_duplicate_subtree: Probability = 0.1
@@ -73,13 +102,19 @@ class Variation(Section, frozen=True):
 
 
 class Culling(Section, frozen=True):
-    """The survivors' rule of an arena for an off-line population of varying size.
+    """Off-line survivor selection by the rule of an arena; the population varies.
 
-    Every ``interval`` births after the founders, and whenever ``population_limit``
-    is reached, those go who are below a share of the mean fitness; in a full
-    population without any such, a share of the limit. ``population_floor`` stay.
-    Source: Hupkes 2016, sections 5.3.3 and 8.2; two births are what an arena's cull
-    interval comes to.
+    Robots below a share of the mean fitness are removed every ``interval`` births
+    and whenever the population is full. If a full population has none of them, a
+    share of it is removed. Source: Hupkes 2016, sections 5.3.3 and 8.2.
+
+    Attributes:
+        interval: births between removals, counted from the last founder; the default
+            corresponds to ``arena.cull_interval_s``.
+        population_limit: size of a full population.
+        population_floor: number of robots that are always kept, the fittest.
+        survive_share_of_mean: robots below this share of the mean are removed.
+        full_cull_share: share of ``population_limit`` to remove.
     """
 
     interval: AtLeastOne = 2
@@ -90,11 +125,15 @@ class Culling(Section, frozen=True):
 
 
 class Reevaluation(Section, frozen=True):
-    """A share of the living is judged anew every ``interval`` births.
+    """Re-evaluation of living robots.
 
-    Whose last judgement is the oldest comes first; of equals, the elder. The new
-    fitness replaces the old one, or ``mean`` of all of them counts. Source: Hupkes
-    2016, section 8.2.
+    Robots whose last evaluation is the oldest come first; of equals, the older robot.
+    Source: Hupkes 2016, section 8.2.
+
+    Attributes:
+        interval: births between re-evaluations, counted from the last founder.
+        share: of the population to re-evaluate, at least one robot.
+        fitness: ``replace`` the old fitness, or take the ``mean`` of all evaluations.
     """
 
     interval: AtLeastOne = 15
@@ -103,10 +142,19 @@ class Reevaluation(Section, frozen=True):
 
 
 class Selection(Section, frozen=True):
-    """Who mates and who lives on (thesis section 5.3).
+    """Parent and survivor selection (thesis section 5.3).
 
-    With ``culling`` the population varies in size, and ``population`` is the number
-    of founders; with ``reevaluation`` a fitness is not for life.
+    Attributes:
+        population: number of individuals; with ``culling``, number of founders.
+        children: births per generation.
+        window: births in flight at once; ``children`` if not given.
+        parents: selection of parents; ``none`` makes each child a random robot.
+        tournament_size: individuals per tournament.
+        survivors: the ``best`` or ``random`` ones survive.
+        keep_parents: parents compete with their children for survival.
+        max_mating_attempts: attempts per birth before two new parents are chosen.
+        culling: makes the population vary in size.
+        reevaluation: re-evaluates living robots.
     """
 
     population: AtLeastOne = 15
@@ -122,38 +170,55 @@ class Selection(Section, frozen=True):
 
     @property
     def parents_needed(self) -> int:
-        """How many must be there to choose two parents from; 0 if none is chosen."""
+        """Least population to choose two parents from; 0 if none are chosen."""
         needs = {"tournament": self.tournament_size + 1, "random": 2, "none": 0}
         return needs[self.parents]
 
 
 class Vetting(Section, frozen=True):
-    """Which bodies can be built: ``overlap`` allows touching, ``contact`` not."""
+    """Checks of bodies before they are simulated.
+
+    Attributes:
+        mode: refuse parts that ``overlap``, or also parts in ``contact``.
+        tolerance_m: least depth of an overlap, or greatest gap of a contact [m].
+    """
 
     mode: Literal["overlap", "contact"] = "overlap"
     tolerance_m: NotNegative = 1e-6
 
 
 NoiseLevel = Annotated[float, Meta(ge=0, le=1e6)]
-"""A standard deviation; no robot's arithmetic overflows within these bounds."""
+"""A standard deviation; within these bounds no arithmetic overflows."""
 
 
 class Simulation(Section, frozen=True):
-    """The simulated world and its clocks, in physics steps.
+    """Physics, noise, and clocks in physics steps.
 
-    ``armature`` and, at driven joints, ``servo_armature`` [kg m2], ``damping`` and
-    ``servo_stiffness`` [N m s/rad] and ``contact_time_s`` are what MuJoCo needs
-    beyond the original's numbers; their effect is measured in docs/physics.md. A
-    servo chatters above a stiffness of 2 servo_armature / timestep_s.
+    MuJoCo needs ``armature``, ``damping``, ``servo_armature``, ``servo_stiffness``
+    and ``contact_time_s`` beyond the numbers of the thesis; docs/physics.md has their
+    measured effect. Noise is drawn from normal distributions at every brain tick.
 
-    Off-line, ``evaluation_s`` [s] has every evaluation last a time of its own, drawn
-    uniformly between the two, warm-up included; the window is its last part.
-
-    ``sensor_noise`` and ``actuator_noise`` are standard deviations of what is drawn
-    anew, from a normal distribution, at every tick of the brain: for each reading,
-    in the reading's own unit (m/s2 and rad/s of an imu, touch and light from 0 to
-    1), and for each output before it is clipped to [0, 1], the range of its joint.
-    The network's own memory is not touched. At 0 nothing is drawn.
+    Attributes:
+        timestep_s: physics step [s].
+        brain_steps: steps between brain ticks.
+        pose_steps: steps between recorded poses.
+        window_steps: steps of the fitness window.
+        warmup_steps: steps before the window.
+        gravity: [m/s2].
+        friction: sliding friction coefficient of all contacts.
+        armature: rotor inertia of passive joints [kg m2].
+        damping: of all joints [N m s/rad].
+        servo_armature: rotor inertia of driven joints [kg m2].
+        servo_stiffness: torque per error of angular velocity [N m s/rad]; a servo
+            chatters above 2 servo_armature / timestep_s.
+        contact_time_s: time constant of contacts [s].
+        drop_m: height above the ground at the start [m].
+        evaluation_s: shortest and longest evaluation [s], warm-up included, off-line;
+            each evaluation draws its own, and the window is its last part.
+        sensor_noise: standard deviation of each reading, in its unit: m/s2 and rad/s
+            of an imu, 0 to 1 of touch and light.
+        actuator_noise: standard deviation of each output before it is clipped to
+            [0, 1], the range of its joint; the network's state has no noise.
     """
 
     timestep_s: Positive = 0.005
@@ -175,7 +240,14 @@ class Simulation(Section, frozen=True):
 
 
 class Fitness(Section, frozen=True):
-    """What is maximised: a function ``module:attribute`` and its weights."""
+    """The function that evolution maximises.
+
+    Attributes:
+        function: ``module:attribute``.
+        path_weight, straight_weight: weights of the velocities along the path and
+            between its ends.
+        limit: greatest realistic fitness; above it, fitness is 0.
+    """
 
     function: str = "worker.fitness:thesis"
     path_weight: float = 1.0
@@ -184,10 +256,35 @@ class Fitness(Section, frozen=True):
 
 
 class Arena(Section, frozen=True):
-    """An on-line world: robots are born, judged all the time and die in it.
+    """An on-line world: robots are born, evaluated all the time and die in it.
 
-    Times are simulated seconds. Source: Hupkes 2016, section 5.3.3, and the code's
-    intervals (facts of the original, section 5.2).
+    Times are simulated. Source: Hupkes 2016, section 5.3.3, and the intervals of its
+    code (facts of the original, section 5.2).
+
+    Attributes:
+        founder_interval_s: time between births of founders [s].
+        birth_interval_s: time between later births [s].
+        cull_interval_s: time between removals of weak robots [s].
+        sample_interval_s: time between samples of fitness [s].
+        snapshot_interval_s: time between saved states [s].
+        population_limit: living robots at which births stop.
+        population_floor: number of mature robots that removals always keep.
+        survive_share_of_mean: mature robots below this share of their mean fitness
+            are removed.
+        full_cull_share: share of ``population_limit`` to remove if that many robots
+            are mature and none is below the share of the mean.
+        birth_radius_m: robots are born within this distance of the origin [m].
+        birth_distance_m: least distance of a birth place from robots [m].
+        birth_place_tries: places to try for that; the last one is used in any case.
+        drop_m: height above the ground at birth [m].
+        wall_diameter_m: of the ring wall [m]; 0 is no wall.
+        wall_segments, wall_height_m, wall_thickness_m: of the ring wall [m].
+        light: position of the light [m]; None is no light.
+        record_touches: write the table ``touches``.
+        proximity_steps: physics steps between checks of distances.
+        merge_distance_m: robots that may come nearer than this before the next check
+            share a model [m].
+        split_distance_m: robots farther apart than this get separate models [m].
     """
 
     founder_interval_s: Positive = 1.0
@@ -215,10 +312,13 @@ class Arena(Section, frozen=True):
 
 
 class Islands(Section, frozen=True):
-    """Some islands, and what is different on them; None is as in the document.
+    """Islands with settings of their own; None is as in the rest of the document.
 
-    A section that a document holds here changes its own keys only; read, it is
-    whole.
+    A section given here changes the keys that it names. After reading, it is
+    complete.
+
+    Attributes:
+        count: number of such islands.
     """
 
     count: AtLeastOne = 1
@@ -234,10 +334,13 @@ class Islands(Section, frozen=True):
 
 
 class Experiment(Section, frozen=True):
-    """One experiment; ``births`` counts the initial population.
+    """An experiment.
 
-    Without ``islands`` it is one island. With them they are numbered from 0, in the
-    order of the document, and ``births`` counts on each.
+    Attributes:
+        name: names the run folder.
+        births: number of births on each island, the initial population included.
+        islands: numbered from 0, in the order of the document; none is one island.
+        migration: between the islands.
     """
 
     name: str
@@ -256,7 +359,7 @@ class Experiment(Section, frozen=True):
 
     @property
     def window(self) -> int:
-        """Births in flight at once: a whole brood unless the document says less."""
+        """Births in flight at once: a whole generation by default."""
         return self.selection.window or self.selection.children
 
 
@@ -267,12 +370,10 @@ def island_count(experiment: Experiment) -> int:
 
 @lru_cache(maxsize=1024)
 def island_experiment(experiment: Experiment, number: int) -> Experiment:
-    """Return what is done on one island, as an experiment of its own.
-
-    Its ``migration`` is the island's; it names no ``islands``.
+    """Return the settings of one island as an experiment without ``islands``.
 
     Raises:
-        ValueError: it has no island of that number.
+        ValueError: the experiment has no island of that number.
     """
     count = island_count(experiment)
     if not 0 <= number < count:
@@ -289,17 +390,17 @@ def island_experiment(experiment: Experiment, number: int) -> Experiment:
 
 
 def with_births(experiment: Experiment, births: int) -> Experiment:
-    """Return an experiment that ends, on each of its islands, at ``births``."""
+    """Return an experiment with another number of births on each island."""
     islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
     return structs.replace(experiment, births=births, islands=islands)
 
 
 @lru_cache(maxsize=64)
 def body_space(space: Space) -> BodySpace:
-    """Return the part types that a document names, by name, in its order.
+    """Return the part types of a document by name, in its order.
 
     Raises:
-        UnknownPlugin: a name that nothing answers to.
+        UnknownPlugin: no such module or attribute.
         ExperimentError: not a part type, two of one name, or not exactly one core.
     """
     types: dict[str, PartType] = {}
@@ -308,18 +409,20 @@ def body_space(space: Space) -> BodySpace:
         if not isinstance(kind, PartType):
             raise ExperimentError(f"space.part_types: {path!r} is not a PartType")
         if kind.name in types:
-            raise ExperimentError(f"space.part_types: two types named {kind.name!r}")
+            raise ExperimentError(
+                f"space.part_types: two part types are named {kind.name!r}"
+            )
         types[kind.name] = kind if space.planar else _freed(kind)
     cores = [name for name, kind in types.items() if kind.is_root]
     if len(cores) != 1:
         raise ExperimentError(
-            f"space.part_types: needs exactly one core, got {len(cores)} {cores}"
+            f"space.part_types: must contain exactly one core, got {len(cores)} {cores}"
         )
     return types
 
 
 def _freed(kind: PartType) -> PartType:
-    """Return a bar that may also twist: only planar bodies hold beta at 0."""
+    """Return a part type whose beta may vary; in planar bodies it is 0."""
     return replace(
         kind,
         own_parameters=tuple(
@@ -330,5 +433,5 @@ def _freed(kind: PartType) -> PartType:
 
 
 def steps_of(seconds: float, simulation: Simulation) -> int:
-    """Return a time in physics steps, rounded."""
+    """Return a duration [s] as a number of physics steps, rounded."""
     return round(seconds / simulation.timestep_s)

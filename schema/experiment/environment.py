@@ -1,4 +1,4 @@
-"""The section ``[environment]``: how the ground lies, and what stands on it."""
+"""The section ``[environment]``: slope, rough ground and scenery."""
 
 from functools import lru_cache
 from math import cos, isclose, radians, sin
@@ -12,24 +12,26 @@ from schema.parts import Vector
 from schema.robot.results import Floats
 
 MOST_PATCHES = 400
-"""Patches of rough ground side by side: every robot's model has all of them."""
+"""Most patches of rough ground per axis; each robot's model holds all of them."""
 TAPER = 0.2
-"""Share of the extent over which rough ground comes down to the plane."""
+"""Share of the extent over which rough ground descends to the plane."""
 
 
 class Environment(Section, frozen=True):
-    """What robots are put into, off-line and in arenas.
+    """Ground and scenery, off-line and in arenas.
 
-    ``slope_deg`` [degrees] is how steeply the ground rises along x. World frames lie
-    in the ground, so it is gravity that leans: heights, walls and places of birth
-    are as on level ground, and so are pictures.
+    World frames lie in the ground. On a slope gravity is tilted, and heights, walls,
+    birth places and pictures are as on level ground. Rough ground is a height field
+    that descends to the plane at its rim; beyond the rim is the plane.
 
-    Above 0, ``roughness_m`` [m] makes a height field: nodes ``patch_m`` apart, drawn
-    by ``ground_seed``, the highest that high, within ``extent_m`` of the origin along
-    x and y. It comes down to the plane at its rim, and beyond there is the plane.
-
-    ``scenery`` is MJCF of what stands there and never moves; a document may name a
-    file instead, relative to itself.
+    Attributes:
+        slope_deg: rise of the ground along x [degrees], below 45.
+        roughness_m: height of the highest bump [m]; 0 is a plane.
+        patch_m: distance between nodes of the height field [m].
+        extent_m: half length of the height field along x and y [m], about the origin.
+        ground_seed: seed of the heights.
+        scenery: MJCF of static objects; a document may give the path of a file,
+            relative to itself.
     """
 
     slope_deg: Annotated[float, Meta(ge=0, lt=45)] = 0.0
@@ -41,32 +43,32 @@ class Environment(Section, frozen=True):
 
     @property
     def is_even(self) -> bool:
-        """Whether there is nothing but a plane."""
+        """Whether the ground is a plane without scenery."""
         return not (self.roughness_m or self.scenery)
 
     @property
     def patches(self) -> int:
-        """Patches of rough ground from the origin to the rim."""
+        """Number of patches from the origin to the rim."""
         return round(self.extent_m / self.patch_m)
 
     def gravity_vector(self, gravity: float) -> Vector:
-        """Return gravity of some strength in the ground's frame, x uphill [m/s2]."""
+        """Return the gravity vector in the ground's frame, x uphill [m/s2]."""
         slope = radians(self.slope_deg)
-        # From 0, so that a plane has no negative zero: it would change readings.
+        # 0.0 minus: avoids -0.0, which would change sensor readings.
         return 0.0 - gravity * sin(slope), 0.0, -gravity * cos(slope)
 
 
 FLAT = Environment()
-"""The thesis's: an endless plane."""
+"""The default: an infinite plane."""
 
 
 def is_mjcf(scenery: str) -> bool:
-    """Return whether scenery is MJCF itself and not the path of a file."""
+    """Return whether scenery is MJCF, not the path of a file."""
     return scenery.lstrip().startswith("<")
 
 
 def ground_problem(environment: Environment) -> str:
-    """Return why rough ground cannot be laid out; nothing if it can."""
+    """Return what is wrong with rough ground, or nothing."""
     if not environment.roughness_m:
         return ""
     extent_m, patch_m = environment.extent_m, environment.patch_m

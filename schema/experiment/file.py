@@ -1,4 +1,4 @@
-"""Reads and writes experiment documents: TOML by people, JSON in a run's tables."""
+"""Reading and writing of experiments: TOML of users, JSON of the runs table."""
 
 import tomllib
 from collections.abc import Collection
@@ -23,7 +23,7 @@ def read_experiment(source: str) -> Experiment:
         source: ``scenario1``, or a path that ends in ``.toml``.
 
     Raises:
-        ExperimentError: no such experiment or file, or a document that is not one.
+        ExperimentError: no such experiment or file, or an invalid document.
     """
     if source.endswith(".toml"):
         try:
@@ -38,10 +38,10 @@ def read_experiment(source: str) -> Experiment:
 
 
 def check_source(source: str, shipped: Collection[str]) -> None:
-    """Raise unless a word is a path of a TOML file or one of the shipped names.
+    """Raise unless a source is the path of a TOML file or a shipped name.
 
     Raises:
-        ExperimentError: it is neither; the nearest is named.
+        ExperimentError: neither; the message names the nearest.
     """
     if not source.endswith(".toml") and source not in shipped:
         raise ExperimentError(
@@ -65,16 +65,16 @@ def parse_experiment(text: str, where: str) -> Experiment:
 
     Args:
         text: the document.
-        where: its path, for messages and for scenery that is named beside it.
+        where: its path, for messages and for relative paths of scenery.
 
     Raises:
-        ExperimentError: bad TOML, an unknown key (the nearest is named), a wrong
-            type or a value outside its range, or values that exclude each other.
+        ExperimentError: not TOML; an unknown key (the nearest is named); a value of a
+            wrong type or outside its range; inconsistent values.
     """
     try:
         document = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise ExperimentError(f"{where}: not TOML: {error}") from None
+        raise ExperimentError(f"{where}: not valid TOML: {error}") from None
     _refuse_unknown(document, Experiment, where, "")
     _read_scenery(document, where)
     document = _completed(document)
@@ -87,7 +87,7 @@ def parse_experiment(text: str, where: str) -> Experiment:
 
 
 def _read_scenery(document: dict[str, Any], where: str) -> None:
-    """Put the text of scenery where its path stands, so that it goes along."""
+    """Replace paths of scenery by the text of the files, in place."""
     for table in (document, *document.get("islands", ())):
         environment = table.get("environment", {})
         named = environment.get("scenery", "")
@@ -101,13 +101,13 @@ def _read_scenery(document: dict[str, Any], where: str) -> None:
                 f"{where}: environment.scenery: {named}: cannot be read: {error}"
             ) from None
         if not text.strip():
-            # Or it would be taken for no scenery at all.
+            # An empty text means no scenery.
             raise ExperimentError(f"{where}: environment.scenery: {named}: is empty")
         environment["scenery"] = text
 
 
 def _completed(document: dict[str, Any]) -> dict[str, Any]:
-    """Return a document whose ``islands`` have their sections whole."""
+    """Return a document with complete sections in ``islands``."""
     if "islands" not in document:
         return document
     islands = [
@@ -118,12 +118,12 @@ def _completed(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def _completed_table(kept: Any, changed: Any) -> Any:  # noqa: ANN401 - any TOML value
-    """Return a section in which what islands change stands among what they keep."""
+    """Return a section with the changes of islands merged into it."""
     return {**(kept or {}), **changed} if isinstance(changed, dict) else changed
 
 
 def experiment_text(experiment: Experiment) -> str:
-    """Return an experiment as one line of JSON, every default written out."""
+    """Return an experiment as one line of JSON with all defaults."""
     return msgspec.json.encode(experiment).decode()
 
 
@@ -131,7 +131,7 @@ def experiment_from_text(text: str) -> Experiment:
     """Return the experiment that ``experiment_text`` wrote.
 
     Raises:
-        ExperimentError: not such a text.
+        ExperimentError: another text.
     """
     try:
         return msgspec.json.decode(text.encode(), type=Experiment)
@@ -142,7 +142,7 @@ def experiment_from_text(text: str) -> Experiment:
 def _refuse_unknown(
     document: dict[str, Any], kind: type[Struct], where: str, prefix: str
 ) -> None:
-    """Raise for a key that a section does not have, or a number that is none."""
+    """Raise for an unknown key or a number that is not finite."""
     fields = {field.name: field for field in msgspec.structs.fields(kind)}
     for key, value in document.items():
         if key not in fields:
@@ -173,7 +173,7 @@ def _refuse_unknown(
 
 
 def _section(kind: Any) -> type[Struct] | None:  # noqa: ANN401 - any annotation
-    """Return the section that a key holds, be it optional; None if a plain value."""
+    """Return the section type of an annotation; None if it is a plain value."""
     for each in (kind, *get_args(kind)):
         if isinstance(each, type) and issubclass(each, Struct):
             return each
@@ -181,7 +181,7 @@ def _section(kind: Any) -> type[Struct] | None:  # noqa: ANN401 - any annotation
 
 
 def _explain(error: msgspec.ValidationError, document: dict[str, Any]) -> str:
-    """Return msgspec's message as ``key: expected, got value``."""
+    """Return the message of msgspec as ``key: expected, got value``."""
     message, _, path = str(error).partition(" - at `$.")
     key = path.rstrip("`")
     value: Any = document
@@ -202,7 +202,7 @@ def _explain(error: msgspec.ValidationError, document: dict[str, Any]) -> str:
 
 
 def _type_of(kind: Any, key: str) -> Any:  # noqa: ANN401 - any annotation
-    """Return the annotation of a key of the section that an annotation names."""
+    """Return the annotation of a key of a section, given the section's own."""
     section = _section(kind)
     fields = msgspec.structs.fields(section) if section else ()
     return next((field.type for field in fields if field.name == key), None)

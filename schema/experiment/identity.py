@@ -1,4 +1,4 @@
-"""Whose chance it is: what a worker's draws depend on, beside the tick."""
+"""Identity of an evaluation: the random draws of a worker depend on it."""
 
 from dataclasses import dataclass
 
@@ -7,12 +7,12 @@ from schema.robot.ids import BirthId
 
 
 class Origin(Section, frozen=True):
-    """Where something happens: a run, and the island that asked for it.
+    """A run and the island that requests an evaluation.
 
     Attributes:
-        seed: of the experiment's execution.
+        seed: of the run.
         run: number of the repeat, from 0.
-        island: its number in the run.
+        island: number of the island, from 0.
     """
 
     seed: Count = 0
@@ -22,12 +22,12 @@ class Origin(Section, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Which evaluation it is.
+    """Identity of an evaluation.
 
     Attributes:
-        origin: who asked for it.
-        birth: whose it is.
-        trial: which of the robot's, from 0.
+        origin: run and island that request it.
+        birth: of the robot.
+        trial: number among the robot's evaluations, from 0.
     """
 
     origin: Origin
@@ -36,4 +36,4 @@ class Identity:
 
 
 NOBODY = Identity(Origin(), BirthId(0, 0), 0)
-"""An evaluation that belongs to no run: of a robot of a file, or of a benchmark."""
+"""Identity outside of a run: of a robot file or a benchmark."""

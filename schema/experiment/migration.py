@@ -1,8 +1,8 @@
-"""The section on migration: who neighbours whom, and who moves between islands.
+"""The section ``[migration]``: topology, and exchange of individuals.
 
-Words follow pagmo's archipelago where they fit: a topology connects the islands,
-handling says whether a migrant is preserved on its island or evicted from it.
-Source: own; Biscani and Izzo 2020, on pagmo, for the words.
+The terms follow pagmo: a topology connects islands, and handling tells whether a
+migrant is preserved on its island or evicted from it.
+Source: own; Biscani and Izzo 2020, on pagmo, for the terms.
 """
 
 from typing import Annotated, Literal
@@ -24,29 +24,29 @@ Topology = Literal[
 
 
 class Migration(Section, frozen=True):
-    """Which islands are neighbours, and what they exchange.
+    """Topology of the islands, and their exchange of migrants.
 
-    At the end of an epoch (so many births, or in an arena so many simulated seconds
-    if those are over first) an island sends migrants to each of its neighbours, and
-    goes on when those of its neighbours' epoch have come.
+    At the end of an epoch an island sends migrants to each of its neighbours. It
+    continues when the migrants of its neighbours' epoch have arrived.
 
     Attributes:
-        topology: ``grid`` is as square as the number of islands allows; of a
-            ``star`` island 0 is the middle.
-        degree: neighbours of each island, ``random-regular`` and ``small-world``.
-        p_rewire: share of connections that a ``small-world`` sets anew.
+        topology: ``grid`` is as square as the number of islands allows; island 0 is
+            the centre of a ``star``.
+        degree: neighbours of each island, for ``random-regular`` and ``small-world``.
+        p_rewire: share of connections that a ``small-world`` rewires.
         edges: pairs (from, to) of islands, for ``edges``; all other topologies
             connect both ways.
-        epoch: births between exchanges; an island's own.
-        epoch_s: simulated seconds between exchanges, arenas only.
-        migrants: how many leave for each neighbour, or what share of the population.
-        emigrants: who leaves; a tournament is as large as the one for parents.
-        handling: ``preserve`` sends copies, the same to each neighbour; ``evict``
-            moves, to one neighbour each.
-        replaced: who makes room, where nobody has left; ``none`` where the number
-            of the living varies.
-        judge_anew: evaluate immigrants again. So it is always where the islands
-            judge in different ways, and in an arena.
+        epoch: births per epoch, on the island itself.
+        epoch_s: simulated time per epoch [s], arenas only; the earlier end counts.
+        migrants: number for each neighbour, or share of the population.
+        emigrants: selection of migrants; tournaments have the size of those for
+            parents.
+        handling: ``preserve`` copies the same migrants to each neighbour; ``evict``
+            moves each migrant to one neighbour.
+        replaced: individuals that make room for immigrants; ``none`` requires a
+            population of varying size.
+        judge_anew: re-evaluate immigrants; always the case in an arena, and between
+            islands that evaluate in different ways.
     """
 
     topology: Topology = "unconnected"
@@ -63,7 +63,7 @@ class Migration(Section, frozen=True):
 
 
 def migrant_count(migration: Migration, population: int) -> int:
-    """Return how many leave a population of so many for each neighbour."""
+    """Return the number of migrants for each neighbour, given a population size."""
     if isinstance(migration.migrants, int):
         return min(migration.migrants, population)
     return round(migration.migrants * population)

@@ -1,6 +1,6 @@
-"""Code named by data: ``"package.module:attribute"``.
+"""Loading of plug-ins by name: ``"package.module:attribute"``.
 
-Nothing registers itself; the process that runs the code resolves its name.
+There is no registry; the process that runs the code resolves the name.
 """
 
 from difflib import get_close_matches
@@ -12,7 +12,7 @@ from schema.errors import ExperimentError, UnknownPlugin
 
 @lru_cache(maxsize=256)
 def load(path: str, where: str) -> object:
-    """Return what a dotted path names.
+    """Return the object that a dotted path names.
 
     Args:
         path: ``package.module:attribute``.
@@ -21,7 +21,7 @@ def load(path: str, where: str) -> object:
     Raises:
         UnknownPlugin: not of that form, no such module, no such attribute (the
             nearest is named).
-        ExperimentError: the module breaks while it is imported.
+        ExperimentError: importing the module raises another error.
     """
     module_name, colon, attribute = path.partition(":")
     words = [*module_name.split("."), attribute]

@@ -1,7 +1,7 @@
-"""What code a document names, and whether two machines have the same.
+"""Digests of plug-ins, to check that two machines have the same code.
 
-A plug-in is known by its source: the files of its top-level module or package. The
-rooms of this project are no plug-ins; their version stands for them.
+The digest covers the source files of a plug-in's top-level module or package. The
+packages of this project are not plug-ins; their version identifies them.
 """
 
 import re
@@ -19,7 +19,7 @@ _DIGITS = 12
 
 @lru_cache(maxsize=64)
 def plugins_of(settings: bytes) -> str:
-    """Return the plug-ins that settings name, with what they are here.
+    """Return the plug-ins that settings name, with their digests on this machine.
 
     Args:
         settings: JSON; every text in it like ``module:attribute`` names a plug-in.
@@ -34,13 +34,13 @@ def plugins_of(settings: bytes) -> str:
 
 @lru_cache(maxsize=64)
 def check_plugins(wanted: str) -> None:
-    """Raise unless all plug-ins are here as they are elsewhere.
+    """Raise unless this machine has the same plug-ins.
 
     Args:
-        wanted: what ``plugins_of`` returned there.
+        wanted: the result of ``plugins_of`` on the other machine.
 
     Raises:
-        PluginDiffers: one is not here, or has another content.
+        PluginDiffers: one is missing, or its source differs.
     """
     for each in wanted.split():
         name, _, digest = each.partition("=")
@@ -49,14 +49,14 @@ def check_plugins(wanted: str) -> None:
             raise PluginDiffers(f"has no plug-in {name!r}")
         if found != digest:
             raise PluginDiffers(
-                f"its plug-in {name!r} is another than the coordinator's: source "
-                f"{found}, wanted {digest}"
+                f"its plug-in {name!r} differs from the coordinator's: source digest "
+                f"{found}, expected {digest}"
             )
 
 
 @lru_cache(maxsize=64)
 def _digest(module: str) -> str:
-    """Return the digest of a top-level module's source; empty if it is not here."""
+    """Return the digest of a top-level module's source; empty if not installed."""
     try:
         spec = find_spec(module)
     except (ImportError, ValueError):

@@ -1,7 +1,7 @@
-"""A user's MJCF of what stands in a world, read as geoms that never move.
+"""Scenery: a user's MJCF, read as static geoms.
 
-All of it becomes geoms of the world's own body: what counts bodies and joints finds
-those of robots only.
+All geoms are added to the world body, so that a model's bodies and joints are those
+of robots only.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _ALLOWED = (
     *("mujoco", "compiler", "default", "worldbody"),
     *("body", "frame", "replicate", "geom"),
 )
-"""Elements of MJCF that can only stand still."""
+"""MJCF elements that are allowed: none of them moves."""
 _SHAPES = {
     mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
     mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
@@ -29,33 +29,24 @@ _SHAPES = {
     mujoco.mjtGeom.mjGEOM_BOX: "box",
 }
 _WORDS = ("name", "class", "childclass", "model")
-"""Attributes that hold no numbers."""
+"""Attributes whose values are not numbers."""
 _COPIED = (
     *("type", "size", "rgba", "contype", "conaffinity", "condim", "priority"),
     *("friction", "solmix", "solref", "solimp", "margin", "gap"),
 )
-"""What a geom is, beside where."""
-
-
-def scenery_problem(scenery: str, simulation: Simulation) -> str:
-    """Return why a text cannot be scenery; nothing if it can."""
-    try:
-        scenery_model(scenery, simulation)
-    except ExperimentError as error:
-        return str(error)
-    return ""
+"""Attributes of a geom that are copied; pose is not among them."""
 
 
 @dataclass(frozen=True, slots=True)
 class Solid:
-    """One shape of scenery, for whoever draws it.
+    """Shape of scenery, for drawing.
 
     Attributes:
         shape: box, sphere, capsule, ellipsoid or cylinder.
-        size: (3,) as MuJoCo has it: half sizes or semi-axes; of the round ones about
-            z the radius, then half of the length without caps [m].
+        size: (3,) as in MuJoCo: half sizes or semi-axes; of cylinder and capsule the
+            radius, then the half length without caps [m].
         centre: (3,) world frame [m].
-        rotation: (3, 3) its frame into the world's.
+        rotation: (3, 3) shape frame to world frame.
         colour: red, green, blue, opacity, 0 to 1.
     """
 
@@ -70,7 +61,7 @@ def solids(scenery: str, simulation: Simulation) -> list[Solid]:
     """Return the shapes of scenery, in the order of its geoms.
 
     Raises:
-        ExperimentError: it is not scenery.
+        ExperimentError: the text is not valid scenery.
     """
     model = scenery_model(scenery, simulation)
     data = mujoco.MjData(model)
@@ -88,15 +79,15 @@ def solids(scenery: str, simulation: Simulation) -> list[Solid]:
 
 
 def add_scenery(spec: mujoco.MjSpec, scenery: str, simulation: Simulation) -> None:
-    """Add what stands in a world: its geoms, named ``scenery/{k}``.
+    """Add the geoms of scenery to a world, named ``scenery/{k}``.
 
     Args:
-        spec: the world's.
+        spec: of the world.
         scenery: MJCF.
-        simulation: whose friction and contact it has where it says nothing.
+        simulation: default friction and contact of its geoms.
 
     Raises:
-        ExperimentError: it is not scenery.
+        ExperimentError: the text is not valid scenery.
     """
     model = scenery_model(scenery, simulation)
     data = mujoco.MjData(model)
@@ -113,22 +104,22 @@ def add_scenery(spec: mujoco.MjSpec, scenery: str, simulation: Simulation) -> No
 
 @lru_cache(maxsize=16)
 def scenery_model(scenery: str, simulation: Simulation) -> mujoco.MjModel:
-    """Return scenery alone, compiled; not to be changed.
+    """Return the compiled model of scenery alone; do not change it.
 
     Args:
         scenery: MJCF.
-        simulation: whose friction and contact it has where it says nothing.
+        simulation: default friction and contact of its geoms.
 
     Raises:
-        ExperimentError: no XML, no MJCF, nothing in it, or something that moves,
-            comes from another file or is no simple shape.
+        ExperimentError: not XML, not MJCF, no geom, an element that moves or refers
+            to another file, or a shape that is not supported.
     """
     try:
         root = ET.fromstring(scenery)  # noqa: S314 - of the user's own document
     except ET.ParseError as error:
-        raise ExperimentError(f"environment.scenery: no XML: {error}") from None
+        raise ExperimentError(f"environment.scenery: not valid XML: {error}") from None
     _check_elements(root)
-    # Before the user's own, which go beyond it.
+    # First, so that the user's own defaults override it.
     general = ET.Element("default")
     ET.SubElement(
         general,
@@ -143,7 +134,7 @@ def scenery_model(scenery: str, simulation: Simulation) -> mujoco.MjModel:
         model = mujoco.MjSpec.from_string(text).compile()
     except ValueError as error:
         raise ExperimentError(
-            f"environment.scenery: no MJCF: {one_line(error)}"
+            f"environment.scenery: not valid MJCF: {one_line(error)}"
         ) from None
     _check_shapes(model)
     return model
@@ -157,8 +148,8 @@ def _check_elements(root: ET.Element) -> None:
     for element in root.iter():
         if element.tag not in _ALLOWED:
             raise ExperimentError(
-                f"environment.scenery: <{element.tag}> is not allowed, for scenery "
-                f"only stands there; allowed: {', '.join(_ALLOWED)}"
+                f"environment.scenery: <{element.tag}> is not allowed, because scenery "
+                f"does not move; allowed: {', '.join(_ALLOWED)}"
             )
         for key, value in element.items():
             if key not in _WORDS and not all(map(_is_finite, value.split())):
@@ -169,13 +160,13 @@ def _check_elements(root: ET.Element) -> None:
         if element.get("mocap", "false") != "false":
             name = element.get("name", "")
             raise ExperimentError(
-                f"environment.scenery: <body name={name!r}> must not be mocap, for "
-                "scenery only stands there"
+                f"environment.scenery: <body name={name!r}> must not be mocap, because "
+                "scenery does not move"
             )
 
 
 def _is_finite(word: str) -> bool:
-    """Return whether a word is no number that is none; the engine takes them."""
+    """Return whether a word is not inf or nan, which MuJoCo accepts."""
     try:
         return isfinite(float(word))
     except ValueError:

@@ -1,4 +1,4 @@
-"""What the sections of an experiment document are made of."""
+"""Base class and number types of the sections of an experiment."""
 
 from typing import Annotated
 
@@ -12,4 +12,4 @@ AtLeastOne = Annotated[int, Meta(ge=1)]
 
 
 class Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Base of the sections: immutable, nothing unknown, keys by name."""
+    """Base of the sections: immutable, without unknown keys, keyword-only."""

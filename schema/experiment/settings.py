@@ -1,4 +1,4 @@
-"""What goes with a request, beside the robot: the part of an experiment it needs."""
+"""Settings in requests: the sections of an experiment that an answer depends on."""
 
 from collections.abc import Callable
 from functools import lru_cache
@@ -24,14 +24,14 @@ T = TypeVar("T")
 
 
 class VettingSettings(Section, frozen=True):
-    """What an analyzer's answer depends on, beside the robot."""
+    """Settings of a vetting request."""
 
     space: Space
     vetting: Vetting
 
 
 class EvaluationSettings(Section, frozen=True):
-    """What a worker's answer depends on, beside the robot."""
+    """Settings of an evaluation request."""
 
     space: Space
     simulation: Simulation
@@ -40,7 +40,7 @@ class EvaluationSettings(Section, frozen=True):
 
 
 class ArenaSettings(Section, frozen=True):
-    """What an arena's advances depend on, beside its state and its changes."""
+    """Settings of a request to advance an arena."""
 
     space: Space
     simulation: Simulation
@@ -51,33 +51,36 @@ class ArenaSettings(Section, frozen=True):
 
 
 def vetting_settings(experiment: Experiment) -> bytes:
-    """Return the JSON that goes with every vetting request."""
+    """Return the JSON that every vetting request of an experiment holds."""
     return msgspec.json.encode(
         VettingSettings(space=experiment.space, vetting=experiment.vetting)
     )
 
 
-def evaluation_settings(experiment: Experiment) -> bytes:
-    """Return the JSON that goes with every evaluation request."""
-    return msgspec.json.encode(
-        EvaluationSettings(
-            space=experiment.space,
-            simulation=experiment.simulation,
-            fitness=experiment.fitness,
-            environment=experiment.environment,
-        )
+def evaluation_settings_of(experiment: Experiment) -> EvaluationSettings:
+    """Return the evaluation settings of an experiment."""
+    return EvaluationSettings(
+        space=experiment.space,
+        simulation=experiment.simulation,
+        fitness=experiment.fitness,
+        environment=experiment.environment,
     )
 
 
+def evaluation_settings(experiment: Experiment) -> bytes:
+    """Return the JSON that every evaluation request of an experiment holds."""
+    return msgspec.json.encode(evaluation_settings_of(experiment))
+
+
 def arena_settings(experiment: Experiment, origin: Origin) -> bytes:
-    """Return the JSON that goes with every request about the experiment's arena.
+    """Return the JSON that every request to advance an arena holds.
 
     Args:
-        experiment: the island's.
-        origin: the run and the island.
+        experiment: of the island.
+        origin: run and island.
 
     Raises:
-        ExperimentError: an off-line experiment.
+        ExperimentError: the experiment has no arena.
     """
     if experiment.arena is None:
         raise ExperimentError(f"{experiment.name}: has no arena")
@@ -98,7 +101,7 @@ def read_arena_settings(settings: bytes) -> ArenaSettings:
     """Return the settings of a request to advance an arena.
 
     Raises:
-        ExperimentError: not such settings.
+        ExperimentError: the bytes are not such settings.
     """
     return _from_json(settings, ArenaSettings)
 
@@ -108,7 +111,7 @@ def read_vetting_settings(settings: bytes) -> VettingSettings:
     """Return the settings of a vetting request.
 
     Raises:
-        ExperimentError: not such settings.
+        ExperimentError: the bytes are not such settings.
     """
     return _from_json(settings, VettingSettings)
 
@@ -118,7 +121,7 @@ def read_evaluation_settings(settings: bytes) -> EvaluationSettings:
     """Return the settings of an evaluation request.
 
     Raises:
-        ExperimentError: not such settings.
+        ExperimentError: the bytes are not such settings.
     """
     return _from_json(settings, EvaluationSettings)
 
@@ -131,12 +134,16 @@ def _from_json(settings: bytes, kind: type[T]) -> T:
 
 
 def lasting(settings: EvaluationSettings, steps: int) -> EvaluationSettings:
-    """Return settings by which an evaluation takes so many physics steps.
+    """Return settings with another total length of an evaluation.
 
-    What is more than the window comes before it. With 0 steps nothing changes.
+    The window keeps its length and ends the evaluation; the rest is warm-up.
+
+    Args:
+        settings: to change.
+        steps: of physics, warm-up included; 0 keeps the settings as they are.
 
     Raises:
-        ExperimentError: not even the window lasts so short.
+        ExperimentError: fewer steps than the window has.
     """
     if not steps:
         return settings
@@ -152,13 +159,15 @@ def lasting(settings: EvaluationSettings, steps: int) -> EvaluationSettings:
 
 
 def fitness_function(fitness: Fitness) -> Callable[..., float]:
-    """Return the function that a document names.
+    """Return the fitness function that an experiment names.
 
     Raises:
-        UnknownPlugin: a name that nothing answers to.
+        UnknownPlugin: no such module or attribute.
         ExperimentError: not a function.
     """
     function = load(fitness.function, "fitness.function")
     if not callable(function):
-        raise ExperimentError(f"fitness.function: {fitness.function!r} is no function")
+        raise ExperimentError(
+            f"fitness.function: {fitness.function!r} is not a function"
+        )
     return cast("Callable[..., float]", function)

@@ -1,22 +1,42 @@
-"""Robot files: the ending decides what is written and read.
+"""Robot files: the file name's ending selects the format.
 
-YAML for people (.yaml, .yml), Protobuf for machines (.pb) and MJCF for MuJoCo (.xml)
-hold a whole robot, so one becomes the other and back without loss. URDF (.urdf)
-holds its body only and is written, not read. RoboGen's text (.txt) and JSON (.json)
-are read, not written.
+YAML (.yaml, .yml), Protobuf (.pb) and MJCF (.xml) hold a whole robot and convert
+into each other without loss. URDF (.urdf) holds the body only and is written, not
+read. RoboGen's text (.txt) and JSON (.json) are read, not written.
 """
 
 from pathlib import Path
 
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
-from schema.experiment.settings import EvaluationSettings
+from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.formats.robogen_json import robot_from_robogen_json
 from schema.formats.robogen_text import robot_from_robogen_text
-from schema.formats.yaml import robot_from_yaml, robot_to_yaml
+from schema.formats.yaml import Reader, robot_to_yaml
+from schema.formats.yaml_2016 import RevolveReader, is_of_revolve
+from schema.formats.yaml_node import compose
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot.robot import Robot, check_robot
 from schema.wire.codec import decode_robot, encode_robot
+
+
+def robot_from_yaml(text: str, file: str, space: BodySpace) -> Robot:
+    """Return the robot of a YAML text, in our form or in that of Revolve (2016).
+
+    Args:
+        text: the document.
+        file: its name, for messages.
+        space: the allowed part types.
+
+    Raises:
+        InvalidRobot: not YAML; an unknown or missing key, part type or name; a value
+            of a wrong type; a robot that is not well formed in this body space. The
+            message names file, line and field.
+    """
+    document = compose(text, file)
+    reader = RevolveReader if is_of_revolve(document) else Reader
+    return reader(space, file).read(document)
+
 
 YAML_ENDINGS = (".yaml", ".yml")
 PROTOBUF_ENDINGS = (".pb",)
@@ -34,21 +54,16 @@ _ANY_BUILT_IN = Space(part_types=(*Space().part_types, "schema.parts:LIGHT_SENSO
 
 
 def settings_of(experiment: Experiment | None) -> EvaluationSettings:
-    """Return how an experiment judges robots.
+    """Return the evaluation settings of an experiment.
 
     Args:
-        experiment: None for the thesis's values, with all built-in part types.
+        experiment: None for the default values, with all built-in part types.
     """
     if experiment is None:
         return EvaluationSettings(
             space=_ANY_BUILT_IN, simulation=Simulation(), fitness=Fitness()
         )
-    return EvaluationSettings(
-        space=experiment.space,
-        simulation=experiment.simulation,
-        fitness=experiment.fitness,
-        environment=experiment.environment,
-    )
+    return evaluation_settings_of(experiment)
 
 
 def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
@@ -56,16 +71,16 @@ def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
 
     Args:
         path: ends in .yaml, .yml, .pb, .xml, .txt or .json.
-        space: the part types that it may use.
+        space: the allowed part types.
 
     Raises:
-        InvalidRobot: another ending, a file that cannot be read, a text that is no
-            robot, or a robot that is not well formed in this body space.
-        MalformedMessage: bytes that are no robot.
+        InvalidRobot: another ending, a file that cannot be read, a text that is not
+            a robot, or a robot that is not well formed in this body space.
+        MalformedMessage: a .pb file that does not hold a robot.
     """
     ending = _ending(path, _READ)
     if ending == MJCF_ENDING:
-        # The engine is loaded for its own forms only: a coordinator has no other use.
+        # MuJoCo is imported only if needed: it is slow to load.
         from schema.formats.mjcf import read_mjcf  # noqa: PLC0415
 
         robot, _ = read_mjcf(path)
@@ -77,7 +92,7 @@ def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
     except OSError as error:
         raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
-        raise InvalidRobot(f"{path}: byte {error.start} is no text") from None
+        raise InvalidRobot(f"{path}: not UTF-8 text (byte {error.start})") from None
     if ending in _TEXTS:
         return _TEXTS[ending](text, str(path), space)
     try:
@@ -100,7 +115,7 @@ def write_robot(
         robot: the robot.
         path: ends in .yaml, .yml, .pb, .xml or .urdf.
         space: its part types.
-        settings: the world that goes with it into MJCF; the thesis's by default.
+        settings: stored in MJCF; the default values if None.
 
     Raises:
         InvalidRobot: another ending, a robot that is not well formed in this body

@@ -71,7 +71,7 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
         model = spec.compile()
     except ValueError as error:
         reason = " ".join(str(error).split())
-        raise InvalidRobot(f"{where}: no MJCF: {reason}") from None
+        raise InvalidRobot(f"{where}: not valid MJCF: {reason}") from None
     held = {one.name: one.data for one in spec.texts}
     try:
         robot = decode_robot(_bytes(held, ROBOT))
@@ -96,14 +96,14 @@ def read_mjcf(path: Path) -> tuple[Robot, EvaluationSettings]:
     except OSError as error:
         raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
-        raise InvalidRobot(f"{path}: no MJCF: byte {error.start} is no text") from None
+        raise InvalidRobot(f"{path}: not UTF-8 text (byte {error.start})") from None
 
 
 def _bytes(held: dict[str, str], name: str) -> bytes:
     if name not in held:
         raise InvalidRobot(
-            f"holds no text {name!r}: only MJCF that `revolve robot convert` wrote "
-            "has a brain inside"
+            f"has no text {name!r}: only MJCF that `revolve robot convert` wrote "
+            "contains a brain"
         )
     try:
         return base64.b64decode(held[name], validate=True)
@@ -125,6 +125,6 @@ def _check_body(found: mujoco.MjModel, built: mujoco.MjModel, where: str) -> Non
         ]
     if differing:
         raise InvalidRobot(
-            f"{where}: its body is not that of the robot it holds "
+            f"{where}: its body differs from the robot in its text "
             f"({', '.join(differing)}): edit the robot's YAML and convert it again"
         )

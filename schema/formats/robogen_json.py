@@ -43,9 +43,11 @@ def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
     try:
         document = json.loads(text, parse_constant=_refuse)
     except json.JSONDecodeError as error:
-        raise InvalidRobot(f"{where}:{error.lineno}: no JSON: {error.msg}") from None
+        raise InvalidRobot(
+            f"{where}:{error.lineno}: not valid JSON: {error.msg}"
+        ) from None
     except (ValueError, RecursionError) as error:
-        raise InvalidRobot(f"{where}: no JSON: {error}") from None
+        raise InvalidRobot(f"{where}: not valid JSON: {error}") from None
     theirs = RobogenRobot(_body(document, where))
     ends: dict[str, Ending] = {}
     for at, neuron in _items(document, ("brain", "neuron"), where):
@@ -80,7 +82,7 @@ def _body(document: object, where: str) -> RobogenPart:
     for at, entry in _items(document, ("body", "part"), where):
         name = _get(entry, "id", str, at)
         if name in parts:
-            raise InvalidRobot(f"{at}.id: a second part {name!r}")
+            raise InvalidRobot(f"{at}.id: duplicate part {name!r}")
         values = tuple(
             _get(value, "paramValue", float, inner)
             for inner, value in _items(entry, ("evolvableParam",), at)
@@ -99,15 +101,21 @@ def _body(document: object, where: str) -> RobogenPart:
         parent = _known(parts, _get(entry, "src", str, at), f"{at}.src")
         slot = _get(entry, "srcSlot", int, at)
         if _get(entry, "destSlot", int, at) != 0:
-            raise InvalidRobot(f"{at}.destSlot: parts sit by their slot 0")
+            raise InvalidRobot(
+                f"{at}.destSlot: must be 0: parts attach by their slot 0"
+            )
         if child.name in carried:
-            raise InvalidRobot(f"{at}.dest: {child.name!r} sits on a part already")
+            raise InvalidRobot(
+                f"{at}.dest: {child.name!r} is already attached to a part"
+            )
         if slot in parent.children or (slot == 0 and parent is not roots[0]):
             raise InvalidRobot(f"{at}.srcSlot: slot {slot} is taken")
         carried.add(child.name)
         parent.children[slot] = child
     if loose := [name for name in parts if name not in carried]:
-        raise InvalidRobot(f"{where}: body.part: {loose[0]!r} sits nowhere")
+        raise InvalidRobot(
+            f"{where}: body.part: {loose[0]!r} is not attached to any part"
+        )
     _check_connected(roots[0], len(parts), where)
     return roots[0]
 
@@ -120,7 +128,8 @@ def _check_connected(root: RobogenPart, count: int, where: str) -> None:
         waiting += waiting.pop().children.values()
     if reached != count:
         raise InvalidRobot(
-            f"{where}: body.connection: {count - reached} parts do not hang on the core"
+            f"{where}: body.connection: {count - reached} parts are not connected to "
+            "the core"
         )
 
 
@@ -161,9 +170,9 @@ Known = TypeVar("Known")
 
 def _known(things: dict[str, Known], name: str, at: str) -> Known:
     if name not in things:
-        raise InvalidRobot(f"{at}: nothing is called {name!r}")
+        raise InvalidRobot(f"{at}: unknown name {name!r}")
     return things[name]
 
 
 def _refuse(name: str) -> NoReturn:
-    raise ValueError(f"{name} is no number")
+    raise ValueError(f"{name} is not allowed")

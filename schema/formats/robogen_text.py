@@ -65,7 +65,7 @@ def robot_from_robogen_text(text: str, where: str, space: BodySpace) -> Robot:
     for line, words in next(sections, []):
         _read_parameters(theirs, words, line)
     if rest := next(sections, []):
-        raise InvalidRobot(f"{rest[0][0]}: a fifth section: four are allowed")
+        raise InvalidRobot(f"{rest[0][0]}: a fifth section; at most four are allowed")
     return our_robot(theirs, space, where)
 
 
@@ -85,7 +85,7 @@ def _sections(text: str, where: str) -> Iterator[list[tuple[str, list[str]]]]:
 def _body(lines: list[tuple[str, list[str]]], where: str) -> RobogenPart:
     """Return the tree of a text's first section."""
     if not lines:
-        raise InvalidRobot(f"{where}:1: must hold the core, got an empty line")
+        raise InvalidRobot(f"{where}:1: must be the core, got an empty line")
     path: list[RobogenPart] = []
     names: set[str] = set()
     for line, (written,) in lines:
@@ -101,7 +101,7 @@ def _body(lines: list[tuple[str, list[str]]], where: str) -> RobogenPart:
         part = checked_part(name, kind, int(turns), values, line)
         depth = len(tabs)
         if name in names:
-            raise InvalidRobot(f"{line}: a second part {name!r}")
+            raise InvalidRobot(f"{line}: duplicate part {name!r}")
         names.add(name)
         if (depth == 0) != (not path) or depth > len(path):
             allowed = f"1..{len(path)}" if path else "0"

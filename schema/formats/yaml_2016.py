@@ -7,8 +7,8 @@ hidden neurons are a mapping by their names. Edges go from ``src`` to ``dst``.
 Source: the conversion of the published code (revolve/convert), and its examples.
 """
 
+from schema.formats.yaml import Reader
 from schema.formats.yaml_node import Table
-from schema.formats.yaml_reader import Reader
 from schema.robot.brain import NEURON_TYPES, Brain, Layer, Neuron
 
 _KINDS = {"CoreComponent": "Core"}

@@ -24,7 +24,9 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
             mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise yaml.composer.ComposerError(None, None, "no aliases here", mark)
+            raise yaml.composer.ComposerError(
+                None, None, "aliases are not allowed", mark
+            )
         return super().compose_node(parent, index)
 
 
@@ -53,7 +55,7 @@ class Table:
             if not isinstance(key, yaml.ScalarNode):
                 self._fail(path, "a key must be a word or a number", _line(key))
             if key.value in self._values:
-                self._fail(self._at(key.value), "stands here twice", _line(key))
+                self._fail(self._at(key.value), "is given twice", _line(key))
             self._values[key.value] = value
             self._key_lines[key.value] = _line(key)
 
@@ -191,7 +193,7 @@ class Table:
             InvalidRobot: not a plain number such as 0 or 12.
         """
         if not _SLOT.fullmatch(key):
-            self.refuse(key, "must be the number of a slot: 0, 1, ...")
+            self.refuse(key, "must be a slot number: 0, 1, ...")
         return int(key)
 
     def _at(self, key: str) -> str:
@@ -222,10 +224,10 @@ def compose(text: str, file: str) -> Table:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = "" if mark is None else f":{mark.line + 1}"
-        raise InvalidRobot(f"{file}{line}: not YAML: {error.problem}") from None
+        raise InvalidRobot(f"{file}{line}: not valid YAML: {error.problem}") from None
     except yaml.YAMLError as error:
         words = " ".join(str(error).split())
-        raise InvalidRobot(f"{file}: not YAML: {words}") from None
+        raise InvalidRobot(f"{file}: not valid YAML: {words}") from None
     except RecursionError:
         raise InvalidRobot(f"{file}: nested too deeply") from None
     return Table(node, "", file)

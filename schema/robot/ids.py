@@ -1,10 +1,15 @@
-"""The name of an individual."""
+"""Identifier of an individual."""
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
+
+from msgspec import Meta
+
+IslandNumber = Annotated[int, Meta(ge=0, le=2**32 - 1)]
+BirthNumber = Annotated[int, Meta(ge=0)]
 
 
 class BirthId(NamedTuple):
-    """Names an individual for ever: its island and its number there, from 0."""
+    """Identifies an individual: its island of birth and its number there, from 0."""
 
-    island: int
-    number: int
+    island: IslandNumber
+    number: BirthNumber

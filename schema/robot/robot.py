@@ -216,7 +216,7 @@ def _check_order(parts: Sequence[Part]) -> None:
             not path or last_slot.get(part.parent, -1) >= part.parent_slot
         ):
             raise InvalidRobot(
-                f"body.parts[{index}]: parts must stand depth first, "
+                f"body.parts[{index}]: parts must be in depth-first order, "
                 "children by ascending slot"
             )
         last_slot[part.parent] = part.parent_slot

@@ -21,10 +21,10 @@ from schema.experiment.file import read_experiment
 from schema.experiment.identity import NOBODY
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.ids import BirthId
-from schema.robot.robot import Robot
 from schema.wire.arena import Advance
 from schema.wire.arena_codec import Live, decode_live, encode_live
-from schema.wire.news import Newborn, News
+from schema.wire.codec import encode_body
+from schema.wire.updates import Birth, Update
 from worker.arena.replay import alone
 from worker.bench.spider import spider
 
@@ -47,7 +47,7 @@ def say(line: str) -> None:
     sys.stdout.write(f"\n{line}")
 
 
-def crowd() -> tuple[News, list[pa.Table]]:
+def crowd() -> tuple[Update, list[pa.Table]]:
     """Return the births of 30 spiders, and poses of real motion, advance by advance."""
     experiment = read_experiment("scenario1")
     settings = EvaluationSettings(
@@ -60,12 +60,12 @@ def crowd() -> tuple[News, list[pa.Table]]:
     rng = np.random.default_rng(1)
     starts = rng.integers(0, motion.num_rows, ROBOTS)
     places = rng.uniform(-2.0, 2.0, (ROBOTS, 2)).astype(np.float32)
-    body = Robot(robot.parts)
+    body = encode_body(robot)
     births = tuple(
-        Newborn(BirthId(0, number), (), 1, number + 1, 0.0, body)
+        Birth(BirthId(0, number), (), 1, number + 1, 0.0, body)
         for number in range(ROBOTS)
     )
-    told = News("run", 1, 1, is_whole=True, experiment="watched", births=births)
+    told = Update("run", 1, 1, is_whole=True, experiment="watched", births=births)
     rows = ADVANCE_S * HERTZ
     tables = []
     for first in range(0, MINUTES * 60 * HERTZ, rows):

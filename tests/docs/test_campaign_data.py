@@ -157,16 +157,16 @@ def test_the_last_population_is_kept_with_its_genomes(data: Path) -> None:
 def test_collecting_resumes_where_it_was_left(
     place: Path, parts: Parts, data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    integer_breaks = _files(data)
-    before = {name: (data / name).stat().st_mtime_ns for name in integer_breaks}
+    files = _files(data)
+    before = {name: (data / name).stat().st_mtime_ns for name in files}
     path_of(data, "runs", "scenario1-01").unlink()
     path_of(data, "final", "scenario3-00").write_bytes(b"PAR1")
     capsys.readouterr()
     assert campaign.collect(place, data, COMMIT, parts) == 0
     assert "2 repeats collected, 0 failed" in capsys.readouterr().out
-    assert _files(data) == integer_breaks
+    assert _files(data) == files
     touched = {
-        name for name in integer_breaks if (data / name).stat().st_mtime_ns != before[name]
+        name for name in files if (data / name).stat().st_mtime_ns != before[name]
     }
     assert {Path(name).stem for name in touched} == {"scenario1-01", "scenario3-00"}
 
@@ -296,11 +296,11 @@ def test_experiments_are_compared_by_what_is_kept(
 
 def test_courses_are_those_of_the_runs(place: Path, parts: Parts, data: Path) -> None:
     runs, _ = read_runs([place / "runs" / part.folder for part in parts])
-    integer_breaks = progression(concatenated(measure_runs(runs))["populations"])
+    courses = progression(concatenated(measure_runs(runs))["populations"])
     ours = progression(kept(data, "populations"))
-    is_kept = pc.is_in(integer_breaks["births"], pa.array([MARK, BIRTHS]))
-    assert ours == integer_breaks.filter(is_kept)
-    assert integer_breaks.num_rows > ours.num_rows > 40
+    is_kept = pc.is_in(courses["births"], pa.array([MARK, BIRTHS]))
+    assert ours == courses.filter(is_kept)
+    assert courses.num_rows > ours.num_rows > 40
 
 
 def test_committed_rows_are_whole() -> None:

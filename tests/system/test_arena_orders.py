@@ -49,7 +49,7 @@ def test_pause_list_insert_remove_snapshot_resume(
         until(lambda: arena("list").startswith("paused"), "the arena stands still")
         before = arena("list")
         first = before.splitlines()[2].split()[0]
-        assert "does not live" in arena("remove", "999", code=1)
+        assert "is not alive" in arena("remove", "999", code=1)
         arena("remove", first)
         arena_stage.run("robot", "convert", str(calm / "best.yaml"), "guest.pb")
         arena("insert", "guest.pb", "--place", "0.1", "0.2")

@@ -38,7 +38,7 @@ def _document(stage: Stage, text: str) -> str:
             "schema.parts:CORE",
         ),
         ('name = "a"\n[fitness]\nfunction = "worker.fitness:thesiss"', "thesis"),
-        ("name = ", "not TOML"),
+        ("name = ", "not valid TOML"),
     ],
 )
 def test_broken_experiment(stage: Stage, text: str, told: str) -> None:

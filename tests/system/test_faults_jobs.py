@@ -148,7 +148,7 @@ def test_a_worker_without_the_plug_in_or_with_another_is_refused_and_others_go_o
             assert heard[-1], heard
         assert f"refused: {name}-0." in heard[-1]
     assert "has no plug-in 'plugged'" in "".join(heard)
-    assert "its plug-in 'plugged' is another than the coordinator's" in heard[-1]
+    assert "its plug-in 'plugged' differs from the coordinator's" in heard[-1]
     fleet.join("good")
     fleet.finish()
     assert compare(stage.folder / "calm", fleet.folder) == []

@@ -2,7 +2,6 @@
 
 import os
 import threading
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import mujoco
 import numpy as np
 import pyarrow as pa
 import pytest
+from msgspec.structs import replace
 
 from analysis.viewer.blueprint import layout
 from analysis.viewer.entities import PoseBatch, TimePoint
@@ -28,10 +28,11 @@ from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import TABLES
-from schema.wire.news import Departed, Level, Newborn, News
+from schema.wire.codec import encode_body
+from schema.wire.updates import Birth, Death, Level, Update
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
-WHOLE = News("run", 1, 4, is_whole=True, experiment="e")
+WHOLE = Update("run", 1, 4, is_whole=True, experiment="e")
 
 
 class Recorded:
@@ -44,8 +45,8 @@ class Recorded:
         return lambda *words: self.told.append((name, *words))
 
 
-def _news(sequence: int, run: str = "run", epoch: int = 1) -> News:
-    return News(run, epoch, sequence, is_whole=False, experiment="e")
+def _news(sequence: int, run: str = "run", epoch: int = 1) -> Update:
+    return Update(run, epoch, sequence, is_whole=False, experiment="e")
 
 
 def test_news_that_follow_are_shown_and_nothing_is_asked() -> None:
@@ -58,7 +59,7 @@ def test_news_that_follow_are_shown_and_nothing_is_asked() -> None:
 
 
 @pytest.mark.parametrize("late", [_news(6), _news(1, epoch=2)])
-def test_a_gap_has_all_asked_anew_until_it_comes(late: News) -> None:
+def test_a_gap_has_all_asked_anew_until_it_comes(late: Update) -> None:
     sequel = Sequel()
     sequel.take(WHOLE)
     assert sequel.take(late)
@@ -117,7 +118,7 @@ def test_the_lineage_is_drawn_every_ten_births_and_knows_the_living() -> None:
     recorded = Recorded()
     lineage = Lineage(recorded)  # type: ignore[arg-type]
     for number in range(12):
-        one = Newborn(BirthId(0, number), (), 1, number + 1, None, None)
+        one = Birth(BirthId(0, number), (), 1, number + 1, None, None)
         assert lineage.add(one)
         assert not lineage.add(one)
     assert len(recorded.told) == 1
@@ -132,10 +133,10 @@ def test_the_lineage_is_drawn_every_ten_births_and_knows_the_living() -> None:
 def test_who_dies_vanishes_with_as_many_births_as_its_last_pose_has() -> None:
     recorded: Any = Recorded()
     show = Show(recorded, BUILT_IN)
-    first, second = (Newborn(BirthId(0, n), (), 1, n + 1, 10.0 * n, CORE)
+    first, second = (Birth(BirthId(0, n), (), 1, n + 1, 10.0 * n, encode_body(CORE))
                      for n in range(2))  # fmt: skip
     # At 10 s the second is born and the first dies: one birth, says the table.
-    death = Departed(0, first.birth, 1, 10.0, "cull")
+    death = Death(0, first.birth, 1, 10.0, "cull")
     show.tell(replace(WHOLE, births=(first, second), deaths=(death,)))
     rows = [
         {"record": n, "island": 0, "birth": 0, "sim_time_s": 9.0 + n, "angles": [],

@@ -1,12 +1,12 @@
 """Watching a run: how far it is, and where the recording went."""
 
 import threading
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from analysis.viewer.live import Ended, Told
 from analysis.viewer.output import Output
@@ -14,16 +14,16 @@ from analysis.viewer.watch import LiveView, watch
 from schema.errors import NetworkError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId
-from schema.wire.news import Newborn, News
+from schema.wire.updates import Birth, Update
 
 
-def news(sequence: int, *births: tuple[int, int]) -> News:
+def news(sequence: int, *births: tuple[int, int]) -> Update:
     """Return news of births, by island and number."""
     born = tuple(
-        Newborn(BirthId(island, number), (), 1, number + 1, None, None)
+        Birth(BirthId(island, number), (), 1, number + 1, None, None)
         for island, number in births
     )
-    return News("a/run", 1, sequence, is_whole=False, experiment="e", births=born)
+    return Update("a/run", 1, sequence, is_whole=False, experiment="e", births=born)
 
 
 WHOLE = replace(

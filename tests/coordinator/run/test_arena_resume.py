@@ -19,7 +19,7 @@ from coordinator.dispatch.events import DispatchEvent, Returned
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.run.loop import Loop
-from coordinator.run.operators import Desk
+from coordinator.run.operators import RunOperator
 from coordinator.run.requests import RunContext
 from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.compare import compare
@@ -34,17 +34,16 @@ from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.files import read_table
+from schema.wire.codec import encode_robot
 from schema.wire.operator import (
-    InsertWish,
-    ListWish,
+    InsertRobot,
+    ListRobots,
+    OperatorAction,
     OperatorRequest,
-    PauseWish,
-    RemoveWish,
-    ResumeWish,
-    SnapshotWish,
-    Wish,
-    decode_operator_reply,
-    encode_operator_request,
+    PauseArena,
+    RemoveRobot,
+    ResumeArena,
+    SaveSnapshot,
 )
 from tests.coordinator.arena_world import experiment
 from tests.worker.fake_world import FakeWorld, OddWorld
@@ -128,11 +127,10 @@ class Run:
             **other,
         )
         self.loop.start(journal.replay())
-        self.desk = Desk(self.loop, EXPERIMENT)
+        self.operator = RunOperator(self.loop, EXPERIMENT)
 
-    def ask(self, wish: Wish, name: str = "x") -> str:
-        request = encode_operator_request(OperatorRequest(name, 0, wish))
-        reply = decode_operator_reply(self.desk.answer(request))
+    def ask(self, action: OperatorAction, name: str = "x") -> str:
+        reply = self.operator.reply_to(OperatorRequest(name, 0, action))
         return f"refused: {reply.text}" if reply.is_refused else reply.text
 
 
@@ -269,13 +267,15 @@ def ordered(path: Path, point: Point) -> list[str]:
                 living = [each.birth for each in one.arena.population]
                 if one.arena.step == 12000 and not one.arena.is_paused:
                     guest = develop(one.arena.population[1].genome, BUILT_IN)
-                    said.append(one.ask(RemoveWish(living[0]), "remove"))
-                    said.append(one.ask(InsertWish(guest, (0.5, 1.5)), "insert"))
-                    said.append(one.ask(PauseWish(), "pause"))
-                    said.append(one.ask(SnapshotWish()))
+                    said.append(one.ask(RemoveRobot(living[0]), "remove"))
+                    said.append(
+                        one.ask(InsertRobot(encode_robot(guest), (0.5, 1.5)), "insert")
+                    )
+                    said.append(one.ask(PauseArena(), "pause"))
+                    said.append(one.ask(SaveSnapshot()))
                 elif one.arena.is_paused:
-                    said.append(one.ask(ListWish()).partition("\n")[0])
-                    said.append(one.ask(ResumeWish(), "resume"))
+                    said.append(one.ask(ListRobots()).partition("\n")[0])
+                    said.append(one.ask(ResumeArena(), "resume"))
                 one.fleet.listen(0.0, float(turns))
                 one.loop.act(float(turns))
                 turns += 1
@@ -305,29 +305,30 @@ def test_orders_are_obeyed_again_in_a_replay(tmp_path: Path, calm: Path) -> None
 
 
 @pytest.mark.parametrize(
-    ("wish", "why"),
+    ("action", "why"),
     [
-        (RemoveWish(BirthId(0, 999)), "birth 999: does not live"),
-        (InsertWish(Robot((Part("Barrow", -1, -1, -1, 0, ()),))), "Barrow"),
+        (RemoveRobot(BirthId(0, 999)), "birth 999: is not alive"),
+        (
+            InsertRobot(encode_robot(Robot((Part("Barrow", -1, -1, -1, 0, ()),)))),
+            "Barrow",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused_and_not_journalled(
-    tmp_path: Path, wish: Wish, why: str
+    tmp_path: Path, action: OperatorAction, why: str
 ) -> None:
     with ExitStack() as stack:
         one = Run(tmp_path / "run", stack, lambda _: None)
         before = (tmp_path / "run" / NAME).stat().st_size
-        assert why in one.ask(wish)
-        assert one.ask(wish).startswith("refused")
+        assert why in one.ask(action)
+        assert one.ask(action).startswith("refused")
         assert (tmp_path / "run" / NAME).stat().st_size == before
 
 
-def test_other_islands_and_other_bytes_are_refused(tmp_path: Path) -> None:
+def test_request_for_an_unknown_island_is_refused(tmp_path: Path) -> None:
     with ExitStack() as stack:
-        desk = Run(tmp_path / "run", stack, lambda _: None).desk
-        other = encode_operator_request(OperatorRequest("x", 7, PauseWish()))
-        for data in (other, b"", b"\xff"):
-            assert decode_operator_reply(desk.answer(data)).is_refused
+        operator = Run(tmp_path / "run", stack, lambda _: None).operator
+        assert operator.reply_to(OperatorRequest("x", 7, PauseArena())).is_refused
 
 
 def test_snapshot_that_went_missing_is_named(tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
-"""What a run tells those who watch: numbered, complete, and no body of the dead."""
+"""Updates for viewers: numbered, complete, without bodies of dead robots."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from coordinator.islands.events import Record
 from coordinator.run.feed import Feed
@@ -8,10 +8,12 @@ from coordinator.storage.folder import RunDetails
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.columns import Row, body_rows
-from schema.wire.news import Crewman, Newborn, News
+from schema.wire.codec import encode_body
+from schema.wire.updates import Birth, Update, WorkerInfo
 
 CORE = Robot((Part("Core", -1, -1, -1, 0, (0.1, 0.2, 0.3)),))
-WORKERS = (Crewman("w", "x", (0,)),)
+BODY = encode_body(CORE)
+WORKERS = (WorkerInfo("w", "x", (0,)),)
 
 
 def _birth(number: int, sim_time_s: float | None = None, *parents: int) -> Record:
@@ -50,67 +52,67 @@ def _feed(*records: Record) -> Feed:
     return feed
 
 
-def _told(news: News | None) -> News:
-    assert news is not None
-    return news
+def _sent(update: Update | None) -> Update:
+    assert update is not None
+    return update
 
 
-def test_news_are_numbered_and_tell_each_row_once() -> None:
+def test_updates_are_numbered_and_hold_each_row_once() -> None:
     feed = _feed(_birth(0), _birth(1))
-    first = _told(feed.news(()))
+    first = _sent(feed.update(()))
     feed.note(_birth(2, None, 0, 1))
-    second = _told(feed.news(()))
+    second = _sent(feed.update(()))
     assert (first.sequence, second.sequence) == (1, 2)
     assert [one.birth.number for one in first.births] == [0, 1]
     assert second.births == (
-        Newborn(BirthId(0, 2), (BirthId(0, 0), BirthId(0, 1)), 2, 3, None, CORE),
+        Birth(BirthId(0, 2), (BirthId(0, 0), BirthId(0, 1)), 2, 3, None, BODY),
     )
-    assert feed.news(()) is None
+    assert feed.update(()) is None
 
 
-def test_who_works_is_told_when_it_changes() -> None:
+def test_changed_workers_make_an_update() -> None:
     feed = _feed()
-    assert _told(feed.news(WORKERS)).workers == WORKERS
-    assert feed.news(WORKERS) is None
-    assert _told(feed.news(())).workers == ()
+    assert _sent(feed.update(WORKERS)).workers == WORKERS
+    assert feed.update(WORKERS) is None
+    assert _sent(feed.update(())).workers == ()
 
 
-def test_all_of_it_is_the_sum_of_the_news() -> None:
+def test_the_whole_is_the_sum_of_the_updates() -> None:
     feed = _feed(_birth(0), _birth(1), *_population(2, 0, 1))
-    parts = [_told(feed.news(WORKERS))]
+    parts = [_sent(feed.update(WORKERS))]
     for record in (_birth(2, None, 0, 1), *_population(3, 1, 2)):
         feed.note(record)
-    parts.append(_told(feed.news(WORKERS)))
+    parts.append(_sent(feed.update(WORKERS)))
     whole = feed.whole()
     assert (whole.sequence, whole.is_whole) == (2, True)
-    told = [one for news in parts for one in news.births]
-    assert [one.birth for one in whole.births] == [one.birth for one in told]
-    levels = [level for news in parts for level in news.levels]
+    births = [one.birth for update in parts for one in update.births]
+    assert [one.birth for one in whole.births] == births
+    levels = [level for update in parts for level in update.levels]
     assert whole.levels == (replace(levels[0], members=()), levels[1])
     assert whole.workers == WORKERS
 
 
-def test_all_of_it_says_nothing_that_the_news_have_not_said() -> None:
+def test_the_whole_holds_nothing_that_no_update_held() -> None:
     feed = _feed(_birth(0))
-    feed.news(())
+    feed.update(())
     feed.note(_birth(1))
     assert len(feed.whole().births) == 1
 
 
-def test_the_dead_leave_no_body_on_line() -> None:
+def test_bodies_of_dead_robots_are_dropped_on_line() -> None:
     feed = _feed(_birth(0, 0.0), _birth(1, 1.0), *_population(2, 0, 1))
-    feed.news(())
+    feed.update(())
     feed.note(_death(0))
-    news = _told(feed.news(()))
-    assert [gone.birth for gone in news.deaths] == [BirthId(0, 0)]
-    assert [one.body for one in feed.whole().births] == [None, CORE]
+    update = _sent(feed.update(()))
+    assert [gone.birth for gone in update.deaths] == [BirthId(0, 0)]
+    assert [one.body for one in feed.whole().births] == [None, BODY]
 
 
-def test_who_is_not_selected_leaves_no_body_off_line() -> None:
+def test_bodies_of_robots_that_were_not_selected_are_dropped_off_line() -> None:
     feed = _feed(_birth(0), _birth(1), *_population(2, 0, 1), _birth(2), _birth(3))
-    feed.news(())
+    feed.update(())
     for record in (*_population(4, 1, 3), _birth(4)):
         feed.note(record)
-    feed.news(())
+    feed.update(())
     bodies = {one.birth.number: one.body for one in feed.whole().births}
-    assert bodies == {0: None, 1: CORE, 2: None, 3: CORE, 4: CORE}
+    assert bodies == {0: None, 1: BODY, 2: None, 3: BODY, 4: BODY}

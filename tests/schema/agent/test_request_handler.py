@@ -117,8 +117,8 @@ def test_plug_ins_are_known_by_their_source(
     reply = server().reply(request(plugins=f"plugged_one=0 {two}"))
     digest = one.partition("=")[2]
     assert reply.reason == (
-        f"{UNFIT}its plug-in 'plugged_one' is another than the coordinator's: source "
-        f"{digest}, wanted 0"
+        f"{UNFIT}its plug-in 'plugged_one' differs from the coordinator's: source "
+        f"digest {digest}, expected 0"
     )
     assert server().reply(request(plugins=wanted)) == Reply(b"answer")
     assert plugins_of(b'{"function":"worker.fitness:thesis"}') == ""

@@ -50,18 +50,18 @@ def test_the_edge_of_what_is_possible_is_taken(text: str) -> None:
             "[selection.culling]\npopulation_limit = 20\npopulation_floor = 20",
             "population_limit: must be > population_floor .* 21, got 20",
         ),
-        ("[selection.culling]\nfull_cull_share = 0.01", "full_cull_share: must make"),
+        ("[selection.culling]\nfull_cull_share = 0.01", "full_cull_share: must remove"),
         (
             '[selection]\nsurvivors = "random"\n[selection.culling]',
-            "selection.culling: who is fit enough survives",
+            "selection.culling: survival depends on fitness",
         ),
         (
             "[selection]\nkeep_parents = false\n[selection.culling]",
-            "selection.culling: who is fit enough survives",
+            "selection.culling: survival depends on fitness",
         ),
         (
             "[selection]\nkeep_parents = false\n[selection.reevaluation]",
-            "selection.reevaluation: nobody lives beyond a brood",
+            "selection.reevaluation: no individual outlives its brood",
         ),
         ("[selection.reevaluation]\nshare = 0", "share: Expected `float` > 0"),
         ("[selection.reevaluation]\nintervall = 3", "did you mean 'interval'"),
@@ -73,9 +73,12 @@ def test_the_edge_of_what_is_possible_is_taken(text: str) -> None:
         ("[simulation]\nevaluation_s = [30, 20]", r"\[shortest, longest\], got \[30"),
         ("[simulation]\nevaluation_s = [30]", "length 2, got 1"),
         ("[simulation]\nevaluation_s = [12, inf]", "must be finite"),
-        ("[arena]\n[selection.culling]", "selection.culling: an arena has"),
-        ("[arena]\n[selection.reevaluation]", "selection.reevaluation: an arena"),
-        ("[arena]\n[simulation]\nevaluation_s = [12, 20]", "evaluation_s: an arena's"),
+        ("[arena]\n[selection.culling]", "selection.culling: arenas have"),
+        ("[arena]\n[selection.reevaluation]", "selection.reevaluation: arenas"),
+        (
+            "[arena]\n[simulation]\nevaluation_s = [12, 20]",
+            "evaluation_s: not for arenas",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(text: str, message: str) -> None:
@@ -89,5 +92,5 @@ def test_immigrants_may_come_on_top_where_a_population_varies() -> None:
     migration = '[[islands]]\ncount = 2\n[migration]\ntopology = "ring"\n'
     migration += 'replaced = "none"\n'
     parse(f"[selection.culling]\n{migration}")
-    with pytest.raises(ExperimentError, match="without selection"):
+    with pytest.raises(ExperimentError, match="only with selection"):
         parse(migration)

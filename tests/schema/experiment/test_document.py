@@ -111,7 +111,7 @@ def test_window_may_be_narrower_than_a_brood() -> None:
         ),
         ("space = 3", "space: must be a table"),
         ("[space]\npart_types = [1]", r"space.part_types\[0\]: .*, got 1"),
-        ("[[", "test.toml: not TOML: "),
+        ("[[", "test.toml: not valid TOML: "),
     ],
 )
 def test_wrong_document(text: str, message: str) -> None:
@@ -186,9 +186,12 @@ def test_unknown_plug_in(types: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("types", "message"),
     [
-        ('"schema.parts:HINGE"', "needs exactly one core, got 0"),
-        ('"schema.parts:CORE", "schema.parts:HINGE"', "none of them has a motor"),
-        ('"schema.parts:CORE", "schema.parts:CORE"', "two types named 'Core'"),
+        ('"schema.parts:HINGE"', "must contain exactly one core, got 0"),
+        (
+            '"schema.parts:CORE", "schema.parts:HINGE"',
+            "at least one type must have a motor",
+        ),
+        ('"schema.parts:CORE", "schema.parts:CORE"', "two part types are named 'Core'"),
         ('"schema.parts:SERVO"', "'schema.parts:SERVO' is not a PartType"),
     ],
 )
@@ -216,7 +219,7 @@ def test_a_users_part_type_stands_beside_ours() -> None:
     [
         ("NOT_A_PART", "is not a PartType"),
         ("FLIPER", "did you mean 'flippers:FLIPPER'"),
-        ('FLIPPER", "flippers:SECOND_FLIPPER', "two types named 'Flipper'"),
+        ('FLIPPER", "flippers:SECOND_FLIPPER', "two part types are named 'Flipper'"),
     ],
 )
 def test_a_users_mistake_is_told(name: str, message: str) -> None:

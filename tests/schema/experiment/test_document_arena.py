@@ -75,9 +75,9 @@ def test_settings_and_text_round_trip() -> None:
         ("[arena]\npopulation_floor = 4", "floor: must be >= 5, .*, got 4"),
         ("[arena]\nbirth_interval_s = 15.1", "birth_interval_s: .* 1 s, .* got 15.1"),
         ("[arena]\nsample_interval_s = 0.001", "sample_interval_s: must be a whole"),
-        ("[arena]\nfounder_interval_s = 0.5", "founder_interval_s: .* 1 s, where"),
+        ("[arena]\nfounder_interval_s = 0.5", "founder_interval_s: .* 1 s, the common"),
         ("[arena]\n[simulation]\nwarmup_steps = 601", "warmup_steps: .* 40, got 601"),
-        ('[arena]\n[selection]\nsurvivors = "random"', "survivors of an arena"),
+        ('[arena]\n[selection]\nsurvivors = "random"', "survival in an arena"),
         ("[arena]\nsplit_distance_m = 0.01", "split_distance_m: must be >= "),
     ],
 )

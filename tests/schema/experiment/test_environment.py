@@ -63,7 +63,10 @@ def test_gravity_pulls_downhill() -> None:
         ("roughness_m = 0.1\npatch_m = 0.01", "patch_m: must be >= 2 environment"),
         ('scenery = "none.xml"', "environment.scenery: none.xml: cannot be read: "),
         ("scenery = 3", "environment.scenery: Expected `str`, got `int`"),
-        ('scenery = "<mujoco>"', "environment.scenery: no XML: no element found"),
+        (
+            'scenery = "<mujoco>"',
+            "environment.scenery: not valid XML: no element found",
+        ),
     ],
 )
 def test_what_is_refused(text: str, told: str) -> None:

@@ -74,7 +74,7 @@ BOX = '<geom type="box" size="1 1 1"/>'
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("<mujoco><worldbody>", "no XML: "),
+        ("<mujoco><worldbody>", "not valid XML: "),
         ("<sdf/>", "must be <mujoco>, got <sdf>"),
         (scene(""), "must have a <geom>, got none"),
         (scene(f"<body><freejoint/>{BOX}</body>"), "<freejoint> is not allowed"),
@@ -87,8 +87,8 @@ BOX = '<geom type="box" size="1 1 1"/>'
         (scene('<geom type="plane" size="1 1 1"/>'), "geom 0 '' must be one of sphere"),
         (scene('<geom size="nan"/>'), "<geom size='nan'> must be finite"),
         (scene(f'<body pos="0 -inf 0">{BOX}</body>'), "<body pos='0 -inf 0'> must be"),
-        (scene('<geom type="mesh" mesh="a"/>'), "no MJCF: "),
-        (scene('<geom type="box" sise="1 1 1"/>'), "no MJCF: "),
+        (scene('<geom type="mesh" mesh="a"/>'), "not valid MJCF: "),
+        (scene('<geom type="box" sise="1 1 1"/>'), "not valid MJCF: "),
     ],
 )  # fmt: skip
 def test_what_is_refused_at_the_start(text: str, told: str) -> None:

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
 from schema.errors import InvalidRobot, MalformedMessage, RevolveError
-from schema.formats.files import read_robot, write_robot
-from schema.formats.yaml import robot_from_yaml, robot_to_yaml
+from schema.formats.files import read_robot, robot_from_yaml, write_robot
+from schema.formats.yaml import robot_to_yaml
 from schema.parts import BUILT_IN
 from schema.robot.brain import Connection, Neuron
 from schema.robot.genome import Node, develop
@@ -105,29 +105,29 @@ def test_a_body_without_a_brain() -> None:
         ("orientation: 90", "orientation: 91", 10, "orientation: must be one of"),
         ("orientation: 90", "orientation: x", 10, "must be a whole number, got 'x'"),
         ("    2:", "    4:", 7, "parent_slot: Core has slots 0..3, got 4"),
-        ("    2:", "    0:", 17, "children.0: stands here twice"),
-        ("    2:", "    two:", 6, "must be the number of a slot"),
-        ("    2:", "    007:", 6, "must be the number of a slot"),
-        ("    2:", "    -1:", 6, "must be the number of a slot"),
+        ("    2:", "    0:", 17, "children.0: is given twice"),
+        ("    2:", "    two:", 6, "must be a slot number"),
+        ("    2:", "    007:", 6, "must be a slot number"),
+        ("    2:", "    -1:", 6, "must be a slot number"),
         ("    2:", "    [1, 2]:", 6, "a key must be a word or a number"),
         ("slot: 0, type: T", "type: T", 17, "children.0.slot: is missing"),
         ("      slot: 0\n", "      slot: 5\n", 7, "slot: ActiveHinge has slots 0..1"),
-        ("id: leg", "id: trunk", 8, "id: second part named 'trunk'"),
+        ("id: leg", "id: trunk", 8, "id: duplicate part name 'trunk'"),
         ("id: leg", "id:", 8, "id: must be a word, got nothing"),
         ("gene: 3", "gene: -3", 4, "gene: must be"),
         ("gene: 3", "slot: 3", 4, "slot: no such key"),
-        ("gene: 3", "type: Core", 4, "type: stands here twice"),
+        ("gene: 3", "type: Core", 4, "type: is given twice"),
         ("type: TouchSensor", "type: Core", 17, "exactly the first part"),
         ("part: leg", "part: lag", 21, "part: must be one of trunk, .*mean 'leg'"),
         ("layer: output", "layer: input", 21, "must be one of output, hidden"),
         ("Oscillator", "Oscilator", 21, "type: .*did you mean 'Oscillator'"),
-        ("id: out", "id: trunk-in-0", 21, "second neuron named 'trunk-in-0'"),
+        ("id: out", "id: trunk-in-0", 21, "duplicate neuron name 'trunk-in-0'"),
         ("bias", "period", 20, "period: no such key.*; allowed: bias, gain"),
         ("target: out", "target: trunk-in-1", 23, "target: neuron 1 is an input"),
         ("target: out", "target: oat", 23, "target: must be one of .*mean 'out'"),
         (", weight: .5", "", 24, r"connections\[1\].weight: is missing"),
         ("  neurons:", "  nurons:", 19, "brain.nurons: .*'neurons'"),
-        ("- {id: out, part", "- {id: out; part", 21, "not YAML: "),
+        ("- {id: out, part", "- {id: out; part", 21, "not valid YAML: "),
         ("brain:\n", "brian:\n", 18, "brian: no such key; did you mean 'brain'"),
         ("body:\n", "revolve_robot: 2\nbody:\n", 1, "must be 1, got 2"),
     ],
@@ -225,7 +225,7 @@ def test_broken_bytes(tmp_path: Path) -> None:
         read_robot(path)
     path = tmp_path / "robot.yaml"
     path.write_bytes(b"body: \xff")
-    with pytest.raises(InvalidRobot, match=r"robot\.yaml: byte 6 is no text"):
+    with pytest.raises(InvalidRobot, match=r"robot\.yaml: not UTF-8 text \(byte 6\)"):
         read_robot(path)
 
 

@@ -70,19 +70,19 @@ def test_an_edited_body_is_refused() -> None:
     text = robot_to_mjcf(ARM, SETTINGS)
     heavier = text.replace('mass="0.0102"', 'mass="0.0104"')
     assert heavier != text
-    with pytest.raises(InvalidRobot, match=r"^it: its body is not .*body_mass.*YAML"):
+    with pytest.raises(InvalidRobot, match=r"^it: its body differs .*body_mass.*YAML"):
         robot_from_mjcf(heavier, "it")
     fewer = re.sub(r'<geom name="2/body".*?/>', "", text)
     assert fewer != text
-    with pytest.raises(InvalidRobot, match=r"^it: its body is not .*\(ngeom\)"):
+    with pytest.raises(InvalidRobot, match=r"^it: its body differs .*\(ngeom\)"):
         robot_from_mjcf(fewer, "it")
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("<mujoco", "^it: no MJCF: "),
-        ("<mujoco/>", "^it: holds no text 'revolve_robot': only MJCF that"),
+        ("<mujoco", "^it: not valid MJCF: "),
+        ("<mujoco/>", "^it: has no text 'revolve_robot': only MJCF that"),
         (
             '<mujoco><custom><text name="revolve_robot" data="?"/></custom></mujoco>',
             "^it: text 'revolve_robot': ",
@@ -103,7 +103,7 @@ def test_files(tmp_path: Path) -> None:
     write_robot(ARM, path)
     assert read_robot(path) == ARM
     path.write_bytes(b"\xff")
-    with pytest.raises(InvalidRobot, match=r"arm\.xml: no MJCF: byte 0 is no text"):
+    with pytest.raises(InvalidRobot, match=r"arm\.xml: not UTF-8 text \(byte 0\)"):
         read_robot(path)
     with pytest.raises(InvalidRobot, match=r"none\.xml: cannot be read: No such file"):
         read_robot(tmp_path / "none.xml")

@@ -120,7 +120,7 @@ def test_a_bar_in_our_units() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "it.txt:1: must hold the core"),
+        ("", "it.txt:1: must be the core"),
         ("0 Core C 0", "it.txt:1: type must be one of CoreComponent, .*got 'Core'"),
         ("0 E C 0\n\t0 J w 0 0.04", "it.txt:2: type must be one of .*got 'J'"),
         ("0 E C 0\n\t0 F a", "it.txt:2: must be TABS SLOT TYPE NAME"),
@@ -132,7 +132,7 @@ def test_a_bar_in_our_units() -> None:
         ("0 E C 0\n\t0 F a 0\n\t\t3 F b 0", "it.txt:3: 'a' has 3 slots to put"),
         ("0 E C 0\n\t\t0 F a 0", "it.txt:2: tabs must be 1..1, got 2"),
         ("0 E C 0\n0 F a 0", "it.txt:2: tabs must be 1..1, got 0"),
-        ("0 E C 0\n\t0 F C 0", "it.txt:2: a second part 'C'"),
+        ("0 E C 0\n\t0 F C 0", "it.txt:2: duplicate part 'C'"),
         ("0 E C 0\n\nX sigmoid", "it.txt:3: no part 'X'"),
         ("0 E C 0\n\nC gauss", "it.txt:3: must be one of simple, .*got 'gauss'"),
         ("0 E C 0\n\n\nC 0 C 9 1", "it.txt: no neuron 9 on part 'C'"),
@@ -181,14 +181,14 @@ def test_json_says_what_the_text_says() -> None:
 @pytest.mark.parametrize(
     ("path", "value", "message"),
     [
-        (("body", "part", 1, "id"), "C", r"it: body.part\[1\].id: a second part 'C'"),
+        (("body", "part", 1, "id"), "C", r"it: body.part\[1\].id: duplicate part 'C'"),
         (("body", "part", 1, "type"), 3, r"it: body.part\[1\].type: must be of"),
         (("body", "part", 0, "root"), False, "exactly one must be the root, got 0"),
-        (("body", "connection"), [], "it: body.part: 'H' sits nowhere"),
-        (("body", "connection", 0, "src"), "X", r"connection\[0\].src: nothing .*'X'"),
+        (("body", "connection"), [], "it: body.part: 'H' is not attached to any"),
+        (("body", "connection", 0, "src"), "X", r"\[0\].src: unknown name 'X'"),
         (("body", "connection", 0, "src"), "H", "slot 0 is taken"),
         (("body", "connection", 0, "srcSlot"), 4, "Core has no slot 4"),
-        (("brain", "connection", 0, "dest"), "X", r"connection\[0\].dest: nothing"),
+        (("brain", "connection", 0, "dest"), "X", r"\[0\].dest: unknown name"),
         (("brain", "neuron", 1, "type"), "x", r"neuron\[1\].type: must be one of"),
         (("brain", "neuron", 1, "layer"), "x", r"neuron\[1\].layer: must be one of in"),
         (("brain", "neuron", 1, "bodyPartId"), "X", "no neuron 0 on part 'X'"),
@@ -211,8 +211,8 @@ def test_what_is_wrong_is_said_with_its_path(
 
 def test_text_that_is_no_json() -> None:
     for text, message in (
-        ("{\n]", "it:2: no JSON"),
-        ('{"a": NaN}', "NaN is no number"),
+        ("{\n]", "it:2: not valid JSON"),
+        ('{"a": NaN}', "NaN is not allowed"),
     ):
         with pytest.raises(InvalidRobot, match=message):
             robot_from_robogen_json(text, "it", BUILT_IN)

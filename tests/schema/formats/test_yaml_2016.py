@@ -3,7 +3,8 @@
 import pytest
 
 from schema.errors import InvalidRobot
-from schema.formats.yaml import robot_from_yaml, robot_to_yaml
+from schema.formats.files import robot_from_yaml
+from schema.formats.yaml import robot_to_yaml
 from schema.parts import BUILT_IN
 from schema.robot.brain import Connection, Neuron
 from schema.robot.robot import Robot, check_robot

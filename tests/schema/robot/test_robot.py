@@ -68,7 +68,7 @@ def test_well_formed(robot: Robot) -> None:
         (3, {"slot": -1}, r"slot: must be >= 0, got -1"),
         (3, {"parent_slot": -2}, r"parent_slot: must be >= 0, got -2"),
         (4, {"parent": 2, "parent_slot": 0}, "slot 0 of part 2 is taken"),
-        (1, {"parent_slot": 2}, "depth first, children by ascending slot"),
+        (1, {"parent_slot": 2}, "depth-first order, children by ascending slot"),
         (1, {"orientation": 45}, r"orientation: must be one of .*, got 45"),
         (1, {"orientation": 360}, "orientation: must be one of"),
         (1, {"parameters": (0.5, 0.5)}, "ActiveHinge takes 3, got 2"),
@@ -95,7 +95,9 @@ def test_no_part_at_all() -> None:
 
 def test_breadth_first_is_refused(robot: Robot) -> None:
     core, hinge, brick, _, touch = robot.parts
-    with pytest.raises(InvalidRobot, match=r"parts\[3\]: parts must stand depth first"):
+    with pytest.raises(
+        InvalidRobot, match=r"parts\[3\]: parts must be in depth-first order"
+    ):
         check_tree((core, hinge, touch, brick))
 
 

@@ -1,7 +1,9 @@
-"""Operators' requests and replies as bytes."""
+"""Operator requests and replies as bytes."""
 
 from contextlib import suppress
+from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,19 +12,19 @@ from schema.errors import MalformedMessage
 from schema.parts import BUILT_IN
 from schema.robot.genome import Node, develop
 from schema.robot.ids import BirthId
-from schema.wire import revolve_pb2 as pb
+from schema.wire.codec import encode_robot
 from schema.wire.operator import (
-    BrainWish,
-    InsertWish,
-    ListWish,
+    GetStatus,
+    InsertRobot,
+    ListRobots,
+    OperatorAction,
     OperatorReply,
     OperatorRequest,
-    PauseWish,
-    RemoveWish,
-    ResumeWish,
-    SnapshotWish,
-    StatusWish,
-    Wish,
+    PauseArena,
+    RemoveRobot,
+    ResumeArena,
+    SaveSnapshot,
+    SetBrain,
     decode_operator_reply,
     decode_operator_request,
     encode_operator_reply,
@@ -30,42 +32,40 @@ from schema.wire.operator import (
 )
 from schema.wire.status import IslandStatus, RunStatus, Status
 
-CORE = develop(Node("Core", -1, 0, (0.5, 0.5, 0.5)), BUILT_IN)
+CORE = encode_robot(develop(Node("Core", -1, 0, (0.5, 0.5, 0.5)), BUILT_IN))
+ARENA = IslandStatus(7, 50, None, 12, 33.5, is_paused=True)
+ISLAND = IslandStatus(15, 15, 0.25, 15)
+RUNS = (
+    RunStatus("/a/b-0", "b", 0, "running", 1.5, (ARENA, ISLAND)),
+    RunStatus("/a/b-1", "b", 1, "waiting"),
+)
+STATUS = OperatorReply("", status=Status(RUNS, 2, 1, 1.5))
 
 
 @pytest.mark.parametrize(
-    "wish",
+    "action",
     [
-        ListWish(),
-        PauseWish(),
-        ResumeWish(),
-        SnapshotWish(),
-        StatusWish(),
-        InsertWish(CORE),
-        InsertWish(CORE, (0.0, -1.5)),
-        RemoveWish(BirthId(1, 12)),
-        BrainWish(BirthId(0, 3), CORE),
+        ListRobots(),
+        PauseArena(),
+        ResumeArena(),
+        SaveSnapshot(),
+        GetStatus(),
+        InsertRobot(CORE),
+        InsertRobot(CORE, (0.0, -1.5)),
+        RemoveRobot(BirthId(2**32 - 1, 2**64 - 1)),
+        SetBrain(BirthId(0, 3), CORE),
     ],
 )
-def test_requests_come_back(wish: Wish) -> None:
-    request = OperatorRequest("id", 2, wish, "a/run")
+def test_decoding_inverts_encoding_of_requests(action: OperatorAction) -> None:
+    request = OperatorRequest("id", 2, action, "a/run")
     assert decode_operator_request(encode_operator_request(request)) == request
 
 
-@pytest.mark.parametrize("is_refused", [False, True])
-def test_replies_come_back(is_refused: bool) -> None:  # noqa: FBT001 - a case
-    reply = OperatorReply("at 5 s", is_refused=is_refused)
-    assert decode_operator_reply(encode_operator_reply(reply)) == reply
-
-
-def test_a_status_comes_back() -> None:
-    arena = IslandStatus(7, 50, None, 12, 33.5, is_paused=True)
-    island = IslandStatus(15, 15, 0.25, 15)
-    runs = (
-        RunStatus("/a/b-0", "b", 0, "running", 1.5, (arena, island)),
-        RunStatus("/a/b-1", "b", 1, "waiting"),
-    )
-    reply = OperatorReply("", status=Status(runs, 2, 1, 1.5))
+@pytest.mark.parametrize(
+    "reply",
+    [OperatorReply("at 5 s"), OperatorReply("no arena", is_refused=True), STATUS],
+)
+def test_decoding_inverts_encoding_of_replies(reply: OperatorReply) -> None:
     assert decode_operator_reply(encode_operator_reply(reply)) == reply
 
 
@@ -77,28 +77,59 @@ def test_time_left_counts_what_is_still_to_be_born() -> None:
     assert Status((done,), 0, 1, 0.0).left_s == 0.0
 
 
-def test_a_request_needs_a_name_and_a_wish() -> None:
-    nameless = pb.OperatorRequest(pause=pb.Nothing())
-    with pytest.raises(MalformedMessage, match="request_id"):
-        decode_operator_request(nameless.SerializeToString())
-    with pytest.raises(MalformedMessage, match="no wish"):
-        decode_operator_request(pb.OperatorRequest(request_id="x").SerializeToString())
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ({"request_id": ""}, "request_id"),
+        ({"action": {}}, "action"),
+        ({"action": {"type": "explode"}}, "explode"),
+        ({"action": {"type": "pause", "island": 1}}, "unknown field `island`"),
+        ({"island": -1}, "island"),
+        ({"island": 2**32}, "island"),
+        ({"action": {"type": "remove", "birth": (0, -1)}}, "birth"),
+        ({"action": {"type": "insert", "robot": b"\xff"}}, "Robot"),
+        ({"action": {"type": "brain", "birth": (0, 1), "robot": b""}}, "core"),
+        ({"action": {"type": "insert", "robot": CORE, "place": (0.0, 1e999)}}, "place"),
+        (
+            {"action": {"type": "insert", "robot": CORE, "place": (1e999 * 0, 0.0)}},
+            "place",
+        ),
+        ({"version": 2}, "version of Revolve Islands"),
+    ],
+)
+def test_requests_that_break_a_rule_are_malformed(
+    change: dict[str, Any], why: str
+) -> None:
+    request = {"request_id": "x", "island": 0, "action": {"type": "pause"}}
+    decode_operator_request(msgspec.msgpack.encode(request))
+    with pytest.raises(MalformedMessage, match=why):
+        decode_operator_request(msgspec.msgpack.encode(request | change))
 
 
-def test_a_place_must_be_one() -> None:
-    placed = pb.PlacedRobot(has_place=True, x=float("nan"))
-    placed.robot.ParseFromString(
-        pb.OperatorRequest.FromString(
-            encode_operator_request(OperatorRequest("x", 0, InsertWish(CORE)))
-        ).insert.robot.SerializeToString()
-    )
-    message = pb.OperatorRequest(request_id="x", insert=placed)
-    with pytest.raises(MalformedMessage, match=r"insert\.x"):
-        decode_operator_request(message.SerializeToString())
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), -float("inf")])
+def test_status_with_a_number_that_is_not_finite_is_malformed(number: float) -> None:
+    reply = OperatorReply("", status=Status((), 0, 0, number))
+    with pytest.raises(MalformedMessage, match="births_per_s"):
+        decode_operator_reply(encode_operator_reply(reply))
 
 
 @given(st.binary(max_size=200))
-def test_any_bytes_decode_or_are_refused(data: bytes) -> None:
+def test_any_bytes_decode_or_are_malformed(data: bytes) -> None:
     for decode in (decode_operator_request, decode_operator_reply):
         with suppress(MalformedMessage):
             decode(data)
+
+
+@given(st.integers(0, 10**4), st.integers(0, 255))
+def test_messages_with_one_other_byte_decode_or_are_malformed(
+    index: int, value: int
+) -> None:
+    request = OperatorRequest("id", 2, InsertRobot(CORE, (0.0, -1.5)), "a/run")
+    data = bytearray(encode_operator_request(request))
+    data[index % len(data)] = value
+    with suppress(MalformedMessage):
+        decode_operator_request(bytes(data))
+    data = bytearray(encode_operator_reply(STATUS))
+    data[index % len(data)] = value
+    with suppress(MalformedMessage):
+        decode_operator_reply(bytes(data))

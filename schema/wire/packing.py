@@ -1,0 +1,39 @@
+"""MessagePack of Structs: messages between processes of one version.
+
+Coordinators, operators and viewers exchange them; nothing stores them. Decoding is
+typed: unknown or missing fields, numbers out of range and numbers that are not
+finite are refused.
+"""
+
+import sys
+from typing import Annotated, TypeVar
+
+from msgspec import Meta, Struct
+from msgspec.msgpack import Decoder
+
+from schema.errors import MalformedMessage
+
+T = TypeVar("T")
+
+_GREATEST = sys.float_info.max
+Finite = Annotated[float, Meta(ge=-_GREATEST, le=_GREATEST)]
+"""Float that is neither infinite nor NaN: NaN satisfies no bound."""
+
+
+class Message(Struct, frozen=True, forbid_unknown_fields=True):
+    """Base of the messages: immutable, without unknown fields."""
+
+
+def unpack(decoder: Decoder[T], data: bytes) -> T:
+    """Return the message of some bytes.
+
+    Raises:
+        MalformedMessage: not the bytes of such a message.
+    """
+    try:
+        return decoder.decode(data)
+    except ValueError as error:  # of msgspec, or text that is not UTF-8
+        raise MalformedMessage(
+            "not a message of this version of Revolve Islands "
+            f"(is the other process of the same version?): {error}"
+        ) from None

@@ -1,0 +1,235 @@
+"""What a coordinator sends to viewers: rows of a run's tables, condensed.
+
+A live run sends an ``Update`` a few times per second. A replay builds the same from
+the tables, through the functions of this file, so that a viewer shows both alike.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
+from math import fsum
+from typing import Any
+
+from msgspec.msgpack import Decoder, encode
+
+from schema.experiment.section import Count
+from schema.robot.ids import BirthId, IslandNumber
+from schema.robot.robot import Part, Robot
+from schema.wire.codec import decode_body, encode_body
+from schema.wire.packing import Finite, Message, unpack
+
+
+class Birth(Message, frozen=True):
+    """A birth.
+
+    Attributes:
+        birth: id of the individual.
+        parents: ids, in order; empty for a random robot.
+        rank: one more than the greatest rank of the parents.
+        births: number of births on the island so far, this one included.
+        sim_time_s: simulated time of the birth in an arena [s]; None off-line.
+        body: bytes of the body (``encode_body``); None if the robot is dead.
+    """
+
+    birth: BirthId
+    parents: tuple[BirthId, ...]
+    rank: Count
+    births: Count
+    sim_time_s: Finite | None
+    body: bytes | None
+
+
+class Death(Message, frozen=True):
+    """A death in an arena.
+
+    Attributes:
+        island: number of the arena's island.
+        birth: id of the individual.
+        births: number of births on the island so far.
+        sim_time_s: simulated time of the death [s].
+        reason: as in the deaths table.
+    """
+
+    island: IslandNumber
+    birth: BirthId
+    births: Count
+    sim_time_s: Finite
+    reason: str
+
+
+class Level(Message, frozen=True):
+    """Fitness of a population after a number of births.
+
+    Attributes:
+        island: number of the population's island.
+        births: number of births on the island so far.
+        size: number of living individuals.
+        judged: number of living individuals that have a fitness.
+        mean, best: fitness of those; 0 if there is none.
+        members: living individuals, ascending; given for the newest level of an
+            island only.
+    """
+
+    island: IslandNumber
+    births: Count
+    size: Count
+    judged: Count
+    mean: Finite
+    best: Finite
+    members: tuple[BirthId, ...] = ()
+
+
+class Migrant(Message, frozen=True):
+    """A migration of an individual, moved or copied.
+
+    Attributes:
+        birth: id of the individual.
+        island, to: numbers of the islands that it left and reached.
+        epoch: number of the migration epoch.
+        births: number of births on the island that it left, so far.
+        sim_time_s: simulated time when it left an arena [s]; None off-line.
+    """
+
+    birth: BirthId
+    island: IslandNumber
+    to: IslandNumber
+    epoch: Count
+    births: Count
+    sim_time_s: Finite | None
+
+
+class WorkerInfo(Message, frozen=True):
+    """A connected worker, its platform and the arena shards that it holds."""
+
+    name: str
+    platform: str
+    shards: tuple[IslandNumber, ...]
+
+
+class Update(Message, frozen=True):
+    """What happened in a run since the update before, or since its beginning.
+
+    Attributes:
+        run: name of the run.
+        epoch: of its coordinator.
+        sequence: number of the update; a viewer detects lost updates by a gap.
+        is_whole: holds everything since the beginning and replaces earlier updates.
+        experiment: name of the experiment.
+        births, deaths, levels, migrants: in the order of their tables.
+        workers: all that are connected now.
+        document: JSON of the experiment, if is_whole.
+    """
+
+    run: str
+    epoch: Count
+    sequence: Count
+    is_whole: bool
+    experiment: str
+    births: tuple[Birth, ...] = ()
+    deaths: tuple[Death, ...] = ()
+    levels: tuple[Level, ...] = ()
+    migrants: tuple[Migrant, ...] = ()
+    workers: tuple[WorkerInfo, ...] = ()
+    document: str = ""
+
+
+_UPDATE = Decoder(Update)
+
+
+def encode_update(news: Update) -> bytes:
+    """Return the bytes of an update."""
+    return encode(news)
+
+
+def decode_update(data: bytes) -> Update:
+    """Return the update of some bytes.
+
+    Raises:
+        MalformedMessage: not an update's bytes, a body that is not a tree of parts,
+            a number that is not finite.
+    """
+    update = unpack(_UPDATE, data)
+    for birth in update.births:
+        if birth.body is not None:
+            decode_body(birth.body)
+    return update
+
+
+def read_birth(row: Mapping[str, Any], births: int) -> Birth:
+    """Return the birth of a row of the births table.
+
+    Args:
+        row: of the table; ``genome`` and the counts are not read.
+        births: number of births on its island so far, this one included.
+    """
+    return Birth(
+        BirthId(row["island"], row["birth"]),
+        tuple(BirthId(each["island"], each["birth"]) for each in row["parents"]),
+        row["rank"],
+        births,
+        row["sim_time_s"],
+        encode_body(Robot(tuple(map(_part, row["body"])))),
+    )
+
+
+def individual(row: Mapping[str, Any]) -> BirthId:
+    """Return the individual of a row: by default one born on the row's island."""
+    island = row.get("birth_island")
+    return BirthId(row["island"] if island is None else island, row["birth"])
+
+
+def read_death(row: Mapping[str, Any]) -> Death:
+    """Return the death of a row of the deaths table."""
+    return Death(
+        row["island"],
+        individual(row),
+        row["births"],
+        row["sim_time_s"],
+        row["reason"],
+    )
+
+
+def read_levels(rows: Iterable[Mapping[str, Any]]) -> list[Level]:
+    """Return the levels of rows of the population table, one per set of rows.
+
+    Args:
+        rows: in the order of the table, so that rows of one set are adjacent.
+    """
+    sets = groupby(rows, key=lambda row: (row["island"], row["births"]))
+    return [_level(island, births, list(each)) for (island, births), each in sets]
+
+
+def _level(island: int, births: int, rows: Sequence[Mapping[str, Any]]) -> Level:
+    fitness = [row["fitness"] for row in rows if row["fitness"] is not None]
+    return Level(
+        island=island,
+        births=births,
+        size=len(rows),
+        judged=len(fitness),
+        mean=fsum(fitness) / len(fitness) if fitness else 0.0,
+        best=max(fitness, default=0.0),
+        members=tuple(sorted(map(individual, rows))),
+    )
+
+
+def read_migrant(row: Mapping[str, Any]) -> Migrant:
+    """Return the migration of a row of the migrations table."""
+    return Migrant(
+        individual(row),
+        row["island"],
+        row["to"],
+        row["epoch"],
+        row["births"],
+        row["sim_time_s"],
+    )
+
+
+def _part(row: Mapping[str, Any]) -> Part:
+    return Part(
+        row["kind"],
+        row["parent"],
+        row["parent_slot"],
+        row["child_slot"],
+        row["rot"],
+        tuple(row["params"]),
+        row["gene"],
+    )
