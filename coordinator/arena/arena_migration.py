@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from coordinator.evolution.selection import Individual
-from coordinator.islands.events import Emigrate, Travelled
+from coordinator.islands.events import Emigrate, MigrationEvent
 from coordinator.islands.migration import MigrationEpochs
 from schema.robot.ids import BirthId
 
@@ -65,7 +65,7 @@ class ImmigrantQueue:
         self._empty += len(gone)
         return sent, gone
 
-    def take(self, event: Travelled) -> None:
+    def take(self, event: MigrationEvent) -> None:
         """Keep what came until ``arrive``.
 
         Raises:

@@ -187,7 +187,7 @@ class NeighbourClosed:
     neighbour: int
 
 
-Travelled = Immigrated | NeighbourClosed
+MigrationEvent = Immigrated | NeighbourClosed
 """Events that come of other islands' commands; no journal holds them."""
 
 
@@ -212,15 +212,15 @@ class Audited:
 Answered = Vetted | VettingFailed | Evaluated | EvaluationFailed
 """Events that answer a question of an off-line island."""
 
-Heard = Answered | Advanced | Commanded
+ExternalEvent = Answered | Advanced | Commanded
 """Events of a journal that an island or an arena is told."""
 
-Journalled = Heard | Audited
+JournalledEvent = ExternalEvent | Audited
 """Events that are no function of others: what the journal keeps."""
 
-IslandEvent = Started | Answered | Travelled
+IslandEvent = Started | Answered | MigrationEvent
 
-ArenaEvent = Started | Vetted | VettingFailed | Advanced | Commanded | Travelled
+ArenaEvent = Started | Vetted | VettingFailed | Advanced | Commanded | MigrationEvent
 
 # --- Commands ------------------------------------------------------
 

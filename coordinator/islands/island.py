@@ -20,9 +20,9 @@ from coordinator.islands.events import (
     Immigrated,
     IslandCommand,
     IslandEvent,
+    MigrationEvent,
     NeighbourClosed,
     Started,
-    Travelled,
     Vet,
     Vetted,
     VettingFailed,
@@ -249,7 +249,7 @@ class Island:
         commands, self.population = migrant_buffer.depart(self.population, self.births)
         return [*rows, *commands, *self._land()]
 
-    def _hear(self, event: Travelled | Evaluated | EvaluationFailed) -> None:
+    def _hear(self, event: MigrationEvent | Evaluated | EvaluationFailed) -> None:
         """Take news of neighbours, of immigrants, and of who is judged anew.
 
         For neighbours and immigrants nobody waits at the end.

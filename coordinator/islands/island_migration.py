@@ -15,8 +15,8 @@ from coordinator.islands.events import (
     Evaluate,
     Evaluated,
     EvaluationFailed,
+    MigrationEvent,
     Record,
-    Travelled,
 )
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import evaluation_record, migration_records
@@ -69,7 +69,7 @@ class MigrantBuffer:
         left = tuple(one for one in population if one not in gone)
         return [*rows, *sent], left
 
-    def take(self, event: Travelled | Outcome) -> None:
+    def take(self, event: MigrationEvent | Outcome) -> None:
         """Keep what came until ``land``; old judgements are ignored.
 
         Raises:

@@ -15,7 +15,12 @@ import numpy as np
 from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.seeding import Purpose, stream
 from coordinator.evolution.selection import Individual, fittest_first
-from coordinator.islands.events import Emigrate, Immigrated, NeighbourClosed, Travelled
+from coordinator.islands.events import (
+    Emigrate,
+    Immigrated,
+    MigrationEvent,
+    NeighbourClosed,
+)
 from schema.errors import UnexpectedEvent
 from schema.experiment.migration import Migration, migrant_count
 from schema.robot.ids import BirthId
@@ -134,7 +139,7 @@ class MigrationEpochs:
         ]
         return sent, chosen if is_moved and targets else []
 
-    def take(self, event: Travelled) -> None:
+    def take(self, event: MigrationEvent) -> None:
         """Keep what came until ``arrive``.
 
         Raises:
