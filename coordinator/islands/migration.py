@@ -33,12 +33,12 @@ class Neighbours:
     Attributes:
         targets: islands that it sends migrants to, ascending.
         sources: islands that send it migrants, ascending.
-        strange: those of its sources whose judgement does not count here.
+        differing: those of its sources whose judgement does not count here.
     """
 
     targets: tuple[int, ...]
     sources: tuple[int, ...]
-    strange: tuple[int, ...] = ()
+    differing: tuple[int, ...] = ()
 
     @property
     def neighbours(self) -> tuple[int, ...]:
@@ -176,7 +176,7 @@ class MigrationEpochs:
         met = [one for one in self._meeting if (one, self.epoch) in self._inbox]
         arrivals: dict[BirthId, tuple[Individual, bool]] = {}
         for source in met:
-            is_strange = self._migration.judge_anew or source in self.links.strange
+            is_strange = self._migration.judge_anew or source in self.links.differing
             for one in self._inbox.pop((source, self.epoch)):
                 arrivals.setdefault(one.birth, (one, is_strange))
         # Not those who are open by now: that would depend on who is faster.
