@@ -25,7 +25,7 @@ from coordinator.arena.rows import (
 )
 from coordinator.evolution.breeding import Breeder, Candidate
 from coordinator.evolution.buffered_rng import BufferedRng
-from coordinator.evolution.culling import select_doomed
+from coordinator.evolution.culling import select_culled
 from coordinator.evolution.seeding import Purpose, stream
 from coordinator.evolution.selection import Couple, Individual
 from coordinator.islands.events import (
@@ -237,8 +237,8 @@ class Arena:
                 return [*commands, self._finish()]
             commands += self._mate()
         if self.step % self._clock.cull == 0:
-            reason, doomed = select_doomed(self._living.mature(), self._rules)
-            for one in doomed:
+            reason, culled = select_culled(self._living.mature(), self._rules)
+            for one in culled:
                 resident = self._living.remove(one.birth)
                 commands.append(self._gone(resident, reason))
         return commands if self._vetting_queue.is_busy else commands + self._conclude()

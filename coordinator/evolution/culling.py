@@ -14,7 +14,7 @@ from schema.experiment.document import Arena, Culling
 CullReason = Literal["selection", "cull"]
 
 
-def select_doomed(
+def select_culled(
     mature: Sequence[Individual], rules: Arena | Culling
 ) -> tuple[CullReason, list[Individual]]:
     """Return who dies and by which rule, the least fit first.

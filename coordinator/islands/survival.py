@@ -9,7 +9,7 @@ Source: Hupkes 2016, sections 5.3 and 8.2.
 from collections.abc import Sequence
 
 from coordinator.evolution.breeding import Breeder
-from coordinator.evolution.culling import select_doomed
+from coordinator.evolution.culling import select_culled
 from coordinator.evolution.selection import Individual
 from schema.experiment.document import Culling, Experiment
 from schema.robot.ids import BirthId
@@ -63,8 +63,8 @@ class SurvivorSelection:
         is_due = self._every.is_due_at(births)
         if not is_due and len(living) < rules.population_limit:
             return living
-        _, doomed = select_doomed(living, rules)
-        gone = {one.birth for one in doomed}
+        _, culled = select_culled(living, rules)
+        gone = {one.birth for one in culled}
         return [one for one in living if one.birth not in gone]
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from coordinator.arena.place import draw_place
 from coordinator.evolution.buffered_rng import BufferedRng
-from coordinator.evolution.culling import select_doomed
+from coordinator.evolution.culling import select_culled
 from coordinator.evolution.selection import Individual
 from schema.experiment.document import Arena
 from schema.robot.genome import Node
@@ -24,45 +24,45 @@ def mature(*fitness: float) -> list[Individual]:
     ]
 
 
-def doomed(fitness: list[float], **rules: float) -> tuple[str, list[int]]:
+def culled(fitness: list[float], **rules: float) -> tuple[str, list[int]]:
     arena = msgspec.structs.replace(Arena(), **rules)
-    reason, found = select_doomed(mature(*fitness), arena)
+    reason, found = select_culled(mature(*fitness), arena)
     return reason, [one.birth.number for one in found]
 
 
 def test_exactly_the_share_of_the_mean_lives() -> None:
     # Mean 1.0, limit 0.5: one half is enough, a little less is not.
     fitness = [0.5, 0.499, 1.501, 1.5, *([1.0] * 8)]
-    assert doomed(fitness, survive_share_of_mean=0.5) == ("selection", [1])
+    assert culled(fitness, survive_share_of_mean=0.5) == ("selection", [1])
 
 
 def test_the_weakest_go_first_and_eight_stay() -> None:
     fitness = [0.03, 0.01, 0.02, *([1.0] * 7)]
-    assert doomed(fitness) == ("selection", [1, 2])
+    assert culled(fitness) == ("selection", [1, 2])
 
 
 def test_of_equals_the_younger_goes() -> None:
-    assert doomed([0.0, 0.0, 0.0, *([1.0] * 7)]) == ("selection", [2, 1])
+    assert culled([0.0, 0.0, 0.0, *([1.0] * 7)]) == ("selection", [2, 1])
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 8])
 def test_up_to_the_floor_nobody_dies(count: int) -> None:
-    assert doomed([0.0, *([1.0] * 7)][:count])[1] == []
+    assert culled([0.0, *([1.0] * 7)][:count])[1] == []
 
 
 def test_a_full_arena_of_equals_loses_seven_tenths() -> None:
-    assert doomed([1.0] * 29) == ("selection", [])
-    reason, found = doomed([1.0] * 30)
+    assert culled([1.0] * 29) == ("selection", [])
+    reason, found = culled([1.0] * 30)
     assert (reason, len(found)) == ("cull", 21)
     assert found == list(range(29, 8, -1))
 
 
 def test_one_weak_robot_spares_a_full_arena() -> None:
-    assert doomed([0.1, *([1.0] * 29)]) == ("selection", [0])
+    assert culled([0.1, *([1.0] * 29)]) == ("selection", [0])
 
 
 def test_the_floor_holds_in_a_cull_too() -> None:
-    assert len(doomed([1.0] * 30, population_floor=12)[1]) == 18
+    assert len(culled([1.0] * 30, population_floor=12)[1]) == 18
 
 
 def draws(seed: int) -> BufferedRng:
