@@ -7,7 +7,7 @@ import pytest
 
 from schema.experiment.document import Experiment, Islands, Selection
 from schema.experiment.migration import Migration
-from tests.coordinator.sea import Sea
+from tests.coordinator.sea import ArchipelagoRun
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
 
@@ -28,12 +28,12 @@ def per_generation(migration: Migration | None) -> float:
     )
     times = []
     for seed in range(3):
-        sea = Sea(document, seed=seed)
-        sea.start()
-        while any(island.births < 5 for island in sea.islands.values()):
-            sea.turn()
+        archipelago_run = ArchipelagoRun(document, seed=seed)
+        archipelago_run.start()
+        while any(island.births < 5 for island in archipelago_run.islands.values()):
+            archipelago_run.turn()
         began = time.process_time()
-        sea.live()
+        archipelago_run.live()
         times.append(time.process_time() - began)
     return min(times) / ISLANDS / BROODS
 
