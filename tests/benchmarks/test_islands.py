@@ -7,7 +7,7 @@ import pytest
 
 from schema.experiment.document import Experiment, Islands, Selection
 from schema.experiment.migration import Migration
-from tests.coordinator.sea import ArchipelagoRun
+from tests.coordinator.archipelago_run import ArchipelagoRun
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
 

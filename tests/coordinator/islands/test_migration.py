@@ -20,7 +20,7 @@ from schema.experiment.document import Experiment, Islands, Selection, Simulatio
 from schema.experiment.environment import Environment
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
-from tests.coordinator.sea import ArchipelagoRun
+from tests.coordinator.archipelago_run import ArchipelagoRun
 
 Names = list[tuple[int, int]]
 

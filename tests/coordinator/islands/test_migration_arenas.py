@@ -10,8 +10,8 @@ from schema.experiment.document import Arena as Rules
 from schema.experiment.document import Experiment, Islands, Selection, Simulation
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
+from tests.coordinator.archipelago_run import ArchipelagoRun
 from tests.coordinator.arena_world import World
-from tests.coordinator.sea import ArchipelagoRun
 
 FEW = Selection(population=5, tournament_size=2)
 CALM = Simulation(warmup_steps=600)

@@ -19,7 +19,7 @@ from schema.experiment.document import Experiment, Islands, Selection, Simulatio
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
-from tests.coordinator.sea import ArchipelagoRun
+from tests.coordinator.archipelago_run import ArchipelagoRun
 
 fixed = settings(max_examples=20, derandomize=True, database=None, deadline=None)
 
