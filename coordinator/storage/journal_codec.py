@@ -68,10 +68,10 @@ def decode_entry(data: bytes) -> JournalledEvent:
     Raises:
         MalformedMessage: not an entry's bytes, or no event in it.
     """
-    return decoded(data, pb.Entry(), _journalled_event)
+    return decoded(data, pb.Entry(), _journalled)
 
 
-def _journalled_event(entry: pb.Entry) -> JournalledEvent:
+def _journalled(entry: pb.Entry) -> JournalledEvent:
     is_audit = entry.WhichOneof("event") == "audited"
     return _audited(entry.audited) if is_audit else _event(entry)
 

@@ -19,8 +19,10 @@ CALM = Simulation(warmup_steps=600)
 
 
 def arenas(
-    *births: int, rules: dict[str, Any] | None = None, **migration: Any
-) -> ArchipelagoRun:  # noqa: ANN401
+    *births: int,
+    rules: dict[str, Any] | None = None,
+    **migration: Any,  # noqa: ANN401 - any setting
+) -> ArchipelagoRun:
     """Return arenas with five founders, dropped in the first 4 s; a birth each 15 s."""
     wanted = {"population_limit": 12, "population_floor": 4, **(rules or {})}
     document = Experiment(
@@ -35,11 +37,9 @@ def arenas(
     return ArchipelagoRun(document)
 
 
-def inserted(
-    archipelago_run: ArchipelagoRun, island: int
-) -> dict[BirthId, tuple[float, float]]:
+def inserted(lived: ArchipelagoRun, island: int) -> dict[BirthId, tuple[float, float]]:
     """Return who was put into an arena, and where."""
-    return dict(archipelago_run.worlds[island].places)
+    return dict(lived.worlds[island].places)
 
 
 def test_a_moved_robot_dies_here_and_lives_there() -> None:
