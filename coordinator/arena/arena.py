@@ -24,9 +24,8 @@ from coordinator.arena.rows import (
     touch_records,
 )
 from coordinator.evolution.breeding import Breeder, Candidate
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.culling import select_culled
-from coordinator.evolution.seeding import Purpose, stream
+from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import Couple, Individual
 from coordinator.islands.events import (
     Advanced,

@@ -7,7 +7,7 @@ centre; a few tries for some distance to everybody else.
 from collections.abc import Iterable
 from math import cos, dist, sin, tau
 
-from coordinator.evolution.buffered_rng import BufferedRng
+from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Arena
 
 Place = tuple[float, float]

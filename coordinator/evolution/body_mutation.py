@@ -9,7 +9,6 @@ from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from math import ceil
 
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.growth import (
     endings,
     half_up,
@@ -26,6 +25,7 @@ from coordinator.evolution.mutable_genome import (
     lineage,
     preorder,
 )
+from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.size_counts import SizeCounts, greatest, tallies, tally
 from schema.experiment.document import Experiment, Space, body_space
 

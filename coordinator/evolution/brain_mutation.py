@@ -10,9 +10,9 @@ from decimal import Decimal
 
 from msgspec.structs import replace
 
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.growth import connect, endings, random_neuron
 from coordinator.evolution.mutable_genome import MutableGenome, follow
+from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Experiment
 from schema.robot.brain import NEURON_TYPES
 from schema.robot.genome import ConnectionGene, NeuronGene

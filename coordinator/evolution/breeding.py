@@ -9,9 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.generation import generate
-from coordinator.evolution.seeding import Purpose, stream
+from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import (
     Couple,
     Individual,

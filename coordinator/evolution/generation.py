@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.growth import (
     Place,
     endings,
@@ -26,6 +25,7 @@ from coordinator.evolution.mutable_genome import (
     preorder,
     to_genome,
 )
+from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.size_counts import SizeCounts, tally
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, body_space

@@ -6,8 +6,8 @@ Source: facts of the original, sections 4.3 and 4.5.
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.mutable_genome import MutableGenome, path_between
+from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.size_counts import SizeCounts
 from schema.experiment.document import Space
 from schema.parts import COLOURS, BodySpace, PartType

@@ -6,7 +6,7 @@ Source: Hupkes 2016, section 5.3; facts of the original, section 5.1.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from coordinator.evolution.buffered_rng import BufferedRng
+from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Selection
 from schema.robot.genome import Genome
 from schema.robot.ids import BirthId

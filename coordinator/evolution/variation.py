@@ -22,7 +22,6 @@ from coordinator.evolution.brain_mutation import (
     delete_hidden_neurons,
     vary_neurons,
 )
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.mutable_genome import (
     MutableGenome,
     gene_ids,
@@ -31,6 +30,7 @@ from coordinator.evolution.mutable_genome import (
     to_genome,
     to_mutable,
 )
+from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.size_counts import greatest, tallies, tally
 from schema.experiment.document import Experiment, body_space
 from schema.robot.genome import Genome

@@ -12,8 +12,7 @@ from math import inf
 
 import numpy as np
 
-from coordinator.evolution.buffered_rng import BufferedRng
-from coordinator.evolution.seeding import Purpose, stream
+from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import Individual, fittest_first
 from coordinator.islands.events import (
     Emigrate,

@@ -10,8 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import fsum, isfinite
 
-from coordinator.evolution.buffered_rng import BufferedRng
-from coordinator.evolution.seeding import Purpose, stream
+from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Evaluate, Evaluated, EvaluationFailed, Record
 from coordinator.islands.rows import evaluation_record

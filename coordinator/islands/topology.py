@@ -8,7 +8,7 @@ from collections.abc import Callable
 from math import isqrt
 from typing import Any
 
-from coordinator.evolution.seeding import Purpose, stream
+from coordinator.evolution.random_streams import Purpose, stream
 from schema.errors import ExperimentError
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId

@@ -21,7 +21,7 @@ from worker.robot.controller import Widths
 BLOCK_TICKS = 64
 """Ticks that are drawn at once: starting a generator takes longer than a draw."""
 _PURPOSE = 11
-"""Sets these streams apart from those of ``coordinator.evolution.seeding.Purpose``."""
+"""No number of ``coordinator.evolution.random_streams.Purpose``: other streams."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,6 @@ from coordinator.evolution.body_mutation import (
     swap_subtrees,
     vary_parts,
 )
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import (
     gene_ids,
@@ -23,6 +22,7 @@ from coordinator.evolution.mutable_genome import (
     to_genome,
     to_mutable,
 )
+from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.size_counts import greatest, tally
 from schema.experiment.document import (
     Experiment,

@@ -16,10 +16,10 @@ from coordinator.evolution.brain_mutation import (
     delete_hidden_neurons,
     vary_neurons,
 )
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.generation import generate
 from coordinator.evolution.growth import half_up
 from coordinator.evolution.mutable_genome import preorder, to_genome, to_mutable
+from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Experiment, Space, Variation, body_space
 from schema.robot.brain import NEURON_TYPES, Layer
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop, walk

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from coordinator.arena.place import draw_place
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.culling import select_culled
+from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.selection import Individual
 from schema.experiment.document import Arena
 from schema.robot.genome import Node

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from coordinator.evolution.buffered_rng import BufferedRng
+from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.selection import (
     Individual,
     fittest_first,

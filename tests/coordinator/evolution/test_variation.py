@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import (
     gene_ids,
@@ -16,6 +15,7 @@ from coordinator.evolution.mutable_genome import (
     to_genome,
     to_mutable,
 )
+from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.size_counts import greatest, tallies
 from coordinator.evolution.variation import crossover, mate, mutate
 from schema.experiment.document import Experiment, Space, Variation, body_space
