@@ -316,7 +316,7 @@ def test_new_parents_come_after_so_many_attempts() -> None:
     couples = []
     while waiting:
         context = waiting.popleft()
-        candidate = island._unborn[context.birth.number].candidate
+        candidate = island._in_flight[context.birth.number].candidate
         if context.birth.number == 9 and candidate.attempt < 9:
             assert candidate.couple is not None
             names = tuple(one.birth.number for one in candidate.couple)
