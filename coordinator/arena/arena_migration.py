@@ -1,111 +1,112 @@
-"""Immigrants of an arena, from their arrival until there is room for them."""
+"""Migration of an arena: its emigrants, and immigrants until there is room for them."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
+from coordinator.arena.living import LivingRobots
+from coordinator.arena.rows import Moment, death_record
+from coordinator.evolution.random_streams import Purpose
 from coordinator.evolution.selection import Individual
-from coordinator.islands.events import Emigrate, Travelled
+from coordinator.islands.events import Emigrate, Record
 from coordinator.islands.migration import MigrationEpochs
+from coordinator.islands.rows import migration_records
+from schema.experiment.document import Experiment, body_space
+from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 
 
-class ImmigrantQueue:
-    """Those who leave an arena, and those who wait for room in it.
+class ArenaMigration:
+    """Emigrants and immigrants of one arena.
 
-    Whoever leaves is an empty place: the next immigrants take it, and nobody makes
-    room for them.
+    A robot that is moved away leaves a place for an immigrant, which then replaces no
+    other robot.
 
     Attributes:
-        queue: who waits, the first to come first.
-        settled: how many immigrants have been let in.
+        epochs: when the arena sends migrants, and what its neighbours sent.
+        is_starving: too few robots live to mate, so the epoch ends early.
+        is_extinct: the end of the epoch brought a starving arena no immigrant.
     """
 
-    def __init__(self, epochs: MigrationEpochs) -> None:
-        """Expect nobody."""
-        self.queue: list[Individual] = []
-        self.settled = 0
-        self._epochs = epochs
-        self._empty = 0
+    def __init__(
+        self, experiment: Experiment, epochs: MigrationEpochs, living: LivingRobots
+    ) -> None:
+        assert experiment.arena is not None
+        self.epochs = epochs
+        self.is_starving = self.is_extinct = False
+        self._births = experiment.births
+        self._stay = experiment.selection.parents_needed
+        self._space = body_space(experiment.space)
+        self._floor = experiment.arena.population_floor
+        self._living = living
+        self._queue: list[Individual] = []
+        self._settled = 0
+        self._vacancies = 0
 
     @property
-    def is_waiting(self) -> bool:
-        """The arena has sent its migrants, and waits for those of others."""
-        return self._epochs.is_waiting
+    def may_bring_robots(self) -> bool:
+        """An immigrant awaits room, or may come at the end of the epoch."""
+        return bool(self._queue) or self.epochs.has_sources
 
-    @property
-    def is_complete(self) -> bool:
-        """All that it waits for is there."""
-        return self._epochs.is_complete
+    def exchange(self, moment: Moment) -> list[Record | Emigrate]:
+        """Send migrants if they are due, and admit immigrants that have arrived."""
+        commands: list[Record | Emigrate] = []
+        if not self.epochs.is_waiting and moment.births < self._births:
+            is_due = self.epochs.is_due(moment.births, moment.sim_time_s)
+            if is_due or self.is_starving:
+                commands += self._send(moment)
+        if self.epochs.is_complete:
+            has_arrivals = self._receive(moment)
+            self.is_extinct = self.is_starving and not has_arrivals
+            self.is_starving = False
+        if not self.epochs.is_waiting and not self.is_extinct:
+            commands += self._admit(moment)
+        return commands
 
-    @property
-    def is_hopeful(self) -> bool:
-        """Somebody waits for room, or may come at the next exchange."""
-        return bool(self.queue) or self._epochs.has_sources
+    def _send(self, moment: Moment) -> list[Record | Emigrate]:
+        """End the epoch; return rows and migrants."""
+        mature = self._living.mature()
+        spare = len(mature) - self._stay
+        sent, moved = self.epochs.send(mature, len(self._living), spare)
+        self._vacancies += len(moved)
+        return [
+            *migration_records(sent, moment.births, moment.sim_time_s),
+            *sent,
+            *(self._removed(one, "migrated", moment) for one in moved),
+        ]
 
-    @property
-    def neighbours(self) -> tuple[int, ...]:
-        """Whom the arena is connected with."""
-        return self._epochs.links.neighbours
-
-    def is_due(self, births: int, now_s: float) -> bool:
-        """Return whether the epoch ends at a time [s], with so many births."""
-        return not self.is_waiting and self._epochs.is_due(births, now_s)
-
-    def depart(
-        self, mature: Sequence[Individual], living: int, stay: int
-    ) -> tuple[list[Emigrate], list[Individual]]:
-        """End the epoch; return what is sent, and who is moved away.
-
-        Args:
-            mature: who may leave.
-            living: how many live there.
-            stay: so many of the mature are not moved away.
-        """
-        sent, gone = self._epochs.leave(mature, living, len(mature) - stay)
-        self._empty += len(gone)
-        return sent, gone
-
-    def take(self, event: Travelled) -> None:
-        """Keep what came until ``arrive``.
-
-        Raises:
-            UnexpectedEvent: it cannot come; nothing has changed.
-        """
-        self._epochs.take(event)
-
-    def arrive(
-        self, living: Sequence[BirthId], births: int, now_s: float
-    ) -> list[Individual]:
-        """Begin the next epoch; return who came and waits for room now.
-
-        Args:
-            living: who is there already, and needs no copy.
-            births: in the arena.
-            now_s: simulated time [s].
-        """
-        known = [*living, *(one.birth for one in self.queue)]
-        came = [
+    def _receive(self, moment: Moment) -> bool:
+        """Begin the next epoch; return whether new immigrants await room."""
+        known = {one.birth for one in [*self._living, *self._queue]}
+        immigrants = [
             replace(one, fitness=0.0, has_failed=False)
-            for one, _ in self._epochs.arrive(births, now_s)
+            for one, _ in self.epochs.receive(moment.births, moment.sim_time_s)
             if one.birth not in known
         ]
-        self.queue += came
-        return came
+        self._queue += immigrants
+        return bool(immigrants)
 
-    def next_in(
-        self, mature: Sequence[Individual], *, has_room: bool
-    ) -> tuple[Individual, Individual | None] | None:
-        """Return who comes in, and who makes room; None if nobody can come in.
+    def _admit(self, moment: Moment) -> list[Record]:
+        """Insert immigrants at random places; return the rows of replaced robots.
 
-        Args:
-            mature: who may be replaced.
-            has_room: the arena is not full.
+        No robot is replaced where the living are fewer than the population floor.
         """
-        gone = None
-        if not self._empty:
-            gone = self._epochs.place_for(mature, self.settled)
-        if not self.queue or not (gone or has_room):
-            return None
-        self._empty = max(0, self._empty - 1)
-        self.settled += 1
-        return self.queue.pop(0), gone
+        records = []
+        while self._queue:
+            replaced = None
+            if not self._vacancies and len(self._living) >= self._floor:
+                mature = self._living.mature()
+                replaced = self.epochs.choose_replaced(mature, self._settled)
+            if replaced is not None:
+                records.append(self._removed(replaced, "replaced", moment))
+            elif not self._living.has_room:
+                break
+            self._vacancies = max(0, self._vacancies - 1)
+            self._settled += 1
+            name = BirthId(moment.island, self._settled)
+            place = self._living.random_place(name, Purpose.IMMIGRANT_PLACE)
+            immigrant = self._queue.pop(0)
+            robot = develop(immigrant.genome, self._space)
+            self._living.insert(immigrant, robot, place)
+        return records
+
+    def _removed(self, one: Individual, reason: str, moment: Moment) -> Record:
+        return death_record(self._living.remove(one.birth), reason, moment)

@@ -1,8 +1,9 @@
-"""An arena's unborn: candidates whose bodies the analyzer is asked about."""
+"""Candidates of an arena that await vetting or insertion."""
 
 from collections.abc import Sequence
+from math import inf
 
-from coordinator.evolution.breeding import BARREN, Breeder, Candidate
+from coordinator.evolution.breeding import Breeder, Candidate
 from coordinator.evolution.selection import Couple, Individual
 from coordinator.islands.events import Vet, Vetted, VettingFailed
 from schema.errors import UnexpectedEvent
@@ -10,22 +11,19 @@ from schema.robot.ids import BirthId
 
 
 class VettingQueue:
-    """Brings founders and children to the point where they can be inserted.
+    """Founders and children until their bodies are viable and they are inserted.
 
-    A number is used when somebody is viable under it. Attempts that came to none go
-    on being counted at the next slot, so that no two of them draw alike.
-
-    Attributes:
-        viable: who can be inserted, by number; the arena takes them out.
+    A birth number is used once a candidate is viable. Failed attempts at a number are
+    counted on at the next birth, so that each attempt has its own stream.
     """
 
     def __init__(self, breeder: Breeder, island: int, attempts: int) -> None:
-        """Begin with nobody; a couple has so many attempts at a child."""
-        self.viable: dict[int, Candidate] = {}
+        """Initialise an empty queue; a couple has ``attempts`` attempts at a child."""
         self._breeder = breeder
         self._island = island
         self._attempts = attempts
-        self._asked: dict[int, Candidate] = {}
+        self._viable: dict[int, Candidate] = {}
+        self._in_vetting: dict[int, Candidate] = {}
         self._mature: tuple[Individual, ...] = ()
         self._next = 0
         self._failed = 0
@@ -33,47 +31,52 @@ class VettingQueue:
 
     @property
     def is_busy(self) -> bool:
-        """A verdict is awaited."""
-        return bool(self._asked)
+        """A report is awaited."""
+        return bool(self._in_vetting)
 
-    def found(self, count: int) -> list[Vet]:
-        """Make founders, as often as it takes; return what to ask."""
+    def begin_founders(self, count: int) -> list[Vet]:
+        """Generate the founders; return their vettings."""
         self._next = count
         vets: list[Vet] = []
         for number in range(count):
             vets += self._try(number, 0, None, "")
         return vets
 
-    def mate(self, mature: Sequence[Individual]) -> list[Vet]:
-        """Let two of the mature try for a child; return what to ask, if anything."""
+    def begin_child(self, mature: Sequence[Individual]) -> list[Vet]:
+        """Mate two of the mature; return the vetting, if there is a candidate."""
         self._mature = tuple(mature)
         self._end = self._failed + self._attempts
         return self._try(self._next, self._failed, None, "")
 
+    def take_viable(self) -> list[Candidate]:
+        """Return the viable candidates by birth id, and remove them."""
+        viable, self._viable = self._viable, {}
+        return [viable[number] for number in sorted(viable)]
+
     def take_number(self) -> BirthId:
-        """Return a name for somebody who was not conceived here."""
+        """Return the next birth id, for a robot that needs no vetting."""
         self._next, self._failed = self._next + 1, 0
         return BirthId(self._island, self._next - 1)
 
-    def judge(self, event: Vetted | VettingFailed) -> list[Vet]:
-        """Take a verdict; return what to ask next, if anything.
+    def take(self, event: Vetted | VettingFailed) -> list[Vet]:
+        """Handle a report; return the vetting of the next attempt, if there is one.
 
         Raises:
-            UnexpectedEvent: a verdict on what was never asked.
+            UnexpectedEvent: a report on a vetting that was never requested.
         """
         number = event.birth.number
-        candidate = self._asked.get(number)
+        candidate = self._in_vetting.get(number)
         if event.birth.island != self._island or self._is_new(event, candidate):
             raise UnexpectedEvent(
                 f"island {self._island}, births 0..{self._next - 1} are taken, "
-                f"{self._failed} attempts at the next failed, asked about "
-                f"{sorted(self._asked)}: never asked, got {event}"
+                f"{self._failed} attempts at the next failed, vetting "
+                f"{sorted(self._in_vetting)}: never requested, got {event}"
             )
         if candidate is None or event.attempt < candidate.attempt:
             return []
-        del self._asked[number]
+        del self._in_vetting[number]
         if isinstance(event, Vetted) and event.report.is_viable:
-            self.viable[number] = candidate
+            self._viable[number] = candidate
             if number == self._next:
                 self.take_number()
             return []
@@ -83,7 +86,7 @@ class VettingQueue:
     def _is_new(
         self, event: Vetted | VettingFailed, candidate: Candidate | None
     ) -> bool:
-        """Return whether an answer is to a question of the future."""
+        """Return whether an answer belongs to no request so far."""
         number = event.birth.number
         if candidate is not None:
             return event.attempt > candidate.attempt
@@ -94,18 +97,19 @@ class VettingQueue:
     def _try(
         self, number: int, attempt: int, couple: Couple | None, why: str
     ) -> list[Vet]:
-        """Ask about the first candidate from an attempt on; or give up."""
+        """Return the vetting of the first candidate from an attempt on, if any."""
         birth = BirthId(self._island, number)
         is_founder = number < self._next
-        mature = () if is_founder else self._mature
-        while is_founder or attempt < self._end:
-            couple, candidate = self._breeder.attempt(
-                birth, attempt, mature, couple, why
-            )
-            if candidate is not None:
-                self._asked[number] = candidate
-                return [Vet(birth, attempt, candidate.robot)]
-            attempt += 1
-            why = BARREN
-        self._failed = attempt
-        return []
+        candidate = self._breeder.candidate(
+            birth,
+            attempt,
+            () if is_founder else self._mature,
+            couple,
+            why,
+            end=inf if is_founder else self._end,
+        )
+        if candidate is None:
+            self._failed = self._end
+            return []
+        self._in_vetting[number] = candidate
+        return [Vet(birth, candidate.attempt, candidate.robot)]

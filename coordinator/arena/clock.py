@@ -1,4 +1,4 @@
-"""When an arena decides: its intervals, counted in physics steps."""
+"""Clock of an arena: its intervals, in physics steps."""
 
 from dataclasses import dataclass
 
@@ -7,11 +7,11 @@ from schema.experiment.document import Arena, Simulation, steps_of
 
 @dataclass(frozen=True, slots=True)
 class ArenaClock:
-    """The intervals of an arena [steps]; every decision is at a multiple of one.
+    """Intervals of an arena; every decision falls on a multiple of one of them.
 
     Attributes:
-        founder, birth, cull, sample, snapshot: the intervals.
-        timestep_s: how long a step is [s].
+        founder, birth, cull, sample, snapshot: intervals [steps].
+        timestep_s: length of a step [s].
     """
 
     founder: int
@@ -23,7 +23,7 @@ class ArenaClock:
 
     @classmethod
     def of(cls, arena: Arena, simulation: Simulation) -> "ArenaClock":
-        """Return the clock of an experiment's sections."""
+        """Return the clock of an experiment."""
         return cls(
             steps_of(arena.founder_interval_s, simulation),
             steps_of(arena.birth_interval_s, simulation),
@@ -47,5 +47,5 @@ class ArenaClock:
         return (step // self.founder + 1) * self.founder
 
     def is_snapshot_due(self, step: int, until: int) -> bool:
-        """Return whether a snapshot falls due on the way from a step to another."""
+        """Return whether a snapshot is due between two steps."""
         return until // self.snapshot > step // self.snapshot

@@ -1,24 +1,29 @@
-"""Those who live in an arena."""
+"""Living robots of an arena, their places, and the changes that await an advance."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from math import cos, dist, sin, tau
 
-from coordinator.arena.place import Place
+from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import Individual
+from schema.experiment.document import Arena
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.wire.arena import Judgement
+from schema.wire.arena import BrainChange, Changes, Insertion, Judgement
+
+Place = tuple[float, float]
+"""A point of the ground plane [m]."""
 
 
 @dataclass(slots=True)
 class LivingRobot:
-    """One of an arena's living.
+    """Living robot of an arena.
 
     Attributes:
-        individual: who it is; its fitness is the last that was told.
-        robot: what it is now.
-        place: where it was inserted [m].
-        judgement: the last; None until an advance has been.
+        individual: the individual; its fitness is the last one reported.
+        robot: its current body and brain.
+        place: place where it was inserted [m].
+        judgement: the last report; None before the first advance.
     """
 
     individual: Individual
@@ -28,7 +33,7 @@ class LivingRobot:
 
     @property
     def birth(self) -> BirthId:
-        """Its name."""
+        """Its birth id."""
         return self.individual.birth
 
     @property
@@ -38,16 +43,24 @@ class LivingRobot:
 
     @property
     def last_place(self) -> Place:
-        """Where it was when last seen [m]."""
+        """Its last known place [m]."""
         return self.place if self.judgement is None else self.judgement.place[:2]
 
 
 class LivingRobots:
-    """The living of an arena, always in the order of their names."""
+    """Living robots in the order of their birth ids, and the changes to their world.
 
-    def __init__(self) -> None:
-        """Begin with nobody."""
+    Insertions, removals and new brains take effect here at once, and in the world
+    with the next advance, which takes them by ``take_changes``.
+    """
+
+    def __init__(self, rules: Arena, *, seed: int, run: int) -> None:
+        self._rules = rules
+        self._seed, self._run = seed, run
         self._living: dict[BirthId, LivingRobot] = {}
+        self._removals: list[BirthId] = []
+        self._insertions: dict[BirthId, Insertion] = {}
+        self._brains: dict[BirthId, BrainChange] = {}
 
     def __len__(self) -> int:
         return len(self._living)
@@ -55,27 +68,85 @@ class LivingRobots:
     def __iter__(self) -> Iterator[LivingRobot]:
         return (self._living[birth] for birth in sorted(self._living))
 
+    @property
+    def has_room(self) -> bool:
+        """The population is below its limit."""
+        return len(self._living) < self._rules.population_limit
+
     def get(self, birth: BirthId) -> LivingRobot | None:
-        """Return who has a name, None if nobody living has."""
+        """Return the robot with a birth id, None if none such lives."""
         return self._living.get(birth)
 
-    def add(self, resident: LivingRobot) -> None:
-        """Let somebody in."""
-        self._living[resident.birth] = resident
+    def mature(self) -> tuple[Individual, ...]:
+        """Return the individuals that may mate."""
+        return tuple(one.individual for one in self if one.is_mature)
+
+    def random_place(self, name: BirthId, purpose: Purpose) -> Place:
+        """Return a random place away from the living; the name is that of a stream."""
+        draws = BufferedRng(stream(self._seed, self._run, name, 0, purpose))
+        return draw_place(draws, [one.last_place for one in self], self._rules)
+
+    def insert(self, individual: Individual, robot: Robot, place: Place) -> None:
+        """Insert a robot."""
+        self._living[individual.birth] = LivingRobot(individual, robot, place)
+        self._insertions[individual.birth] = Insertion(individual.birth, robot, place)
 
     def remove(self, birth: BirthId) -> LivingRobot:
-        """Let somebody go who lives, and return who it was."""
-        return self._living.pop(birth)
+        """Remove a living robot, and return it."""
+        removed = self._living.pop(birth)
+        self._brains.pop(birth, None)
+        # A robot that was not inserted yet need not be removed.
+        if self._insertions.pop(birth, None) is None:
+            self._removals.append(birth)
+        return removed
+
+    def lose(self, birth: BirthId) -> None:
+        """Remove a living robot that the world has removed already."""
+        del self._living[birth]
+
+    def replace_brain(self, robot: LivingRobot, changed: Robot) -> None:
+        """Replace the brain of a living robot by that of ``changed``."""
+        robot.robot, birth = changed, robot.birth
+        inserted = self._insertions.get(birth)
+        if inserted is None:
+            self._brains[birth] = BrainChange(birth, changed.brain)
+        else:
+            self._insertions[birth] = replace(inserted, robot=changed)
 
     def judge(self, judgements: Iterable[Judgement]) -> None:
-        """Take what was last seen of all who live."""
+        """Store the reports on all living robots."""
         for judgement in judgements:
-            resident = self._living[judgement.birth]
-            resident.judgement = judgement
-            resident.individual = replace(
-                resident.individual, fitness=judgement.fitness
-            )
+            robot = self._living[judgement.birth]
+            robot.judgement = judgement
+            robot.individual = replace(robot.individual, fitness=judgement.fitness)
 
-    def mature(self) -> tuple[Individual, ...]:
-        """Return those who may mate."""
-        return tuple(one.individual for one in self if one.is_mature)
+    def take_changes(self) -> Changes:
+        """Return all changes since the last call."""
+        changes = Changes(
+            tuple(self._removals),
+            tuple(self._insertions.values()),
+            tuple(self._brains.values()),
+        )
+        self._removals, self._insertions, self._brains = [], {}, {}
+        return changes
+
+
+def draw_place(draws: BufferedRng, others: Sequence[Place], arena: Arena) -> Place:
+    """Return a random place away from all others, or the last one tried.
+
+    Places are uniform in radius, so denser in the centre (facts of the original,
+    section 5).
+
+    Args:
+        draws: source of two numbers for each try, the angle first.
+        others: last known places of the living [m].
+        arena: radius, distance and number of tries.
+    """
+    place = (0.0, 0.0)
+    for _ in range(arena.birth_place_tries):
+        angle = tau * draws.number()
+        radius = arena.birth_radius_m * draws.number()
+        place = (radius * cos(angle), radius * sin(angle))
+        if all(dist(place, other) >= arena.birth_distance_m for other in others):
+            break
+    return place

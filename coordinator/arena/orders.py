@@ -1,10 +1,21 @@
-"""What an operator may order: looked at before a journal keeps it."""
+"""Orders of operators: checks, and the queue until they are carried out."""
 
 from dataclasses import replace
 from math import isfinite
 
-from coordinator.evolution.selection import Individual
-from coordinator.islands.events import Insert, Order
+from coordinator.arena.living import LivingRobots
+from coordinator.arena.rows import Moment, death_record
+from coordinator.evolution.breeding import Candidate
+from coordinator.islands.events import (
+    Commanded,
+    Insert,
+    Order,
+    Pause,
+    Record,
+    Remove,
+    ReplaceBrain,
+    Resume,
+)
 from schema.errors import InvalidRobot
 from schema.experiment.document import Experiment, body_space
 from schema.parts import BodySpace
@@ -14,26 +25,80 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot, check_robot
 
 
-def check_order(order: Order, experiment: Experiment) -> None:
-    """Raise unless an order can be carried out.
+class Orders:
+    """Orders to an arena.
 
-    Whether a robot that it names lives when it takes effect is nobody's fault.
+    Attributes:
+        is_paused: the arena is paused, or will be after its advance.
+        pending: orders to carry out at the next decision.
+        insertions: robots to insert as soon as there is room.
+    """
+
+    def __init__(self, experiment: Experiment, living: LivingRobots) -> None:
+        self.is_paused = False
+        self.pending: list[Order] = []
+        self.insertions: list[Insert] = []
+        self._experiment = experiment
+        self._space = body_space(experiment.space)
+        self._living = living
+        self._ids: set[str] = set()
+
+    def has(self, command_id: str) -> bool:
+        """Return whether an order has arrived before."""
+        return command_id in self._ids
+
+    def take(self, event: Commanded) -> None:
+        """Store an order until the next decision.
+
+        Raises:
+            InvalidRobot: as in ``check_order``; nothing has changed.
+        """
+        check_order(event.order, self._experiment)
+        self._ids.add(event.command_id)
+        self.pending.append(event.order)
+
+    def carry_out(self, moment: Moment) -> list[Record]:
+        """Carry out the pending orders; return rows of removed robots."""
+        records = []
+        for order in self.pending:
+            match order:
+                case Pause() | Resume():
+                    self.is_paused = isinstance(order, Pause)
+                case Insert():
+                    self.insertions.append(order)
+                case Remove(birth=birth):
+                    if self._living.get(birth):
+                        removed = self._living.remove(birth)
+                        records.append(death_record(removed, "removed", moment))
+                case ReplaceBrain(birth=birth, brain=brain):
+                    living = self._living.get(birth)
+                    robot = living and _with_brain(living.robot, brain, self._space)
+                    if living and robot:
+                        self._living.replace_brain(living, robot)
+        self.pending = []
+        return records
+
+
+def check_order(order: Order, experiment: Experiment) -> None:
+    """Raise if an order is invalid.
+
+    An order that names a robot which is dead when it takes effect is valid.
 
     Raises:
-        InvalidRobot: a genome that no robot of the experiment has, or a place that
-            is none.
+        InvalidRobot: the genome fits no robot of the experiment, or the place is not
+            finite.
     """
     if isinstance(order, Insert):
-        guest(order, BirthId(0, 0), body_space(experiment.space))
+        inserted(order, BirthId(0, 0), body_space(experiment.space))
         if order.place is not None and not all(map(isfinite, order.place)):
             raise InvalidRobot(f"place: must be finite, got {order.place}")
 
 
-def guest(order: Insert, birth: BirthId, space: BodySpace) -> tuple[Individual, Robot]:
-    """Return whom an order inserts: somebody without parents.
+def inserted(order: Insert, birth: BirthId, space: BodySpace) -> Candidate:
+    """Return the candidate, without parents, that an order inserts.
 
     Raises:
-        InvalidRobot: a genome that no robot of these part types has.
+        InvalidRobot: the genome fits no robot of these part types.
     """
     for node, _, _ in walk(order.genome):
         if node.kind not in space:
@@ -42,11 +107,11 @@ def guest(order: Insert, birth: BirthId, space: BodySpace) -> tuple[Individual, 
             )
     robot = develop(order.genome, space)
     check_robot(robot, space)
-    return Individual(birth, order.genome, 0.0, 1, None), robot
+    return Candidate(birth, 0, None, order.genome, robot)
 
 
-def rewired(robot: Robot, brain: Brain, space: BodySpace) -> Robot | None:
-    """Return a robot with another brain; None if that does not fit its body."""
+def _with_brain(robot: Robot, brain: Brain, space: BodySpace) -> Robot | None:
+    """Return a robot with another brain; None if the brain does not fit its body."""
     changed = replace(robot, brain=brain)
     try:
         check_robot(changed, space)

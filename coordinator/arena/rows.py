@@ -1,6 +1,7 @@
-"""What an arena writes beside births: rows of the tables in `schema.tables.columns`."""
+"""Table rows of arenas, besides births and migrations."""
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from coordinator.arena.living import LivingRobot
 from coordinator.islands.events import Record
@@ -8,17 +9,29 @@ from coordinator.islands.rows import named
 from schema.wire.arena import Casualty, Touch
 
 
-def sample_records(
-    living_robots: Iterable[LivingRobot], island: int, births: int, sim_time_s: float
-) -> list[Record]:
-    """Return the fitness rows of a sample: all living who were ever judged."""
+class Moment(NamedTuple):
+    """State of an arena that its rows refer to.
+
+    Attributes:
+        island: number of the arena.
+        births: number of births.
+        sim_time_s: simulated time [s].
+    """
+
+    island: int
+    births: int
+    sim_time_s: float
+
+
+def sample_records(living: Iterable[LivingRobot], moment: Moment) -> list[Record]:
+    """Return the fitness rows of a sample: all living robots with a report."""
     return [
         Record(
             "fitness",
             {
-                **named(one.birth, island),
-                "sim_time_s": sim_time_s,
-                "births": births,
+                **named(one.birth, moment.island),
+                "sim_time_s": moment.sim_time_s,
+                "births": moment.births,
                 "age_s": one.judgement.age_s,
                 "path_velocity": one.judgement.path_velocity,
                 "straight_velocity": one.judgement.straight_velocity,
@@ -26,38 +39,34 @@ def sample_records(
                 "is_mature": one.judgement.is_mature,
             },
         )
-        for one in living_robots
+        for one in living
         if one.judgement is not None
     ]
 
 
-def living_records(
-    living_robots: Iterable[LivingRobot], island: int, births: int
-) -> list[Record]:
+def living_records(living: Iterable[LivingRobot], moment: Moment) -> list[Record]:
     """Return the population rows at a birth; the immature have no fitness yet."""
     return [
         Record(
             "population",
             {
-                "island": island,
-                "births": births,
-                **named(one.birth, island),
+                "island": moment.island,
+                "births": moment.births,
+                **named(one.birth, moment.island),
                 "fitness": one.individual.fitness if one.is_mature else None,
             },
         )
-        for one in living_robots
+        for one in living
     ]
 
 
-def casualty_record(
-    casualty: Casualty, island: int, births: int, sim_time_s: float
-) -> Record:
+def casualty_record(casualty: Casualty, moment: Moment) -> Record:
     """Return the deaths row of a robot whose physics diverged."""
     x, y, z = casualty.place
     row = {
-        **named(casualty.birth, island),
-        "sim_time_s": sim_time_s,
-        "births": births,
+        **named(casualty.birth, moment.island),
+        "sim_time_s": moment.sim_time_s,
+        "births": moment.births,
         "reason": "diverged",
         "detail": casualty.reason,
         "x": x,
@@ -67,36 +76,34 @@ def casualty_record(
     return Record("deaths", row)
 
 
-def death_record(
-    resident: LivingRobot, reason: str, *, island: int, births: int, sim_time_s: float
-) -> Record:
-    """Return the deaths row of a robot that is taken out where it stands."""
-    x, y = resident.last_place
+def death_record(removed: LivingRobot, reason: str, moment: Moment) -> Record:
+    """Return the deaths row of a robot that is removed from the arena."""
+    x, y = removed.last_place
     row = {
-        **named(resident.birth, island),
-        "sim_time_s": sim_time_s,
-        "births": births,
+        **named(removed.birth, moment.island),
+        "sim_time_s": moment.sim_time_s,
+        "births": moment.births,
         "reason": reason,
         "detail": "",
         "x": x,
         "y": y,
-        "z": resident.judgement and resident.judgement.place[2],
+        "z": removed.judgement and removed.judgement.place[2],
     }
     return Record("deaths", row)
 
 
 def touch_records(
-    touches: Iterable[Touch], island: int, sim_time_s: float, over_s: float
+    touches: Iterable[Touch], moment: Moment, over_s: float
 ) -> list[Record]:
-    """Return the touches rows of an advance that took ``over_s``."""
+    """Return the touches rows of an advance that lasted ``over_s``."""
     return [
         Record(
             "touches",
             {
-                **named(touch.first, island),
+                **named(touch.first, moment.island),
                 "other_island": touch.second.island,
                 "other_birth": touch.second.number,
-                "sim_time_s": sim_time_s,
+                "sim_time_s": moment.sim_time_s,
                 "over_s": over_s,
                 "duration_s": touch.duration_s,
             },

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from coordinator.evolution.generation import generate
-from coordinator.evolution.seeding import Purpose, stream
+from coordinator.evolution.random_streams import Purpose, stream
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.flags import Flags, whole_number

@@ -1,18 +1,16 @@
-"""The steps of mutation that change the body; `variation` orders them.
+"""Mutation of the body, step by step; `variation` calls the steps in order.
 
-Each changes a tree in place and keeps every restriction. Source: Hupkes 2016,
-section 4.4.6; facts of the original, section 4.5. Its traps are avoided: a new part
-may connect to every neuron, and the mean size of what could be duplicated is a mean.
+Each step changes a tree in place and keeps every restriction. Source: Hupkes 2016,
+section 4.4.6; facts of the original, section 4.5. Two errors of the original are
+avoided: a new part may connect to every neuron, and the mean size of the subtrees
+that can be duplicated is a mean.
 """
 
 from collections.abc import Iterable, Iterator
-from fractions import Fraction
 from math import ceil
 
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.growth import (
-    endings,
-    half_up,
+    endpoints,
     pick_growth,
     random_neuron,
     random_part,
@@ -21,19 +19,23 @@ from coordinator.evolution.growth import (
 )
 from coordinator.evolution.mutable_genome import (
     MutableGenome,
+    SizeCounts,
     copied,
     free_places,
     lineage,
     preorder,
+    size_limits,
+    size_of,
+    subtree_sizes,
 )
-from coordinator.evolution.size_counts import SizeCounts, greatest, tallies, tally
+from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Experiment, Space, body_space
 
 
 def deletable(
     sizes: dict[MutableGenome, SizeCounts], space: Space
 ) -> list[MutableGenome]:
-    """Return the subtrees without which a tree keeps the least number of parts."""
+    """Return the subtrees that can be deleted without falling below the least size."""
     total = next(iter(sizes.values()))
     return [
         branch
@@ -45,8 +47,8 @@ def deletable(
 def duplicable(
     sizes: dict[MutableGenome, SizeCounts], space: Space
 ) -> list[MutableGenome]:
-    """Return the subtrees of which a tree may hold one more."""
-    room = greatest(space).plus(next(iter(sizes.values())), -1)
+    """Return the subtrees of which a second copy stays within all limits."""
+    room = size_limits(space).minus(next(iter(sizes.values())))
     return [
         branch for branch, size in sizes.items() if branch.parent and size.fits(room)
     ]
@@ -55,56 +57,54 @@ def duplicable(
 def delete_subtree(
     draws: BufferedRng, root: MutableGenome, experiment: Experiment
 ) -> None:
-    """Delete a random subtree, with the experiment's probability."""
+    """Delete a random subtree, with the probability of the experiment."""
     if not draws.chance(experiment.variation.p_delete_subtree):
         return
-    if candidates := deletable(tallies(preorder(root)), experiment.space):
+    if candidates := deletable(subtree_sizes(preorder(root)), experiment.space):
         draws.pick(candidates).cut()
 
 
 def duplicate_subtree(
     draws: BufferedRng, root: MutableGenome, experiment: Experiment
 ) -> None:
-    """Put a copy of a random subtree on a free slot, with a probability."""
+    """Attach a copy of a random subtree to a free slot, with a probability."""
     if not draws.chance(experiment.variation.p_duplicate_subtree):
         return
     branches = preorder(root)
-    candidates = duplicable(tallies(branches), experiment.space)
+    candidates = duplicable(subtree_sizes(branches), experiment.space)
     places = free_places(branches)
     if candidates and places:
-        twin = copied(draws.pick(candidates))
+        copy = copied(draws.pick(candidates))
         parent, slot = draws.pick(places)
-        parent.graft(twin, slot)
+        parent.graft(copy, slot)
 
 
 def swap_subtrees(
     draws: BufferedRng, root: MutableGenome, experiment: Experiment
 ) -> None:
-    """Let two subtrees, neither within the other, change places, by chance."""
+    """Exchange two subtrees, neither within the other, with a probability."""
     if not draws.chance(experiment.variation.p_swap_subtree):
         return
     others = preorder(root)[1:]
     if not others:
         return
     first = draws.pick(others)
-    above = lineage(first)
-    candidates = [b for b in others if b not in above and first not in lineage(b)]
+    ancestors = lineage(first)
+    candidates = [b for b in others if b not in ancestors and first not in lineage(b)]
     if candidates:
         second = draws.pick(candidates)
-        (one, at), (other, there) = _seat(first), _seat(second)
-        one.graft(second, at)
-        other.graft(first, there)
-
-
-def _seat(branch: MutableGenome) -> tuple[MutableGenome, int]:
-    assert branch.parent is not None
-    return branch.parent, branch.parent_slot
+        one, slot = first.parent, first.parent_slot
+        other, other_slot = second.parent, second.parent_slot
+        assert one is not None
+        assert other is not None
+        one.graft(second, slot)
+        other.graft(first, other_slot)
 
 
 def vary_parts(
     draws: BufferedRng, branches: Iterable[MutableGenome], epsilon: float
 ) -> None:
-    """Move every part's parameters, but for its colour, towards random values."""
+    """Move the parameters of every part, except its colour, towards random values."""
     for branch in branches:
         if branch.kind.own_parameters:
             branch.parameters = draws.nearby(
@@ -113,19 +113,19 @@ def vary_parts(
 
 
 def expected_parts(root: MutableGenome, experiment: Experiment) -> float:
-    """Return how many parts to add on average; 0 or less is none.
+    """Return the mean number of parts to add; 0 or less means none.
 
-    What deletion takes on average, less what duplication gives, but no more than
-    there is room for.
+    It is the mean number that deletion removes less the mean number that duplication
+    adds, limited by the room that is left.
     """
     variation, space = experiment.variation, experiment.space
-    sizes = tallies(preorder(root))
-    gone = [sizes[branch].parts for branch in deletable(sizes, space)]
-    doubled = [sizes[branch].parts for branch in duplicable(sizes, space)]
-    more = float(sum(doubled))
-    if doubled and variation.duplicable_size == "mean":
-        more /= len(doubled)
-    less = sum(gone) / len(gone) if gone else 0.0
+    sizes = subtree_sizes(preorder(root))
+    deleted = [sizes[branch].parts for branch in deletable(sizes, space)]
+    duplicated = [sizes[branch].parts for branch in duplicable(sizes, space)]
+    more = float(sum(duplicated))
+    if duplicated and variation.duplicable_size == "mean":
+        more /= len(duplicated)
+    less = sum(deleted) / len(deleted) if deleted else 0.0
     return min(
         variation.p_delete_subtree * less - variation.p_duplicate_subtree * more,
         space.max_parts - sizes[root].parts,
@@ -138,15 +138,13 @@ def add_parts(
     genes: Iterator[int],
     experiment: Experiment,
 ) -> None:
-    """Add random parts, `expected_parts` on average, each with its share of brain."""
+    """Add random parts, `expected_parts` on average, with neurons and connections."""
     expected = expected_parts(root, experiment)
     if expected <= 0.0:
         return
-    reevaluations = (
-        ceil(2.0 * expected) if experiment.variation.add_parts == "loop" else 1
-    )
-    for _ in range(reevaluations):
-        if draws.chance(expected / reevaluations):
+    trials = ceil(2.0 * expected) if experiment.variation.add_parts == "loop" else 1
+    for _ in range(trials):
+        if draws.chance(expected / trials):
             _add_part(draws, root, genes, experiment)
 
 
@@ -158,21 +156,22 @@ def _add_part(
 ) -> None:
     space = experiment.space
     branches = preorder(root)
-    size = tally(branches)
+    size = size_of(branches)
     usable = usable_types(body_space(space), size, space)
     growth = pick_growth(draws, free_places(branches), usable)
     if growth is None:
         return
     (parent, slot), kind = growth
     part = random_part(draws, kind, genes)
-    share = half_up(Fraction(draws.below(space.max_hidden + 1), size.parts))
+    # A share of 0..max_hidden neurons, rounded half up.
+    share = (2 * draws.below(space.max_hidden + 1) + size.parts) // (2 * size.parts)
     part.hidden = tuple(
         random_neuron(draws) for _ in range(min(share, space.max_hidden - size.hidden))
     )
     parent.graft(part, slot)
     wire(
         draws,
-        endings([part], "input", "output", "hidden"),
-        endings(preorder(root), "output", "hidden"),
+        endpoints([part], "input", "output", "hidden"),
+        endpoints(preorder(root), "output", "hidden"),
         experiment.generation.p_connect_neurons,
     )

@@ -1,8 +1,8 @@
-"""The steps of mutation that change the brain; `variation` orders them.
+"""Mutation of the brain, step by step; `variation` calls the steps in order.
 
-Each changes a tree in place and keeps every restriction. Source: Hupkes 2016,
-section 4.4.6; facts of the original, section 4.5. Its trap is avoided: deleting a
-hidden neuron re-wires nothing.
+Each step changes a tree in place and keeps every restriction. Source: Hupkes 2016,
+section 4.4.6; facts of the original, section 4.5. One error of the original is
+avoided: deleting a hidden neuron redirects no other connection.
 """
 
 from collections.abc import Sequence
@@ -10,9 +10,9 @@ from decimal import Decimal
 
 from msgspec.structs import replace
 
-from coordinator.evolution.buffered_rng import BufferedRng
-from coordinator.evolution.growth import connect, endings, random_neuron
+from coordinator.evolution.growth import connect, endpoints, random_neuron
 from coordinator.evolution.mutable_genome import MutableGenome, follow
+from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Experiment
 from schema.robot.brain import NEURON_TYPES
 from schema.robot.genome import ConnectionGene, NeuronGene
@@ -23,38 +23,40 @@ _HALF = Decimal("0.5")
 def delete_hidden_neurons(
     draws: BufferedRng, branches: Sequence[MutableGenome], probability: float
 ) -> None:
-    """Delete each hidden neuron with a probability, and what led to or from it.
+    """Delete each hidden neuron with a probability, and its connections.
 
-    Connections to and from the neurons that stay lead where they led before.
+    Connections of the remaining neurons keep their source and target.
     """
-    moved: dict[MutableGenome, list[int | None]] = {}
+    new_offsets: dict[MutableGenome, list[int | None]] = {}
     for branch in branches:
         if not branch.hidden:
             continue
         stays = [not draws.chance(probability) for _ in branch.hidden]
         if not all(stays):
             offsets = iter(range(len(stays)))
-            moved[branch] = [next(offsets) if stay else None for stay in stays]
-    if not moved:
+            new_offsets[branch] = [next(offsets) if stay else None for stay in stays]
+    if not new_offsets:
         return
     for branch in branches:
         if branch.connections:
-            renamed = [_renamed(gene, branch, moved) for gene in branch.connections]
-            branch.connections = tuple([gene for gene in renamed if gene is not None])
-    for branch, offsets_after in moved.items():
+            genes = [
+                _renumbered(gene, branch, new_offsets) for gene in branch.connections
+            ]
+            branch.connections = tuple([gene for gene in genes if gene is not None])
+    for branch, after_deletion in new_offsets.items():
         branch.hidden = tuple(
             neuron
-            for neuron, after in zip(branch.hidden, offsets_after, strict=True)
+            for neuron, after in zip(branch.hidden, after_deletion, strict=True)
             if after is not None
         )
 
 
-def _renamed(
+def _renumbered(
     gene: ConnectionGene,
     owner: MutableGenome,
-    moved: dict[MutableGenome, list[int | None]],
+    new_offsets: dict[MutableGenome, list[int | None]],
 ) -> ConnectionGene | None:
-    """Return a connection under its neurons' new offsets; None if one is gone."""
+    """Return a connection with new offsets; None if one of its neurons is deleted."""
     if "hidden" not in (gene.source[0], gene.target[0]):
         return gene
     offsets = {"source": gene.source[1], "target": gene.target[1]}
@@ -63,17 +65,15 @@ def _renamed(
         ("source", owner, gene.source[0]),
         ("target", end, gene.target[0]),
     ):
-        after = moved.get(branch) if branch is not None else None
+        after = new_offsets.get(branch) if branch is not None else None
         if after is None or layer != "hidden":
             continue
         before = offsets[name]
-        # A connection to a neuron that never was keeps leading to none.
-        renamed = after[before] if before < len(after) else before - after.count(None)
-        if renamed is None:
+        # An offset beyond the layer stays beyond it.
+        new = after[before] if before < len(after) else before - after.count(None)
+        if new is None:
             return None
-        offsets[name] = renamed
-    if offsets == {"source": gene.source[1], "target": gene.target[1]}:
-        return gene
+        offsets[name] = new
     return replace(
         gene,
         source=(gene.source[0], offsets["source"]),
@@ -95,7 +95,7 @@ def delete_connections(
 def vary_neurons(
     draws: BufferedRng, branches: Sequence[MutableGenome], epsilon: float
 ) -> None:
-    """Move every neuron's parameters towards random values."""
+    """Move the parameters of every neuron towards random values."""
     for branch in branches:
         if branch.outputs:
             branch.outputs = _varied(draws, branch.outputs, epsilon)
@@ -123,13 +123,13 @@ def add_hidden_neurons(
     before: int,
     experiment: Experiment,
 ) -> None:
-    """Add as many hidden neurons as deletion takes on average.
+    """Add as many hidden neurons as deletion removes on average.
 
     Args:
-        draws: where they come from.
-        branches: the tree, depth first.
-        before: hidden neurons that it had before any was deleted.
-        experiment: probability, limit and way of rounding.
+        draws: source of all choices.
+        branches: branches of the tree, depth first.
+        before: number of hidden neurons before deletion.
+        experiment: probability of deletion, limit and rounding.
     """
     variation = experiment.variation
     if variation.hidden_rounding == "half-up":
@@ -147,20 +147,20 @@ def add_connections(
     before: int,
     experiment: Experiment,
 ) -> None:
-    """Add as many connections as deletion takes on average, rounded half up.
+    """Add as many connections as deletion removes on average, rounded half up.
 
     Args:
-        draws: where they come from.
-        branches: the tree, depth first.
-        before: connections that it had before any was deleted.
+        draws: source of all choices.
+        branches: branches of the tree, depth first.
+        before: number of connections before deletion.
         experiment: probability of deletion.
     """
     probability = experiment.variation.p_remove_brain_connection
     count = _share(before, probability)
     if not count:
         return
-    sources = endings(branches, "input", "output", "hidden")
-    targets = [ending for ending in sources if ending[1][0] != "input"]
+    sources = endpoints(branches, "input", "output", "hidden")
+    targets = [endpoint for endpoint in sources if endpoint[1][0] != "input"]
     if not (sources and targets):
         return
     for _ in range(count):
@@ -171,6 +171,6 @@ def add_connections(
 def _share(count: int, probability: float) -> int:
     """Return a share of a count, rounded half up.
 
-    The probability is the decimal number that a document wrote: halves are exact.
+    The probability counts as the decimal number of the document: halves are exact.
     """
     return int(count * Decimal(repr(probability)) + _HALF)

@@ -1,20 +1,21 @@
-"""How a birth's candidates come about: made at random, or by two parents.
+"""Candidates of a birth, random or from two parents, and the survivors of a brood.
 
-Every candidate is a pure function of seed, run, birth, attempt and the population:
-attempts are numbered through all couples of a birth, so that no two draw alike.
+Every candidate is a pure function of seed, run, birth, attempt and population.
+Attempts are numbered through all couples of a birth, so that each has its own stream.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.generation import generate
-from coordinator.evolution.seeding import Purpose, stream
+from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import (
     Couple,
     Individual,
+    cull_population,
     select_parents,
     select_survivors,
 )
@@ -25,23 +26,23 @@ from schema.robot.genome import Genome, develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 
-BARREN = "crossover found no fitting subtree, or the child had no motor"
-"""Why an attempt comes to no candidate."""
+_NO_CHILD = "crossover found no fitting subtree, or the child had no motor"
+"""Reason why an attempt gives no candidate."""
 
 _COUPLES = 100
-"""Couples that may fail at one birth before a document is called impossible."""
+"""Number of couples that may fail at one birth before `Breeder` gives up."""
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """Who may be born under a number.
+    """Robot that may be born under a birth id.
 
     Attributes:
-        birth: the number.
-        attempt: that came to this one, from 0.
+        birth: the birth id.
+        attempt: number of the attempt that gave this candidate, from 0.
         couple: its parents; None for a random robot.
         genome: what it inherits.
-        robot: what that develops into.
+        robot: the robot that develops from the genome.
     """
 
     birth: BirthId
@@ -50,9 +51,14 @@ class Candidate:
     genome: Genome
     robot: Robot
 
+    @property
+    def rank(self) -> int:
+        """Rank of the individual (thesis eq. 6.1)."""
+        return 1 + max((parent.rank for parent in self.couple or ()), default=0)
+
 
 class Breeder:
-    """Makes candidates and picks survivors for one execution of an experiment."""
+    """Source of candidates and selector of survivors for one run of an experiment."""
 
     __slots__ = ("_experiment", "_run", "_seed")
 
@@ -61,32 +67,41 @@ class Breeder:
         self._seed = seed
         self._run = run
 
-    def attempt(
+    def candidate(
         self,
         birth: BirthId,
-        number: int,
+        attempt: int,
         population: Sequence[Individual],
-        couple: Couple | None,
-        why: str,
-    ) -> tuple[Couple | None, Candidate | None]:
-        """Return one attempt's parents, and the candidate if they come to one.
+        couple: Couple | None = None,
+        why: str = "",
+        *,
+        end: float = inf,
+    ) -> Candidate | None:
+        """Return the candidate of the first attempt that gives one.
 
         Args:
-            birth: who is to be born.
-            number: of the attempt, from 0, through all couples of this birth.
-            population: who may mate; empty for a founder.
+            birth: id of the birth.
+            attempt: number of the first attempt, from 0, through all couples.
+            population: possible parents; empty for a founder.
             couple: parents of the attempt before; None at the first.
-            why: the attempt before failed; empty at the first.
+            why: reason why the attempt before failed; empty at the first.
+            end: number of the attempt at which to stop.
+
+        Returns:
+            The candidate; None if no attempt before ``end`` gives one.
 
         Raises:
-            ExperimentError: restrictions that (nearly) no robot meets.
+            ExperimentError: (nearly) no robot meets the restrictions.
         """
-        self.check_patience(birth, number, population, why)
-        couple, genome = self.conceive(birth, number, population, couple)
-        if genome is None:
-            return couple, None
-        robot = develop(genome, body_space(self._experiment.space))
-        return couple, Candidate(birth, number, couple, genome, robot)
+        while attempt < end:
+            self.check_attempts(birth, attempt, population, why)
+            couple, genome = self.conceive(birth, attempt, population, couple)
+            if genome is not None:
+                robot = develop(genome, body_space(self._experiment.space))
+                return Candidate(birth, attempt, couple, genome, robot)
+            attempt += 1
+            why = _NO_CHILD
+        return None
 
     def conceive(
         self,
@@ -95,20 +110,20 @@ class Breeder:
         population: Sequence[Individual],
         couple: Couple | None,
     ) -> tuple[Couple | None, Genome | None]:
-        """Return one attempt's parents and the genome that they come to.
+        """Return the parents of one attempt and the genome of their child.
 
         Args:
-            birth: whose genome it is to be.
-            attempt: from 0, through all couples of this birth.
-            population: who may mate; empty for a founder.
+            birth: id of the birth.
+            attempt: number of the attempt, from 0, through all couples.
+            population: possible parents; empty for a founder.
             couple: parents of the attempt before; None at attempt 0.
 
         Returns:
-            The parents, None for a random robot; and the genome, None where mating
-            came to none. After ``max_mating_attempts`` come new parents.
+            The parents, None for a random robot; and the genome, None if mating
+            failed. After ``max_mating_attempts`` new parents are selected.
 
         Raises:
-            ExperimentError: restrictions that no random robot meets.
+            ExperimentError: no random robot meets the restrictions.
         """
         selection = self._experiment.selection
         if self._is_random(population):
@@ -121,20 +136,20 @@ class Breeder:
         first, second = couple
         return couple, mate(first.genome, second.genome, rng, self._experiment, birth)
 
-    def check_patience(
+    def check_attempts(
         self, birth: BirthId, attempts: int, population: Sequence[Individual], why: str
     ) -> None:
-        """Raise if a birth has failed so often that it always will.
+        """Raise if too many attempts at a birth have failed.
 
         Args:
-            birth: the one that is tried.
-            attempts: that failed.
-            population: who may mate; empty for a founder.
-            why: the last attempt failed.
+            birth: id of the birth.
+            attempts: number of failed attempts.
+            population: possible parents; empty for a founder.
+            why: reason why the last attempt failed.
 
         Raises:
-            ExperimentError: the document's own limit for random robots is reached,
-                or a hundred couples failed.
+            ExperimentError: the experiment's limit for random robots is reached, or
+                a hundred couples failed.
         """
         if self._is_random(population):
             limit, what = self._experiment.generation.max_tries, "generation.max_tries"
@@ -149,15 +164,20 @@ class Breeder:
             )
 
     def survivors(
-        self,
-        parents: Sequence[Individual],
-        children: Sequence[Individual],
-        last: BirthId,
+        self, parents: Sequence[Individual], children: Sequence[Individual]
     ) -> tuple[Individual, ...]:
-        """Return the population after a brood whose last birth is ``last``."""
-        draws = BufferedRng(self._stream(last, 0, Purpose.SURVIVORS))
+        """Return the population after a brood, in birth order.
+
+        Args:
+            parents: the population before.
+            children: the brood, in birth order; at least one.
+        """
         selection = self._experiment.selection
-        return select_survivors(parents, children, draws, selection)
+        if selection.culling is not None:
+            founders = selection.population
+            return cull_population(parents, children, founders, selection.culling)
+        rng = self._stream(children[-1].birth, 0, Purpose.SURVIVORS)
+        return select_survivors(parents, children, BufferedRng(rng), selection)
 
     def _is_random(self, population: Sequence[Individual]) -> bool:
         return not population or self._experiment.selection.parents == "none"

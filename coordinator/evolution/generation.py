@@ -1,18 +1,17 @@
-"""Random robots: the founders, and the whole of the no-reproduction baseline.
+"""Random genomes: founders, and all robots of the no-reproduction baseline.
 
-Source: Hupkes 2016, section 4.4.2; facts of the original, section 4.3. Two traps
-are avoided: an experiment's least number of parts is kept, not only aimed at, and
-every part has an identity of its own beside the colour that it shares.
+Source: Hupkes 2016, section 4.4.2; facts of the original, section 4.3. Two errors of
+the original are avoided: no robot has fewer parts than the experiment allows, and
+every part has its own identity beside the common colour.
 """
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.growth import (
     Place,
-    endings,
+    endpoints,
     pick_growth,
     random_neuron,
     random_part,
@@ -24,9 +23,10 @@ from coordinator.evolution.mutable_genome import (
     gene_ids,
     level,
     preorder,
+    size_of,
     to_genome,
 )
-from coordinator.evolution.size_counts import SizeCounts, tally
+from coordinator.evolution.random_streams import BufferedRng
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, body_space
 from schema.parts import COLOURS
@@ -35,7 +35,7 @@ from schema.robot.ids import BirthId
 
 FIRST = BirthId(0, 0)
 MAX_TREES = 10_000
-"""Trees without a motor, or too small, before a document is called impossible."""
+"""Number of trees without a motor, or too small, before `generate` fails."""
 
 
 def generate(
@@ -43,22 +43,22 @@ def generate(
 ) -> Genome:
     """Return a random genome: at least one motor, within all restrictions.
 
-    Whether its parts intersect is the analyzer's question, not this one's.
+    The analyzer checks later whether its parts intersect.
 
     Args:
         rng: the stream to draw from.
         experiment: body space, restrictions, probabilities.
-        birth: whose it is; its parts' identities are made of it.
+        birth: id of the individual; the identities of its parts derive from it.
 
     Raises:
-        ExperimentError: restrictions that no random tree meets.
+        ExperimentError: no random tree meets the restrictions.
     """
     draws = BufferedRng(rng)
     least = experiment.space.min_parts
     for _ in range(MAX_TREES):
         root = _random_body(draws, experiment, gene_ids(birth))
         branches = preorder(root)
-        size = tally(branches)
+        size = size_of(branches)
         if size.outputs and size.parts >= least:
             _add_brain(draws, branches, experiment)
             if experiment.space.planar:
@@ -74,7 +74,7 @@ def generate(
 def _random_body(
     draws: BufferedRng, experiment: Experiment, genes: Iterator[int]
 ) -> MutableGenome:
-    """Return a random tree without hidden neurons; it may lack a motor."""
+    """Return a random tree without hidden neurons, possibly without a motor."""
     space, shape = experiment.space, experiment.generation
     types = body_space(space)
     drawn = int(draws.normal(shape.parts_mean, shape.parts_sd))
@@ -82,7 +82,7 @@ def _random_body(
     core = next(kind for kind in types.values() if kind.is_root)
     root = random_part(draws, core, genes)
     colour = root.parameters[-len(COLOURS) :]
-    size = SizeCounts(1, core.inputs, core.outputs, 0)
+    size = size_of([root])
     places: list[Place] = [(root, slot) for slot in range(core.arity)]
     while size.parts < target:
         growth = pick_growth(draws, places, usable_types(types, size, space))
@@ -91,7 +91,7 @@ def _random_body(
         (parent, slot), kind = growth
         part = random_part(draws, kind, genes, colour)
         parent.graft(part, slot)
-        size = size.plus(SizeCounts(1, kind.inputs, kind.outputs, 0))
+        size = size.plus(size_of([part]))
         places.extend((part, free) for free in part.free_slots())
     return root
 
@@ -99,7 +99,7 @@ def _random_body(
 def _add_brain(
     draws: BufferedRng, branches: Sequence[MutableGenome], experiment: Experiment
 ) -> None:
-    """Give a tree its hidden neurons, and connections among all neurons."""
+    """Add hidden neurons to a tree, and connections among all neurons."""
     hosts = branches
     if experiment.generation.hidden_on == "wired":
         hosts = [b for b in branches if b.kind.inputs or b.outputs]
@@ -107,7 +107,7 @@ def _add_brain(
         draws.pick(hosts).hidden += (random_neuron(draws),)
     wire(
         draws,
-        endings(branches, "input", "output", "hidden"),
-        endings(branches, "output", "hidden"),
+        endpoints(branches, "input", "output", "hidden"),
+        endpoints(branches, "output", "hidden"),
         experiment.generation.p_connect_neurons,
     )

@@ -1,14 +1,16 @@
-"""What generation and mutation add to a tree: parts, neurons, connections.
+"""Random parts, neurons and connections, for generation and mutation.
 
 Source: facts of the original, sections 4.3 and 4.5.
 """
 
 from collections.abc import Iterable, Iterator
-from fractions import Fraction
 
-from coordinator.evolution.buffered_rng import BufferedRng
-from coordinator.evolution.mutable_genome import MutableGenome, path_between
-from coordinator.evolution.size_counts import SizeCounts
+from coordinator.evolution.mutable_genome import (
+    MutableGenome,
+    SizeCounts,
+    path_between,
+)
+from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Space
 from schema.parts import COLOURS, BodySpace, PartType
 from schema.robot.brain import NEURON_TYPES, Layer
@@ -16,19 +18,15 @@ from schema.robot.genome import ConnectionGene, NeuronGene
 from schema.robot.robot import ORIENTATIONS
 
 Place = tuple[MutableGenome, int]
-Ending = tuple[MutableGenome, tuple[Layer, int]]
-"""One end of a connection: a branch and a neuron of it."""
+"""A branch and one of its slots."""
+Endpoint = tuple[MutableGenome, tuple[Layer, int]]
+"""One end of a connection: a branch and one of its neurons."""
 
 _NEURONS = tuple(NEURON_TYPES.items())
 
 
-def half_up(number: Fraction) -> int:
-    """Return the nearest integer, the upper one of two: the original's rounding."""
-    return int(number + Fraction(1, 2))
-
-
 def random_neuron(draws: BufferedRng) -> NeuronGene:
-    """Return an output or hidden neuron of uniform type, uniform parameters."""
+    """Return an output or hidden neuron of uniform type with uniform parameters."""
     kind, parameters = draws.pick(_NEURONS)
     return NeuronGene(kind, draws.values(parameters))
 
@@ -39,13 +37,13 @@ def random_part(
     genes: Iterator[int],
     colour: tuple[float, ...] = (),
 ) -> MutableGenome:
-    """Return a part that hangs nowhere yet, without hidden neurons.
+    """Return a detached part without hidden neurons.
 
     Args:
-        draws: where its slot, turn, parameters and neurons come from.
-        kind: its type; a root gets no slot and no turn.
+        draws: source of its slot, orientation, parameters and neurons.
+        kind: its type; a root gets no slot and no orientation.
         genes: the next of them becomes its identity.
-        colour: red, green, blue; empty for random ones.
+        colour: red, green, blue; empty for a random colour.
     """
     return MutableGenome(
         kind,
@@ -58,7 +56,7 @@ def random_part(
 
 
 def usable_types(types: BodySpace, size: SizeCounts, space: Space) -> list[PartType]:
-    """Return the part types that a tree of some size may still take."""
+    """Return the part types that fit a tree of some size within all limits."""
     return [
         kind
         for kind in types.values()
@@ -72,40 +70,41 @@ def usable_types(types: BodySpace, size: SizeCounts, space: Space) -> list[PartT
 def pick_growth(
     draws: BufferedRng, places: list[Place], usable: list[PartType]
 ) -> tuple[Place, PartType] | None:
-    """Return a free place and a type to put there, or None if nothing fits.
+    """Return a free place and a type for it, or None if nothing fits.
 
     The place is uniform among those that some type fits, the type uniform among
-    those that fit the place. The place is taken out of ``places``, as is any that
-    nothing fits: as a tree grows, what is usable only becomes less.
+    those that fit the place. The place is removed from ``places``, as is every place
+    that no type fits: a growing tree never makes more types usable.
     """
     while places and usable:
         place = places.pop(draws.below(len(places)))
-        under = place[0].kind.name
-        if fitting := [kind for kind in usable if under not in kind.not_on]:
+        parent = place[0].kind.name
+        if fitting := [kind for kind in usable if parent not in kind.not_on]:
             return place, draws.pick(fitting)
     return None
 
 
-def endings(branches: Iterable[MutableGenome], *layers: Layer) -> list[Ending]:
-    """Return the neurons of some layers that connections may end or begin at."""
+def endpoints(branches: Iterable[MutableGenome], *layers: Layer) -> list[Endpoint]:
+    """Return all neurons of some layers as ends of connections."""
     return [(branch, end) for branch in branches for end in branch.neurons(*layers)]
 
 
-def connect(draws: BufferedRng, source: Ending, target: Ending) -> ConnectionGene:
-    """Return a connection of random weight with the path that leads there."""
+def connect(draws: BufferedRng, source: Endpoint, target: Endpoint) -> ConnectionGene:
+    """Return a connection of random weight from one neuron to another."""
     path = path_between(source[0], target[0])
     return ConnectionGene(source[1], path, target[1], draws.number())
 
 
 def wire(
-    draws: BufferedRng, sources: list[Ending], targets: list[Ending], probability: float
+    draws: BufferedRng,
+    sources: list[Endpoint],
+    targets: list[Endpoint],
+    probability: float,
 ) -> None:
     """Add each connection of the full product with a probability."""
     for source in sources:
-        branch = source[0]
-        made = tuple(
+        source[0].connections += tuple(
             connect(draws, source, target)
             for target in targets
-            if draws.number() < probability
+            if draws.chance(probability)
         )
-        branch.connections += made

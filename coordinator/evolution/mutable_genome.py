@@ -1,13 +1,16 @@
-"""A genome in the making: the tree that generation and variation cut and graft.
+"""Mutable tree of a genome, and the sizes of its subtrees.
 
-A genome never changes; a `MutableGenome` may. It is thawed from a genome, worked upon
-within one function call, and frozen into a new genome.
+Generation and variation convert a genome into such a tree, change the tree within one
+function call, and convert it into a new genome.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count
+from operator import add, le, sub
+from typing import NamedTuple
 
+from schema.experiment.document import Space
 from schema.parts import BodySpace, PartType
 from schema.robot.brain import Layer
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, walk
@@ -16,10 +19,12 @@ from schema.robot.ids import BirthId
 
 @dataclass(slots=True, eq=False)
 class MutableGenome:
-    """A node that may still change; its fields are those of `Node`.
+    """Mutable node of a genome; its first fields are those of `Node`.
 
-    ``parent`` and ``parent_slot`` are None and -1 at the root; ``children`` stand by
-    ascending slot.
+    Attributes:
+        parent: None at the root.
+        parent_slot: slot of the parent that it occupies; -1 at the root.
+        children: by slot, ascending.
     """
 
     kind: PartType
@@ -35,7 +40,7 @@ class MutableGenome:
     children: "dict[int, MutableGenome]" = field(default_factory=dict)
 
     def free_slots(self) -> list[int]:
-        """Return the slots that nothing sits on, ascending."""
+        """Return the slots that are free, ascending."""
         return [
             slot
             for slot in range(self.kind.arity)
@@ -43,18 +48,18 @@ class MutableGenome:
         ]
 
     def graft(self, child: "MutableGenome", slot: int) -> None:
-        """Put a child on a slot, in the place of whatever sat there."""
+        """Attach a child to a slot; it replaces the child that was there."""
         child.parent, child.parent_slot = self, slot
         self.children = dict(sorted({**self.children, slot: child}.items()))
 
     def cut(self) -> None:
-        """Take this branch, which must not be a root, off its parent."""
+        """Detach this branch, which must not be a root, from its parent."""
         assert self.parent is not None
         del self.parent.children[self.parent_slot]
         self.parent, self.parent_slot = None, -1
 
     def neurons(self, *layers: Layer) -> list[tuple[Layer, int]]:
-        """Return (layer, offset) of its own neurons of some layers, in turn."""
+        """Return (layer, offset) of its own neurons, in the order of the layers."""
         found: list[tuple[Layer, int]] = []
         for layer in layers:
             if layer == "input":
@@ -67,7 +72,7 @@ class MutableGenome:
 
 
 def gene_ids(birth: BirthId) -> Iterator[int]:
-    """Return the gene identities that an individual may give to its new parts.
+    """Return the gene identities for the new parts of an individual.
 
     They are unique over a run: 16 bits of island, 32 of birth number and 16 of a
     running index from 1, so that no gene is 0.
@@ -76,7 +81,7 @@ def gene_ids(birth: BirthId) -> Iterator[int]:
 
 
 def to_mutable(genome: Genome, space: BodySpace) -> MutableGenome:
-    """Return a genome as a tree that may change."""
+    """Return a genome as a mutable tree."""
     branches: list[MutableGenome] = []
     for node, parent, slot in walk(genome):
         branch = MutableGenome(
@@ -98,10 +103,10 @@ def to_mutable(genome: Genome, space: BodySpace) -> MutableGenome:
 
 
 def to_genome(branches: Sequence[MutableGenome]) -> Genome:
-    """Return a tree, given depth first, as a genome."""
-    frozen: dict[MutableGenome, Node] = {}
+    """Return the genome of a tree whose branches are given depth first."""
+    nodes: dict[MutableGenome, Node] = {}
     for branch in reversed(branches):
-        frozen[branch] = Node(
+        nodes[branch] = Node(
             branch.kind.name,
             branch.slot,
             branch.orientation,
@@ -110,9 +115,9 @@ def to_genome(branches: Sequence[MutableGenome]) -> Genome:
             branch.outputs,
             branch.hidden,
             branch.connections,
-            tuple([(slot, frozen[child]) for slot, child in branch.children.items()]),
+            tuple([(slot, nodes[child]) for slot, child in branch.children.items()]),
         )
-    return frozen[branches[0]]
+    return nodes[branches[0]]
 
 
 def preorder(root: MutableGenome) -> list[MutableGenome]:
@@ -128,23 +133,11 @@ def preorder(root: MutableGenome) -> list[MutableGenome]:
 
 
 def copied(root: MutableGenome) -> MutableGenome:
-    """Return a copy of a tree that hangs nowhere."""
-    twins: dict[MutableGenome, MutableGenome] = {}
-    for branch in preorder(root):
-        twin = twins[branch] = MutableGenome(
-            branch.kind,
-            branch.slot,
-            branch.orientation,
-            branch.parameters,
-            branch.gene,
-            branch.outputs,
-            branch.hidden,
-            branch.connections,
-        )
-        if branch is not root:
-            assert branch.parent is not None
-            twins[branch.parent].graft(twin, branch.parent_slot)
-    return twins[root]
+    """Return a detached copy of a tree."""
+    copy = replace(root, parent=None, parent_slot=-1, children={})
+    for slot, child in root.children.items():
+        copy.graft(copied(child), slot)
+    return copy
 
 
 def free_places(branches: Iterable[MutableGenome]) -> list[tuple[MutableGenome, int]]:
@@ -176,7 +169,7 @@ def path_between(source: MutableGenome, target: MutableGenome) -> tuple[int, ...
 
 
 def follow(branch: MutableGenome, path: tuple[int, ...]) -> MutableGenome | None:
-    """Return the branch that a path leads to, or None if it leads nowhere."""
+    """Return the branch at the end of a path; None if the path does not exist."""
     here: MutableGenome | None = branch
     for slot in path:
         if here is None:
@@ -186,10 +179,10 @@ def follow(branch: MutableGenome, path: tuple[int, ...]) -> MutableGenome | None
 
 
 def level(branches: Iterable[MutableGenome]) -> None:
-    """Turn the levelled parts of a tree, given depth first, to its core's plane.
+    """Turn the levelled parts of a tree, given depth first, into its core's plane.
 
-    Walking outwards, the turns add up; every part that is levelled gets the turn
-    that brings the sum back to zero, all others keep theirs.
+    Turns add up from the core outwards. Every levelled part gets the turn that brings
+    the sum back to zero; all other parts keep theirs.
 
     Source: facts of the original, section 2 (planarity).
     """
@@ -202,3 +195,57 @@ def level(branches: Iterable[MutableGenome]) -> None:
         if branch.kind.is_levelled:
             branch.orientation = (360 - before) % 360
         turns[branch] = (before + branch.orientation) % 360
+
+
+class SizeCounts(NamedTuple):
+    """Counts of everything that the restrictions of a space limit, of some branches."""
+
+    parts: int
+    inputs: int
+    outputs: int
+    hidden: int
+
+    def plus(self, other: "SizeCounts") -> "SizeCounts":
+        """Return the sum with other counts."""
+        return SizeCounts(*map(add, self, other))
+
+    def minus(self, other: "SizeCounts") -> "SizeCounts":
+        """Return what is left without other counts."""
+        return SizeCounts(*map(sub, self, other))
+
+    def fits(self, room: "SizeCounts") -> bool:
+        """Return whether no count exceeds that of ``room``."""
+        return all(map(le, self, room))
+
+
+def size_limits(space: Space) -> SizeCounts:
+    """Return the greatest counts that a whole tree may have."""
+    return SizeCounts(
+        space.max_parts, space.max_inputs, space.max_outputs, space.max_hidden
+    )
+
+
+def size_of(branches: Iterable[MutableGenome]) -> SizeCounts:
+    """Return the counts of some branches, without their children."""
+    parts = inputs = outputs = hidden = 0
+    for branch in branches:
+        parts += 1
+        inputs += branch.kind.inputs
+        outputs += len(branch.outputs)
+        hidden += len(branch.hidden)
+    return SizeCounts(parts, inputs, outputs, hidden)
+
+
+def subtree_sizes(branches: Sequence[MutableGenome]) -> dict[MutableGenome, SizeCounts]:
+    """Return the counts of every subtree, in the order of the branches.
+
+    Args:
+        branches: those of a tree, depth first.
+    """
+    sums: dict[MutableGenome, SizeCounts] = {}
+    for branch in reversed(branches):
+        size = size_of([branch])
+        for child in branch.children.values():
+            size = size.plus(sums[child])
+        sums[branch] = size
+    return dict(reversed(sums.items()))

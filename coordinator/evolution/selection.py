@@ -1,30 +1,34 @@
-"""Who mates and who lives on.
+"""Selection of parents and of survivors, and culling.
 
-Source: Hupkes 2016, section 5.3; facts of the original, section 5.1.
+Source: Hupkes 2016, sections 5.3 and 8.2; facts of the original, sections 5.1 and 5.2.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import fsum
+from typing import Literal
 
-from coordinator.evolution.buffered_rng import BufferedRng
-from schema.experiment.document import Selection
+from coordinator.evolution.random_streams import BufferedRng
+from schema.experiment.document import Arena, Culling, Selection
 from schema.robot.genome import Genome
 from schema.robot.ids import BirthId
 
 Couple = tuple["Individual", "Individual"]
 
+CullReason = Literal["selection", "cull"]
+
 
 @dataclass(frozen=True, slots=True)
 class Individual:
-    """One of a population.
+    """Member of a population.
 
     Attributes:
-        birth: its name.
-        genome: what it hands down.
+        birth: its id.
+        genome: what its children inherit.
         fitness: always maximised; 0 where its evaluation failed.
         rank: 1 without parents, else 1 + the greatest of theirs (thesis eq. 6.1).
         generation: number of its brood; founders are 0; None on-line.
-        has_failed: its evaluation ended without a judgement.
+        has_failed: its evaluation ended without a fitness.
     """
 
     birth: BirthId
@@ -36,7 +40,7 @@ class Individual:
 
 
 def fittest_first(individuals: Sequence[Individual]) -> list[Individual]:
-    """Return individuals by falling fitness; of equals the elder comes first."""
+    """Return individuals by descending fitness; of equals the elder comes first."""
     return sorted(individuals, key=_order)
 
 
@@ -50,21 +54,24 @@ def select_parents(
     """Return two different parents, the one that gives its root first.
 
     Args:
-        population: those who may mate, in an order that repeats.
-        draws: where chance comes from.
-        selection: ``tournament``: each is the fittest of a few drawn without
-            replacement, the second from those that the first leaves; otherwise
-            both are uniform.
+        population: the candidates, in a reproducible order.
+        draws: source of all choices.
+        selection: ``tournament``: each parent is the fittest of a few drawn without
+            replacement, the second from the rest of the population; otherwise both
+            are uniform.
     """
     if selection.parents != "tournament":
         first, second = draws.sample(population, 2)
         return first, second
-    first = _win(population, draws, selection.tournament_size)
+    first = tournament(population, draws, selection.tournament_size)
     rest = [one for one in population if one is not first]
-    return first, _win(rest, draws, selection.tournament_size)
+    return first, tournament(rest, draws, selection.tournament_size)
 
 
-def _win(candidates: Sequence[Individual], draws: BufferedRng, size: int) -> Individual:
+def tournament(
+    candidates: Sequence[Individual], draws: BufferedRng, size: int
+) -> Individual:
+    """Return the fittest of ``size`` candidates drawn without replacement."""
     return min(draws.sample(candidates, size), key=_order)
 
 
@@ -74,12 +81,12 @@ def select_survivors(
     draws: BufferedRng,
     selection: Selection,
 ) -> tuple[Individual, ...]:
-    """Return the next population in birth order.
+    """Return the next population of constant size, in birth order.
 
     Args:
-        parents: the population that was.
-        children: those born since.
-        draws: where chance comes from.
+        parents: the population before.
+        children: the brood.
+        draws: source of all choices.
         selection: size of the population; ``best`` or ``random``; whether parents
             compete with their children. A brood cut short by the end of the run
             always competes with its parents, or the population would shrink.
@@ -95,3 +102,57 @@ def select_survivors(
     else:
         chosen = draws.sample(pool, size)
     return tuple(sorted(chosen, key=lambda one: one.birth))
+
+
+def cull_population(
+    parents: Sequence[Individual],
+    children: Sequence[Individual],
+    founders: int,
+    rules: Culling,
+) -> tuple[Individual, ...]:
+    """Return the next population of varying size, in birth order.
+
+    The rule is that of an arena, with births as its clock. A full arena waits for its
+    next cull; a full off-line population is culled at once, or no brood would follow.
+
+    Args:
+        parents: the population before.
+        children: the brood, in birth order.
+        founders: number of births before the first interval begins.
+        rules: interval between culls, limits and shares.
+    """
+    living = sorted([*parents, *children], key=lambda one: one.birth)
+    births = children[-1].birth.number + 1 - founders
+    before = max(0, births - len(children))
+    is_due = births // rules.interval > before // rules.interval
+    if not is_due and len(living) < rules.population_limit:
+        return tuple(living)
+    _, culled = select_culled(living, rules)
+    return tuple(one for one in living if one not in culled)
+
+
+def select_culled(
+    mature: Sequence[Individual], rules: Arena | Culling
+) -> tuple[CullReason, list[Individual]]:
+    """Return the robots to cull and the reason, the least fit first.
+
+    Robots below a share of the mean fitness are culled ("selection"). If there are
+    none, and the mature alone reach the population limit, a share of the limit is
+    culled ("cull"). At least ``population_floor`` of the mature remain. The original
+    cut an unsorted list instead (trap B11).
+
+    Args:
+        mature: the robots that were evaluated over a whole window.
+        rules: those of an arena or of an off-line island.
+    """
+    weakest = fittest_first(mature)[::-1]
+    spare = max(0, len(weakest) - rules.population_floor)
+    if not weakest:
+        return "selection", []
+    mean = fsum(one.fitness for one in weakest) / len(weakest)
+    limit = rules.survive_share_of_mean * mean
+    below = [one for one in weakest if one.fitness < limit]
+    if below or len(weakest) < rules.population_limit:
+        return "selection", below[:spare]
+    count = round(rules.full_cull_share * rules.population_limit)
+    return "cull", weakest[: min(count, spare)]

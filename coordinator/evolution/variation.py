@@ -1,7 +1,7 @@
-"""How two parents make a child: crossover, mutation, and what is refused.
+"""Variation: the genome of a child by crossover and mutation.
 
 Source: Hupkes 2016, sections 4.4.3 to 4.4.6; facts of the original, sections 4.4 to
-4.6. The analyzer's verdict, which ends a mating attempt, is asked for elsewhere.
+4.6. The analyzer checks the body of the child later.
 """
 
 from collections.abc import Iterable, Iterator
@@ -22,16 +22,18 @@ from coordinator.evolution.brain_mutation import (
     delete_hidden_neurons,
     vary_neurons,
 )
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.mutable_genome import (
     MutableGenome,
     gene_ids,
     level,
     preorder,
+    size_limits,
+    size_of,
+    subtree_sizes,
     to_genome,
     to_mutable,
 )
-from coordinator.evolution.size_counts import greatest, tallies, tally
+from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Experiment, body_space
 from schema.robot.genome import Genome
 from schema.robot.ids import BirthId
@@ -44,23 +46,24 @@ def mate(
     experiment: Experiment,
     birth: BirthId,
 ) -> Genome | None:
-    """Return a child of two parents, or None where this attempt comes to none.
+    """Return the genome of a child of two parents, or None if the attempt fails.
 
     Args:
-        first: gives the child its root.
-        second: gives a subtree.
+        first: parent that gives the root.
+        second: parent that gives a subtree.
         rng: the stream of this attempt.
         experiment: body space, restrictions, probabilities.
-        birth: whose genome it is to be; its new parts' identities are made of it.
+        birth: id of the child; the identities of its new parts derive from it.
 
     Returns:
-        A genome within all restrictions, planar where bodies are, with at least
-        one motor; None if crossover finds no fitting subtree or no motor is left.
+        A genome within all restrictions, planar where the experiment says so, with at
+        least one motor; None if crossover finds no fitting subtree or no motor is
+        left.
     """
     draws = BufferedRng(rng)
     types = body_space(experiment.space)
     root, donor = to_mutable(first, types), to_mutable(second, types)
-    thawed = [*preorder(root), *preorder(donor)]
+    parents = [*preorder(root), *preorder(donor)]
     child: Genome | None = None
     if crossover(draws, root, donor, experiment):
         mutate(draws, root, gene_ids(birth), experiment)
@@ -69,16 +72,15 @@ def mate(
             if experiment.space.planar:
                 level(branches)
             child = to_genome(branches)
-        _let_go(branches)
-    _let_go(thawed)
+        _unlink(branches)
+    _unlink(parents)
     return child
 
 
-def _let_go(branches: Iterable[MutableGenome]) -> None:
-    """Free branches at once, with whatever was cut off them.
+def _unlink(branches: Iterable[MutableGenome]) -> None:
+    """Break the reference cycles of branches, so that they are freed at once.
 
-    Parents and children name each other: they would wait for the garbage collector,
-    which was a twentieth of the coordinator's time.
+    Collecting them as garbage took a twentieth of the coordinator's time.
     """
     for branch in branches:
         branch.parent = None
@@ -90,39 +92,41 @@ def crossover(
     donor: MutableGenome,
     experiment: Experiment,
 ) -> bool:
-    """Put a subtree of a donor in the place of one of a tree, neither a root.
+    """Replace a subtree by one of a donor; neither is a root.
 
-    The subtree that goes is uniform; the one that comes is uniform among those with
-    which the tree stays within its limits. It keeps its own slot and turn.
+    The replaced subtree is uniform. The donated one is uniform among those with which
+    the tree stays within its limits; it keeps its own slot and orientation.
 
     Args:
-        draws: where the choices come from.
-        root: the tree that changes.
-        donor: the other; what is taken is cut off it.
+        draws: source of all choices.
+        root: root of the tree that changes.
+        donor: root of the other tree, which loses the donated subtree.
         experiment: restrictions.
 
     Returns:
-        Whether it was done; if not, the trees are as they were.
+        Whether a subtree was replaced; if not, the trees are unchanged.
     """
     space = experiment.space
-    branches, gifts = preorder(root), tallies(preorder(donor))
+    branches, donated_sizes = preorder(root), subtree_sizes(preorder(donor))
     if len(branches) == 1:
         return False
-    gone = draws.pick(branches[1:])
-    rest = tally(branches).plus(tally(preorder(gone)), -1)
-    room = greatest(space).plus(rest, -1)
+    replaced = draws.pick(branches[1:])
+    rest = size_of(branches).minus(size_of(preorder(replaced)))
+    room = size_limits(space).minus(rest)
     candidates = [
-        branch for branch, size in gifts.items() if branch.parent and size.fits(room)
+        branch
+        for branch, size in donated_sizes.items()
+        if branch.parent and size.fits(room)
     ]
     if not candidates:
         return False
-    gift = draws.pick(candidates)
-    parts = rest.parts + gifts[gift].parts
+    donated = draws.pick(candidates)
+    parts = rest.parts + donated_sizes[donated].parts
     if experiment.variation.check_min_parts and parts < space.min_parts:
         return False
-    assert gone.parent is not None
-    gift.cut()
-    gone.parent.graft(gift, gone.parent_slot)
+    assert replaced.parent is not None
+    donated.cut()
+    replaced.parent.graft(donated, replaced.parent_slot)
     return True
 
 
@@ -132,12 +136,12 @@ def mutate(
     genes: Iterator[int],
     experiment: Experiment,
 ) -> None:
-    """Change a tree in place, step by step in the order of the thesis.
+    """Mutate a tree in place, step by step in the order of the thesis.
 
     Args:
-        draws: where all choices come from.
-        root: the tree.
-        genes: identities for parts that are added.
+        draws: source of all choices.
+        root: root of the tree.
+        genes: identities of added parts.
         experiment: restrictions and probabilities.
     """
     variation = experiment.variation

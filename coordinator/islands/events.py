@@ -20,12 +20,12 @@ from schema.wire.arena import Advance, Changes
 
 @dataclass(frozen=True, slots=True)
 class Started:
-    """The run begins; comes once, first."""
+    """The run starts; the first event, once."""
 
 
 @dataclass(frozen=True, slots=True)
 class Vetted:
-    """The analyzer judged a candidate body."""
+    """The analyzer reported on a candidate's body."""
 
     birth: BirthId
     attempt: int
@@ -34,7 +34,7 @@ class Vetted:
 
 @dataclass(frozen=True, slots=True)
 class VettingFailed:
-    """The analyzer cannot judge a candidate, and would fail on it again."""
+    """The analyzer failed on a candidate and would fail again."""
 
     birth: BirthId
     attempt: int
@@ -43,14 +43,14 @@ class VettingFailed:
 
 @dataclass(frozen=True, slots=True)
 class Evaluated:
-    """A robot was simulated and judged.
+    """A robot was evaluated.
 
     Attributes:
-        birth: whose robot.
-        evaluation: what it came to.
-        provenance: who did it.
-        trial: which evaluation of the robot it is; 0 is the one at its birth.
-        requester: the island that wanted it; None is the one of its birth.
+        birth: id of the robot.
+        evaluation: the outcome.
+        provenance: which worker did it.
+        trial: number of the evaluation of this robot; 0 is the one at its birth.
+        requester: island that requested it; None for the island of its birth.
     """
 
     birth: BirthId
@@ -62,13 +62,13 @@ class Evaluated:
 
 @dataclass(frozen=True, slots=True)
 class EvaluationFailed:
-    """A robot's simulation ended without a judgement, for a reason of its own.
+    """A robot's evaluation failed for a reason that lies in the robot.
 
     Attributes:
-        birth: whose robot.
-        reason: why.
-        provenance: who found out.
-        trial, requester: as of ``Evaluated``.
+        birth: id of the robot.
+        reason: the reason.
+        provenance: which worker reported it.
+        trial, requester: as in ``Evaluated``.
     """
 
     birth: BirthId
@@ -80,15 +80,15 @@ class EvaluationFailed:
 
 @dataclass(frozen=True, slots=True)
 class Advanced:
-    """An arena shard reached the step that it was to reach.
+    """An arena shard reached the requested step.
 
     Attributes:
-        island: whose shard.
-        number: of the advance that was asked for.
-        advance: what it came to; a journal gives it back without its poses, which
-            stand in their table before the journal has this.
-        pose_rows: how many rows its poses are.
-        provenance: who advanced it.
+        island: number of the arena.
+        number: number of the requested advance.
+        advance: its result; a journal returns it without poses, which are stored in
+            their table before the journal has this event.
+        pose_rows: number of pose rows.
+        provenance: which worker advanced it.
     """
 
     island: int
@@ -100,21 +100,21 @@ class Advanced:
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """The arena stands still until it is to resume."""
+    """Pause the arena until it is resumed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Resume:
-    """A paused arena goes on."""
+    """Resume a paused arena."""
 
 
 @dataclass(frozen=True, slots=True)
 class Insert:
-    """A robot joins: a birth without parents, who may mate like any other.
+    """Insert a robot: a birth without parents that may mate like any other robot.
 
     Attributes:
-        genome: what it hands down, and develops from.
-        place: where in the ground plane [m]; drawn as for any birth if None.
+        genome: its genome.
+        place: point of the ground plane [m]; drawn as for any birth if None.
     """
 
     genome: Genome
@@ -123,21 +123,21 @@ class Insert:
 
 @dataclass(frozen=True, slots=True)
 class Remove:
-    """A robot is taken out; nothing happens if it is not there any more."""
+    """Remove a robot; no effect if it is dead."""
 
     birth: BirthId
 
 
 @dataclass(frozen=True, slots=True)
 class ReplaceBrain:
-    """A robot gets another brain, which it does not hand down."""
+    """Replace a robot's brain; its genome stays the same."""
 
     birth: BirthId
     brain: Brain
 
 
 Order = Pause | Resume | Insert | Remove | ReplaceBrain
-"""What an operator may want of an arena."""
+"""Orders that an operator may give to an arena."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,10 +145,10 @@ class Commanded:
     """An operator gave an order.
 
     Attributes:
-        island: to which arena.
-        command_id: unique; an order that comes twice is carried out once.
-        step: at which it takes effect: the next decision (``Arena.next_step``).
-        order: what is to be done.
+        island: number of the arena.
+        command_id: unique id; a repeated order is carried out once.
+        step: step at which it takes effect: the next decision (``Arena.next_step``).
+        order: the order.
     """
 
     island: int
@@ -159,13 +159,13 @@ class Commanded:
 
 @dataclass(frozen=True, slots=True)
 class Immigrated:
-    """A neighbour's migrants of an epoch came, be they none.
+    """A neighbour's migrants of an epoch arrived (may be empty).
 
     Attributes:
-        island: to whom.
-        source: from which island.
-        epoch: that ended there, from 0.
-        migrants: who came, each with its fitness there.
+        island: the receiving island.
+        source: the sending island.
+        epoch: number of the epoch that ended there, from 0.
+        migrants: individuals with their fitness at the source.
     """
 
     island: int
@@ -176,31 +176,31 @@ class Immigrated:
 
 @dataclass(frozen=True, slots=True)
 class NeighbourClosed:
-    """A neighbour has finished: nobody comes from there any more.
+    """A neighbour has finished and sends no more migrants.
 
     Attributes:
-        island: whose neighbour.
-        neighbour: which.
+        island: the receiving island.
+        neighbour: the island that has finished.
     """
 
     island: int
     neighbour: int
 
 
-Travelled = Immigrated | NeighbourClosed
-"""Events that come of other islands' commands; no journal holds them."""
+MigrationEvent = Immigrated | NeighbourClosed
+"""Events that follow from other islands' commands; they are not journalled."""
 
 
 @dataclass(frozen=True, slots=True)
 class Audited:
-    """Two workers, if there are two, did the same evaluation."""
+    """The same evaluation was done twice, by two workers if there are two."""
 
     first: Evaluated | EvaluationFailed
     second: Evaluated | EvaluationFailed
 
     @property
     def agrees(self) -> bool:
-        """They came to the same, to the last bit."""
+        """Both outcomes are equal to the last bit."""
         match self.first, self.second:
             case Evaluated(evaluation=one), Evaluated(evaluation=other):
                 return one == other
@@ -210,24 +210,24 @@ class Audited:
 
 
 Answered = Vetted | VettingFailed | Evaluated | EvaluationFailed
-"""Events that answer a question of an off-line island."""
+"""Events that answer a request of an off-line island."""
 
-Heard = Answered | Advanced | Commanded
-"""Events of a journal that an island or an arena is told."""
+ExternalEvent = Answered | Advanced | Commanded
+"""Journalled events that an island or an arena handles."""
 
-Journalled = Heard | Audited
-"""Events that are no function of others: what the journal keeps."""
+JournalledEvent = ExternalEvent | Audited
+"""Events that the journal keeps: all that do not follow from other events."""
 
-IslandEvent = Started | Answered | Travelled
+IslandEvent = Started | Answered | MigrationEvent
 
-ArenaEvent = Started | Vetted | VettingFailed | Advanced | Commanded | Travelled
+ArenaEvent = Started | Vetted | VettingFailed | Advanced | Commanded | MigrationEvent
 
 # --- Commands ------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Vet:
-    """Have a candidate's body judged."""
+    """Have a candidate's body checked by the analyzer."""
 
     birth: BirthId
     attempt: int
@@ -236,14 +236,14 @@ class Vet:
 
 @dataclass(frozen=True, slots=True)
 class Evaluate:
-    """Have a robot simulated and judged.
+    """Have a robot evaluated.
 
     Attributes:
-        birth: whose robot.
-        robot: itself.
-        trial: which evaluation of the robot it is, from 0.
-        steps: of physics to simulate; 0: as the experiment says for all.
-        requester: as of ``Evaluated``.
+        birth: id of the robot.
+        robot: the robot.
+        trial: number of the evaluation of this robot, from 0.
+        steps: physics steps to simulate; 0 for the duration of the experiment.
+        requester: as in ``Evaluated``.
     """
 
     birth: BirthId
@@ -255,7 +255,7 @@ class Evaluate:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Write a row of a table; rows of one table come in a repeatable order."""
+    """Write a row of a table; the rows of a table have a reproducible order."""
 
     table: str
     row: Mapping[str, Any]
@@ -263,13 +263,13 @@ class Record:
 
 @dataclass(frozen=True, slots=True)
 class Append:
-    """Add rows of a bulk table that come as columns.
+    """Append rows to a bulk table, given as columns.
 
     Attributes:
-        table: its name.
-        rows: how many they are.
+        table: name of the table.
+        rows: number of rows.
         columns: Arrow IPC stream of all columns but ``record``; empty in a replay,
-            where the rows stand on disk already.
+            where the rows are on disk already.
     """
 
     table: str
@@ -279,14 +279,14 @@ class Append:
 
 @dataclass(frozen=True, slots=True)
 class AdvanceShard:
-    """Have an arena changed and then advanced.
+    """Have an arena shard changed and then advanced.
 
     Attributes:
-        island: whose shard.
-        number: of the shard's advances, from 0.
+        island: number of the arena.
+        number: number of the advance, from 0.
         until: step to reach.
-        changes: what is done before.
-        wants_snapshot: its state is due to be kept when it is there.
+        changes: changes to make before.
+        wants_snapshot: a snapshot is due at the end of the advance.
     """
 
     island: int
@@ -298,13 +298,13 @@ class AdvanceShard:
 
 @dataclass(frozen=True, slots=True)
 class Emigrate:
-    """Send a neighbour the migrants of an epoch, be they none.
+    """Send the migrants of an epoch (may be empty) to a neighbour.
 
     Attributes:
-        island: from where.
-        to: the neighbour.
-        epoch: that ended, from 0.
-        migrants: who goes, or whose copies do.
+        island: the sending island.
+        to: the receiving island.
+        epoch: number of the epoch that ended, from 0.
+        migrants: individuals that are moved or copied.
     """
 
     island: int
@@ -315,7 +315,7 @@ class Emigrate:
 
 @dataclass(frozen=True, slots=True)
 class Finish:
-    """The island is done; its neighbours shall know."""
+    """The island has finished; its neighbours are informed."""
 
     island: int
     neighbours: tuple[int, ...] = ()
@@ -327,7 +327,7 @@ ArenaCommand = Vet | AdvanceShard | Record | Append | Emigrate | Finish
 
 
 def requester_of(about: Vet | Evaluate | Answered) -> int:
-    """Return which island asks, or is answered."""
+    """Return the island that sent a request, or that an answer goes to."""
     if isinstance(about, Vet | Vetted | VettingFailed) or about.requester is None:
         return about.birth.island
     return about.requester

@@ -1,15 +1,15 @@
-"""An off-line island: who is born, is judged, and lives on. A pure machine.
+"""Off-line island: births, evaluations, selection and migration. A pure machine.
 
-Founders come first, then broods of children of the population that stands when
-the brood begins. Births of a brood are in flight together, up to the experiment's
-window; whatever order their answers arrive in, they are committed in birth order.
+Founders come first, then broods of children of the population at the start of the
+brood. Births of a brood are in flight together, up to the experiment's window. They
+are committed in birth order, whatever the order of their answers.
 Source: Hupkes 2016, section 5.3; facts of the original, section 5.1.
 """
 
 from dataclasses import dataclass
 from math import isfinite
 
-from coordinator.evolution.breeding import BARREN, Breeder, Candidate
+from coordinator.evolution.breeding import Breeder, Candidate
 from coordinator.evolution.selection import Couple, Individual
 from coordinator.islands.events import (
     Answered,
@@ -20,26 +20,32 @@ from coordinator.islands.events import (
     Immigrated,
     IslandCommand,
     IslandEvent,
+    MigrationEvent,
     NeighbourClosed,
+    Record,
     Started,
-    Travelled,
     Vet,
     Vetted,
     VettingFailed,
 )
-from coordinator.islands.island_migration import MigrantBuffer
+from coordinator.islands.island_migration import IslandMigration
 from coordinator.islands.migration import MigrationEpochs
-from coordinator.islands.reevaluation import Reevaluations
+from coordinator.islands.reevaluation import Reevaluations, with_duration
 from coordinator.islands.rows import birth_record, evaluation_record, population_records
-from coordinator.islands.survival import SurvivorSelection
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
 from schema.robot.ids import BirthId
 
 
 @dataclass(slots=True)
-class _Unborn:
-    """Who is to be born under a number; ``candidate`` is the one being judged."""
+class _Birth:
+    """Birth in flight.
+
+    Attributes:
+        candidate: candidate of the current attempt.
+        is_viable: the candidate has passed vetting.
+        outcome: its evaluation; None until it has arrived.
+    """
 
     candidate: Candidate
     is_viable: bool = False
@@ -50,8 +56,8 @@ class Island:
     """One population and its births.
 
     Attributes:
-        births: how many individuals have been born and recorded.
-        population: the living, in birth order.
+        births: number of recorded births.
+        population: living individuals, in birth order.
     """
 
     def __init__(
@@ -63,108 +69,122 @@ class Island:
         *,
         epochs: MigrationEpochs | None = None,
     ) -> None:
-        """Make an island to which nothing has happened.
+        """Initialise an island before its first event.
 
         Args:
-            experiment: what is evolved, and how.
-            seed: of the experiment's execution.
+            experiment: settings of this island.
+            seed: seed of the run.
             run: number of the repeat, from 0.
-            number: of this island.
-            epochs: its side of migration; None if it has no neighbours.
+            number: number of this island.
+            epochs: its migration; None without neighbours.
         """
+        selection = experiment.selection
         self.births = 0
         self.population: tuple[Individual, ...] = ()
         self._experiment = experiment
-        self._number = number
+        self._seed, self._run, self._number = seed, run, number
         self._space = body_space(experiment.space)
         self._breeder = Breeder(experiment, seed, run)
-        self._survivor_selection = SurvivorSelection(experiment, self._breeder)
-        self._reevaluations = Reevaluations(experiment, seed, run, number)
+        self._reevaluations = (
+            None
+            if selection.reevaluation is None
+            else Reevaluations(experiment, selection.reevaluation, number)
+        )
+        self._migration = (
+            None if epochs is None else IslandMigration(experiment, epochs)
+        )
         self._has_started = False
         self._generation = 0
         self._begun = 0
-        # Founders need nobody's fitness: all of them are in flight together.
-        self._window = self._brood_end = experiment.selection.population
-        self._unborn: dict[int, _Unborn] = {}
+        # Founders have no parents: all of them are in flight together.
+        self._window = self._brood_end = selection.population
+        self._in_flight: dict[int, _Birth] = {}
         self._brood: list[Individual] = []
-        self._migrant_buffer = (
-            None if epochs is None else MigrantBuffer(experiment, number, epochs)
-        )
 
     @property
     def judged(self) -> tuple[Individual, ...]:
-        """Those of the living whose fitness is known."""
+        """Living individuals whose fitness is known."""
         return tuple(one for one in self.population if not one.has_failed)
 
     @property
     def is_finished(self) -> bool:
-        """All births of the experiment have been recorded."""
-        return (
-            self.births == self._experiment.births and not self._reevaluations.is_open
+        """All births of the experiment are recorded, and no re-evaluation is open."""
+        return self.births == self._experiment.births and not (
+            self._reevaluations and self._reevaluations.is_open
         )
 
     def handle(self, event: IslandEvent) -> list[IslandCommand]:
-        """Take an event and return what follows from it.
+        """Handle an event and return the commands that follow from it.
 
-        Duplicates of answers that were taken before are ignored.
+        Duplicate answers are ignored.
 
         Raises:
-            UnexpectedEvent: an event that cannot come now; nothing has changed.
-            ExperimentError: restrictions that no robot meets; the island cannot go
-                on.
+            UnexpectedEvent: the event is impossible now; nothing has changed.
+            ExperimentError: no robot meets the restrictions; the island cannot
+                continue.
         """
-        if isinstance(event, Started):
-            if self._has_started:
-                raise self._unexpected(event, "it has started before")
-            self._has_started = True
-            return self._proceed()
-        if isinstance(event, Immigrated | NeighbourClosed) or (
-            isinstance(event, Evaluated | EvaluationFailed) and event.trial
-        ):
-            self._hear(event)
-            return [*self._land(), *self._proceed()]
-        unborn = self._asked(event)
-        if unborn is None:
+        if isinstance(event, Evaluated) and not isfinite(event.evaluation.fitness):
+            raise self._unexpected(event, "fitness must be finite")
+        match event:
+            case Started():
+                if self._has_started:
+                    raise self._unexpected(event, "it has started before")
+                self._has_started = True
+                commands = self._proceed()
+            case Immigrated() | NeighbourClosed():
+                commands = self._migrated(event)
+            case Evaluated() | EvaluationFailed() if event.trial:
+                commands = self._reevaluated(event)
+            case _:
+                commands = self._answered(event)
+        if self._experiment.simulation.evaluation_s is None:
+            return commands
+        return [
+            with_duration(each, self._experiment.simulation, self._seed, self._run)
+            if isinstance(each, Evaluate)
+            else each
+            for each in commands
+        ]
+
+    def _answered(self, event: Answered) -> list[IslandCommand]:
+        """Handle the answer to a vetting or to the first evaluation of a robot."""
+        found = self._birth_of(event)
+        if found is None:
             return []
+        candidate = found.candidate
         match event:
             case Vetted(report=report) if report.is_viable:
-                unborn.is_viable = True
-                candidate = unborn.candidate
-                return [
-                    self._reevaluations.timed(
-                        Evaluate(candidate.birth, candidate.robot)
-                    )
-                ]
+                found.is_viable = True
+                return [Evaluate(candidate.birth, candidate.robot)]
             case Vetted() | VettingFailed():
                 why = event.report if isinstance(event, Vetted) else event
-                return [self._retry(unborn.candidate, why.reason)]
+                attempt = candidate.attempt + 1
+                return [self._begin(event.birth, attempt, candidate.couple, why.reason)]
             case Evaluated() | EvaluationFailed():
-                unborn.outcome = event
+                found.outcome = event
                 return self._proceed()
 
-    def _asked(self, event: Answered) -> _Unborn | None:
-        """Return the unborn that an answer is news of, None if it is none.
+    def _birth_of(self, event: Answered) -> _Birth | None:
+        """Return the birth that an answer belongs to; None for a duplicate answer.
 
         Raises:
-            UnexpectedEvent: an answer to what was never asked.
+            UnexpectedEvent: the answer to a request that was never sent.
         """
         birth = event.birth
         if birth.island != self._number or not 0 <= birth.number < self._begun:
             raise self._unexpected(event, f"births 0..{self._begun - 1} have begun")
-        unborn = self._unborn.get(birth.number)
-        if unborn is None or unborn.outcome is not None:
+        found = self._in_flight.get(birth.number)
+        if found is None or found.outcome is not None:
             return None
         if isinstance(event, Vetted | VettingFailed):
-            attempt = unborn.candidate.attempt
+            attempt = found.candidate.attempt
             if event.attempt > attempt:
                 raise self._unexpected(event, f"it is at attempt {attempt}")
-            is_old = event.attempt < attempt or unborn.is_viable
-            return None if is_old else unborn
-        if not unborn.is_viable:
+            is_old = event.attempt < attempt or found.is_viable
+            return None if is_old else found
+        if not found.is_viable:
             raise self._unexpected(event, "it has not been vetted")
-        if isinstance(event, Evaluated) and not isfinite(event.evaluation.fitness):
-            raise self._unexpected(event, "fitness must be finite")
-        return unborn
+        return found
 
     def _unexpected(self, event: IslandEvent, why: str) -> UnexpectedEvent:
         return UnexpectedEvent(
@@ -174,120 +194,120 @@ class Island:
         )
 
     def _proceed(self) -> list[IslandCommand]:
-        """Commit who is judged and next in turn, and begin what the window allows."""
+        """Commit evaluated births in order, and begin births up to the window."""
         commands: list[IslandCommand] = []
-        while (first := self._unborn.get(self.births)) and first.outcome:
+        while (first := self._in_flight.get(self.births)) and first.outcome:
             commands += self._commit(first.candidate, first.outcome)
         if self.births == self._brood_end and self._brood:
-            commands += self._reevaluations.ask_anew(self.births, self.population)
-            if not self._reevaluations.is_open:
+            reevaluations = self._reevaluations
+            if reevaluations is not None:
+                commands += reevaluations.start(self.births, self.population)
+            if reevaluations is None or not reevaluations.is_open:
                 commands += self._close_brood()
         while self._begun < min(self._brood_end, self.births + self._window):
-            birth = BirthId(self._number, self._begun)
-            candidate = self._conceived(birth, 0, None, "")
-            self._unborn[self._begun] = _Unborn(candidate)
             self._begun += 1
-            commands.append(Vet(birth, candidate.attempt, candidate.robot))
+            commands.append(self._begin(BirthId(self._number, self._begun - 1)))
         return commands
 
-    def _retry(self, candidate: Candidate, why: str) -> Vet:
-        """Replace a candidate that cannot live by the next of its birth."""
-        birth = candidate.birth
-        following = self._conceived(birth, candidate.attempt + 1, candidate.couple, why)
-        self._unborn[birth.number] = _Unborn(following)
-        return Vet(birth, following.attempt, following.robot)
-
-    def _conceived(
-        self, birth: BirthId, attempt: int, couple: Couple | None, why: str
-    ) -> Candidate:
-        """Return the candidate of the first attempt, from this one, that gives one."""
-        while True:
-            couple, candidate = self._breeder.attempt(
-                birth, attempt, self.population, couple, why
-            )
-            if candidate is not None:
-                return candidate
-            attempt += 1
-            why = BARREN
+    def _begin(
+        self,
+        birth: BirthId,
+        attempt: int = 0,
+        couple: Couple | None = None,
+        why: str = "",
+    ) -> Vet:
+        """Begin a birth, or its next attempt; arguments as of ``Breeder.candidate``."""
+        candidate = self._breeder.candidate(
+            birth, attempt, self.population, couple, why
+        )
+        assert candidate is not None
+        self._in_flight[birth.number] = _Birth(candidate)
+        return Vet(birth, candidate.attempt, candidate.robot)
 
     def _commit(
         self, candidate: Candidate, outcome: Evaluated | EvaluationFailed
     ) -> list[IslandCommand]:
-        """Make a judged candidate an individual."""
-        parents = candidate.couple or ()
-        is_judged = isinstance(outcome, Evaluated)
+        """Add an evaluated candidate to the brood; return its rows."""
+        is_evaluated = isinstance(outcome, Evaluated)
         individual = Individual(
             candidate.birth,
             candidate.genome,
             outcome.evaluation.fitness if isinstance(outcome, Evaluated) else 0.0,
-            1 + max((parent.rank for parent in parents), default=0),
+            candidate.rank,
             self._generation,
-            has_failed=not is_judged,
+            has_failed=not is_evaluated,
         )
-        del self._unborn[self.births]
+        del self._in_flight[self.births]
         self._brood.append(individual)
         self.births += 1
-        attempts = candidate.attempt + 1
         return [
-            birth_record(individual, parents, attempts, candidate.robot, self._space),
+            birth_record(candidate, self._generation, self._space),
             evaluation_record(outcome),
         ]
 
     def _close_brood(self) -> list[IslandCommand]:
-        """Let the survivors be the population, and end the epoch if it is over."""
-        parents, rows = self._reevaluations.conclude(self.population)
-        last = BirthId(self._number, self.births - 1)
-        self.population = self._survivor_selection.survivors(parents, self._brood, last)
+        """Select the survivors, and end the epoch of migration if it is due."""
+        parents, rows = self.population, list[Record]()
+        if self._reevaluations is not None:
+            parents, rows = self._reevaluations.conclude(parents)
+        self.population = self._breeder.survivors(parents, self._brood)
         self._brood = []
-        migrant_buffer = self._migrant_buffer
+        migration = self._migration
         if (
-            migrant_buffer is None
+            migration is None
             or self.is_finished
-            or not migrant_buffer.is_due(self.births)
+            or not migration.epochs.is_due(self.births)
         ):
             return [*rows, *self._open_brood()]
-        commands, self.population = migrant_buffer.depart(self.population, self.births)
-        return [*rows, *commands, *self._land()]
+        commands, self.population = migration.send(self.population, self.births)
+        return [*rows, *commands, *self._receive(migration)]
 
-    def _hear(self, event: Travelled | Evaluated | EvaluationFailed) -> None:
-        """Take news of neighbours, of immigrants, and of who is judged anew.
-
-        For neighbours and immigrants nobody waits at the end.
-        """
-        if isinstance(event, Evaluated | EvaluationFailed) and event.requester is None:
-            self._reevaluations.take(event)
-            return
-        if self._migrant_buffer is None:
+    def _migrated(self, event: MigrationEvent) -> list[IslandCommand]:
+        """Handle an event of a neighbour; a finished island ignores it."""
+        if self._migration is None:
             raise self._unexpected(event, "it has no neighbours")
-        if not self.is_finished:
-            self._migrant_buffer.take(event)
-
-    def _land(self) -> list[IslandCommand]:
-        """Let immigrants live here, once all are there that were waited for."""
-        if self._migrant_buffer is None:
+        if self.is_finished:
             return []
-        commands, population = self._migrant_buffer.land(self.population, self.births)
-        timed = [
-            self._reevaluations.timed(each) if isinstance(each, Evaluate) else each
-            for each in commands
-        ]
+        self._migration.epochs.take(event)
+        return [*self._receive(self._migration), *self._proceed()]
+
+    def _reevaluated(self, event: Evaluated | EvaluationFailed) -> list[IslandCommand]:
+        """Handle the re-evaluation of a robot of this island or of an immigrant."""
+        if event.requester is None:
+            if self._reevaluations is None:
+                raise self._unexpected(event, "it re-evaluates no robot")
+            self._reevaluations.take(event)
+            return self._proceed()
+        if self._migration is None:
+            raise self._unexpected(event, "it has no neighbours")
+        if self.is_finished:
+            return []
+        self._migration.take(event)
+        return [*self._receive(self._migration), *self._proceed()]
+
+    def _receive(self, migration: IslandMigration) -> list[IslandCommand]:
+        """Settle the immigrants of the epoch once all of them can settle."""
+        commands, population = migration.receive(self.population, self.births)
         if population is None:
-            return [*timed]
+            return [*commands]
         self.population = population
-        return [*timed, *self._open_brood()]
+        return [*commands, *self._open_brood()]
 
     def _open_brood(self) -> list[IslandCommand]:
-        """Set out the next brood of the population that stands, or finish."""
+        """Record the population and open the next brood, or finish."""
         commands: list[IslandCommand] = []
         commands += population_records(self._number, self.births, self.population)
         if self.is_finished:
-            neighbours = (
-                () if self._migrant_buffer is None else self._migrant_buffer.neighbours
-            )
+            migration = self._migration
+            neighbours = migration.epochs.links.neighbours if migration else ()
             return [*commands, Finish(self._number, neighbours)]
+        selection = self._experiment.selection
+        children = selection.children
+        if selection.culling is not None:
+            # A brood keeps within the population limit, but has at least one child.
+            room = selection.culling.population_limit - len(self.population)
+            children = min(children, max(1, room))
         self._generation += 1
         self._window = self._experiment.window
-        self._brood_end = self._survivor_selection.brood_end(
-            self.births, len(self.population)
-        )
+        self._brood_end = min(self.births + children, self._experiment.births)
         return commands

@@ -1,13 +1,7 @@
-"""The harbour of an off-line island: who leaves at the end of an epoch, who lands.
+"""Migration of an off-line island: its emigrants, and immigrants until they settle."""
 
-Everybody who comes in one epoch, and must be judged anew, is judged before any of
-them settles. Who lives on the island already, be it the original or a copy that
-came before, is turned away.
-"""
-
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from math import isfinite
 
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import (
@@ -16,7 +10,6 @@ from coordinator.islands.events import (
     Evaluated,
     EvaluationFailed,
     Record,
-    Travelled,
 )
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import evaluation_record, migration_records
@@ -28,120 +21,119 @@ from schema.robot.ids import BirthId
 Outcome = Evaluated | EvaluationFailed
 
 
-class MigrantBuffer:
-    """Those who leave an island and those who come."""
+class IslandMigration:
+    """Emigrants and immigrants of one island.
 
-    def __init__(
-        self, experiment: Experiment, number: int, epochs: MigrationEpochs
-    ) -> None:
-        """Expect nobody on an island."""
+    All immigrants of an epoch settle together, after the last of their
+    re-evaluations. An immigrant that lives on the island already is dropped, be it
+    the original or a copy.
+
+    Attributes:
+        epochs: when the island sends migrants, and what its neighbours sent.
+    """
+
+    def __init__(self, experiment: Experiment, epochs: MigrationEpochs) -> None:
+        selection = experiment.selection
+        self.epochs = epochs
         self._space = body_space(experiment.space)
-        culling = experiment.selection.culling
-        self._size = (
-            experiment.selection.population
-            if culling is None
-            else culling.population_limit
+        self._limit = (
+            selection.population
+            if selection.culling is None
+            else selection.culling.population_limit
         )
-        self._stay = experiment.selection.parents_needed
-        self._number = number
-        self._epochs = epochs
+        self._stay = selection.parents_needed
         self._settled = 0
-        self._guests: dict[BirthId, Individual] = {}
-        self._awaited: dict[BirthId, Outcome | None] = {}
-        self._is_immigrating = False
+        self._immigrants: dict[BirthId, Individual] | None = None
+        self._outcomes: dict[BirthId, Outcome | None] = {}
 
-    @property
-    def neighbours(self) -> tuple[int, ...]:
-        """Whom the island is connected with."""
-        return self._epochs.links.neighbours
-
-    def is_due(self, births: int) -> bool:
-        """Return whether an epoch ends with so many births."""
-        return self._epochs.is_due(births)
-
-    def depart(
+    def send(
         self, population: Sequence[Individual], births: int
     ) -> tuple[list[Record | Emigrate], tuple[Individual, ...]]:
-        """End the epoch; return what follows, and who is left."""
+        """End the epoch; return rows and migrants, and the remaining population."""
         living = len(population)
-        sent, gone = self._epochs.leave(population, living, living - self._stay)
+        sent, moved = self.epochs.send(population, living, living - self._stay)
         rows = migration_records(sent, births)
-        left = tuple(one for one in population if one not in gone)
-        return [*rows, *sent], left
+        return [*rows, *sent], tuple(one for one in population if one not in moved)
 
-    def take(self, event: Travelled | Outcome) -> None:
-        """Keep what came until ``land``; old judgements are ignored.
+    def take(self, outcome: Outcome) -> None:
+        """Store the re-evaluation of an immigrant; duplicates are ignored.
 
         Raises:
-            UnexpectedEvent: it cannot come; nothing has changed.
+            UnexpectedEvent: no such evaluation is open; nothing has changed.
         """
-        if not isinstance(event, Evaluated | EvaluationFailed):
-            self._epochs.take(event)
-            return
-        epoch = self._epochs.epoch
-        is_known = event.trial < epoch or event.birth in self._awaited
-        if event.requester != self._number or event.trial > epoch or not is_known:
+        epoch = self.epochs.epoch
+        is_known = outcome.trial < epoch or outcome.birth in self._outcomes
+        is_own = outcome.requester == self.epochs.island
+        if not is_own or outcome.trial > epoch or not is_known:
             raise UnexpectedEvent(
-                f"island {self._number} awaits judgements {epoch} of "
-                f"{list(self._awaited)}, got {event}"
+                f"island {self.epochs.island} awaits evaluations {epoch} of "
+                f"{list(self._outcomes)}, got {outcome}"
             )
-        if isinstance(event, Evaluated) and not isfinite(event.evaluation.fitness):
-            raise UnexpectedEvent(f"fitness must be finite, got {event}")
-        if event.trial == epoch and self._awaited[event.birth] is None:
-            self._awaited[event.birth] = event
+        if outcome.trial == epoch and self._outcomes[outcome.birth] is None:
+            self._outcomes[outcome.birth] = outcome
 
-    def land(
+    def receive(
         self, population: Sequence[Individual], births: int
     ) -> tuple[list[Evaluate | Record], tuple[Individual, ...] | None]:
-        """Return what follows, and the new population once all have settled."""
+        """Receive the immigrants of the epoch if all neighbours have sent theirs.
+
+        Returns:
+            Evaluations to do and rows; and the new population once all immigrants
+            have settled, None before.
+        """
         commands: list[Evaluate | Record] = []
-        if self._epochs.is_complete:
-            commands += self._welcome(population, births)
-        if not self._is_immigrating or None in self._awaited.values():
+        if self.epochs.is_complete:
+            commands += self._arrive(population, births)
+        if self._immigrants is None or None in self._outcomes.values():
             return commands, None
-        for birth, outcome in self._awaited.items():
+        for birth, outcome in self._outcomes.items():
             assert outcome is not None
-            self._guests[birth] = _judged(self._guests[birth], outcome)
-            commands.append(evaluation_record(outcome))
-        self._is_immigrating = False
-        return commands, self._settle(population)
-
-    def _welcome(self, population: Sequence[Individual], births: int) -> list[Evaluate]:
-        """Take in who came; return whom to judge."""
-        arrivals = self._epochs.arrive(births)
-        living = {one.birth for one in population}
-        news = [(one, anew) for one, anew in arrivals if one.birth not in living]
-        self._is_immigrating = True
-        self._guests = {one.birth: one for one, _ in news}
-        self._awaited = {one.birth: None for one, is_anew in news if is_anew}
-        trial = self._epochs.epoch
-        return [
-            Evaluate(
-                birth,
-                develop(self._guests[birth].genome, self._space),
-                trial,
-                requester=self._number,
+            immigrant = self._immigrants[birth]
+            self._immigrants[birth] = (
+                replace(immigrant, fitness=0.0, has_failed=True)
+                if isinstance(outcome, EvaluationFailed)
+                else replace(
+                    immigrant, fitness=outcome.evaluation.fitness, has_failed=False
+                )
             )
-            for birth in self._awaited
+            commands.append(evaluation_record(outcome))
+        settled = self._settle(population, self._immigrants.values())
+        self._immigrants, self._outcomes = None, {}
+        return commands, settled
+
+    def _arrive(self, population: Sequence[Individual], births: int) -> list[Evaluate]:
+        """Begin the next epoch; return the re-evaluations of its immigrants."""
+        living = {one.birth for one in population}
+        arrivals = [
+            (one, is_reevaluated)
+            for one, is_reevaluated in self.epochs.receive(births)
+            if one.birth not in living
         ]
+        self._immigrants = {one.birth: one for one, _ in arrivals}
+        evaluations = [
+            Evaluate(
+                one.birth,
+                develop(one.genome, self._space),
+                self.epochs.epoch,
+                requester=self.epochs.island,
+            )
+            for one, is_reevaluated in arrivals
+            if is_reevaluated
+        ]
+        self._outcomes = {each.birth: None for each in evaluations}
+        return evaluations
 
-    def _settle(self, population: Sequence[Individual]) -> tuple[Individual, ...]:
-        """Return the population in which all guests live who found room."""
-        living_robots, settled = list(population), list[Individual]()
-        for guest in self._guests.values():
-            if len(living_robots) + len(settled) >= self._size:
-                gone = self._epochs.place_for(living_robots, self._settled)
-                if gone is None:
+    def _settle(
+        self, population: Sequence[Individual], immigrants: Iterable[Individual]
+    ) -> tuple[Individual, ...]:
+        """Return the population with all immigrants that there is room for."""
+        natives, settled = list(population), list[Individual]()
+        for immigrant in immigrants:
+            if len(natives) + len(settled) >= self._limit:
+                replaced = self.epochs.choose_replaced(natives, self._settled)
+                if replaced is None:
                     continue
-                living_robots.remove(gone)
+                natives.remove(replaced)
             self._settled += 1
-            settled.append(guest)
-        self._guests, self._awaited = {}, {}
-        return tuple(sorted([*living_robots, *settled], key=lambda one: one.birth))
-
-
-def _judged(guest: Individual, outcome: Outcome) -> Individual:
-    """Return an immigrant with the fitness that it has here."""
-    if isinstance(outcome, EvaluationFailed):
-        return replace(guest, fitness=0.0, has_failed=True)
-    return replace(guest, fitness=outcome.evaluation.fitness, has_failed=False)
+            settled.append(immigrant)
+        return tuple(sorted([*natives, *settled], key=lambda one: one.birth))

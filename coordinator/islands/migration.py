@@ -1,21 +1,23 @@
-"""One island's side of migration: when it sends whom, and for whom it waits.
+"""Migration epochs of one island: which migrants it sends, and which it awaits.
 
-Epochs are counted on each island by itself. At the end of its epoch e an island
-sends every neighbour its migrants, be they none, and goes on when all neighbours
-have sent theirs of epoch e, or have finished. So who meets whom does not depend on
-who is faster, and nobody can wait for somebody who waits for him.
+Each island counts its own epochs. At the end of epoch e an island sends its migrants,
+possibly none, to every neighbour, and continues when all neighbours have sent theirs
+of epoch e or have finished. So the outcome does not depend on the speed of the
+islands, and no two islands can wait for each other.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 
-import numpy as np
-
-from coordinator.evolution.buffered_rng import BufferedRng
-from coordinator.evolution.seeding import Purpose, stream
-from coordinator.evolution.selection import Individual, fittest_first
-from coordinator.islands.events import Emigrate, Immigrated, NeighbourClosed, Travelled
+from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
+from coordinator.evolution.selection import Individual, fittest_first, tournament
+from coordinator.islands.events import (
+    Emigrate,
+    Immigrated,
+    MigrationEvent,
+    NeighbourClosed,
+)
 from schema.errors import UnexpectedEvent
 from schema.experiment.migration import Migration, migrant_count
 from schema.robot.ids import BirthId
@@ -23,31 +25,32 @@ from schema.robot.ids import BirthId
 
 @dataclass(frozen=True, slots=True)
 class Neighbours:
-    """Where an island lies.
+    """Neighbours of an island.
 
     Attributes:
         targets: islands that it sends migrants to, ascending.
         sources: islands that send it migrants, ascending.
-        strange: those of its sources whose judgement does not count here.
+        differing: sources with another evaluation; their migrants are re-evaluated.
     """
 
     targets: tuple[int, ...]
     sources: tuple[int, ...]
-    strange: tuple[int, ...] = ()
+    differing: tuple[int, ...] = ()
 
     @property
     def neighbours(self) -> tuple[int, ...]:
-        """All that it is connected with, one way or both, ascending."""
+        """All islands that it is connected with, one way or both, ascending."""
         return tuple(sorted({*self.targets, *self.sources}))
 
 
 class MigrationEpochs:
-    """What an island sends, and what has come for it.
+    """Epochs of one island: its emigrants, and immigrants that have arrived.
 
     Attributes:
-        epoch: that it is in, from 0.
-        is_waiting: it has sent its migrants, and has not got all of those it is due.
-        links: where it lies.
+        island: number of the island.
+        links: its neighbours.
+        epoch: number of the epoch, from 0.
+        is_waiting: it has sent its migrants and awaits those of its neighbours.
     """
 
     def __init__(
@@ -60,122 +63,126 @@ class MigrationEpochs:
         seed: int,
         run: int,
     ) -> None:
-        """Begin with the first epoch.
+        """Initialise the first epoch.
 
         Args:
-            migration: the island's rules.
-            number: of the island.
-            links: where it lies.
-            tournament_size: for emigrants, if they are chosen so.
-            seed: of the experiment's execution.
+            migration: settings of the island.
+            number: number of the island.
+            links: its neighbours.
+            tournament_size: for emigrants, where tournaments choose them.
+            seed: seed of the run.
             run: number of the repeat, from 0.
         """
+        self.island = number
+        self.links = links
         self.epoch = 0
         self.is_waiting = False
-        self.links = links
         self._migration = migration
-        self._number = number
         self._tournament_size = tournament_size
         self._seed, self._run = seed, run
         self._due_births = migration.epoch
         self._due_s = inf if migration.epoch_s is None else migration.epoch_s
         self._inbox: dict[tuple[int, int], tuple[Individual, ...]] = {}
-        self._open = dict.fromkeys(links.neighbours, 0)
-        self._meeting = links.neighbours
+        self._next_epochs = dict.fromkeys(links.neighbours, 0)
+        self._active = links.neighbours
 
     def is_due(self, births: int, now_s: float = -inf) -> bool:
-        """Return whether the epoch has ended.
+        """Return whether the epoch ends now.
 
         Args:
-            births: on the island.
-            now_s: simulated time, in an arena [s].
+            births: number of births on the island.
+            now_s: simulated time of an arena [s].
         """
         return births >= self._due_births or now_s >= self._due_s
 
     @property
     def has_sources(self) -> bool:
-        """Somebody came of late, or sent nobody, and may come again."""
-        return any(source in self._meeting for source in self.links.sources)
+        """A source took part in the last epoch, and may send migrants again."""
+        return any(source in self._active for source in self.links.sources)
 
     @property
     def is_complete(self) -> bool:
-        """It has sent, and all that it is due for the epoch is there."""
+        """It is waiting, and all open neighbours have sent their migrants."""
         return self.is_waiting and all(
-            reached > self.epoch for reached in self._open.values()
+            following > self.epoch for following in self._next_epochs.values()
         )
 
-    def leave(
+    def send(
         self, candidates: Sequence[Individual], living: int, spare: int
     ) -> tuple[list[Emigrate], list[Individual]]:
-        """End the epoch: return what is sent, and who is not on the island any more.
+        """End the epoch; return the migrants of each neighbour, and who was moved.
 
         Args:
-            candidates: who may leave, in an order that repeats.
-            living: how many live there.
-            spare: how many may be moved away at most.
+            candidates: possible emigrants, in a reproducible order.
+            living: size of the population.
+            spare: greatest number of individuals that may be moved away.
         """
         self.is_waiting = True
-        targets = [to for to in self.links.targets if to in self._meeting]
+        targets = [to for to in self.links.targets if to in self._active]
         count = migrant_count(self._migration, living)
         is_moved = self._migration.handling == "evict"
         if is_moved:
             count = min(count * len(targets), max(0, spare))
         chosen = self._choose(candidates, min(count, len(candidates)))
-        bags = dict.fromkeys(targets, chosen)
+        shares = dict.fromkeys(targets, chosen)
         if is_moved:
-            # Whoever is dealt to first changes, or a lone migrant knew one way only.
-            bags = {
+            # The first target changes, or a single migrant would always go there.
+            shares = {
                 to: chosen[(place - self.epoch) % len(targets) :: len(targets)]
                 for place, to in enumerate(targets)
             }
         sent = [
-            Emigrate(self._number, to, self.epoch, tuple(bags.get(to, ())))
-            for to in self._meeting
+            Emigrate(self.island, to, self.epoch, tuple(shares.get(to, ())))
+            for to in self._active
         ]
         return sent, chosen if is_moved and targets else []
 
-    def take(self, event: Travelled) -> None:
-        """Keep what came until ``arrive``.
+    def take(self, event: MigrationEvent) -> None:
+        """Store an event until ``receive``.
 
         Raises:
-            UnexpectedEvent: it is from no open neighbour, or not the next.
+            UnexpectedEvent: it comes from no open neighbour, or not in order.
         """
         source = event.source if isinstance(event, Immigrated) else event.neighbour
-        expected = self._open.get(source)
-        if event.island != self._number or expected is None:
+        expected = self._next_epochs.get(source)
+        if event.island != self.island or expected is None:
             raise UnexpectedEvent(
-                f"island {self._number} has open neighbours {list(self._open)}, "
+                f"island {self.island} has open neighbours {list(self._next_epochs)}, "
                 f"got {event}"
             )
         if isinstance(event, NeighbourClosed):
-            del self._open[source]
+            del self._next_epochs[source]
             return
         if event.epoch != expected:
             raise UnexpectedEvent(
-                f"island {self._number}: epoch {expected} of {source} is next, "
+                f"island {self.island}: epoch {expected} of {source} is next, "
                 f"got {event}"
             )
-        self._open[source] = expected + 1
+        self._next_epochs[source] = expected + 1
         self._inbox[source, event.epoch] = event.migrants
 
-    def arrive(self, births: int, now_s: float = -inf) -> list[tuple[Individual, bool]]:
-        """Begin the next epoch: return who came, each once.
+    def receive(
+        self, births: int, now_s: float = -inf
+    ) -> list[tuple[Individual, bool]]:
+        """Begin the next epoch; return the immigrants of the last one, each once.
 
         Args:
-            births: on the island.
-            now_s: simulated time, in an arena [s].
+            births: number of births on the island.
+            now_s: simulated time of an arena [s].
 
         Returns:
-            The immigrants by their source, and whether each must be judged anew.
+            The immigrants by their source, and whether each must be re-evaluated.
         """
-        met = [one for one in self._meeting if (one, self.epoch) in self._inbox]
+        senders = [one for one in self._active if (one, self.epoch) in self._inbox]
         arrivals: dict[BirthId, tuple[Individual, bool]] = {}
-        for source in met:
-            is_strange = self._migration.judge_anew or source in self.links.strange
+        for source in senders:
+            is_reevaluated = (
+                self._migration.judge_anew or source in self.links.differing
+            )
             for one in self._inbox.pop((source, self.epoch)):
-                arrivals.setdefault(one.birth, (one, is_strange))
-        # Not those who are open by now: that would depend on who is faster.
-        self._meeting = tuple(met)
+                arrivals.setdefault(one.birth, (one, is_reevaluated))
+        # Not the neighbours that are open now: that would depend on their speed.
+        self._active = tuple(senders)
         self.epoch += 1
         self.is_waiting = False
         length = self._migration.epoch
@@ -184,37 +191,36 @@ class MigrationEpochs:
             self._due_s = now_s + self._migration.epoch_s
         return list(arrivals.values())
 
-    def place_for(
-        self, living_robots: Sequence[Individual], arrival: int
+    def choose_replaced(
+        self, candidates: Sequence[Individual], arrival: int
     ) -> Individual | None:
-        """Return who makes room for an immigrant; None if nobody does.
+        """Return the individual that an immigrant replaces; None if it replaces none.
 
         Args:
-            living_robots: who may be replaced, in an order that repeats.
-            arrival: number of the immigrant, of all that came to the island.
+            candidates: individuals that may be replaced, in a reproducible order.
+            arrival: number of immigrants that settled on the island before.
         """
-        if not living_robots or self._migration.replaced == "none":
+        if not candidates or self._migration.replaced == "none":
             return None
         if self._migration.replaced == "worst":
-            return fittest_first(living_robots)[-1]
-        name = BirthId(self._number, arrival)
-        return BufferedRng(self._stream(name, Purpose.REPLACED)).pick(living_robots)
+            return fittest_first(candidates)[-1]
+        return self._draws(arrival, Purpose.REPLACED).pick(candidates)
 
-    def _stream(self, name: BirthId, purpose: Purpose) -> np.random.Generator:
-        return stream(self._seed, self._run, name, 0, purpose)
+    def _draws(self, number: int, purpose: Purpose) -> BufferedRng:
+        name = BirthId(self.island, number)
+        return BufferedRng(stream(self._seed, self._run, name, 0, purpose))
 
     def _choose(self, candidates: Sequence[Individual], count: int) -> list[Individual]:
-        """Return who leaves, the first chosen first."""
+        """Return the emigrants in the order of choice."""
         if self._migration.emigrants == "best":
             return fittest_first(candidates)[:count]
-        name = BirthId(self._number, self.epoch)
-        draws = BufferedRng(self._stream(name, Purpose.EMIGRANTS))
+        draws = self._draws(self.epoch, Purpose.EMIGRANTS)
         if self._migration.emigrants == "random":
             return draws.sample(candidates, count)
         chosen: list[Individual] = []
         rest = list(candidates)
         for _ in range(count):
             size = min(self._tournament_size, len(rest))
-            chosen.append(fittest_first(draws.sample(rest, size))[0])
+            chosen.append(tournament(rest, draws, size))
             rest.remove(chosen[-1])
         return chosen

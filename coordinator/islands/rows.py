@@ -1,18 +1,18 @@
-"""What islands write: rows of the tables in `schema.tables.columns`."""
+"""Table rows of off-line islands, and those that arenas share with them."""
 
 from collections.abc import Sequence
 
+from coordinator.evolution.breeding import Candidate
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Emigrate, Evaluated, EvaluationFailed, Record
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
-from schema.robot.robot import Robot
 from schema.tables.columns import body_rows, sizes
 from schema.wire.codec import encode_genome
 
 
 def named(birth: BirthId, island: int) -> dict[str, int | None]:
-    """Return the columns that name an individual in a row of some island."""
+    """Return the columns that identify an individual in a row of an island."""
     return {
         "island": island,
         "birth_island": None if birth.island == island else birth.island,
@@ -21,39 +21,35 @@ def named(birth: BirthId, island: int) -> dict[str, int | None]:
 
 
 def birth_record(
-    individual: Individual,
-    parents: Sequence[Individual],
-    attempts: int,
-    robot: Robot,
+    candidate: Candidate,
+    generation: int | None,
     space: BodySpace,
     *,
     sim_time_s: float | None = None,
     place: tuple[float, float] | None = None,
 ) -> Record:
-    """Return the births row of an individual.
+    """Return the births row of a candidate that is born.
 
     Args:
-        individual: who was born.
-        parents: in order; none for a random robot.
-        attempts: that it took, this one included.
-        robot: what its genome develops into.
+        candidate: the candidate.
+        generation: number of its brood; None on-line.
         space: the part types.
-        sim_time_s: when it was born on-line [s].
-        place: and where, in the ground plane [m].
+        sim_time_s: simulated time of its birth on-line [s].
+        place: its place of birth in the ground plane [m].
     """
     row = {
-        "island": individual.birth.island,
-        "birth": individual.birth.number,
+        "island": candidate.birth.island,
+        "birth": candidate.birth.number,
         "parents": [
             {"island": parent.birth.island, "birth": parent.birth.number}
-            for parent in parents
+            for parent in candidate.couple or ()
         ],
-        "generation": individual.generation,
-        "rank": individual.rank,
-        "attempts": attempts,
-        "genome": encode_genome(individual.genome),
-        "body": body_rows(robot),
-        **sizes(robot, individual.genome, space),
+        "generation": generation,
+        "rank": candidate.rank,
+        "attempts": candidate.attempt + 1,
+        "genome": encode_genome(candidate.genome),
+        "body": body_rows(candidate.robot),
+        **sizes(candidate.robot, candidate.genome, space),
         "sim_time_s": sim_time_s,
         "x": place and place[0],
         "y": place and place[1],
@@ -62,19 +58,19 @@ def birth_record(
 
 
 def evaluation_record(outcome: Evaluated | EvaluationFailed) -> Record:
-    """Return the evaluations row of an outcome; a failure has no numbers."""
+    """Return the evaluations row of an outcome; a failure has no measures."""
     provenance = outcome.provenance
-    judged = outcome.evaluation if isinstance(outcome, Evaluated) else None
+    found = outcome.evaluation if isinstance(outcome, Evaluated) else None
     island = outcome.birth.island if outcome.requester is None else outcome.requester
     row = {
         **named(outcome.birth, island),
         "trial": outcome.trial,
         "status": "ok" if isinstance(outcome, Evaluated) else "failed",
         "reason": "" if isinstance(outcome, Evaluated) else outcome.reason,
-        "fitness": judged and judged.fitness,
-        "path_velocity": judged and judged.path_velocity,
-        "straight_velocity": judged and judged.straight_velocity,
-        "simulated_s": judged and judged.simulated_s,
+        "fitness": found and found.fitness,
+        "path_velocity": found and found.path_velocity,
+        "straight_velocity": found and found.straight_velocity,
+        "simulated_s": found and found.simulated_s,
         "wall_s": provenance.wall_s,
         "worker": provenance.agent,
         "platform": provenance.platform,
@@ -85,7 +81,7 @@ def evaluation_record(outcome: Evaluated | EvaluationFailed) -> Record:
 def population_records(
     island: int, births: int, population: Sequence[Individual]
 ) -> list[Record]:
-    """Return the population rows: who is alive when so many had been born."""
+    """Return the population rows of the living at a number of births."""
     return [
         Record(
             "population",
@@ -103,7 +99,7 @@ def population_records(
 def migration_records(
     sent: Sequence[Emigrate], births: int, sim_time_s: float | None = None
 ) -> list[Record]:
-    """Return the migrations rows of all who were sent."""
+    """Return the migrations rows of all migrants that were sent."""
     return [
         Record(
             "migrations",

@@ -1,6 +1,6 @@
-"""Which islands of an archipelago are neighbours.
+"""Topology: which islands of an archipelago are neighbours.
 
-Source: networkx makes the graphs; the small world is that of Watts and Strogatz
+Source: networkx builds the graphs; the small world is that of Watts and Strogatz
 1998, drawn until it is connected.
 """
 
@@ -8,28 +8,29 @@ from collections.abc import Callable
 from math import isqrt
 from typing import Any
 
-from coordinator.evolution.seeding import Purpose, stream
+from coordinator.evolution.random_streams import Purpose, stream
 from schema.errors import ExperimentError
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
 
 Edge = tuple[int, int]
-"""From which island to which."""
+"""Numbers of the source and the target island."""
 
 
 def connections(
     migration: Migration, islands: int, seed: int, run: int
 ) -> tuple[Edge, ...]:
-    """Return who sends migrants to whom, in order.
+    """Return the directed edges along which migrants travel, in order.
 
     Args:
-        migration: names the topology.
-        islands: how many there are.
-        seed: of the experiment's execution; only random topologies depend on it.
+        migration: settings; they name the topology.
+        islands: number of islands.
+        seed: seed of the run; only random topologies depend on it.
         run: number of the repeat, from 0.
 
     Raises:
-        ExperimentError: no small world of that degree is connected.
+        ExperimentError: networkx cannot build the graph, e.g. a connected small world
+            of that degree.
     """
     if migration.topology == "unconnected":
         return ()
@@ -42,7 +43,7 @@ def connections(
 
 def _graph(migration: Migration, islands: int, seed: int) -> list[Edge]:
     """Return the edges of an undirected graph, each once."""
-    # A large package, which only an archipelago needs.
+    # A large package that only archipelagos need.
     import networkx as nx  # noqa: PLC0415
 
     rows = _rows(islands)
@@ -67,5 +68,5 @@ def _graph(migration: Migration, islands: int, seed: int) -> list[Edge]:
 
 
 def _rows(islands: int) -> int:
-    """Return how many rows the most square grid of so many islands has."""
+    """Return the number of rows of the most square grid of the islands."""
     return max(rows for rows in range(1, isqrt(islands) + 1) if islands % rows == 0)

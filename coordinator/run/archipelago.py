@@ -55,7 +55,7 @@ def _links(
             Neighbours(
                 targets=tuple(to for source, to in edges if source == number),
                 sources=sources,
-                strange=tuple(each for each in sources if _differs(own, owns[each])),
+                differing=tuple(each for each in sources if _differs(own, owns[each])),
             )
         )
     return links

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from coordinator.dispatch.events import DispatchEvent
 from coordinator.dispatch.fleet import Fleet
-from coordinator.islands.events import Append, Journalled, Record
+from coordinator.islands.events import Append, JournalledEvent, Record
 from coordinator.run.archipelago import archipelago
 from coordinator.run.loop import Loop
 from coordinator.run.requests import RunContext
@@ -104,5 +104,5 @@ class _Nothing:
     def store(self, rows: Append) -> None:
         """Store nothing."""
 
-    def append(self, rows: Append | Sequence[Journalled]) -> None:
+    def append(self, rows: Append | Sequence[JournalledEvent]) -> None:
         """Append nothing."""

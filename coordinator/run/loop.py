@@ -24,15 +24,15 @@ from coordinator.islands.events import (
     Evaluate,
     Evaluated,
     EvaluationFailed,
+    ExternalEvent,
     Finish,
-    Heard,
     Immigrated,
     IslandCommand,
-    Journalled,
+    JournalledEvent,
+    MigrationEvent,
     NeighbourClosed,
     Record,
     Started,
-    Travelled,
     Vet,
     Vetted,
     VettingFailed,
@@ -54,14 +54,14 @@ Key = tuple[str, int, BirthId, int]
 Asked = Vet | Evaluate | AdvanceShard
 """What islands and arenas have others do."""
 
-Told = Started | Heard | Travelled
+Told = Started | ExternalEvent | MigrationEvent
 """What islands and arenas are told."""
 
 
 class Log(Protocol):
     """What survives a crash of this process."""
 
-    def append(self, events: Sequence[Journalled]) -> None:
+    def append(self, events: Sequence[JournalledEvent]) -> None:
         """Keep events, durably, before anybody acts on them."""
 
 
@@ -144,7 +144,7 @@ class Loop:
         """Answers that did not decode or did not fit their question."""
         return self._requests.malformed + self.advances.malformed
 
-    def start(self, history: Iterable[Journalled]) -> None:
+    def start(self, history: Iterable[JournalledEvent]) -> None:
         """Begin, or come back: replay a journal, then ask what is still open.
 
         Args:
@@ -211,7 +211,7 @@ class Loop:
             raise UnexpectedEvent(f"no arena {event.island}: {event}")
         self._take([event])
 
-    def _take(self, events: Sequence[Journalled]) -> None:
+    def _take(self, events: Sequence[JournalledEvent]) -> None:
         """Keep events, then act on them."""
         if not events:
             return
@@ -238,7 +238,7 @@ class Loop:
         for record in audit_records(event):
             self._rows.write(record)
 
-    def _take_care(self, events: Sequence[Journalled]) -> None:
+    def _take_care(self, events: Sequence[JournalledEvent]) -> None:
         """Tell the user what is not as it should be.
 
         Raises:
@@ -267,7 +267,7 @@ class Loop:
                 return
         self.advances.request(shard)
 
-    def _tell(self, number: int, event: Started | Heard) -> list[Asked]:
+    def _tell(self, number: int, event: Started | ExternalEvent) -> list[Asked]:
         """Give an island its event, and others what comes of it; return the questions.
 
         Raises:
@@ -310,7 +310,7 @@ class Loop:
         raise UnexpectedEvent(f"no island here takes {event}")
 
 
-def _island(event: Heard) -> int:
+def _island(event: ExternalEvent) -> int:
     """Return whose event it is."""
     if isinstance(event, Advanced | Commanded):
         return event.island

@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Self
 from zlib import crc32
 
-from coordinator.islands.events import Journalled
+from coordinator.islands.events import JournalledEvent
 from coordinator.storage.disk import AppendedFile
 from coordinator.storage.journal_codec import decode_entry, encode_entry
 from schema.errors import MalformedMessage, RunFolderError
@@ -67,12 +67,12 @@ class Journal:
         """Open the journal of a run folder."""
         return cls(folder / NAME, epoch=epoch, fsync=fsync)
 
-    def replay(self) -> list[Journalled]:
+    def replay(self) -> list[JournalledEvent]:
         """Return what it held when it was opened, oldest first; only once."""
         history, self._history = self._history, []
         return history
 
-    def append(self, events: Iterable[Journalled]) -> None:
+    def append(self, events: Iterable[JournalledEvent]) -> None:
         """Keep events before anybody acts on them: all, or on failure none.
 
         Raises:
@@ -196,7 +196,7 @@ def _refuse_gap(path: Path, data: bytes, position: int, sequence: int) -> None:
             )
 
 
-def _event(path: Path, payload: bytes) -> Journalled:
+def _event(path: Path, payload: bytes) -> JournalledEvent:
     try:
         return decode_entry(payload)
     except MalformedMessage as error:

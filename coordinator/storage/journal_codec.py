@@ -6,9 +6,9 @@ from coordinator.islands.events import (
     Commanded,
     Evaluated,
     EvaluationFailed,
-    Heard,
+    ExternalEvent,
     Insert,
-    Journalled,
+    JournalledEvent,
     Order,
     Pause,
     Remove,
@@ -40,7 +40,7 @@ from schema.wire.codec import (
 from schema.wire.messages import finite, genome_from_message, genome_to_message
 
 
-def encode_entry(event: Journalled) -> bytes:
+def encode_entry(event: JournalledEvent) -> bytes:
     """Return the bytes of one event; of an advance all but its poses."""
     entry = pb.Entry()
     match event:
@@ -62,7 +62,7 @@ def encode_entry(event: Journalled) -> bytes:
     return entry.SerializeToString(deterministic=True)
 
 
-def decode_entry(data: bytes) -> Journalled:
+def decode_entry(data: bytes) -> JournalledEvent:
     """Return the event of some bytes.
 
     Raises:
@@ -71,7 +71,7 @@ def decode_entry(data: bytes) -> Journalled:
     return decoded(data, pb.Entry(), _journalled)
 
 
-def _journalled(entry: pb.Entry) -> Journalled:
+def _journalled(entry: pb.Entry) -> JournalledEvent:
     is_audit = entry.WhichOneof("event") == "audited"
     return _audited(entry.audited) if is_audit else _event(entry)
 
@@ -123,7 +123,7 @@ def _write_order(order: Order, command: pb.Command) -> None:
             write_brain_change(change, command.replace_brain)
 
 
-def _event(entry: pb.Entry) -> Heard:
+def _event(entry: pb.Entry) -> ExternalEvent:
     birth = BirthId(entry.island, entry.birth)
     signed = Provenance(
         entry.provenance.agent, entry.provenance.platform, entry.provenance.wall_s

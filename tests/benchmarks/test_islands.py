@@ -7,7 +7,7 @@ import pytest
 
 from schema.experiment.document import Experiment, Islands, Selection
 from schema.experiment.migration import Migration
-from tests.coordinator.sea import Sea
+from tests.coordinator.archipelago_run import ArchipelagoRun
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
 
@@ -28,12 +28,12 @@ def per_generation(migration: Migration | None) -> float:
     )
     times = []
     for seed in range(3):
-        sea = Sea(document, seed=seed)
-        sea.start()
-        while any(island.births < 5 for island in sea.islands.values()):
-            sea.turn()
+        lived = ArchipelagoRun(document, seed=seed)
+        lived.start()
+        while any(island.births < 5 for island in lived.islands.values()):
+            lived.turn()
         began = time.process_time()
-        sea.live()
+        lived.live()
         times.append(time.process_time() - began)
     return min(times) / ISLANDS / BROODS
 

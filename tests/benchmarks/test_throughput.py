@@ -22,7 +22,7 @@ from coordinator.islands.events import (
     Evaluated,
     IslandCommand,
     IslandEvent,
-    Journalled,
+    JournalledEvent,
     Started,
 )
 from coordinator.islands.island import Island
@@ -93,7 +93,7 @@ class Counted:
         self.evaluations = 0
         self._journal = journal
 
-    def append(self, events: Sequence[Journalled]) -> None:
+    def append(self, events: Sequence[JournalledEvent]) -> None:
         self._journal.append(events)
         self.evaluations += sum(isinstance(event, Evaluated) for event in events)
 

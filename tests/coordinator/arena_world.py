@@ -39,7 +39,7 @@ CROWDED = Report(
     is_viable=False, reason="parts 1 and 2 intersect", intersections=((1, 2),),
     lower=ORIGIN, upper=ORIGIN, mass=0.1, motors=1,
 )  # fmt: skip
-SOMEBODY = Provenance("worker-1", "x86", 0.5)
+PROVENANCE = Provenance("worker-1", "x86", 0.5)
 DT = 0.005
 MATURE = 3000
 """Steps of 15 s: 3 s of warm-up and a window of 12 s."""
@@ -56,13 +56,13 @@ def experiment(births: int = 3000, **arena: Any) -> Experiment:  # noqa: ANN401
     return msgspec.structs.replace(shipped, births=births, arena=rules)
 
 
-def equal(birth: BirthId, step: int) -> float:
+def equal_fitness(birth: BirthId, step: int) -> float:
     """Find everybody equally fit."""
     del birth, step
     return 0.1
 
 
-def golden(birth: BirthId, step: int) -> float:
+def distinct_fitness(birth: BirthId, step: int) -> float:
     """Find nobody as fit as another, or as at another time; in (0, 1)."""
     return (birth.number * 0.6180339887498949 + step * 1e-5 + 0.1) % 1.0
 
@@ -72,7 +72,7 @@ def viable(vet: Vet) -> Vetted:
     return Vetted(vet.birth, vet.attempt, VIABLE)
 
 
-def picky(vet: Vet) -> Vetted | VettingFailed:
+def reject_some(vet: Vet) -> Vetted | VettingFailed:
     """Refuse every third attempt, and break at some."""
     if (vet.birth.number + vet.attempt) % 3 == 1:
         return Vetted(vet.birth, vet.attempt, CROWDED)
@@ -83,10 +83,10 @@ def picky(vet: Vet) -> Vetted | VettingFailed:
 
 @dataclass
 class World:
-    """Who is where since when; ``falls`` tells who diverges during an advance."""
+    """Who is where since when; ``diverges`` tells who diverges during an advance."""
 
-    fit: Fit = equal
-    falls: Callable[[BirthId, int], bool] = lambda _birth, _step: False
+    fit: Fit = equal_fitness
+    diverges: Callable[[BirthId, int], bool] = lambda _birth, _step: False
     step: int = 0
     born: dict[BirthId, int] = field(default_factory=dict)
     places: dict[BirthId, tuple[float, float]] = field(default_factory=dict)
@@ -101,7 +101,7 @@ class World:
             self.places[each.birth] = each.place
         assert all(each.birth in self.born for each in command.changes.brains)
         self.step = command.until
-        fallen = [one for one in sorted(self.born) if self.falls(one, self.step)]
+        fallen = [one for one in sorted(self.born) if self.diverges(one, self.step)]
         casualties = tuple(
             Casualty(one, self.step - 1, "diverged: qacc", (*self.places[one], 0.5))
             for one in fallen
@@ -117,7 +117,9 @@ class World:
             touches=tuple(Touch(a, b, 0.25) for a, b in pairwise(living[:3])),
             poses=poses(living, self.step * DT),
         )
-        return Advanced(command.island, command.number, advance, len(living), SOMEBODY)
+        return Advanced(
+            command.island, command.number, advance, len(living), PROVENANCE
+        )
 
     def judged(self, birth: BirthId) -> Judgement:
         age = self.step - self.born[birth]
@@ -143,7 +145,7 @@ def poses(births: list[BirthId], time_s: float) -> bytes:
 
 
 @dataclass
-class Life:
+class ArenaRun:
     """An arena, its world, and all that either said."""
 
     arena: Arena
@@ -169,7 +171,7 @@ class Life:
             return self.tell(self.verdict(asked))
         return self.tell(self.world.advance(asked))
 
-    def live(self, until_s: float = 1e9) -> "Life":
+    def live(self, until_s: float = 1e9) -> "ArenaRun":
         """Go on to a time, or to the end."""
         if not self.events:
             self.tell(Started())

@@ -26,20 +26,20 @@ from schema.wire.arena import Advance
 from tests.coordinator.arena_world import (
     CROWDED,
     DT,
-    SOMEBODY,
+    PROVENANCE,
     VIABLE,
-    Life,
+    ArenaRun,
     World,
-    equal,
+    distinct_fitness,
+    equal_fitness,
     experiment,
-    golden,
-    picky,
+    reject_some,
     viable,
 )
 
 
-def life(births: int = 3000, *, world: World | None = None) -> Life:
-    return Life(Arena(experiment(births), 1, 0), world or World())
+def life(births: int = 3000, *, world: World | None = None) -> ArenaRun:
+    return ArenaRun(Arena(experiment(births), 1, 0), world or World())
 
 
 def numbers(rows: list[dict[str, int]]) -> list[int]:
@@ -145,7 +145,7 @@ def test_no_slot_before_five_are_mature() -> None:
 
 
 def test_only_the_mature_have_children() -> None:
-    lived = life(60, world=World(golden)).live()
+    lived = life(60, world=World(distinct_fitness)).live()
     times = {row["birth"]: row["sim_time_s"] for row in lived.rows("births")}
     ranks = {row["birth"]: row["rank"] for row in lived.rows("births")}
     for row in lived.rows("births")[15:]:
@@ -164,7 +164,7 @@ def test_a_couple_gives_up_after_five_attempts_and_its_slot_is_lost() -> None:
         refused = is_child and vet.attempt < 7
         return Vetted(vet.birth, vet.attempt, CROWDED if refused else VIABLE)
 
-    lived = Life(Arena(experiment(), 1, 0), verdict=stubborn).live(46)
+    lived = ArenaRun(Arena(experiment(), 1, 0), verdict=stubborn).live(46)
     vets = [one for one in lived.commands if isinstance(one, Vet)][15:]
     assert [one.birth.number for one in vets] == [15] * len(vets)
     attempts = [one.attempt for one in vets]
@@ -193,10 +193,10 @@ def test_snapshots_are_wanted_every_hundred_seconds() -> None:
 
 
 def test_a_fallen_robot_is_a_death_with_its_reason() -> None:
-    def falls(birth: BirthId, step: int) -> bool:
+    def diverges(birth: BirthId, step: int) -> bool:
         return birth.number == 3 and step == 4000
 
-    lived = life(world=World(falls=falls)).live(31)
+    lived = life(world=World(diverges=diverges)).live(31)
     (death,) = lived.rows("deaths")
     x, y = lived.world.places[BirthId(0, 3)]
     assert death == {
@@ -211,10 +211,10 @@ def test_a_fallen_robot_is_a_death_with_its_reason() -> None:
 
 
 def test_an_arena_in_which_too_few_are_left_to_mate_is_done() -> None:
-    def falls(birth: BirthId, step: int) -> bool:
+    def diverges(birth: BirthId, step: int) -> bool:
         return birth.number >= 4 and step == 4000
 
-    lived = life(world=World(falls=falls)).live()
+    lived = life(world=World(diverges=diverges)).live()
     assert lived.arena.is_extinct
     assert lived.is_done
     assert lived.arena.step == 6000
@@ -234,7 +234,7 @@ def test_touches_and_poses_go_through() -> None:
 
 
 def test_rows_have_the_columns_of_their_tables() -> None:
-    lived = life(40, world=World(golden)).live()
+    lived = life(40, world=World(distinct_fitness)).live()
     for name in ("births", "population", "fitness", "deaths", "touches"):
         rows = lived.rows(name)
         assert rows
@@ -243,7 +243,7 @@ def test_rows_have_the_columns_of_their_tables() -> None:
 
 
 def advanced(step: int, number: int) -> Advanced:
-    return Advanced(0, number, Advance(step, bytes(32), (), (), (), b""), 0, SOMEBODY)
+    return Advanced(0, number, Advance(step, bytes(32), (), (), (), b""), 0, PROVENANCE)
 
 
 def test_an_old_advance_is_ignored() -> None:
@@ -305,7 +305,7 @@ def test_nothing_comes_before_the_start() -> None:
 
 
 def test_verdicts_that_come_twice_are_ignored() -> None:
-    lived = Life(Arena(experiment(20), 1, 0), verdict=picky).live()
+    lived = ArenaRun(Arena(experiment(20), 1, 0), verdict=reject_some).live()
     verdicts = [one for one in lived.events if isinstance(one, Vetted | VettingFailed)]
     assert len(verdicts) > 20
     assert all(lived.arena.handle(one) == [] for one in verdicts)
@@ -323,7 +323,7 @@ def without_reproduction() -> Experiment:
 
 
 def test_children_may_be_random_robots() -> None:
-    lived = Life(Arena(without_reproduction(), 1, 0), World(equal)).live()
+    lived = ArenaRun(Arena(without_reproduction(), 1, 0), World(equal_fitness)).live()
     assert all(row["parents"] == [] for row in lived.rows("births"))
     # Nobody needs to be mature for it: the first comes at 15 s.
     assert lived.rows("births")[15]["sim_time_s"] == 15.0 == 3000 * DT

@@ -22,26 +22,26 @@ from schema.robot.genome import Genome, Node
 from schema.robot.ids import BirthId
 from tests.coordinator.arena_world import (
     DT,
-    Life,
+    ArenaRun,
     World,
-    equal,
+    distinct_fitness,
+    equal_fitness,
     experiment,
-    golden,
-    picky,
+    reject_some,
 )
 
 
-def life() -> Life:
-    return Life(Arena(experiment(60), 1, 0), World(golden), picky)
+def life() -> ArenaRun:
+    return ArenaRun(Arena(experiment(60), 1, 0), World(distinct_fitness), reject_some)
 
 
-def order(lived: Life, wanted: Order, name: str = "") -> list[ArenaCommand]:
+def order(lived: ArenaRun, wanted: Order, name: str = "") -> list[ArenaCommand]:
     """Give an order now."""
     identity = name or f"order {len(lived.events)}"
     return lived.tell(Commanded(0, identity, lived.arena.next_step, wanted))
 
 
-def genome(lived: Life) -> Genome:
+def genome(lived: ArenaRun) -> Genome:
     return lived.arena.population[0].genome
 
 
@@ -96,7 +96,9 @@ def test_a_robot_that_is_inserted_is_a_birth_without_parents() -> None:
 
 
 def test_a_full_arena_lets_guests_wait() -> None:
-    lived = Life(Arena(experiment(population_limit=16), 1, 0), World(equal)).live(20)
+    lived = ArenaRun(
+        Arena(experiment(population_limit=16), 1, 0), World(equal_fitness)
+    ).live(20)
     order(lived, Insert(genome(lived)))
     order(lived, Insert(genome(lived)))
     lived.turn()
@@ -106,7 +108,7 @@ def test_a_full_arena_lets_guests_wait() -> None:
     assert numbers_of(lived) == [0, 1, 2, 3, 4, 5, 6, *range(8, 17)]
 
 
-def numbers_of(lived: Life) -> list[int]:
+def numbers_of(lived: ArenaRun) -> list[int]:
     return [one.birth.number for one in lived.arena.population]
 
 
@@ -130,7 +132,7 @@ def test_a_brain_is_replaced_and_not_handed_down() -> None:
     assert lived.arena.population[4].genome is before[4].genome
 
 
-def brain_of(lived: Life, number: int) -> Brain:
+def brain_of(lived: ArenaRun, number: int) -> Brain:
     inserted = [each for one in lived.advances for each in one.changes.insertions]
     (found,) = [each for each in inserted if each.birth.number == number]
     return found.robot.brain
@@ -198,6 +200,6 @@ def test_a_robot_that_cannot_be_is_refused(wanted: Insert) -> None:
 
 
 def test_a_finished_arena_takes_no_orders() -> None:
-    lived = Life(Arena(experiment(15), 1, 0), World(equal)).live()
+    lived = ArenaRun(Arena(experiment(15), 1, 0), World(equal_fitness)).live()
     assert lived.arena.step * DT == 15.0
     assert order(lived, Pause()) == []

@@ -23,7 +23,14 @@ from coordinator.islands.events import (
 )
 from coordinator.storage.journal_codec import decode_entry, encode_entry
 from schema.robot.ids import BirthId
-from tests.coordinator.arena_world import DT, Life, World, experiment, golden, picky
+from tests.coordinator.arena_world import (
+    DT,
+    ArenaRun,
+    World,
+    distinct_fitness,
+    experiment,
+    reject_some,
+)
 
 fixed = settings(max_examples=12, derandomize=True, database=None, deadline=None)
 
@@ -42,9 +49,14 @@ def said(commands: list[ArenaCommand]) -> list[ArenaCommand]:
 @given(seed=st.integers(0, 2**32))
 @fixed
 def test_the_order_of_verdicts_does_not_matter(seed: int) -> None:
-    one = Life(Arena(experiment(40), 7, 0), World(golden), picky).live()
-    other = Life(
-        Arena(experiment(40), 7, 0), World(golden), picky, order=shuffled(seed)
+    one = ArenaRun(
+        Arena(experiment(40), 7, 0), World(distinct_fitness), reject_some
+    ).live()
+    other = ArenaRun(
+        Arena(experiment(40), 7, 0),
+        World(distinct_fitness),
+        reject_some,
+        order=shuffled(seed),
     ).live()
     assert said(one.commands) == said(other.commands)
 
@@ -62,7 +74,7 @@ def test_floor_and_limit_hold_in_every_world(
     def fit(birth: BirthId, step: int) -> float:
         return random.Random(f"{luck} {birth} {step}").random()  # noqa: S311
 
-    def falls(birth: BirthId, step: int) -> bool:
+    def diverges(birth: BirthId, step: int) -> bool:
         return random.Random(f"{birth} {step} {luck}").random() < 0.002  # noqa: S311
 
     rules = {
@@ -70,7 +82,9 @@ def test_floor_and_limit_hold_in_every_world(
         "population_floor": floor,
         "survive_share_of_mean": share,
     }
-    lived = Life(Arena(experiment(45, **rules), 3, 0), World(fit, falls), picky)
+    lived = ArenaRun(
+        Arena(experiment(45, **rules), 3, 0), World(fit, diverges), reject_some
+    )
     while not lived.commands or lived.waiting:
         before = lived.arena.step
         found = lived.turn() if lived.commands else lived.tell(Started())
@@ -93,7 +107,9 @@ def test_floor_and_limit_hold_in_every_world(
 
 
 def test_a_replayed_journal_gives_the_same_commands_and_rows() -> None:
-    lived = Life(Arena(experiment(40), 7, 0), World(golden), picky).live(50)
+    lived = ArenaRun(
+        Arena(experiment(40), 7, 0), World(distinct_fitness), reject_some
+    ).live(50)
     for wanted in (Pause(), Remove(BirthId(0, 2)), Resume()):
         identity = type(wanted).__name__
         lived.tell(Commanded(0, identity, lived.arena.next_step, wanted))
@@ -120,7 +136,7 @@ def test_other_seeds_and_runs_give_other_places() -> None:
     places = [
         [
             (row["x"], row["y"])
-            for row in Life(Arena(experiment(15), seed, run), World())
+            for row in ArenaRun(Arena(experiment(15), seed, run), World())
             .live()
             .rows("births")
         ]

@@ -15,15 +15,16 @@ from coordinator.evolution.body_mutation import (
     swap_subtrees,
     vary_parts,
 )
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import (
     gene_ids,
     preorder,
+    size_limits,
+    size_of,
     to_genome,
     to_mutable,
 )
-from coordinator.evolution.size_counts import greatest, tally
+from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import (
     Experiment,
     Generation,
@@ -121,7 +122,7 @@ def test_duplicating_keeps_within_every_limit() -> None:
         for seed in range(200):
             root = to_mutable(CHAIN, TYPES)
             duplicate_subtree(draws(seed), root, setting)
-            assert tally(preorder(root)).fits(greatest(setting.space))
+            assert size_of(preorder(root)).fits(size_limits(setting.space))
     full = experiment({"max_parts": 5}, p_duplicate_subtree=1.0)
     root = to_mutable(CHAIN, TYPES)
     duplicate_subtree(draws(), root, full)

@@ -1,7 +1,6 @@
 """The steps of mutation that change the brain, one by one."""
 
 from collections import Counter
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -16,10 +15,9 @@ from coordinator.evolution.brain_mutation import (
     delete_hidden_neurons,
     vary_neurons,
 )
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.generation import generate
-from coordinator.evolution.growth import half_up
 from coordinator.evolution.mutable_genome import preorder, to_genome, to_mutable
+from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Experiment, Space, Variation, body_space
 from schema.robot.brain import NEURON_TYPES, Layer
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop, walk
@@ -250,9 +248,3 @@ def test_nothing_is_added_where_there_is_no_target() -> None:
     root = to_mutable(lone, TYPES)
     add_connections(draws(), preorder(root), 40, experiment())
     assert to_genome(preorder(root)) == lone
-
-
-def test_halves_are_rounded_up_exactly() -> None:
-    halves = [half_up(Fraction(k, 2)) for k in range(6)]
-    assert halves == [0, 1, 1, 2, 2, 3]
-    assert half_up(Fraction(49, 100)) == 0

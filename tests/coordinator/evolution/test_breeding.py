@@ -1,5 +1,6 @@
 """How a birth's candidates come about, attempt by attempt."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -7,7 +8,7 @@ import pytest
 from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.selection import Individual
 from schema.errors import ExperimentError
-from schema.experiment.document import Experiment, Selection, Space
+from schema.experiment.document import Culling, Experiment, Selection, Space
 from schema.robot.genome import Genome, NeuronGene, Node
 from schema.robot.ids import BirthId
 
@@ -95,10 +96,31 @@ def test_patience_ends_in_one_clear_error(
 ) -> None:
     population = [] if is_founder else founders(5)
     patient = breeder(parents=parents)
-    patient.check_patience(CHILD, limit - 1, population, "too crowded")
+    patient.check_attempts(CHILD, limit - 1, population, "too crowded")
     with pytest.raises(ExperimentError) as caught:
-        patient.check_patience(CHILD, limit, population, "too crowded")
+        patient.check_attempts(CHILD, limit, population, "too crowded")
     message = str(caught.value)
     assert "\n" not in message
     for word in ("birth 40 of island 0", f"{what} = {limit}", "too crowded"):
         assert word in message
+
+
+def test_without_culling_the_best_survive() -> None:
+    genomes = [one.genome for one in founders(4)]
+    fitness = (0.9, 0.1, 0.5, 0.6)
+    living = [
+        Individual(BirthId(0, number), genome, value, rank=1, generation=0)
+        for number, (genome, value) in enumerate(zip(genomes, fitness, strict=True))
+    ]
+    found = breeder(population=3).survivors(living[:3], living[3:])
+    assert [one.birth.number for one in found] == [0, 2, 3]
+
+
+def test_with_culling_weak_robots_are_removed_at_the_interval() -> None:
+    rules = Culling(interval=2, population_floor=1)
+    living = [replace(one, fitness=1.0) for one in founders(6)]
+    living[1] = replace(living[1], fitness=0.1)
+    culling = breeder(population=4, culling=rules)
+    assert culling.survivors(living[:4], living[4:5]) == tuple(living[:5])
+    found = culling.survivors(living[:5], living[5:])
+    assert [one.birth.number for one in found] == [0, 2, 3, 4, 5]

@@ -10,7 +10,7 @@ import pytest
 
 from analyzer.report import analyze
 from coordinator.evolution.generation import generate
-from coordinator.evolution.seeding import Purpose, stream
+from coordinator.evolution.random_streams import Purpose, stream
 from schema.experiment.document import Experiment, Vetting, body_space
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId

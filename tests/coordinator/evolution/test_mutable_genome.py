@@ -16,10 +16,10 @@ from coordinator.evolution.mutable_genome import (
     level,
     path_between,
     preorder,
+    subtree_sizes,
     to_genome,
     to_mutable,
 )
-from coordinator.evolution.size_counts import tallies
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import BUILT_IN
 from schema.robot.frames import place_parts, shapes_of
@@ -99,11 +99,9 @@ def test_a_path_goes_up_by_own_slots_and_down_by_the_parents() -> None:
     assert follow(pads, (0, 3, 2, 0)) is None
 
 
-def test_tallies_count_every_subtree() -> None:
-    found = [
-        tuple(size) for size in tallies(preorder(to_mutable(TREE, TYPES))).values()
-    ]
-    assert found == [
+def test_sizes_of_all_subtrees() -> None:
+    sizes = subtree_sizes(preorder(to_mutable(TREE, TYPES)))
+    assert list(sizes.values()) == [
         (6, 10, 1, 2),
         (2, 2, 1, 2),
         (1, 2, 0, 0),

@@ -3,17 +3,20 @@
 from collections import Counter
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
-from coordinator.evolution.buffered_rng import BufferedRng
+from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.selection import (
     Individual,
+    cull_population,
     fittest_first,
+    select_culled,
     select_parents,
     select_survivors,
 )
-from schema.experiment.document import Selection
+from schema.experiment.document import Arena, Culling, Selection
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 
@@ -118,3 +121,105 @@ def test_random_survivors_are_uniform_among_all() -> None:
 def test_founders_all_live_on() -> None:
     assert survivors([], OLD, population=3) == [0, 1, 2]
     assert survivors([], OLD, population=3, survivors="random") == [0, 1, 2]
+
+
+def culled(fitness: list[float], **rules: float) -> tuple[str, list[int]]:
+    arena = msgspec.structs.replace(Arena(), **rules)
+    reason, found = select_culled(individuals(*fitness), arena)
+    return reason, [one.birth.number for one in found]
+
+
+def test_exactly_the_share_of_the_mean_lives() -> None:
+    # Mean 1.0, limit 0.5: one half is enough, a little less is not.
+    fitness = [0.5, 0.499, 1.501, 1.5, *([1.0] * 8)]
+    assert culled(fitness, survive_share_of_mean=0.5) == ("selection", [1])
+
+
+def test_the_weakest_go_first_and_eight_stay() -> None:
+    fitness = [0.03, 0.01, 0.02, *([1.0] * 7)]
+    assert culled(fitness) == ("selection", [1, 2])
+
+
+def test_of_equals_the_younger_goes() -> None:
+    assert culled([0.0, 0.0, 0.0, *([1.0] * 7)]) == ("selection", [2, 1])
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, 8])
+def test_up_to_the_floor_nobody_dies(count: int) -> None:
+    assert culled([0.0, *([1.0] * 7)][:count])[1] == []
+
+
+def test_a_full_arena_of_equals_loses_seven_tenths() -> None:
+    assert culled([1.0] * 29) == ("selection", [])
+    reason, found = culled([1.0] * 30)
+    assert (reason, len(found)) == ("cull", 21)
+    assert found == list(range(29, 8, -1))
+
+
+def test_one_weak_robot_spares_a_full_arena() -> None:
+    assert culled([0.1, *([1.0] * 29)]) == ("selection", [0])
+
+
+def test_the_floor_holds_in_a_cull_too() -> None:
+    assert len(culled([1.0] * 30, population_floor=12)[1]) == 18
+
+
+def after_culling(
+    rules: Culling,
+    parents: list[Individual],
+    children: list[Individual],
+    founders: int = 15,
+) -> list[int]:
+    return numbers(cull_population(parents, children, founders, rules))
+
+
+def test_all_robots_live_between_two_culls() -> None:
+    living = individuals(*([1.0] * 15), 0.0)
+    assert after_culling(Culling(), living[:15], living[15:]) == list(range(16))
+    # The second birth after the founders: 0.0 < 0.7 * 16 / 17.
+    child = individuals(1.0, first=16)
+    assert after_culling(Culling(), living, child) == [*range(15), 16]
+
+
+def test_founders_are_not_culled() -> None:
+    founders = individuals(*([1.0] * 14), 0.0)
+    assert after_culling(Culling(interval=1), [], founders) == list(range(15))
+
+
+def test_a_brood_that_ends_several_intervals_is_culled_once() -> None:
+    rules = Culling(interval=5)
+    culled = []
+    for births in range(20, 60, 3):
+        living = individuals(0.0, *([1.0] * (births - 1)))[-29:]
+        living[0] = individuals(0.0, first=living[0].birth.number)[0]
+        found = after_culling(rules, living[:-3], living[-3:])
+        if len(found) < len(living):
+            culled.append(births)
+    # Intervals end at 20, 25, 30, ... births.
+    assert culled == [20, 26, 32, 35, 41, 47, 50, 56]
+
+
+def test_the_population_floor_remains() -> None:
+    living = individuals(*([0.0] * 5), *([1.0] * 6))
+    # Five are below 0.7 * 6 / 11; eight remain; of equals the youngest are culled.
+    found = after_culling(Culling(interval=1), living[:10], living[10:], 10)
+    assert found == [0, 1, *range(5, 11)]
+
+
+def test_a_full_population_of_equals_is_culled_at_once() -> None:
+    rules = Culling(interval=100)
+    living = individuals(*([1.0] * 30))
+    assert len(after_culling(rules, living[:28], living[28:29])) == 29
+    # 21 of 30 are culled, the youngest.
+    assert after_culling(rules, living[:29], living[29:]) == list(range(9))
+
+
+def test_one_weak_robot_spares_a_full_population() -> None:
+    living = individuals(*([1.0] * 29), 0.1)
+    rules = Culling(interval=100)
+    assert after_culling(rules, living[:29], living[29:]) == list(range(29))
+
+
+def test_the_rest_of_a_culled_population_is_in_birth_order() -> None:
+    parents, children = individuals(0.9, 0.8, first=7), individuals(0.7, 0.6)
+    assert after_culling(Culling(), parents, children, 3) == [0, 1, 7, 8]

@@ -8,15 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.evolution.buffered_rng import BufferedRng
 from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import (
     gene_ids,
     preorder,
+    size_limits,
+    size_of,
     to_genome,
     to_mutable,
 )
-from coordinator.evolution.size_counts import greatest, tallies
+from coordinator.evolution.random_streams import BufferedRng
 from coordinator.evolution.variation import crossover, mate, mutate
 from schema.experiment.document import Experiment, Space, Variation, body_space
 from schema.parts import BUILT_IN
@@ -230,8 +231,8 @@ def test_a_lineage_stays_within_all_restrictions() -> None:
         population = children
         for genome in population:
             check_robot(develop(genome, TYPES), TYPES)
-            size = tallies(preorder(to_mutable(genome, TYPES)))
-            assert next(iter(size.values())).fits(greatest(DEFAULT.space)), generation
+            size = size_of(preorder(to_mutable(genome, TYPES)))
+            assert size.fits(size_limits(DEFAULT.space)), generation
 
 
 def test_a_child_without_a_motor_is_refused() -> None:

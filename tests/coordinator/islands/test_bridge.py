@@ -2,6 +2,7 @@
 
 from collections import Counter, deque
 from collections.abc import Iterator
+from math import inf
 from typing import Any
 
 import pytest
@@ -31,6 +32,7 @@ from schema.experiment.document import (
     Simulation,
 )
 from schema.experiment.file import read_experiment
+from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -199,8 +201,10 @@ def test_judging_anew_waits_for_everybody() -> None:
     assert island.births == 10
     assert [one.trial for one in late] == [1, 1, 1]
     first, second, third = late
-    with pytest.raises(UnexpectedEvent):
-        island.handle(Evaluated(first.birth, Evaluation(0, 0, 0, 12), Provenance(), 2))
+    for fitness, trial, why in ((0.0, 2, "1 trials"), (inf, 1, "must be finite")):
+        evaluation = Evaluation(fitness, 0, 0, 12)
+        with pytest.raises(UnexpectedEvent, match=why):
+            island.handle(Evaluated(first.birth, evaluation, Provenance(), trial))
     assert island.handle(answer(third)) == []
     assert island.handle(answer(first)) == []
     found = island.handle(answer(second))
@@ -209,9 +213,25 @@ def test_judging_anew_waits_for_everybody() -> None:
     assert isinstance(found[-1], Vet)
 
 
-def test_nothing_is_judged_anew_unless_it_is_wanted() -> None:
+def test_no_brood_exceeds_the_population_limit_or_the_births() -> None:
+    culling = Culling(population_limit=10, population_floor=5, interval=1000)
+    selection = replace(
+        BRIDGE.selection, population=5, children=4, reevaluation=None, culling=culling
+    )
+    commands = live(replace(BRIDGE, births=20, selection=selection))
+    sizes = Counter(row["births"] for row in rows(commands, "population"))
+    # 5 + 4 births; then one child makes the population full, and 3 weak are culled.
+    assert list(sizes.items())[:3] == [(5, 5), (9, 9), (10, 7)]
+    assert max(sizes) == 20
+    assert max(sizes.values()) < 10
+
+
+def test_robots_are_evaluated_once_without_re_evaluation() -> None:
     selection = replace(BRIDGE.selection, reevaluation=None)
     plain = replace(BRIDGE, selection=selection, simulation=Simulation())
+    late = Evaluated(BirthId(0, 0), Evaluation(0, 0, 0, 12), Provenance(), 1)
+    with pytest.raises(UnexpectedEvent, match="re-evaluates no robot"):
+        Island(plain, 7, 0).handle(late)
     asked = [one for one in live(plain) if isinstance(one, Evaluate)]
     assert [(one.trial, one.steps) for one in asked] == [(0, 0)] * 40
 

@@ -41,7 +41,7 @@ CROWDED = Report(
     is_viable=False, reason="parts 1 and 2 intersect", intersections=((1, 2),),
     lower=ORIGIN, upper=ORIGIN, mass=0.1, motors=1,
 )  # fmt: skip
-SOMEBODY = Provenance("worker-1", "x86", 0.5)
+PROVENANCE = Provenance("worker-1", "x86", 0.5)
 
 BASELINES = ("no-selection", "no-reproduction")
 
@@ -68,9 +68,9 @@ def answer(command: Vet | Evaluate) -> Answered:
             return VettingFailed(birth, command.attempt, "analyzer broke thrice")
         return Vetted(birth, command.attempt, VIABLE)
     if birth.number % 7 == 3:
-        return EvaluationFailed(birth, "diverged at 0.3 s", SOMEBODY)
+        return EvaluationFailed(birth, "diverged at 0.3 s", PROVENANCE)
     fitness = fitness_of(birth)
-    return Evaluated(birth, Evaluation(fitness, 0.1, fitness / 5, 12.0), SOMEBODY)
+    return Evaluated(birth, Evaluation(fitness, 0.1, fitness / 5, 12.0), PROVENANCE)
 
 
 def well(command: Vet | Evaluate) -> Answered:
@@ -78,7 +78,7 @@ def well(command: Vet | Evaluate) -> Answered:
     if isinstance(command, Vet):
         return Vetted(command.birth, command.attempt, VIABLE)
     fitness = fitness_of(command.birth)
-    return Evaluated(command.birth, Evaluation(fitness, 0.1, 0.0, 12.0), SOMEBODY)
+    return Evaluated(command.birth, Evaluation(fitness, 0.1, 0.0, 12.0), PROVENANCE)
 
 
 def requests(commands: list[IslandCommand]) -> list[Vet | Evaluate]:
@@ -136,7 +136,7 @@ def test_births_are_committed_in_birth_order() -> None:
     committed = []
     for birth in late:
         evaluation = Evaluation(0.5, 0.0, 0.0, 12.0)
-        found = island.handle(Evaluated(birth, evaluation, SOMEBODY))
+        found = island.handle(Evaluated(birth, evaluation, PROVENANCE))
         committed.append([(r.table, r.row["birth"]) for r in records(found)])
     assert committed == [
         [],
@@ -301,7 +301,7 @@ def test_without_selection_fitness_decides_nothing() -> None:
             if isinstance(found, Evaluated):
                 fitness = sign * found.evaluation.fitness
                 return Evaluated(
-                    found.birth, Evaluation(fitness, 0.0, 0.0, 12.0), SOMEBODY
+                    found.birth, Evaluation(fitness, 0.0, 0.0, 12.0), PROVENANCE
                 )
             return found
 
@@ -316,7 +316,7 @@ def test_new_parents_come_after_so_many_attempts() -> None:
     couples = []
     while waiting:
         context = waiting.popleft()
-        candidate = island._unborn[context.birth.number].candidate
+        candidate = island._in_flight[context.birth.number].candidate
         if context.birth.number == 9 and candidate.attempt < 9:
             assert candidate.couple is not None
             names = tuple(one.birth.number for one in candidate.couple)
@@ -366,7 +366,7 @@ def test_another_seed_or_run_is_another_life(seed: int, run: int) -> None:
     assert all(a["genome"] != b["genome"] for a, b in zip(one, other, strict=True))
 
 
-EVALUATED = Evaluated(BirthId(0, 0), Evaluation(0.1, 0.1, 0.1, 12.0), SOMEBODY)
+EVALUATED = Evaluated(BirthId(0, 0), Evaluation(0.1, 0.1, 0.1, 12.0), PROVENANCE)
 
 
 @pytest.mark.parametrize(
@@ -374,7 +374,7 @@ EVALUATED = Evaluated(BirthId(0, 0), Evaluation(0.1, 0.1, 0.1, 12.0), SOMEBODY)
     [
         (Started(), "it has started before"),
         (EVALUATED, "it has not been vetted"),
-        (EvaluationFailed(BirthId(0, 0), "why", SOMEBODY), "it has not been vetted"),
+        (EvaluationFailed(BirthId(0, 0), "why", PROVENANCE), "it has not been vetted"),
         (Vetted(BirthId(0, 0), 1, VIABLE), "it is at attempt 0"),
         (VettingFailed(BirthId(0, 0), 1, "why"), "it is at attempt 0"),
         (Vetted(BirthId(0, 6), 0, VIABLE), "births 0..5 have begun"),
@@ -405,7 +405,7 @@ def test_a_fitness_that_is_no_number_is_refused() -> None:
     island.handle(Vetted(BirthId(0, 0), 0, VIABLE))
     evaluation = Evaluation(float("nan"), 0.0, 0.0, 12.0)
     with pytest.raises(UnexpectedEvent, match="fitness must be finite"):
-        island.handle(Evaluated(BirthId(0, 0), evaluation, SOMEBODY))
+        island.handle(Evaluated(BirthId(0, 0), evaluation, PROVENANCE))
 
 
 def never(command: Vet | Evaluate) -> Answered:

@@ -20,12 +20,16 @@ from schema.experiment.document import Experiment, Islands, Selection, Simulatio
 from schema.experiment.environment import Environment
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
-from tests.coordinator.sea import Sea
+from tests.coordinator.archipelago_run import ArchipelagoRun
 
 Names = list[tuple[int, int]]
 
 
-def sea(*births: int, selection: Selection | None = None, **migration: Any) -> Sea:  # noqa: ANN401
+def small_islands(
+    *births: int,
+    selection: Selection | None = None,
+    **migration: Any,  # noqa: ANN401 - any setting
+) -> ArchipelagoRun:
     """Return islands of four with broods of two; fitness rises with the name.
 
     Birth n of island i has fitness (4 i + n) / 100 everywhere.
@@ -37,7 +41,7 @@ def sea(*births: int, selection: Selection | None = None, **migration: Any) -> S
         migration=Migration(**{"topology": "ring", "epoch": 4, **migration}),
     )
     check_experiment(document, "test")
-    return Sea(document, fit=rising)
+    return ArchipelagoRun(document, fit=rising)
 
 
 def rising(birth: BirthId, island: int) -> float:
@@ -45,23 +49,23 @@ def rising(birth: BirthId, island: int) -> float:
     return (4 * birth.island + birth.number) / 100
 
 
-def living(sea: Sea, island: int, births: int) -> Names:
+def living(lived: ArchipelagoRun, island: int, births: int) -> Names:
     """Return the names in the population rows of an island."""
     return [
         (row["island"] if row["birth_island"] is None else row["birth_island"],
          row["birth"])
-        for row in sea.rows("population")
+        for row in lived.rows("population")
         if (row["island"], row["births"]) == (island, births)
     ]  # fmt: skip
 
 
-def sent(sea: Sea) -> list[tuple[int, int, int, int, int]]:
+def sent(lived: ArchipelagoRun) -> list[tuple[int, int, int, int, int]]:
     columns = ("island", "to", "epoch", "birth_island", "birth")
-    return [tuple(row[name] for name in columns) for row in sea.rows("migrations")]
+    return [tuple(row[name] for name in columns) for row in lived.rows("migrations")]
 
 
 def test_the_best_is_copied_and_takes_the_place_of_the_worst() -> None:
-    lived = sea(6, 6).live()
+    lived = small_islands(6, 6).live()
     assert sent(lived) == [(0, 1, 0, 0, 3), (1, 0, 0, 1, 3)]
     assert living(lived, 0, 4) == [(0, 1), (0, 2), (0, 3), (1, 3)]
     assert living(lived, 1, 4) == [(0, 3), (1, 1), (1, 2), (1, 3)]
@@ -73,14 +77,14 @@ def test_the_best_is_copied_and_takes_the_place_of_the_worst() -> None:
 
 
 def test_an_evicted_migrant_is_gone_and_its_place_is_taken_first() -> None:
-    lived = sea(6, 6, handling="evict").live()
+    lived = small_islands(6, 6, handling="evict").live()
     assert living(lived, 0, 4) == [(0, 0), (0, 1), (0, 2), (1, 3)]
     assert living(lived, 1, 4) == [(0, 3), (1, 0), (1, 1), (1, 2)]
 
 
 def test_the_evicted_are_dealt_out_and_enough_stay_to_mate() -> None:
     # Two of four must stay: of the three that three neighbours want two go.
-    lived = sea(6, 6, 6, 6, topology="star", handling="evict").live()
+    lived = small_islands(6, 6, 6, 6, topology="star", handling="evict").live()
     assert [each for each in sent(lived) if each[0] == 0] == [
         (0, 1, 0, 0, 3),
         (0, 2, 0, 0, 2),
@@ -90,18 +94,18 @@ def test_the_evicted_are_dealt_out_and_enough_stay_to_mate() -> None:
 
 
 def test_a_share_of_a_population_is_rounded() -> None:
-    lived = sea(6, 6, migrants=0.4).live()
+    lived = small_islands(6, 6, migrants=0.4).live()
     assert sent(lived)[:2] == [(0, 1, 0, 0, 3), (0, 1, 0, 0, 2)]
 
 
 def test_edges_go_one_way() -> None:
-    lived = sea(6, 6, topology="edges", edges=((1, 0),)).live()
+    lived = small_islands(6, 6, topology="edges", edges=((1, 0),)).live()
     assert sent(lived) == [(1, 0, 0, 1, 3)]
     assert living(lived, 1, 4) == [(1, 0), (1, 1), (1, 2), (1, 3)]
 
 
 def test_migrants_have_no_births_and_change_no_rank() -> None:
-    lived = sea(6, 6).live()
+    lived = small_islands(6, 6).live()
     names = [(row["island"], row["birth"]) for row in lived.rows("births")]
     assert names == [(island, birth) for island in (0, 1) for birth in range(6)]
     assert {row["rank"] for row in lived.rows("births")} == {1, 2}
@@ -111,7 +115,7 @@ def test_migrants_have_no_births_and_change_no_rank() -> None:
 def test_whoever_lives_there_already_is_turned_away() -> None:
     # Broods are no better than immigrants: 1:3 stays the best of both islands.
     worst = Selection(population=4, children=2, parents="random")
-    lived = sea(8, 8, epoch=2, selection=worst)
+    lived = small_islands(8, 8, epoch=2, selection=worst)
     lived.fit = lambda birth, _: 0.9 if birth == (1, 3) else 0.5 - birth.number / 99
     lived.live()
     assert (1, 0, 1, 1, 3) in sent(lived)
@@ -120,7 +124,7 @@ def test_whoever_lives_there_already_is_turned_away() -> None:
 
 
 def test_an_immigrant_is_judged_anew_where_the_island_says_so() -> None:
-    lived = sea(6, 6, judge_anew=True)
+    lived = small_islands(6, 6, judge_anew=True)
     lived.fit = lambda birth, island: 0.5 + 0.1 * (birth.island == island)
     lived.live()
     asked = [one for one in lived.commands[0] if isinstance(one, Evaluate)]
@@ -144,18 +148,18 @@ def test_an_immigrant_is_judged_anew_where_the_island_says_so() -> None:
     ],
 )
 def test_islands_that_judge_otherwise_judge_anew(changes: dict[str, object]) -> None:
-    document = sea(6, 6).experiment
+    document = small_islands(6, 6).experiment
     first, second = document.islands
     other = msgspec.structs.replace(second, **changes)
     document = msgspec.structs.replace(document, islands=(first, other))
-    lived = Sea(document, fit=rising).live()
+    lived = ArchipelagoRun(document, fit=rising).live()
     anew = [row for row in lived.rows("evaluations") if row["trial"]]
     assert [(row["island"], row["birth_island"]) for row in anew] == [(0, 1), (1, 0)]
 
 
 def test_nobody_waits_for_an_island_that_has_finished() -> None:
     # What island 1 sends at the end of epoch 1 it sends before it waits.
-    lived = sea(6, 20).live()
+    lived = small_islands(6, 20).live()
     assert [each[:3] for each in sent(lived)] == [(0, 1, 0), (1, 0, 0), (1, 0, 1)]
     assert all(island.is_finished for island in lived.islands.values())
     assert lived.islands[1].births == 20
@@ -163,14 +167,14 @@ def test_nobody_waits_for_an_island_that_has_finished() -> None:
 
 @pytest.mark.parametrize("lazy", [(0,), (1,), (0, 2)])
 def test_the_slow_decide_nothing_but_when(lazy: tuple[int, ...]) -> None:
-    story = sea(12, 8, 10).live().story
-    slow = sea(12, 8, 10)
+    story = small_islands(12, 8, 10).live().story
+    slow = small_islands(12, 8, 10)
     slow.lazy = lazy
     assert slow.live().story == story
 
 
 def test_a_fast_island_waits_for_its_neighbour_s_epoch() -> None:
-    lived = sea(12, 12)
+    lived = small_islands(12, 12)
     lived.lazy = (1,)
     lived.start()
     while any(number == 0 for number, _ in lived.waiting):
@@ -179,12 +183,12 @@ def test_a_fast_island_waits_for_its_neighbour_s_epoch() -> None:
 
 
 def test_the_last_command_tells_the_neighbours() -> None:
-    lived = sea(6, 6, 6).live()
+    lived = small_islands(6, 6, 6).live()
     assert lived.commands[1][-1] == Finish(1, (0, 2))
 
 
 def test_news_that_cannot_be_is_refused() -> None:
-    lived = sea(6, 6).live(3)
+    lived = small_islands(6, 6).live(3)
     island = lived.islands[0]
     for event in (
         Immigrated(0, 2, 0, ()),
@@ -204,14 +208,14 @@ def test_news_that_cannot_be_is_refused() -> None:
 
 def test_an_epoch_ends_with_the_brood_in_which_it_is_over() -> None:
     # Broods end with births 4, 6, 8, 10; multiples of 3 are reached at 4, 6, 10.
-    lived = sea(12, 12, epoch=3).live()
+    lived = small_islands(12, 12, epoch=3).live()
     assert [row["births"] for row in lived.rows("migrations") if not row["island"]] == [
         4, 6, 10,
     ]  # fmt: skip
 
 
 def test_what_leaves_is_sent_before_it_is_waited_for() -> None:
-    lived = sea(6, 6).live()
+    lived = small_islands(6, 6).live()
     kinds = [type(one) for one in lived.commands[0]]
     emigrated = kinds.index(Emigrate)
     assert kinds[emigrated - 1] is Record

@@ -10,15 +10,19 @@ from schema.experiment.document import Arena as Rules
 from schema.experiment.document import Experiment, Islands, Selection, Simulation
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
+from tests.coordinator.archipelago_run import ArchipelagoRun
 from tests.coordinator.arena_world import World
-from tests.coordinator.sea import Sea
 
 FEW = Selection(population=5, tournament_size=2)
 CALM = Simulation(warmup_steps=600)
 """Robots mature 15 s after they were dropped."""
 
 
-def arenas(*births: int, rules: dict[str, Any] | None = None, **migration: Any) -> Sea:  # noqa: ANN401
+def arenas(
+    *births: int,
+    rules: dict[str, Any] | None = None,
+    **migration: Any,  # noqa: ANN401 - any setting
+) -> ArchipelagoRun:
     """Return arenas with five founders, dropped in the first 4 s; a birth each 15 s."""
     wanted = {"population_limit": 12, "population_floor": 4, **(rules or {})}
     document = Experiment(
@@ -30,12 +34,12 @@ def arenas(*births: int, rules: dict[str, Any] | None = None, **migration: Any) 
         migration=Migration(**{"topology": "ring", "epoch": 7, **migration}),
     )
     check_experiment(document, "test")
-    return Sea(document)
+    return ArchipelagoRun(document)
 
 
-def inserted(sea: Sea, island: int) -> dict[BirthId, tuple[float, float]]:
+def inserted(lived: ArchipelagoRun, island: int) -> dict[BirthId, tuple[float, float]]:
     """Return who was put into an arena, and where."""
-    return dict(sea.worlds[island].places)
+    return dict(lived.worlds[island].places)
 
 
 def test_a_moved_robot_dies_here_and_lives_there() -> None:
@@ -115,11 +119,11 @@ def test_a_full_arena_lets_immigrants_wait_for_room() -> None:
         assert len(world.born) <= 5, number
 
 
-def falling(lived: Sea, island: int, step: int) -> None:
+def falling(lived: ArchipelagoRun, island: int, step: int) -> None:
     """Have all but one of an arena's robots break at a step."""
     world = World(
         fit=lived.worlds[island].fit,
-        falls=lambda birth, at: at == step and birth != BirthId(island, 0),
+        diverges=lambda birth, at: at == step and birth != BirthId(island, 0),
     )
     lived.worlds[island] = world
 
@@ -146,7 +150,7 @@ def test_where_nobody_comes_too_few_are_the_end() -> None:
         assert island.is_finished
 
 
-def mixed(**migration: Any) -> Sea:  # noqa: ANN401 - any setting
+def mixed(**migration: Any) -> ArchipelagoRun:  # noqa: ANN401 - any setting
     """Return an off-line island and an arena."""
     document = Experiment(
         name="test",
@@ -162,7 +166,7 @@ def mixed(**migration: Any) -> Sea:  # noqa: ANN401 - any setting
         migration=Migration(**{"topology": "ring", "epoch": 7, **migration}),
     )
     check_experiment(document, "test")
-    return Sea(document)
+    return ArchipelagoRun(document)
 
 
 def test_between_off_line_and_on_line_all_are_judged_anew() -> None:
@@ -183,7 +187,7 @@ def test_between_off_line_and_on_line_all_are_judged_anew() -> None:
 def test_a_casualty_abroad_is_a_death_there() -> None:
     lived = arenas(12, 12)
     lived.worlds[1] = World(
-        fit=lived.worlds[1].fit, falls=lambda birth, _: birth.island == 0
+        fit=lived.worlds[1].fit, diverges=lambda birth, _: birth.island == 0
     )
     lived.live()
     fallen = [row for row in lived.rows("deaths") if row["reason"] == "diverged"]

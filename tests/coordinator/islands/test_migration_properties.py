@@ -19,7 +19,7 @@ from schema.experiment.document import Experiment, Islands, Selection, Simulatio
 from schema.experiment.migration import Migration
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
-from tests.coordinator.sea import Sea
+from tests.coordinator.archipelago_run import ArchipelagoRun
 
 fixed = settings(max_examples=20, derandomize=True, database=None, deadline=None)
 
@@ -56,9 +56,9 @@ def test_the_order_of_answers_decides_nothing(
     islands: tuple[Islands, ...], handling: str
 ) -> None:
     wanted = document(*islands, handling=handling, emigrants="tournament", migrants=2)
-    story = Sea(wanted).live().story
+    story = ArchipelagoRun(wanted).live().story
     for seed in range(4):
-        assert Sea(wanted, order=shuffled(seed)).live().story == story
+        assert ArchipelagoRun(wanted, order=shuffled(seed)).live().story == story
 
 
 @fixed
@@ -93,9 +93,9 @@ def test_every_archipelago_ends_and_repeats(
         check_experiment(wanted, "test")
     except ExperimentError:
         return
-    straight = Sea(wanted).live()
+    straight = ArchipelagoRun(wanted).live()
     assert all(island.is_finished for island in straight.islands.values())
-    assert Sea(wanted, order=shuffled(order)).live().story == straight.story
+    assert ArchipelagoRun(wanted, order=shuffled(order)).live().story == straight.story
     for number, island in straight.islands.items():
         names = Counter(one.birth for one in island.population)
         assert all(count == 1 for count in names.values()), number
@@ -110,7 +110,10 @@ def test_every_archipelago_ends_and_repeats(
 
 def test_the_seed_says_who_is_drawn() -> None:
     wanted = document(OFF_LINE, OFF_LINE, emigrants="random", replaced="random")
-    stories = [Sea(wanted, seed=seed).live().rows("migrations") for seed in (1, 1, 2)]
+    stories = [
+        ArchipelagoRun(wanted, seed=seed).live().rows("migrations")
+        for seed in (1, 1, 2)
+    ]
     assert stories[0] == stories[1] != stories[2]
 
 

@@ -19,7 +19,7 @@ from coordinator.islands.events import (
     Evaluated,
     EvaluationFailed,
     Insert,
-    Journalled,
+    JournalledEvent,
     Order,
     Pause,
     Remove,
@@ -73,7 +73,7 @@ ORDERS: list[Order] = [
         ),
     ),
 ]
-EVENTS: list[Journalled] = [
+EVENTS: list[JournalledEvent] = [
     Vetted(BirthId(0, 0), 2, REFUSED),
     VettingFailed(BirthId(1, 7), 4, "three analyzers raised KeyError: 'Wheel'"),
     Evaluated(
@@ -261,7 +261,7 @@ def test_a_file_that_is_no_journal_is_left_alone(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("event", EVENTS)
-def test_an_entry_round_trips(event: Journalled) -> None:
+def test_an_entry_round_trips(event: JournalledEvent) -> None:
     assert decode_entry(encode_entry(event)) == event
 
 

@@ -26,20 +26,20 @@ from coordinator.run.archipelago import archipelago
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance
-from tests.coordinator.arena_world import VIABLE, World, golden
+from tests.coordinator.arena_world import VIABLE, World, distinct_fitness
 
-SOMEBODY = Provenance("worker-1", "x86", 0.5)
+PROVENANCE = Provenance("worker-1", "x86", 0.5)
 
 Fit = Callable[[BirthId, int], float]
 
 
-def spread(birth: BirthId, island: int) -> float:
+def distinct_on_islands(birth: BirthId, island: int) -> float:
     """Find everybody differently fit, and on each island otherwise; in (0, 1)."""
     return (birth.number * 0.618034 + birth.island * 0.31 + island * 0.07 + 0.1) % 1.0
 
 
 @dataclass
-class Sea:
+class ArchipelagoRun:
     """An archipelago and all that its islands said.
 
     Attributes:
@@ -51,7 +51,7 @@ class Sea:
     experiment: Experiment
     seed: int = 1
     order: Iterator[int] | None = None
-    fit: Fit = spread
+    fit: Fit = distinct_on_islands
     lazy: tuple[int, ...] = ()
     islands: dict[int, Island | Arena] = field(default_factory=dict)
     worlds: dict[int, World] = field(default_factory=dict)
@@ -65,10 +65,10 @@ class Sea:
     def __post_init__(self) -> None:
         """Make the islands."""
         self.islands = archipelago(self.experiment, self.seed, 0)
-        self.worlds = {number: World(golden) for number in self.islands}
+        self.worlds = {number: World(distinct_fitness) for number in self.islands}
         self.commands = {number: [] for number in self.islands}
 
-    def live(self, turns: int = 1_000_000) -> "Sea":
+    def live(self, turns: int = 1_000_000) -> "ArchipelagoRun":
         """Go on to the end, or for some turns."""
         if not any(self.commands.values()):
             self.start()
@@ -96,7 +96,7 @@ class Sea:
             case Evaluate():
                 found = Evaluation(self.fit(asked.birth, number), 0.1, 0.0, 12.0)
                 answer = Evaluated(
-                    asked.birth, found, SOMEBODY, asked.trial, asked.requester
+                    asked.birth, found, PROVENANCE, asked.trial, asked.requester
                 )
                 self.tell(number, answer)
             case AdvanceShard():

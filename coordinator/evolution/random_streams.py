@@ -1,9 +1,11 @@
-"""Chance, cheaply: one random stream read in blocks of plain floats.
+"""Random streams: each named by what it is for, and read in blocks of plain floats.
 
-A scalar call to numpy costs more than most of what variation does with it.
+No draw depends on how many draws happened elsewhere or on the order in which
+answers arrive, so the same seed gives the same births on any number of workers.
 """
 
 from collections.abc import Iterator, Sequence
+from enum import IntEnum
 from itertools import chain
 from statistics import NormalDist
 from typing import TypeVar
@@ -11,6 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from schema.parts import Parameter
+from schema.robot.ids import BirthId
 
 T = TypeVar("T")
 
@@ -18,11 +21,51 @@ _BLOCK = 128
 _TINY = 2.0**-54
 
 
+class Purpose(IntEnum):
+    """Purpose of a stream; the numbers are part of what a seed means.
+
+    The birth id that names a stream of migration is (island, epoch); for the place of
+    an immigrant it is (island, number of immigrants). 11 belongs to workers (noise).
+    """
+
+    GENERATE = 1
+    PARENTS = 2
+    MATE = 3
+    SURVIVORS = 4
+    PLACE = 5
+    DURATION = 6
+    TOPOLOGY = 7
+    EMIGRANTS = 8
+    REPLACED = 9
+    IMMIGRANT_PLACE = 10
+
+
+def stream(
+    seed: int, run: int, birth: BirthId, attempt: int, purpose: Purpose
+) -> np.random.Generator:
+    """Return the stream of one purpose of one attempt at one birth.
+
+    Args:
+        seed: seed of the run.
+        run: number of the repeat, from 0.
+        birth: island and birth number.
+        attempt: from 0.
+        purpose: what is drawn.
+    """
+    key = (run, birth.island, birth.number, attempt, int(purpose))
+    return np.random.Generator(
+        np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key))
+    )
+
+
 class BufferedRng:
-    """Draws from one stream, in the order in which they are asked for.
+    """Random choices from one stream, in the order of the calls.
+
+    A scalar call to NumPy costs more than most of what variation does with it, so
+    the stream is read in blocks.
 
     Attributes:
-        number: the next number, uniform in [0, 1).
+        number: function that returns the next number, uniform in [0, 1).
     """
 
     __slots__ = ("number",)
@@ -39,22 +82,18 @@ class BufferedRng:
         """Return an integer, uniform in 0..count - 1; count >= 1."""
         return int(self.number() * count)
 
-    def pick(self, things: Sequence[T]) -> T:
-        """Return one of the things, uniformly; there must be one."""
-        return things[int(self.number() * len(things))]
+    def pick(self, items: Sequence[T]) -> T:
+        """Return one item, uniformly; there must be at least one."""
+        return items[int(self.number() * len(items))]
 
-    def sample(self, things: Sequence[T], count: int) -> list[T]:
-        """Return ``count`` of the things without replacement, in random order."""
-        rest = list(things)
+    def sample(self, items: Sequence[T], count: int) -> list[T]:
+        """Return ``count`` items without replacement, in random order."""
+        rest = list(items)
         return [rest.pop(self.below(len(rest))) for _ in range(count)]
-
-    def value(self, parameter: Parameter) -> float:
-        """Return a value of a parameter, uniform in its range."""
-        return parameter.low + (parameter.high - parameter.low) * self.number()
 
     def values(self, parameters: Sequence[Parameter]) -> tuple[float, ...]:
         """Return one value for each parameter, uniform in its range."""
-        return tuple(map(self.value, parameters))
+        return tuple([p.low + (p.high - p.low) * self.number() for p in parameters])
 
     def nearby(
         self,
@@ -65,9 +104,9 @@ class BufferedRng:
         """Return values moved by a share of the way to random ones.
 
         Args:
-            parameters: their ranges; what is not mutable stays as it is.
+            parameters: their ranges; immutable parameters keep their value.
             values: one for each parameter.
-            epsilon: 0 leaves them, 1 draws them anew.
+            epsilon: share; 0 keeps the values, 1 draws new ones.
         """
         moved: list[float] = []
         number, rest = self.number, 1.0 - epsilon

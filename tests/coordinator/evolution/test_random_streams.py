@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from coordinator.evolution.buffered_rng import BufferedRng
+from coordinator.evolution.random_streams import BufferedRng
 from schema.parts import Parameter
 
 N = 20_000
@@ -47,7 +47,7 @@ def test_samples_are_without_replacement_and_uniform_in_each_place(
 
 
 def test_values_fill_their_range(draws: BufferedRng) -> None:
-    found = [draws.value(Parameter("p", 20.0, 100.0, 50.0)) for _ in range(N)]
+    found = [draws.values((Parameter("p", 20.0, 100.0, 50.0),))[0] for _ in range(N)]
     assert 20.0 <= min(found) < 20.1
     assert 99.9 < max(found) <= 100.0
     assert np.mean(found) == pytest.approx(60.0, abs=5 * 80 / 12**0.5 / N**0.5)
