@@ -23,7 +23,6 @@ from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
 from coordinator.storage.campaign import (
     Campaign,
-    CampaignFolder,
     check_adopted,
     forget_campaign,
     is_campaign,
@@ -45,6 +44,7 @@ from coordinator.storage.folder_status import (
     unbegun_status,
 )
 from coordinator.storage.hints import command, stopped
+from coordinator.storage.lock import FolderLock
 from schema.agent.network import THIS_MACHINE, Agent, Tls
 from schema.agent.platform_tag import platform_tag
 from schema.agent.service import tell_user
@@ -128,7 +128,7 @@ def start_campaign(folder: Path, campaign: Campaign, deployment: Deployment) -> 
         RunFolderError: the folder is used or held, or the disk fails.
         NetworkError: the address cannot be listened on, or no hub is there.
     """
-    with CampaignFolder(folder):
+    with FolderLock(folder):
         refuse_used(folder)
         planned, barren = _plan(folder, campaign)
         begun = _begun(folder, campaign)
@@ -156,7 +156,7 @@ def resume(folder: Path, deployment: Deployment) -> int:
         ExperimentError: no robot meets a run's restrictions.
     """
     if is_campaign(folder):
-        with CampaignFolder(folder):
+        with FolderLock(folder):
             planned, barren = _plan(folder, read_campaign(folder))
             return _together(folder, planned, barren, deployment)
     if read_state(folder) == "finished":

@@ -11,9 +11,10 @@ from coordinator.cli.execute import ADDRESS
 from coordinator.cli.format import about_arenas, best_of, duration
 from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, read_campaign
-from coordinator.storage.folder import DETAILS, EPOCH, LOCK, RunDetails, holds_run
+from coordinator.storage.folder import DETAILS, EPOCH, RunDetails, holds_run
 from coordinator.storage.folder_status import folder_status, unbegun_status
 from coordinator.storage.journal import NAME as JOURNAL
+from coordinator.storage.lock import LOCK
 from schema.agent.command import add_network_flags, tls_of
 from schema.agent.service import tell_user
 from schema.errors import NetworkError, RevolveError, RunFolderError

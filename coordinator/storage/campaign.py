@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from msgspec.structs import replace
 
-from coordinator.storage.disk import replace_durably, storage_error
-from coordinator.storage.folder import RunDetails, holds_run, lock_folder, unlock_folder
+from coordinator.storage.disk import replace_durably
+from coordinator.storage.folder import RunDetails, holds_run
 from coordinator.storage.hints import command
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.document import Experiment
@@ -57,38 +56,6 @@ class Campaign:
             for repeat in range(self.repeats)
             for experiment in self.experiments
         ]
-
-
-class CampaignFolder:
-    """A campaign's folder that this process holds.
-
-    Attributes:
-        path: where it is.
-    """
-
-    def __init__(self, path: Path) -> None:
-        """Take the folder.
-
-        Raises:
-            RunFolderError: another coordinator holds it (named), or a disk that fails.
-        """
-        self.path = path
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            self._lock = lock_folder(path)
-        except OSError as error:
-            raise storage_error(path, error) from None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        unlock_folder(self._lock)
 
 
 def is_campaign(folder: Path) -> bool:

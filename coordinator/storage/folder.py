@@ -5,13 +5,9 @@ stands in every job, so that answers to an earlier incarnation are told apart an
 a coordinator that slept through its replacement finds out.
 """
 
-import contextlib
-import fcntl
 import json
-import os
 import secrets
 import socket
-import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +17,7 @@ from coordinator.storage.disk import replace_durably, storage_error
 from coordinator.storage.hints import command
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.journal import newest_epoch
+from coordinator.storage.lock import LOCK, FolderLock
 from schema.errors import RunFolderError
 from schema.experiment.identity import Origin
 
@@ -30,12 +27,7 @@ STATES: tuple[State, ...] = ("running", "stopped", "finished")
 DETAILS = "run.json"
 EPOCH = "epoch"
 STATE = "state"
-LOCK = "lock"
 _NONCE = "nonce"
-
-# Who looks who holds a folder has its lock for an instant: no reason to be refused.
-_LOOKED_AT_S = 0.2
-_TRY_AGAIN_S = 0.005
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +82,9 @@ class RunFolder:
             if details is not None:
                 path.mkdir(parents=True, exist_ok=True)
                 _refuse_foreign(path)
-            self._lock = lock_folder(path)
         except OSError as error:
             raise storage_error(path, error) from None
+        self._lock = FolderLock(path)
         try:
             if details is not None:
                 _refuse_used(path)
@@ -144,9 +136,7 @@ class RunFolder:
 
     def close(self) -> None:
         """Let go of the folder."""
-        lock, self._lock = self._lock, -1
-        if lock >= 0:
-            unlock_folder(lock)
+        self._lock.close()
 
     def __enter__(self) -> Self:
         return self
@@ -227,74 +217,6 @@ def read_state(path: Path) -> State:
         if text == state:
             return state
     raise RunFolderError(f"{file}: must be one of {', '.join(STATES)}, got {text!r}")
-
-
-def read_holder(path: Path) -> str:
-    """Return who holds a folder, "process PID on HOST", or nothing if nobody does."""
-    try:
-        descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CLOEXEC)
-    except OSError:
-        return ""
-    try:
-        # Shared: two who look at a time shall not take each other for a holder.
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return _holder(descriptor)
-    finally:
-        os.close(descriptor)
-    return ""
-
-
-def lock_folder(path: Path) -> int:
-    """Return the descriptor of a folder's lock file, locked and signed.
-
-    Raises:
-        RunFolderError: another process holds it (named).
-    """
-    descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    try:
-        _lock(descriptor)
-    except BlockingIOError:
-        holder = _holder(descriptor)
-        os.close(descriptor)
-        raise RunFolderError(
-            f"{path}: in use by {holder}; stop that one first, or wait for it"
-        ) from None
-    signature = f"process {os.getpid()} on {socket.gethostname()}".encode()
-    # A full disk must not keep anybody from opening: the name is a courtesy.
-    with contextlib.suppress(OSError):
-        os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, signature, 0)
-    return descriptor
-
-
-def _lock(descriptor: int) -> None:
-    """Lock a file for this process alone.
-
-    Raises:
-        BlockingIOError: it stays locked by another.
-    """
-    until_s = time.monotonic() + _LOOKED_AT_S
-    while True:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            if time.monotonic() >= until_s:
-                raise
-            time.sleep(_TRY_AGAIN_S)
-        else:
-            return
-
-
-def unlock_folder(descriptor: int) -> None:
-    """Let go of a folder."""
-    # Closing alone would wait for a child that is just being started.
-    fcntl.flock(descriptor, fcntl.LOCK_UN)
-    os.close(descriptor)
-
-
-def _holder(descriptor: int) -> str:
-    return os.pread(descriptor, 500, 0).decode(errors="replace") or "another process"
 
 
 def _refuse_used(path: Path) -> None:

@@ -6,9 +6,10 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from coordinator.storage.folder import RunDetails, read_details, read_holder, read_state
+from coordinator.storage.folder import RunDetails, read_details, read_state
 from coordinator.storage.hints import command
 from coordinator.storage.journal import is_begun
+from coordinator.storage.lock import read_holder
 from schema.errors import RunFolderError
 from schema.experiment.document import island_count, island_experiment
 from schema.experiment.file import experiment_from_text

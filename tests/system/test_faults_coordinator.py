@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import LOCK
 from coordinator.storage.journal import NAME
+from coordinator.storage.lock import LOCK
 
 pytestmark = [
     pytest.mark.system,

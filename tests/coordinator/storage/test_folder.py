@@ -18,10 +18,10 @@ from coordinator.storage.folder import (
     RunDetails,
     RunFolder,
     read_details,
-    read_holder,
     read_state,
 )
 from coordinator.storage.journal import Journal
+from coordinator.storage.lock import read_holder
 from schema.errors import RunFolderError
 from schema.robot.ids import BirthId
 
@@ -187,7 +187,7 @@ def test_who_looks_at_a_folder_is_no_reason_to_refuse_it(tmp_path: Path) -> None
 
 def test_a_child_process_does_not_keep_the_lock(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path / "run", DETAILS)
-    assert not os.get_inheritable(folder._lock)
+    assert not os.get_inheritable(folder._lock._descriptor)
     with subprocess.Popen(
         [sys.executable, "-c", "import sys; sys.stdin.read()"],
         stdin=subprocess.PIPE,
