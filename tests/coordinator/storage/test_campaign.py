@@ -81,7 +81,7 @@ def test_a_second_coordinator_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["", "seed = 1", "seed = ", "experiments = 3"])
 def test_a_damaged_campaign_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "campaign.toml").write_text(text)
-    with pytest.raises(RunFolderError, match="is not one of a campaign"):
+    with pytest.raises(RunFolderError, match="is not a valid campaign"):
         read_campaign(tmp_path)
 
 
@@ -89,7 +89,7 @@ def test_a_damaged_campaign_is_refused(tmp_path: Path, text: str) -> None:
     "sources", [["scenario1", "scenario1"], ["thesis", "scenario3"]]
 )
 def test_names_must_differ(sources: list[str]) -> None:
-    with pytest.raises(ExperimentError, match="names of their own"):
+    with pytest.raises(ExperimentError, match="must have different names"):
         read_experiments(sources)
 
 

@@ -103,7 +103,7 @@ def test_a_lost_epoch_voids_nothing_that_is_written_later(
 def test_a_used_folder_is_refused(tmp_path: Path) -> None:
     RunFolder(tmp_path / "run", DETAILS).close()
     with pytest.raises(
-        RunFolderError, match="already holds a run; to go on with it: revolve "
+        RunFolderError, match="already holds a run; to resume it: revolve "
     ):
         RunFolder(tmp_path / "run", DETAILS)
     assert RunFolder(tmp_path / "run").epoch == 2
@@ -132,7 +132,7 @@ def test_a_folder_with_something_else_is_refused_and_left_alone(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(RunFolderError, match=r"not empty \('thesis.tex' is there\)"):
+    with pytest.raises(RunFolderError, match=r"not empty \(contains 'thesis.tex'\)"):
         RunFolder(tmp_path, DETAILS)
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
 
