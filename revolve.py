@@ -24,7 +24,7 @@ COMMANDS = {
     "robot simulate": ("worker.robot_command", "simulate a robot and show its fitness"),
     "view": ("analysis.__main__", "view a run, live or from its tables"),
     "analyze": ("analysis.__main__", "compute measures, figures and a report"),
-    "bench": ("worker.bench.command", "benchmark this machine"),
+    "bench": ("worker.__main__", "benchmark this machine"),
     "bench dispatch": (_COORDINATOR, "benchmark the coordinator"),
 }
 """Module and summary of each command.

@@ -123,7 +123,7 @@ def _parser() -> argparse.ArgumentParser:
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     for name, what in ACTIONS.items():
         action = actions.add_parser(
-            name, help=what, description=what, allow_abbrev=False
+            name, help=what, description=f"{what.capitalize()}.", allow_abbrev=False
         )
         if name in ("remove", "brain"):
             action.add_argument(

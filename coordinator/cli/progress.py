@@ -1,7 +1,6 @@
 """Progress of a coordinator's runs on the terminal: bars, or lines in a log."""
 
 import math
-from types import TracebackType
 from typing import Self
 
 from rich.console import Console
@@ -48,12 +47,7 @@ class Display:
         self._progress.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         """Stop drawing; the last state stays on the screen."""
         self._progress.stop()
 

@@ -11,8 +11,10 @@ import sys
 import numpy as np
 import pytest
 
+from analyzer.report import analyze
+from coordinator.evolution.generation import generate
 from schema.experiment.file import read_experiment
-from worker.bench.arena_bench import arena_settings_of, vetted_robots
+from worker.bench.arena_bench import RobotSource, arena_settings_of
 from worker.bench.arena_timing import (
     ArenaTiming,
     even_places,
@@ -31,7 +33,7 @@ def timed(count: int, seconds: int, *, threads: int = 1, bare: bool) -> ArenaTim
     """Return the timing of random robots at 30 per disc of 2 m, births included."""
     radius_m = 2.0 * math.sqrt(count / 30)
     born = math.ceil(seconds * count / 30 / BIRTH_S)
-    robots = vetted_robots(EXPERIMENT, count + born, seed=3)
+    robots = RobotSource(generate, analyze).vetted(EXPERIMENT, count + born, seed=3)
     rng = np.random.default_rng(3)
     found = time_arena(
         SETTINGS,
