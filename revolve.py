@@ -1,4 +1,4 @@
-"""The command ``revolve``: names the rooms' commands, nothing else."""
+"""The command ``revolve``: dispatches to the commands of all rooms."""
 
 import io
 import os
@@ -10,26 +10,27 @@ from importlib import import_module
 _COORDINATOR = "coordinator.__main__"
 COMMANDS = {
     "run": (_COORDINATOR, "evolve experiments on this machine"),
-    "resume": (_COORDINATOR, "go on with a run or campaign after any crash"),
+    "resume": (_COORDINATOR, "resume a run or campaign after a stop or crash"),
     "coordinator": (_COORDINATOR, "run experiments for remote workers"),
-    "status": ("coordinator.cli.status", "tell how far runs are"),
-    "arena": ("coordinator.cli.arena", "give orders to a running arena"),
-    "compare": (_COORDINATOR, "tell whether two runs are equal"),
+    "status": ("coordinator.cli.status", "show the progress of runs"),
+    "log": ("coordinator.cli.log", "print the journal of a run"),
+    "arena": ("coordinator.cli.arena", "inspect and control a running arena"),
+    "compare": (_COORDINATOR, "compare two runs that should be equal"),
     "worker": ("worker.__main__", "simulate robots for a coordinator"),
-    "analyzer": ("analyzer.__main__", "vet bodies for a coordinator"),
+    "analyzer": ("analyzer.__main__", "vet robot bodies for a coordinator"),
     "robot": ("schema.__main__", "check, convert or show a robot file"),
-    "robot random": ("coordinator.cli.robot", "make up a robot"),
-    "robot render": ("analysis.__main__", "draw the robot of a file"),
-    "robot simulate": ("worker.robot_command", "judge the robot of a file"),
-    "view": ("analysis.__main__", "watch a run, live or again"),
-    "analyze": ("analysis.__main__", "tables to measures, figures and a report"),
-    "bench": ("worker.bench.command", "measure this machine"),
-    "bench dispatch": (_COORDINATOR, "measure how far a coordinator reaches"),
+    "robot random": ("coordinator.cli.robot", "generate random robots"),
+    "robot render": ("analysis.__main__", "render a robot as picture or film"),
+    "robot simulate": ("worker.robot_command", "simulate a robot and show its fitness"),
+    "view": ("analysis.__main__", "view a run, live or from its tables"),
+    "analyze": ("analysis.__main__", "compute measures, figures and a report"),
+    "bench": ("worker.__main__", "benchmark this machine"),
+    "bench dispatch": (_COORDINATOR, "benchmark the coordinator"),
 }
-"""Module whose ``main`` takes the words, the command first; and what it does.
+"""Module and summary of each command.
 
-A command of two words goes before the command of the first one, which is another
-room's; its module is told both in one.
+The module's ``main`` gets the arguments, the command's name first. Names of two words
+take precedence over their first word; ``main`` gets them as one argument.
 """
 
 
@@ -37,29 +38,30 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one command and return its exit code.
 
     Args:
-        arguments: without the program's name; those of the process by default.
+        arguments: without the program's name; default: those of the process.
 
     Returns:
-        0 if done, 1 if nobody reads on, 2 for a user's error and for output that
-        cannot be written (one line on stderr), 130 after Ctrl-C.
+        The command's exit code; 1 if the reader closed standard output, 2 for a
+        user's error or output that cannot be written (one line on stderr), 130 after
+        Ctrl-C.
     """
     if sys.stdout is None:
-        # A file of the command would take its place, and be written into.
+        # The next file to be opened would get its descriptor, and all output.
         print("revolve: standard output is closed", file=sys.stderr)
         return 2
-    _keep_what_fails()
+    _ensure_buffer()
     try:
         try:
-            return _obey(sys.argv[1:] if arguments is None else arguments)
+            return _run(sys.argv[1:] if arguments is None else arguments)
         finally:
             sys.stdout.flush()
     except OSError:
-        trouble = _trouble_of_output()
-        if trouble is None:
+        output_error = _output_error()
+        if output_error is None:
             raise
-        if isinstance(trouble, BrokenPipeError):
+        if isinstance(output_error, BrokenPipeError):
             return 1
-        why = str(trouble.strerror)
+        why = str(output_error.strerror)
         print(f"revolve: standard output: {why[:1].lower()}{why[1:]}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
@@ -70,12 +72,12 @@ def main(arguments: list[str] | None = None) -> int:
         return 130
     finally:
         if arguments is None:
-            # This process ends: whoever presses again shall not see how.
+            # The process ends now: another Ctrl-C must not print a traceback.
             signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _obey(words: list[str]) -> int:
-    """Run the command that words begin with and return its exit code."""
+def _run(words: list[str]) -> int:
+    """Run the command that the words start with and return its exit code."""
     if not words or words[0] in ("-h", "--help"):
         print(_overview())
         return 0
@@ -104,16 +106,16 @@ def _obey(words: list[str]) -> int:
 
 
 def _is_interrupted(error: BaseException | None) -> bool:
-    """Return whether a Ctrl-C is what an engine could not be loaded for."""
+    """Return whether Ctrl-C caused an import to fail."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
 
 
-def _keep_what_fails() -> None:
-    """Give standard output a buffer: what could not be written is found in it."""
+def _ensure_buffer() -> None:
+    """Give standard output a buffer, so that a failed write can be repeated."""
     if isinstance(getattr(sys.stdout, "buffer", None), io.RawIOBase):
-        sys.stdout = open(  # noqa: SIM115 - as long as the process
+        sys.stdout = open(  # noqa: SIM115 - open until the process ends
             sys.stdout.fileno(),
             "w",
             buffering=1,
@@ -123,19 +125,19 @@ def _keep_what_fails() -> None:
         )
 
 
-def _trouble_of_output() -> OSError | None:
+def _output_error() -> OSError | None:
     """Return why standard output cannot be written, or None if it can."""
     try:
         sys.stdout.flush()
     except OSError as error:
-        # Or the interpreter would complain of it once more when it ends.
+        # The interpreter flushes once more at exit, and must not fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return error
     return None
 
 
 def _also(command: str) -> str:
-    """Return the lines on commands of two words that begin with this one."""
+    """Return help lines of the two-word commands that start with this one."""
     names = [name for name in COMMANDS if name.startswith(f"{command} ")]
     return f"\nalso:\n{_lines(names)}\n" if names else ""
 
@@ -148,13 +150,13 @@ def _lines(names: Iterable[str]) -> str:
 def _overview() -> str:
     return "\n".join(
         [
-            "Evolve robots, bodies and brains, on one machine or on many.",
+            "Evolve the bodies and brains of robots, on one machine or on many.",
             "",
-            "usage: revolve COMMAND ...    (revolve COMMAND --help explains one)",
+            "usage: revolve COMMAND ...    (help: revolve COMMAND --help)",
             "",
             _lines(COMMANDS),
             "",
-            "for example: revolve run scenario1 --seed 1 --births 600",
+            "example: revolve run scenario1 --seed 1 --births 600",
         ]
     )
 

@@ -1,5 +1,6 @@
-"""Who is born, mates, survives; and who evaluates what.
+"""Evolution and dispatch: births, selection, survival, and which worker does what.
 
-Pure machines (`island`, `dispatch`) take events and return commands. Only
-`service`, `journal`, `record` and `__main__` touch network, disk or terminal.
+Pure state machines (``islands``, ``arena``, ``dispatch``, ``evolution``) take events
+and return commands. Only ``network``, ``storage``, ``run`` and ``cli`` use network,
+disk, clock or terminal.
 """

@@ -1,11 +1,12 @@
-"""Commands of the coordinator: those that run, resume, compare and measure."""
+"""Commands of the coordinator: run, coordinator, resume, compare, bench dispatch."""
 
 import argparse
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from coordinator.cli.execute import Deployment, resume, start, start_campaign
+from coordinator.cli.deployment import Deployment
+from coordinator.cli.execute import resume, start, start_campaign
 from coordinator.cli.flags import LISTEN, parser
 from coordinator.dispatch.events import AgentKind
 from coordinator.run.cross_checks import Checks
@@ -35,14 +36,14 @@ from schema.experiment.settings import fitness_function
 
 
 def main(arguments: list[str]) -> int:
-    """Run one of the coordinator's commands.
+    """Run one of the coordinator's commands and return its exit code.
 
     Args:
         arguments: the command's name first.
 
     Returns:
-        0 if done; 1 if ``compare`` found a difference, or a run of a campaign
-        failed; 130 after Ctrl-C.
+        0 for success; 1 if ``compare`` found a difference, a run of a campaign
+        failed, or all evaluations failed; 130 after Ctrl-C.
     """
     command, words = arguments[0], arguments[1:]
     options = parser(command).parse_args(words)
@@ -71,10 +72,10 @@ def main(arguments: list[str]) -> int:
     return _stoppable(folder, lambda: start_campaign(folder, campaign, deployment))
 
 
-def _stoppable(folder: Path, evolve: Callable[[], int]) -> int:
-    """Do what runs in a folder; who interrupts it is told how to go on."""
+def _stoppable(folder: Path, execute: Callable[[], int]) -> int:
+    """Execute a folder's runs; after Ctrl-C say how to resume them."""
     try:
-        return evolve()
+        return execute()
     except KeyboardInterrupt:
         if is_campaign(folder) or holds_run(folder):
             tell_user(stopped(folder))
@@ -82,7 +83,7 @@ def _stoppable(folder: Path, evolve: Callable[[], int]) -> int:
 
 
 def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
-    """Return what is to be run, checked as far as that goes without running it."""
+    """Return the experiments to run, checked as far as possible in advance."""
     experiments = read_experiments(options.experiments)
     if options.births is not None:
         experiments = tuple(
@@ -96,7 +97,7 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
 
 
 def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
-    """Return what is run in a folder."""
+    """Return the experiments of a run or campaign folder."""
     if is_campaign(folder):
         return read_campaign(folder).experiments
     return (experiment_from_text(read_details(folder).document),)
@@ -105,21 +106,21 @@ def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
 def _deployment(
     options: argparse.Namespace, experiments: tuple[Experiment, ...]
 ) -> Deployment:
-    """Return who does the work; this names the other rooms."""
+    """Return processes and network; imports the rooms of worker and analyzer."""
     import analyzer.jobs
     import analyzer.service
     import worker.serve.jobs
     import worker.serve.service
 
     if options.connect and options.listen:
-        raise NetworkError("--listen and --connect: a hub is here or elsewhere")
+        raise NetworkError("--listen and --connect exclude each other")
     if options.view and options.in_process:
-        raise NetworkError("--view needs a network, and --in-process has none")
-    is_for_others = options.command == "coordinator" and not options.connect
+        raise NetworkError("--view needs a network, but --in-process has none")
+    is_hub = options.command == "coordinator" and not options.connect
     workers: int | None = options.workers
     if workers is None:
         workers = 0 if options.connect else cores()
-    # One arena is one process's; many arenas, or single robots, spread over them.
+    # One arena runs in one process; several arenas, or robots, spread over them.
     is_one_arena = len(experiments) == 1 and _has_one_arena(experiments[0], options)
     threads = options.threads or (cores() if is_one_arena else 1)
     answers: dict[AgentKind, Callable[[bytes], bytes]] = {
@@ -133,7 +134,7 @@ def _deployment(
             "worker": worker.serve.service.process,
         },
         answers=answers if options.in_process else None,
-        listen=options.listen or (LISTEN if is_for_others else None),
+        listen=options.listen or (LISTEN if is_hub else None),
         connect=options.connect,
         fleet=options.fleet,
         tls=tls_of(options),
@@ -155,7 +156,7 @@ def _has_one_arena(experiment: Experiment, options: argparse.Namespace) -> bool:
 
 
 def _bench(options: argparse.Namespace) -> int:
-    """Measure; another one that names the other rooms."""
+    """Run the benchmark; imports the rooms of worker and analyzer."""
     import analyzer.service
     import worker.serve.null
     from coordinator.cli import dispatch_bench
@@ -176,7 +177,7 @@ def _compare(options: argparse.Namespace) -> int:
     for line in differences:
         print(line)
     if not differences:
-        print("equal in every column marked repeatable")
+        print("equal in all repeatable columns")
     return 1 if differences else 0
 
 

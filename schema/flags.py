@@ -1,7 +1,7 @@
-"""Flags of commands: complaints in one line, numbers within their limits.
+"""Command line flags: errors in one line, numbers within their limits.
 
-What reads a number raises ``argparse.ArgumentTypeError`` where the text is none, which
-the parser turns into one line: the flag, what is allowed, what came.
+Each reader of a number raises ``argparse.ArgumentTypeError`` for any other text. The
+parser turns it into one line: the flag, what is allowed, what was given.
 """
 
 import argparse
@@ -11,18 +11,18 @@ from typing import NoReturn
 
 
 class Flags(argparse.ArgumentParser):
-    """A parser whose complaints are one line (argparse is made for this override)."""
+    """Parser that reports an error in one line (argparse intends this override)."""
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong and where help is; end with status 2."""
+        """Print the error and where to find help; exit with status 2."""
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 
 def whole_number(least: int = 1) -> Callable[[str], int]:
-    """Return what reads a whole number of a flag.
+    """Return a reader of whole numbers.
 
     Args:
-        least: that is allowed; not negative.
+        least: smallest number allowed; not negative.
     """
 
     def read(text: str) -> int:
@@ -41,11 +41,11 @@ def add_count(
     """Add a flag for a whole number.
 
     Args:
-        flags: to add it to.
-        name: of the flag.
-        default: its value if it is not given.
-        what: it is the number of, for the help.
-        least: that is allowed; not negative.
+        flags: parser that gets the flag.
+        name: name of the flag.
+        default: value if the flag is not given.
+        what: meaning of the number, for the help.
+        least: smallest number allowed; not negative.
     """
     flags.add_argument(
         name,
@@ -58,27 +58,24 @@ def add_count(
 
 def number(text: str) -> float:
     """Return a flag's value as a finite number."""
-    return _number(text, "a finite number", -math.inf, math.inf)
+    return _number(text, "a finite number", lambda _value: True)
 
 
 def positive_number(text: str) -> float:
     """Return a flag's value as a finite number > 0."""
-    value = _number(text, "a finite number > 0", 0.0, math.inf)
-    if value == 0.0:
-        raise argparse.ArgumentTypeError(f"must be a finite number > 0, got {text!r}")
-    return value
+    return _number(text, "a finite number > 0", lambda value: value > 0.0)
 
 
 def share(text: str) -> float:
     """Return a flag's value as a number from 0 to 1."""
-    return _number(text, "a number from 0 to 1", 0.0, 1.0)
+    return _number(text, "a number from 0 to 1", lambda value: 0.0 <= value <= 1.0)
 
 
-def _number(text: str, what: str, least: float, most: float) -> float:
+def _number(text: str, what: str, is_allowed: Callable[[float], bool]) -> float:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
-    if not (math.isfinite(value) and least <= value <= most):
+    if not (math.isfinite(value) and is_allowed(value)):
         raise argparse.ArgumentTypeError(f"must be {what}, got {text!r}")
     return value

@@ -1,4 +1,4 @@
-"""``revolve worker``: evaluate robots for a coordinator, local or remote."""
+"""``revolve worker`` and ``revolve bench``: serve jobs, and benchmark this machine."""
 
 import sys
 
@@ -6,19 +6,32 @@ from schema.agent.supervisor import cores, prepare_process
 
 
 def main(arguments: list[str]) -> int:
-    """Serve until stopped.
+    """Run one of the worker's commands and return its exit code.
 
     Args:
         arguments: the command's name first.
 
     Returns:
-        0 after Ctrl-C or SIGTERM; 130 after a second Ctrl-C.
+        ``worker``: 0 after Ctrl-C or SIGTERM, 130 after a second Ctrl-C; ``bench``: 0
+        if the measurement meets its requirement, 1 if not.
     """
     prepare_process()  # before anything imports numpy
+    if arguments[0] == "bench":
+        return _bench(arguments)
     from schema.agent.command import run_pool
     from worker.serve.service import process
 
     return run_pool("worker", process, arguments[1:], processes=cores())
+
+
+def _bench(arguments: list[str]) -> int:
+    """Benchmark with robots from the other rooms' generator and analyzer."""
+    from analyzer.report import analyze
+    from coordinator.evolution.generation import generate
+    from worker.bench.arena_bench import RobotSource
+    from worker.bench.command import main as bench
+
+    return bench(arguments, RobotSource(generate, analyze))
 
 
 if __name__ == "__main__":

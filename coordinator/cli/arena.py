@@ -1,4 +1,4 @@
-"""``revolve arena``: look into a running arena, and give it orders."""
+"""``revolve arena``: inspect and control a running arena."""
 
 import argparse
 import sys
@@ -28,13 +28,13 @@ from schema.wire.operator import (
 )
 
 ACTIONS = {
-    "list": "tell who lives there",
-    "pause": "let it stand still, at its next decision",
-    "resume": "let it go on",
-    "insert": "put the robot of a file in",
-    "remove": "take a robot out",
-    "brain": "give a robot the brain of the robot of a file",
-    "snapshot": "keep its state in the run folder",
+    "list": "list the living robots",
+    "pause": "pause the arena at its next decision",
+    "resume": "resume a paused arena",
+    "insert": "insert the robot of a file",
+    "remove": "remove a robot",
+    "brain": "replace a robot's brain by that of the robot of a file",
+    "snapshot": "save the arena's state in the run folder",
 }
 
 PLAIN: dict[str, OperatorAction] = {
@@ -46,7 +46,7 @@ PLAIN: dict[str, OperatorAction] = {
 
 
 def main(arguments: list[str]) -> int:
-    """Ask one thing of a running coordinator.
+    """Send one request to a running coordinator and print its reply.
 
     Args:
         arguments: the command's name first.
@@ -55,8 +55,8 @@ def main(arguments: list[str]) -> int:
         0 if done, 1 if refused.
 
     Raises:
-        NetworkError: no coordinator is there, or it does not answer.
-        InvalidRobot: a file that holds no robot.
+        NetworkError: no coordinator answers, or several have such a run.
+        InvalidRobot: the file holds no robot.
     """
     options = _parser().parse_args(arguments[1:])
     action = _action(options)
@@ -76,22 +76,22 @@ def main(arguments: list[str]) -> int:
 
 
 def _coordinator(options: argparse.Namespace) -> str:
-    """Return whose run is meant.
+    """Return the name of the coordinator whose run ``--run`` selects.
 
     Raises:
         NetworkError: not exactly one coordinator has such a run.
     """
-    told = ask_status(options)
+    found = ask_status(options)
     names = [
         name
-        for name, status in told.items()
+        for name, status in found.items()
         if any(Path(run.folder).name.endswith(options.run) for run in status.runs)
     ]
     if len(names) == 1:
         return names[0]
     raise NetworkError(
-        f"{options.connect}: there must be one coordinator with a run "
-        f"{options.run or 'at all'}, got {len(names)} of {len(told)}; name one by --run"
+        f"{options.connect}: exactly one coordinator must have a run "
+        f"{options.run!r}, got {len(names)} of {len(found)}; choose one by --run"
     )
 
 
@@ -117,34 +117,42 @@ def _file(name: str) -> Path:
 def _parser() -> argparse.ArgumentParser:
     parser = Flags(
         prog="revolve arena",
-        description="Look into a running arena, and give it orders.",
-        epilog="for example: revolve arena list --connect tcp/127.0.0.1:7447",
+        description="Inspect and control a running arena.",
+        epilog="example: revolve arena list --connect tcp/127.0.0.1:7447",
         allow_abbrev=False,
     )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
     for name, what in ACTIONS.items():
         action = actions.add_parser(
-            name, help=what, description=what, allow_abbrev=False
+            name, help=what, description=f"{what.capitalize()}.", allow_abbrev=False
         )
         if name in ("remove", "brain"):
-            action.add_argument("birth", type=whole_number(0), help="its number")
+            action.add_argument(
+                "birth", type=whole_number(0), metavar="BIRTH", help="birth number"
+            )
         if name in ("insert", "brain"):
-            action.add_argument("file", help="robot: .yaml, .yml or .pb")
+            action.add_argument(
+                "file", metavar="FILE", help="robot: .yaml, .yml or .pb"
+            )
         if name == "insert":
             action.add_argument(
                 "--place", type=number, nargs=2, metavar=("X", "Y"),
-                help="where [m]; drawn as for a birth if not given",
+                help="position [m] (default: drawn as for a birth)",
             )  # fmt: skip
         action.add_argument(
             "--connect", required=True, metavar="ADDRESS",
-            help="the coordinator's address, as in the run folder's file 'address'",
+            help="address of the coordinator; the run folder's file 'address' holds it",
         )  # fmt: skip
         action.add_argument(
             "--run", default="", metavar="NAME",
-            help="end of its folder's name, where there are several",
+            help="end of the run folder's name (default: the only run)",
         )  # fmt: skip
         action.add_argument(
-            "--island", type=whole_number(0), default=0, help="default: 0"
+            "--island",
+            type=whole_number(0),
+            default=0,
+            metavar="N",
+            help="island number (default: 0)",
         )
         add_network_flags(action)
     return parser

@@ -1,9 +1,9 @@
-"""``revolve bench dispatch``: what giving out jobs costs, and how far it reaches.
+"""``revolve bench dispatch``: cost of dispatch, and the largest fleet it can serve.
 
-Null evaluations through the real network tell what dispatch and network cost alone;
-whole births without physics tell what a birth costs the coordinator; timed
-evaluations tell how busy real workers are kept. With the cost of a birth, fleets
-that no machine here can hold are simulated (``coordinator.cli.fleet_model``).
+Null evaluations over the real network measure dispatch and network alone. Whole births
+without physics measure a birth's cost for the coordinator. Evaluations of fixed
+duration measure the utilisation of real workers. With the cost of a birth, fleets that
+are larger than this machine are simulated (``coordinator.cli.fleet_model``).
 """
 
 import argparse
@@ -11,7 +11,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -42,26 +42,26 @@ from schema.robot.ids import BirthId
 from schema.wire.codec import encode_request, encode_robot
 
 Body = Callable[[Agent, ProcessSlot], None]
-"""What a process of a crew does."""
+"""Function that a process of a pool runs."""
 
 LEAST_NULL_PER_S = 2000
 MOST_NULL_CPU_S = 0.4e-3
 LEAST_WORKERS = 1000
-"""That one coordinator must keep busy with evaluations of 10 s."""
+"""Workers that one coordinator must keep busy with evaluations of 10 s."""
 
 _IN_FLIGHT = 64
 _ROBOTS = 50
-_PATIENCE_S = 60.0
+_TIMEOUT_S = 60.0
 _SHORT_S, _LONG_S = 0.04, 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """What a stream of jobs cost.
+    """Throughput and cost of a stream of jobs.
 
     Attributes:
-        per_s: jobs that were done [1/s].
-        cpu_s: processor time of this process for each, its network's included [s].
+        per_s: finished jobs [1/s].
+        cpu_s: CPU time of this process per job, its network included [s].
     """
 
     per_s: float
@@ -69,37 +69,57 @@ class Rate:
 
 
 class Stream:
-    """Asks for the same evaluations for ever, so many at a time."""
+    """Endless stream of evaluations, a fixed number at a time.
+
+    Attributes:
+        done: number of finished evaluations.
+    """
 
     def __init__(self, fleet: Fleet, in_flight: int) -> None:
-        """Begin to ask."""
+        """Request the first evaluations.
+
+        Args:
+            fleet: workers of the stream.
+            in_flight: evaluations at a time.
+        """
+        experiment = read_experiment("scenario1")
+        space = body_space(experiment.space)
         self.done = 0
         self._fleet = fleet
-        self._payloads = _robots()
+        self._settings = evaluation_settings(experiment)
+        self._robots = [
+            encode_robot(
+                develop(generate(np.random.default_rng(seed), experiment), space)
+            )
+            for seed in range(_ROBOTS)
+        ]
         for _ in range(in_flight):
             self._ask()
 
     def _ask(self) -> None:
         number = self._fleet.new_number()
-        robot = self._payloads[number % len(self._payloads)]
         payload = encode_request(
-            run="bench", epoch=1, number=number, settings=_SETTINGS, robot=robot
+            run="bench",
+            epoch=1,
+            number=number,
+            settings=self._settings,
+            robot=self._robots[number % _ROBOTS],
         )
         self._fleet.ask(Job(number, "evaluate", BirthId(0, number), 0, payload), self)
 
     def is_of(self, run: str, epoch: int) -> bool:
-        """Return whether a job is of this stream."""
+        """Return whether a job belongs to this stream."""
         return (run, epoch) == ("bench", 1)
 
     def checked(self, event: Returned) -> Returned:
-        """Return what came: what it says is of no interest here."""
+        """Return the answer unchecked: the benchmark does not use it."""
         return event
 
     def deliver(self, command: Deliver) -> None:
-        """Count an answer, and ask for the next.
+        """Count an answer and request the next evaluation.
 
         Raises:
-            RuntimeError: the workers cannot do it.
+            RuntimeError: the workers cannot do the job.
         """
         if command.reason:
             raise RuntimeError(command.reason)
@@ -107,49 +127,40 @@ class Stream:
         self._ask()
 
 
-_SETTINGS = evaluation_settings(read_experiment("scenario1"))
-
-
-def _robots() -> list[bytes]:
-    """Return some random robots, encoded."""
-    experiment = read_experiment("scenario1")
-    space = body_space(experiment.space)
-    return [
-        encode_robot(develop(generate(np.random.default_rng(seed), experiment), space))
-        for seed in range(_ROBOTS)
-    ]
-
-
 @contextmanager
 def real_fleet(bodies: dict[AgentKind, tuple[Body, int]]) -> Iterator[Fleet]:
-    """Give a fleet of processes on this machine, all of them there.
+    """Start a fleet of processes on this machine and wait until all have joined.
 
     Args:
-        bodies: what the processes of each kind do, and how many there are.
+        bodies: function and number of the processes of each kind.
+
+    Raises:
+        RuntimeError: a process does not join.
     """
-    with Network(name=unique_name("bench")) as network:
+    with ExitStack() as stack:
+        network = stack.enter_context(Network(name=unique_name("bench")))
         fleet = Fleet(network)
-        process_pools = []
-        try:
-            for kind, (body, size) in bodies.items():
-                agent = Agent(kind, kind, network.address)
-                process_pools.append(ProcessPool(body, (agent,), size=size))
-                process_pools[-1].look_after()
-            until_s = time.monotonic() + _PATIENCE_S
-            while any(
-                fleet.dispatch.agents(kind) < size for kind, (_, size) in bodies.items()
-            ):
-                fleet.listen(0.1, time.monotonic())
-                if time.monotonic() > until_s:
-                    raise RuntimeError("not all processes of the fleet came up")
-            yield fleet
-        finally:
-            for process_pool in process_pools:
-                process_pool.end()
+        for kind, (body, size) in bodies.items():
+            agent = Agent(kind, kind, network.address)
+            stack.enter_context(ProcessPool(body, (agent,), size=size))
+        until_s = time.monotonic() + _TIMEOUT_S
+        while any(
+            fleet.dispatch.agents(kind) < size for kind, (_, size) in bodies.items()
+        ):
+            fleet.listen(0.1, time.monotonic())
+            if time.monotonic() > until_s:
+                raise RuntimeError("not all processes of the fleet have joined")
+        yield fleet
 
 
 def measure(fleet: Fleet, done: Callable[[], int], seconds: float) -> Rate:
-    """Return what is done in some time, after a tenth of it to get going."""
+    """Measure for some time, after a tenth of it to warm up.
+
+    Args:
+        fleet: fleet to listen to.
+        done: returns the number of finished jobs.
+        seconds: duration of the measurement [s].
+    """
     for share in (0.1, 1.0):
         before, wall_s, cpu_s = done(), time.perf_counter(), time.process_time()
         end_s = time.monotonic() + share * seconds
@@ -163,15 +174,15 @@ def measure(fleet: Fleet, done: Callable[[], int], seconds: float) -> Rate:
     return rate
 
 
-def null_rate(body: Body, workers: int, seconds: float) -> Rate:
-    """Return how fast evaluations that do nothing go through the network."""
-    with real_fleet({"worker": (body, workers)}) as fleet:
+def null_rate(body: Body, seconds: float) -> Rate:
+    """Measure null evaluations over the network."""
+    with real_fleet({"worker": (body, 1)}) as fleet:
         stream = Stream(fleet, _IN_FLIGHT)
         return measure(fleet, lambda: stream.done, seconds)
 
 
 def birth_cost(null: Body, analyzer: Body, births: int) -> Rate:
-    """Return what whole births cost without physics: journal and tables are on."""
+    """Measure whole births without physics, journal and tables included."""
     shipped = read_experiment("scenario1")
     experiment = msgspec.structs.replace(shipped, births=births)
     with (
@@ -192,54 +203,54 @@ def birth_cost(null: Body, analyzer: Body, births: int) -> Rate:
 
 
 def run(options: argparse.Namespace, null: Body, timed: Body, analyzer: Body) -> int:
-    """Measure, simulate, and tell.
+    """Measure and simulate; print the results.
 
     Args:
-        options: of the command line.
-        null: a worker that answers at once.
-        timed: one that takes 40 ms and does nothing with them.
-        analyzer: that of real runs.
+        options: options of the command line.
+        null: worker that answers at once.
+        timed: worker that sleeps 40 ms per evaluation.
+        analyzer: analyzer of real runs.
 
     Returns:
-        0 if all figures are as promised, 1 if not.
+        0 if all figures meet their requirements, 1 if not.
     """
     seconds = options.seconds
-    rate = null_rate(null, 1, seconds)
+    rate = null_rate(null, seconds)
     _say(
         f"null evaluations, real network, 1 worker: {rate.per_s:.0f}/s "
-        f"(promised: {LEAST_NULL_PER_S}), coordinator {1e3 * rate.cpu_s:.3f} ms CPU "
-        f"each (promised: {1e3 * MOST_NULL_CPU_S:.1f})"
+        f"(required: {LEAST_NULL_PER_S}), coordinator {1e3 * rate.cpu_s:.3f} ms CPU "
+        f"each (required: {1e3 * MOST_NULL_CPU_S:.1f})"
     )
-    is_kept = rate.per_s >= LEAST_NULL_PER_S and rate.cpu_s <= MOST_NULL_CPU_S
+    is_met = rate.per_s >= LEAST_NULL_PER_S and rate.cpu_s <= MOST_NULL_CPU_S
     with real_fleet({"worker": (timed, options.workers)}) as fleet:
         stream = Stream(fleet, 3 * options.workers)
         slow = measure(fleet, lambda: stream.done, seconds)
     _say(
         f"evaluations of 40 ms, real network, {options.workers} workers: "
-        f"{slow.per_s:.0f}/s, the workers are busy "
-        f"{100 * slow.per_s * _SHORT_S / options.workers:.1f} % of the time"
+        f"{slow.per_s:.0f}/s, utilisation "
+        f"{100 * slow.per_s * _SHORT_S / options.workers:.1f} %"
     )
     birth = birth_cost(null, analyzer, options.births)
     _say(
         f"whole births without physics: {birth.per_s:.0f}/s, coordinator "
         f"{1e3 * birth.cpu_s:.2f} ms CPU per birth"
     )
-    return 0 if simulate(birth.cpu_s) and is_kept else 1
+    return 0 if simulate(birth.cpu_s) and is_met else 1
 
 
 def simulate(coordinator_s: float) -> bool:
-    """Simulate fleets, and tell; return whether they reach as far as promised.
+    """Simulate fleets, print the results, return whether they meet the requirement.
 
     Args:
-        coordinator_s: what a birth costs the coordinator [s].
+        coordinator_s: the coordinator's CPU time per birth [s].
     """
     setting = Setting(LEAST_WORKERS, _LONG_S, coordinator_s, losses_per_s=0.1)
     outcome = FleetModel(setting).run()
     _say(
         f"simulated fleet, {LEAST_WORKERS} workers, evaluations of {_LONG_S:g} s, "
-        f"{outcome.lost} workers lost and replaced: busy "
+        f"{outcome.lost} workers lost and replaced: utilisation "
         f"{100 * outcome.utilisation:.1f} %, {outcome.births_per_s:.0f} births/s, "
-        f"coordinator at work {100 * outcome.coordinator:.0f} % of the time, dispatch "
+        f"coordinator busy {100 * outcome.coordinator:.0f} % of the time, dispatch "
         f"{1e3 * outcome.dispatch_s:.3f} ms CPU per birth"
     )
     reached = 0
@@ -247,10 +258,11 @@ def simulate(coordinator_s: float) -> bool:
         found = replace(setting, evaluation_s=evaluation_s, losses_per_s=0.0)
         reached, outcome = most_workers(found)
         _say(
-            f"evaluations of {evaluation_s:g} s: {100 * LEAST_UTILISATION:.0f} % is "
-            f"lost beyond {reached} workers, at {outcome.births_per_s:.0f} births/s"
+            f"evaluations of {evaluation_s:g} s: up to {reached} workers at a "
+            f"utilisation of {100 * LEAST_UTILISATION:.0f} %, "
+            f"{outcome.births_per_s:.0f} births/s"
         )
-    _say(f"promised for {_LONG_S:g} s: {LEAST_WORKERS} workers")
+    _say(f"required for {_LONG_S:g} s: {LEAST_WORKERS} workers")
     return reached >= LEAST_WORKERS
 
 

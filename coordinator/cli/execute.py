@@ -1,29 +1,16 @@
-"""Runs from their first birth to their last, or to the next resume."""
+"""Start and resume runs and campaigns."""
 
-import contextlib
-import math
-import resource
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from coordinator.cli.progress import Display
-from coordinator.cli.summary import Conclusion, conclude, failures
-from coordinator.dispatch.events import AgentKind
-from coordinator.dispatch.fleet import Agents, Fleet
-from coordinator.network.local import LocalAgents
-from coordinator.network.service import Network
-from coordinator.run.cross_checks import NO_CHECKS, Checks
-from coordinator.run.live_server import LiveServer, open_viewer
-from coordinator.run.operators import OperatorServer
-from coordinator.run.scheduler import Planned, RunScheduler
+from coordinator.cli.deployment import Deployment
+from coordinator.cli.main_loop import execute_runs
+from coordinator.cli.summary import Conclusion, conclude, has_evaluated
+from coordinator.run.scheduler import Planned
 from coordinator.run.session import RunSession
 from coordinator.storage.campaign import (
     Campaign,
-    CampaignFolder,
     check_adopted,
     forget_campaign,
     is_campaign,
@@ -31,7 +18,6 @@ from coordinator.storage.campaign import (
     refuse_used,
     write_campaign,
 )
-from coordinator.storage.disk import replace_durably
 from coordinator.storage.folder import (
     RunDetails,
     RunFolder,
@@ -45,64 +31,12 @@ from coordinator.storage.folder_status import (
     unbegun_status,
 )
 from coordinator.storage.hints import command, stopped
-from schema.agent.network import THIS_MACHINE, Agent, Tls
-from schema.agent.platform_tag import platform_tag
+from coordinator.storage.lock import FolderLock
 from schema.agent.service import tell_user
-from schema.agent.supervision import CPU_LIMIT_S, ProcessSlot
-from schema.agent.supervisor import ProcessPool, stop_on_signals
-from schema.agent.topics import unique_name
 from schema.errors import NetworkError, RevolveError
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text, experiment_text
 from schema.tables.files import has_rows
-
-ADDRESS = "address"
-"""File of a run's or campaign's folder that says where its hub is, while it lives."""
-
-_LOOK_S = 0.2
-_CHORES_S = 1.0
-# Journal, lock and the segments of a run; and what the process itself needs.
-_FILES_OF_A_RUN = 24
-_OTHER_FILES = 200
-
-
-@dataclass(frozen=True, slots=True)
-class Deployment:
-    """Where and by whom a run is done; none of it changes a birth.
-
-    Attributes:
-        workers: worker processes to start here; an analyzer comes with them.
-        bodies: what a process of each kind runs (agent, post).
-        answers: functions in place of processes and network, or None.
-        listen: address of the hub; any free port of this machine if None.
-        connect: address of a hub that is there already; None: be one.
-        fleet: whose agents to use.
-        tls: files for a ``tls/`` address.
-        quiet: show nothing but the end.
-        fsync: survive power loss, too.
-        threads: that advance one arena together in a process here.
-        speed: simulated seconds per second at most, of arenas; None: no limit.
-        view: a viewer is to be opened; the run does not wait for it.
-        cpu_limit_s: CPU time of a job after which its process here is ended [s].
-        checks: what to look out for.
-        allows_drift: an arena may go on by another platform where its own is gone.
-    """
-
-    workers: int
-    bodies: Mapping[AgentKind, Callable[[Agent, ProcessSlot], None]]
-    answers: Mapping[AgentKind, Callable[[bytes], bytes]] | None
-    listen: str | None
-    connect: str | None
-    fleet: str
-    tls: Tls | None
-    quiet: bool
-    fsync: bool
-    threads: int = 1
-    speed: float | None = None
-    view: bool = False
-    cpu_limit_s: float = CPU_LIMIT_S
-    checks: Checks = NO_CHECKS
-    allows_drift: bool = False
 
 
 def start(
@@ -111,75 +45,70 @@ def start(
     """Run an experiment in a new folder; return the exit code.
 
     Raises:
-        RunFolderError: the folder is used or held, or the disk fails.
-        NetworkError: the address cannot be listened on, or no hub is there.
-        ExperimentError: no robot meets its restrictions.
+        RunFolderError: the folder is used or locked, or the disk fails.
+        NetworkError: the address cannot be listened on, or no hub answers.
+        ExperimentError: no robot meets the experiment's restrictions.
     """
     details = RunDetails(experiment.name, 0, seed, experiment_text(experiment))
-    return _alone(folder, RunFolder(folder, details), deployment)
+    return _execute_run(folder, RunFolder(folder, details), deployment)
 
 
 def start_campaign(folder: Path, campaign: Campaign, deployment: Deployment) -> int:
     """Run a campaign in a folder; return the exit code.
 
-    Runs of it that are in the folder already are taken as they are.
+    Runs that the folder already holds become part of the campaign.
 
     Raises:
-        RunFolderError: the folder is used or held, or the disk fails.
-        NetworkError: the address cannot be listened on, or no hub is there.
+        RunFolderError: the folder is used or locked, or the disk fails.
+        NetworkError: the address cannot be listened on, or no hub answers.
     """
-    with CampaignFolder(folder):
+    with FolderLock(folder):
         refuse_used(folder)
-        planned, barren = _plan(folder, campaign)
-        begun = _begun(folder, campaign)
+        planned, failed = _plan(folder, campaign)
+        begun = _count_begun(folder, campaign)
         write_campaign(folder, campaign)
         try:
-            return _together(folder, planned, barren, deployment)
+            return _execute_campaign(folder, planned, failed, deployment)
         except NetworkError:
-            if _begun(folder, campaign) == begun:
+            if _count_begun(folder, campaign) == begun:
                 forget_campaign(folder)
             raise
 
 
-def _begun(folder: Path, campaign: Campaign) -> int:
-    """Return how many runs of a campaign are there, be it no more than a beginning."""
-    return sum(holds_run(path) for path, _ in campaign.runs(folder))
-
-
 def resume(folder: Path, deployment: Deployment) -> int:
-    """Go on with the run or the campaign of a folder; return the exit code.
+    """Continue the run or the campaign of a folder; return the exit code.
 
     Raises:
-        RunFolderError: neither is there, it is held by another coordinator, its
-            journal is damaged, or the disk fails.
-        NetworkError: the address cannot be listened on, or no hub is there.
+        RunFolderError: the folder holds neither, another coordinator has locked it,
+            its journal is damaged, or the disk fails.
+        NetworkError: the address cannot be listened on, or no hub answers.
         ExperimentError: no robot meets a run's restrictions.
     """
     if is_campaign(folder):
-        with CampaignFolder(folder):
-            planned, barren = _plan(folder, read_campaign(folder))
-            return _together(folder, planned, barren, deployment)
+        with FolderLock(folder):
+            planned, failed = _plan(folder, read_campaign(folder))
+            return _execute_campaign(folder, planned, failed, deployment)
     if read_state(folder) == "finished":
         if has_rows(folder, "births"):
-            tell_user(f"{folder}: is finished; nothing is left to do")
-            return 0 if _has_judged(folder) else 1
+            tell_user(f"{folder}: already finished")
+            return 0 if has_evaluated(folder) else 1
         check_rewritable(folder, read_details(folder))
-        tell_user(f"{folder}: its tables are gone: the journal gives them again")
-    return _alone(folder, RunFolder(folder), deployment)
+        tell_user(f"{folder}: tables are missing; writing them again from the journal")
+    return _execute_run(folder, RunFolder(folder), deployment)
 
 
-def _alone(folder: Path, held: RunFolder, deployment: Deployment) -> int:
-    """Do the run of a folder that is held, and tell what came of it."""
+def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:
+    """Execute the run of a locked folder, print its summary, return the exit code."""
+    conclusions: list[Conclusion] = []
     with held:
         status = unbegun_status(folder, held.details)
-        said: list[Conclusion] = []
         try:
-            scheduler = _conduct(
+            scheduler = execute_runs(
                 folder,
                 [Planned(held.details, status, lambda: held)],
                 deployment,
-                lambda run: said.append(_conclusion(run)),
-                lambda _details, _error: None,  # it is raised
+                lambda run: conclusions.append(_conclude(run)),
+                lambda _details, _error: None,  # raised below
             )
         except NetworkError:
             held.forget()
@@ -189,17 +118,22 @@ def _alone(folder: Path, held: RunFolder, deployment: Deployment) -> int:
     if not scheduler.is_finished:
         tell_user(stopped(folder))
         return 130
-    print(said[0].text)
-    return 0 if said[0].is_judged else 1
+    print(conclusions[0].text)
+    return 0 if conclusions[0].has_evaluated else 1
+
+
+def _count_begun(folder: Path, campaign: Campaign) -> int:
+    """Return how many of a campaign's runs have a folder."""
+    return sum(holds_run(path) for path, _ in campaign.runs(folder))
 
 
 def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
-    """Return all runs of a campaign, and where nobody could be judged of the finished.
+    """Return all runs of a campaign, and the finished ones without any evaluation.
 
     Raises:
-        RunFolderError: a run that is there is another one.
+        RunFolderError: a folder of the campaign holds a different run.
     """
-    planned, barren = [], []
+    planned, failed = [], []
     for path, details in campaign.runs(folder):
         status = unbegun_status(path, details)
         try:
@@ -208,203 +142,67 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
                 planned.append(Planned(details, status, take))
                 continue
             found, status = read_details(path), folder_status(path)
-            if status.state == "finished" and not _has_judged(path):
-                barren.append(path)
+            if status.state == "finished" and not has_evaluated(path):
+                failed.append(path)
         except RevolveError as error:
-            # It cannot go on, and is no reason for the others not to.
-            planned.append(Planned(details, status, partial(_refuse, error)))
+            # The damaged run fails when the scheduler opens it; the others continue.
+            planned.append(Planned(details, status, partial(_raise, error)))
             continue
         check_adopted(path, found, details)
         theirs, ours = (
             experiment_from_text(each.document).births for each in (found, details)
         )
         if theirs != ours:
-            tell_user(f"{path}: is taken as it is, with {theirs} births, not {ours}")
+            tell_user(f"{path}: keeps its own number of births, {theirs} (not {ours})")
         planned.append(Planned(found, status, partial(RunFolder, path)))
-    return planned, barren
+    return planned, failed
 
 
-def _has_judged(folder: Path) -> bool:
-    """Return whether anybody of a finished run could be judged."""
-    return failures(folder)[1]
-
-
-def _refuse(error: RevolveError) -> RunFolder:
+def _raise(error: RevolveError) -> RunFolder:
     raise error
 
 
-def _together(
-    folder: Path, planned: Sequence[Planned], barren: list[Path], deployment: Deployment
+def _execute_campaign(
+    folder: Path, planned: Sequence[Planned], failed: list[Path], deployment: Deployment
 ) -> int:
-    """Do all runs of a campaign, and tell what came of them.
+    """Execute a campaign's runs, print the outcome, return the exit code.
 
     Args:
         folder: of the campaign.
         planned: its runs.
-        barren: folders of finished ones in which nobody could be judged.
-        deployment: where and by whom.
+        failed: folders of finished runs in which all evaluations failed.
+        deployment: processes and network.
     """
-    there = sum(one.status.state == "finished" for one in planned)
-    if there:
-        tell_user(f"{there} of {len(planned)} runs are finished already")
+    finished = sum(one.status.state == "finished" for one in planned)
+    if finished:
+        tell_user(f"{finished} of {len(planned)} runs are already finished")
 
     def conclude_run(run: RunSession) -> None:
-        conclusion = _conclusion(run)
+        conclusion = _conclude(run)
         if conclusion.failures:
             tell_user(f"{run.held.path}: {conclusion.failures}")
-        if not conclusion.is_judged:
-            barren.append(run.held.path)
+        if not conclusion.has_evaluated:
+            failed.append(run.held.path)
 
-    scheduler = _conduct(folder, planned, deployment, conclude_run, _report)
+    scheduler = execute_runs(folder, planned, deployment, conclude_run, _report)
     if not scheduler.is_finished:
         tell_user(stopped(folder))
         return 130
     if scheduler.failed:
         tell_user(
-            f"{len(scheduler.failed)} of {len(planned)} runs failed; when that is "
-            f"mended: {command('resume', folder)}"
+            f"{len(scheduler.failed)} of {len(planned)} runs failed; after fixing the "
+            f"cause, run: {command('resume', folder)}"
         )
         return 1
     print(
         f"{len(planned)} runs are finished\ntry next:\n  {command('analyze', folder)}"
     )
-    return 1 if barren else 0
+    return 1 if failed else 0
 
 
-def _conclusion(run: RunSession) -> Conclusion:
+def _conclude(run: RunSession) -> Conclusion:
     return conclude(run.held.path, run.experiment, run.loop.islands)
-
-
-def _conduct(
-    place: Path,
-    planned: Sequence[Planned],
-    deployment: Deployment,
-    conclude_run: Callable[[RunSession], object],
-    report: Callable[[RunDetails, RevolveError], None],
-) -> RunScheduler:
-    """Do runs until all are done or somebody says stop.
-
-    Args:
-        place: folder that shall tell where the coordinator listens.
-        planned: the runs.
-        deployment: where and by whom.
-        conclude_run: told of each run that is finished.
-        report: told of each run that cannot go on, and why.
-    """
-    stop = stop_on_signals()
-    with ExitStack() as stack:
-        agents, process_pools = stack.enter_context(_agents(place, deployment))
-        scheduler = RunScheduler(
-            planned,
-            Fleet(agents, allows_drift=deployment.allows_drift),
-            open_run=lambda held, is_watched: RunSession(
-                held,
-                scheduler.fleet,
-                fsync=deployment.fsync,
-                speed=deployment.speed,
-                is_watched=is_watched and isinstance(agents, Network),
-                checks=deployment.checks,
-            ),
-            most=_most_at_once(),
-            conclude=conclude_run,
-            report=report,
-        )
-        stack.callback(scheduler.close)
-        serve = _servant(scheduler, agents)
-        with Display(scheduler, quiet=deployment.quiet) as display:
-            shown_s = done_s = -math.inf
-            while not (scheduler.is_finished or stop.is_set()):
-                scheduler.turn(_LOOK_S, time.monotonic)
-                serve()
-                now_s = time.monotonic()
-                if now_s - shown_s >= _LOOK_S:
-                    shown_s = now_s
-                    display.update(now_s)
-                if now_s - done_s >= _CHORES_S:
-                    done_s = now_s
-                    scheduler.do_chores(now_s)
-                    for look_after in process_pools:
-                        look_after()
-        scheduler.stop()
-    return scheduler
 
 
 def _report(details: RunDetails, error: RevolveError) -> None:
     tell_user(f"{details.name}-{details.run} failed: {error}")
-
-
-def _most_at_once() -> int:
-    """Return how many runs may have their files open, as many as this system lets."""
-    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    return max(1, (hard - _OTHER_FILES) // _FILES_OF_A_RUN)
-
-
-def _servant(scheduler: RunScheduler, agents: Agents) -> Callable[[], None]:
-    """Return what serves operators and viewers; a run without a network has none."""
-    if not isinstance(agents, Network):
-        return lambda: None
-    operator_server = OperatorServer(scheduler)
-    live_server: list[tuple[RunSession, LiveServer]] = []
-
-    def serve() -> None:
-        now_s = time.monotonic()
-        for order in agents.orders():
-            order.reply(operator_server.answer(order.data, now_s))
-        run = scheduler.watched
-        if live_server and live_server[0][0] is not run:
-            live_server.pop()[1].close()
-        if run is not None and run.feed is not None:
-            if not live_server:
-                shown = LiveServer(run.feed, run.loop, scheduler.fleet, agents)
-                live_server.append((run, shown))
-            live_server[0][1].serve(now_s)
-
-    return serve
-
-
-@contextmanager
-def _agents(
-    place: Path, deployment: Deployment
-) -> Iterator[tuple[Agents, list[Callable[[], None]]]]:
-    """Give whoever does the work, and what looks after them from time to time."""
-    if deployment.answers is not None:
-        yield LocalAgents(deployment.answers, platform_tag()), []
-        return
-    with ExitStack() as stack:
-        network = stack.enter_context(
-            Network(
-                name=unique_name("coordinator"),
-                fleet=deployment.fleet,
-                listen=(deployment.listen or THIS_MACHINE,),
-                connect=deployment.connect or "",
-                tls=deployment.tls,
-            )
-        )
-        note = place / ADDRESS
-        # Whoever waits for the file shall find the address in it.
-        text = f"{network.address}\n"
-        replace_durably(note, lambda file: file.write_text(text, encoding="utf-8"))
-        stack.callback(_take_away, note, text)
-        if deployment.view:
-            open_viewer(network.address, deployment.fleet, deployment.tls)
-        process_pools: list[Callable[[], None]] = []
-        sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
-        for kind, size in sizes.items() if deployment.workers else ():
-            agent = Agent(
-                kind, f"own-{kind}", network.address, deployment.fleet,
-                tls=deployment.tls, threads=deployment.threads,
-                cpu_limit_s=deployment.cpu_limit_s,
-            )  # fmt: skip
-            process_pool = ProcessPool(deployment.bodies[kind], (agent,), size=size)
-            process_pools.append(stack.enter_context(process_pool).look_after)
-        if deployment.listen is not None:
-            tell_user(f"listening on {network.address}")
-        yield network, process_pools
-
-
-def _take_away(note: Path, text: str) -> None:
-    """Remove a file, unless whoever came after us has written another."""
-    with contextlib.suppress(OSError):
-        if note.read_text(encoding="utf-8") == text:
-            note.unlink()

@@ -1,4 +1,4 @@
-"""How figures of runs, and what to do next, are said on a terminal."""
+"""Figures of runs as text for a terminal."""
 
 from schema.wire.status import IslandStatus, RunStatus
 
@@ -6,7 +6,7 @@ _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
 
 
 def duration(seconds: float | None) -> str:
-    """Return a time in words, as "2 h 05 min"; "?" if nobody knows."""
+    """Return a duration as text, such as "2 h 05 min"; "?" if it is unknown."""
     if seconds is None:
         return "?"
     whole = round(seconds)
@@ -19,8 +19,13 @@ def duration(seconds: float | None) -> str:
     return f"{whole} s"
 
 
+def run_details(run: RunStatus) -> str:
+    """Return the best fitness of a run, and the state of its arenas."""
+    return f"{best_of(run)}{about_arenas(run)}"
+
+
 def best_of(counted: RunStatus | IslandStatus) -> str:
-    """Return the greatest fitness of the living, of every island if there are few."""
+    """Return the best fitness of the living robots, per island if there are few."""
     islands = counted.islands if isinstance(counted, RunStatus) else (counted,)
     bests = [island.best for island in islands]
     judged = [best for best in bests if best is not None]
@@ -33,14 +38,13 @@ def best_of(counted: RunStatus | IslandStatus) -> str:
 
 
 def about_arenas(run: RunStatus) -> str:
-    """Return what there is to say of a run's arenas beside their births."""
+    """Return simulated time and number of robots of a run's arenas, if it has any."""
     arenas = [island for island in run.islands if island.simulated_s is not None]
     if not arenas:
         return ""
     simulated_s = sum(island.simulated_s or 0.0 for island in arenas)
     alive = sum(island.alive for island in arenas)
-    paused = sum(island.is_paused for island in arenas)
-    pace = ", paused" if paused else ""
+    pace = ", paused" if any(island.is_paused for island in arenas) else ""
     if run.simulated_per_s:
         pace = f"{pace}, {run.simulated_per_s:.1f} x real time"
     return f", {simulated_s:.0f} s simulated, {alive} alive{pace}"

@@ -1,7 +1,6 @@
-"""What this process shows while it lives: bars of runs and islands on the terminal."""
+"""Progress of a coordinator's runs on the terminal: bars, or lines in a log."""
 
 import math
-from types import TracebackType
 from typing import Self
 
 from rich.console import Console
@@ -13,20 +12,20 @@ from rich.progress import (
     TextColumn,
 )
 
-from coordinator.cli.format import about_arenas, best_of, duration
+from coordinator.cli.format import about_arenas, best_of, duration, run_details
 from coordinator.run.rate import SPAN_S
 from coordinator.run.scheduler import RunScheduler
 from schema.wire.status import IslandStatus, RunStatus, Status
 
 MOST_BARS = 16
-"""Bars of single runs or islands: more would not fit on a screen."""
+"""Bars of single runs or islands that fit on a screen."""
 
 
 class Display:
-    """Progress bars; a line every so often where there is no terminal."""
+    """Progress bars; without a terminal a line at regular intervals."""
 
     def __init__(self, scheduler: RunScheduler, *, quiet: bool) -> None:
-        """Show all runs that somebody conducts."""
+        """Show all runs of a scheduler; nothing if ``quiet``."""
         self._scheduler = scheduler
         self._console = Console(stderr=True)
         self._quiet = quiet
@@ -40,21 +39,16 @@ class Display:
         )
         self._tasks: dict[str, TaskID] = {}
         self._next_line_s = -math.inf
-        self._waits_since: float | None = None
-        self._said_waiting: dict[str, str] = {}
+        self._missing_since_s: float | None = None
+        self._shown_waiting: dict[str, str] = {}
 
     def __enter__(self) -> Self:
         """Start drawing."""
         self._progress.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Leave the last state on the screen."""
+    def __exit__(self, *_error: object) -> None:
+        """Stop drawing; the last state stays on the screen."""
         self._progress.stop()
 
     def update(self, now_s: float) -> None:
@@ -70,25 +64,22 @@ class Display:
             self._draw(status)
         elif now_s >= self._next_line_s:
             self._next_line_s = now_s + SPAN_S
-            self._console.print(_line(status), soft_wrap=True)
-        self._say_who_is_missing(status, now_s)
+            self._print(_line(status))
+        self._warn_of_missing(status, now_s)
 
     def _draw(self, status: Status) -> None:
         rows: dict[str, tuple[IslandStatus | RunStatus | Status, str]] = {}
-        about = f"{_pace(status)}, {_process_pool(status)}"
+        about = _rates(status)
         if len(status.runs) > 1:
-            done = sum(run.state == "finished" for run in status.runs)
-            name = f"{done} of {len(status.runs)} runs"
+            name = _runs_done(status)
             rows[""] = (status, about)
-            shown = [run for run in status.runs if run.state == "running"]
-            for run in shown[:MOST_BARS]:
-                what = f"{best_of(run)}{about_arenas(run)}"
-                rows[f"{run.name}-{run.run}"] = (run, what)
+            active = [run for run in status.runs if run.state == "running"]
+            for run in active[:MOST_BARS]:
+                rows[f"{run.name}-{run.run}"] = (run, run_details(run))
         else:
             (run,) = status.runs
             name = run.name
-            what = f"{about}, {best_of(run)}{about_arenas(run)}"
-            rows[""] = (run, what)
+            rows[""] = (run, f"{about}, {run_details(run)}")
             islands = run.islands if 1 < len(run.islands) <= MOST_BARS else ()
             for number, island in enumerate(islands):
                 rows[f"  island {number}"] = (island, best_of(island))
@@ -105,46 +96,49 @@ class Display:
                 about=what,
             )
 
-    def _say_who_is_missing(self, status: Status, now_s: float) -> None:
-        """Say once, after a while, that nobody is there to do the work."""
-        there = {"worker": status.workers, "analyzer": status.analyzers}
-        missing = [kind for kind, count in there.items() if not count]
+    def _warn_of_missing(self, status: Status, now_s: float) -> None:
+        """Warn of missing kinds of agents, and of arenas without a suitable worker."""
+        counts = {"worker": status.workers, "analyzer": status.analyzers}
+        missing = [kind for kind, count in counts.items() if not count]
         if not missing:
-            self._waits_since = None
-        elif self._waits_since is None:
-            self._waits_since = now_s
-        elif now_s - self._waits_since > SPAN_S:
-            self._waits_since = now_s + 6 * SPAN_S
-            self._console.print(f"waiting: no {' and no '.join(missing)} has joined")
+            self._missing_since_s = None
+        elif self._missing_since_s is None:
+            self._missing_since_s = now_s
+        elif now_s - self._missing_since_s > SPAN_S:
+            self._missing_since_s = now_s + 6 * SPAN_S
+            self._print(f"waiting: no {' and no '.join(missing)} has joined")
         waiting = {
             f"arena {shard} of {run.held.path.name}": platform
             for run in self._scheduler.active
             for shard, platform in run.loop.advances.waiting.items()
         }
-        if "worker" not in missing and waiting != self._said_waiting:
-            self._said_waiting = waiting
-            for shard, platform in waiting.items():
-                self._console.print(
-                    f"waiting: no worker of platform {platform} is there to go on "
-                    f"with {shard}; others would come to other results (--allow-drift)",
-                    soft_wrap=True,
+        if "worker" not in missing and waiting != self._shown_waiting:
+            self._shown_waiting = waiting
+            for arena, platform in waiting.items():
+                self._print(
+                    f"waiting: {arena} needs a worker of platform {platform}; on "
+                    "another platform its results differ (--allow-drift)"
                 )
+
+    def _print(self, line: str) -> None:
+        self._console.print(line, soft_wrap=True)
 
 
 def _line(status: Status) -> str:
-    """Return the state in a line, for a log."""
-    about = f"{status.births} of {status.wanted} births, {_pace(status)}"
+    """Return the state as one line of a log."""
+    about = f"{status.births} of {status.wanted} births, {_rates(status)}"
     if len(status.runs) == 1:
-        about += f"{about_arenas(status.runs[0])}"
-    else:
-        done = sum(run.state == "finished" for run in status.runs)
-        about = f"{done} of {len(status.runs)} runs, {about}"
-    return f"{about}, {_process_pool(status)}"
+        return f"{about}{about_arenas(status.runs[0])}"
+    return f"{_runs_done(status)}, {about}"
 
 
-def _pace(status: Status) -> str:
-    return f"{status.births_per_s:.1f}/s, {duration(status.left_s)} left"
+def _runs_done(status: Status) -> str:
+    done = sum(run.state == "finished" for run in status.runs)
+    return f"{done} of {len(status.runs)} runs"
 
 
-def _process_pool(status: Status) -> str:
-    return f"{status.workers} workers"
+def _rates(status: Status) -> str:
+    return (
+        f"{status.births_per_s:.1f}/s, {duration(status.left_s)} left, "
+        f"{status.workers} workers"
+    )

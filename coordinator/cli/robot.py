@@ -1,4 +1,4 @@
-"""``revolve robot random``: a robot as evolution would start with."""
+"""``revolve robot random``: random robots as evolution starts with."""
 
 import argparse
 import sys
@@ -8,7 +8,7 @@ from coordinator.evolution.generation import generate
 from coordinator.evolution.random_streams import Purpose, stream
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
-from schema.flags import Flags, whole_number
+from schema.flags import Flags, add_count
 from schema.formats.files import settings_of, write_robot
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
@@ -17,17 +17,17 @@ from schema.robot.ids import BirthId
 def main(arguments: list[str]) -> int:
     """Write random robots, one file each, and return the exit code.
 
-    They have passed the experiment's restrictions, not its analyzer.
+    They meet the experiment's restrictions; no analyzer vets them.
 
     Args:
         arguments: the command's name, ``robot random``, first.
 
     Returns:
-        0 if all are written.
+        0 once all files are written.
 
     Raises:
-        ExperimentError: no such experiment, or one that allows (nearly) no robot.
-        InvalidRobot: a file that cannot be written.
+        ExperimentError: no such experiment, or it allows (nearly) no robot.
+        InvalidRobot: a file cannot be written.
     """
     options = _parser().parse_args(arguments[1:])
     experiment = read_experiment(options.experiment)
@@ -47,13 +47,20 @@ def main(arguments: list[str]) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = Flags(
         prog="revolve robot random",
-        description="Make up a robot as an experiment makes up its founders.",
+        description="Generate random robots as an experiment generates its founders.",
         epilog="example: revolve robot random some.yaml --seed 7 --count 3",
     )
-    parser.add_argument("file", type=Path, metavar="FILE", help=".yaml, .pb, .xml, ...")
-    parser.add_argument("--seed", type=whole_number(0), default=1, metavar="N")
-    parser.add_argument("--count", type=whole_number(0), default=1, metavar="N")
-    parser.add_argument("--experiment", default="scenario1", metavar="NAME|FILE.toml")
+    parser.add_argument(
+        "file", type=Path, metavar="FILE", help="output: .yaml, .pb, .xml, ..."
+    )
+    add_count(parser, "--seed", 1, "random seed", least=0)
+    add_count(parser, "--count", 1, "number of robots", least=0)
+    parser.add_argument(
+        "--experiment",
+        default="scenario1",
+        metavar="NAME|FILE.toml",
+        help="experiment whose settings to use (default: %(default)s)",
+    )
     return parser
 
 

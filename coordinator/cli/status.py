@@ -1,4 +1,4 @@
-"""``revolve status``: how far runs are, told by who is at them or by their folders."""
+"""``revolve status``: progress of runs, from their coordinator or their folders."""
 
 import argparse
 from pathlib import Path
@@ -7,13 +7,14 @@ from uuid import uuid4
 from rich.console import Console
 from rich.table import Table
 
-from coordinator.cli.execute import ADDRESS
-from coordinator.cli.format import about_arenas, best_of, duration
+from coordinator.cli.deployment import ADDRESS
+from coordinator.cli.format import duration, run_details
 from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, read_campaign
-from coordinator.storage.folder import DETAILS, EPOCH, LOCK, RunDetails, holds_run
+from coordinator.storage.folder import DETAILS, EPOCH, RunDetails, holds_run
 from coordinator.storage.folder_status import folder_status, unbegun_status
 from coordinator.storage.journal import NAME as JOURNAL
+from coordinator.storage.lock import LOCK
 from schema.agent.command import add_network_flags, tls_of
 from schema.agent.service import tell_user
 from schema.errors import NetworkError, RevolveError, RunFolderError
@@ -28,11 +29,11 @@ from schema.wire.operator import (
 from schema.wire.status import RunStatus, Status
 
 _WIDEST = 1000
-"""Characters of a line; it ends where its text does."""
+"""Characters of the widest line that is not wrapped."""
 
 
 def main(arguments: list[str]) -> int:
-    """Tell how far runs are.
+    """Show the progress of runs.
 
     Args:
         arguments: the command's name first.
@@ -41,8 +42,8 @@ def main(arguments: list[str]) -> int:
         0 if done, 1 if a run is damaged or has failed.
 
     Raises:
-        NetworkError: no coordinator answers at an address that was given.
-        RunFolderError: no run or campaign is in a folder that was given.
+        NetworkError: no coordinator answers at the address.
+        RunFolderError: the folder holds no run and no campaign.
     """
     flags = _flags()
     options = flags.parse_args(arguments[1:])
@@ -59,49 +60,49 @@ def main(arguments: list[str]) -> int:
 
 
 def ask_status(options: argparse.Namespace) -> dict[str, Status]:
-    """Return how far the runs of each coordinator at ``--connect`` are.
+    """Return the status of each coordinator at ``--connect``, by its name.
 
     Raises:
-        NetworkError: none answers.
+        NetworkError: no coordinator answers.
     """
-    told = ask_coordinators(
+    replies = ask_coordinators(
         encode_operator_request(OperatorRequest(uuid4().hex, 0, GetStatus())),
         connect=options.connect,
         fleet=options.fleet,
         tls=tls_of(options),
     )
-    replies = {name: decode_operator_reply(data) for name, data in told.items()}
-    return {name: reply.status for name, reply in replies.items() if reply.status}
+    decoded = {name: decode_operator_reply(data) for name, data in replies.items()}
+    return {name: reply.status for name, reply in decoded.items() if reply.status}
 
 
 def _live(folder: Path, options: argparse.Namespace) -> Status | None:
-    """Return what a folder's coordinator tells, None if it has none."""
+    """Return the status from a folder's coordinator; None if none is running."""
     try:
         options.connect = (folder / ADDRESS).read_text(encoding="utf-8").strip()
-        told = ask_status(options)
+        found = ask_status(options)
     except (OSError, NetworkError):
         return None
     here = folder.resolve()
-    for status in told.values():
-        places = [Path(run.folder) for run in status.runs]
-        if any(here in (place, place.parent) for place in places):
+    for status in found.values():
+        paths = [Path(run.folder) for run in status.runs]
+        if any(here in (path, path.parent) for path in paths):
             return status
     return None
 
 
 def _by_folder(folder: Path) -> Status:
-    """Return how far the runs at or below a folder are by what stands on disk.
+    """Return the status of all runs at or below a folder, read from disk.
 
     Raises:
-        RunFolderError: no run and no campaign is there.
+        RunFolderError: there is no run and no campaign.
     """
     planned: dict[Path, RunDetails] = {}
     runs: list[RunStatus] = []
-    for place in _below(folder, CAMPAIGN):
+    for path in _below(folder, CAMPAIGN):
         try:
-            planned.update(read_campaign(place).runs(place))
+            planned.update(read_campaign(path).runs(path))
         except RunFolderError as error:
-            runs.append(_damaged(place, error))
+            runs.append(_damaged(path, error))
     others = [path for path in _below(folder, DETAILS) if path not in planned]
     for path in (*planned, *filter(_is_ours, others)):
         try:
@@ -112,38 +113,39 @@ def _by_folder(folder: Path) -> Status:
         except RevolveError as error:
             runs.append(_damaged(path, error))
     if not runs:
-        raise RunFolderError(f"{folder}: no run and no campaign is there or below")
+        raise RunFolderError(
+            f"{folder}: no run and no campaign in this folder or below"
+        )
     return Status(tuple(runs), 0, 0, 0.0)
 
 
 def _below(folder: Path, name: str) -> list[Path]:
-    """Return folders that hold a file of a name, at any depth; links are followed once.
+    """Return the folders at any depth that hold a file of a name.
 
-    Deeper ones are not, for they may lead back.
+    Symbolic links are followed one level deep only: deeper ones may form a cycle.
     """
     found = {*folder.glob(f"**/{name}"), *folder.glob(f"*/{name}")}
     return sorted(path.parent for path in found)
 
 
 def _is_ours(folder: Path) -> bool:
-    """Return whether a folder with a description has anything else of a run."""
+    """Return whether a folder with a ``run.json`` has any other file of a run."""
     names = (LOCK, EPOCH, JOURNAL, SEGMENTS, FINISHED)
     return any((folder / name).exists() for name in names)
 
 
 def _damaged(folder: Path, error: RevolveError) -> RunStatus:
-    """Say what is wrong with a folder; nothing else is known of it."""
+    """Report what is wrong with a folder; return a status without any counts."""
     tell_user(f"damaged: {error}")
     return RunStatus(str(folder.resolve()), folder.name, 0, "damaged")
 
 
 def _show(status: Status, title: str, root: Path | None = None) -> None:
-    """Print how far runs are, each by its path below ``root`` or its folder's name."""
+    """Print the progress of runs, named by path below ``root`` or folder name."""
     table = Table("run", "state", "births", "births/s", "best alive, arenas", box=None)
     above = root and root.resolve()
     for run in status.runs:
         folder = Path(run.folder)
-        what = f"{best_of(run)}{about_arenas(run)}"
         if above and above in folder.parents:
             name = str(folder.relative_to(above))
         else:
@@ -153,7 +155,7 @@ def _show(status: Status, title: str, root: Path | None = None) -> None:
             run.state,
             f"{run.births} of {run.wanted}" if run.islands else "",
             f"{run.births_per_s:.1f}" if run.births_per_s else "",
-            what if run.islands else "",
+            run_details(run) if run.islands else "",
         )
     done = sum(run.state == "finished" for run in status.runs)
     births = f"{status.births} of {status.wanted} births"
@@ -164,8 +166,8 @@ def _show(status: Status, title: str, root: Path | None = None) -> None:
             f"{status.analyzers} analyzers, {duration(status.left_s)} left"
         )
     elif done < len(status.runs):
-        lines.append("nobody is at it, or nobody works for it")
-    # As wide as it takes: a narrow terminal wraps lines, and nothing is cut.
+        lines.append("no coordinator is running, or it has no workers and analyzers")
+    # Wide: a narrow terminal wraps lines, but none is cut.
     console = Console(width=_WIDEST, highlight=False, markup=False)
     for line in lines:
         console.print(line)
@@ -175,15 +177,18 @@ def _show(status: Status, title: str, root: Path | None = None) -> None:
 def _flags() -> Flags:
     flags = Flags(
         prog="revolve status",
-        description="Tell how far a run, a campaign or all runs of a fleet are.",
-        epilog="for example: revolve status runs/thesis-seed1",
+        description="Show the progress of a run, a campaign or all runs of a fleet.",
+        epilog="example: revolve status runs/thesis-seed1",
         allow_abbrev=False,
     )
     flags.add_argument(
-        "folder", nargs="?", help="of a run or campaign, or one that has such in it"
+        "folder",
+        nargs="?",
+        metavar="FOLDER",
+        help="run or campaign folder, or a folder that contains some",
     )
     flags.add_argument(
-        "--connect", metavar="ADDRESS", help="the hub of whoever is to be asked"
+        "--connect", metavar="ADDRESS", help="ask all coordinators at this hub"
     )
     add_network_flags(flags)
     return flags

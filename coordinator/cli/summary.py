@@ -1,4 +1,4 @@
-"""What a finished run comes to: the best robot, what failed, and where all is."""
+"""Summary of a finished run: best robot, failures, where the results are."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -22,47 +22,47 @@ BEST = "best.yaml"
 
 @dataclass(frozen=True, slots=True)
 class Conclusion:
-    """What a finished run comes to.
+    """Summary of a finished run.
 
     Attributes:
-        text: what there is to see.
-        failures: a line on who could not be judged; empty if all could.
-        is_judged: somebody could.
+        text: lines for the user.
+        failures: line about failed evaluations; empty if there are none.
+        has_evaluated: at least one evaluation succeeded.
     """
 
     text: str
     failures: str
-    is_judged: bool
+    has_evaluated: bool
 
 
 def conclude(
     folder: Path, experiment: Experiment, islands: Mapping[int, Island | Arena]
 ) -> Conclusion:
-    """Write the best robot of all islands to a file; return what there is to see.
+    """Write the best robot of all islands to a file; return the run's summary.
 
     Args:
-        folder: of the run; its tables are there.
-        experiment: what was run.
-        islands: finished, by their numbers.
+        folder: run folder with its tables.
+        experiment: the run's experiment.
+        islands: finished islands by number.
 
     Raises:
-        RunFolderError: a table cannot be read, or the robot not be written.
+        RunFolderError: a table cannot be read, or the robot cannot be written.
     """
-    told, is_judged = failures(folder)
-    lines = [*_results(folder, experiment, islands), f"tables: {folder / 'tables'}"]
-    if told:
-        lines.insert(1, told)
-    lines.append("try next:")
+    failures = _failures(folder)
+    lines = _results(folder, experiment, islands)
+    if failures:
+        lines.insert(1, failures)
+    lines += [f"tables: {folder / 'tables'}", "try next:"]
     if (folder / BEST).exists():
         lines.append(f"  {command('robot', 'render', folder / BEST, 'best.gif')}")
     lines += [f"  {command(what, folder)}" for what in ("view", "analyze")]
-    return Conclusion("\n".join(lines), told, is_judged)
+    return Conclusion("\n".join(lines), failures, has_evaluated(folder))
 
 
 def _results(
     folder: Path, experiment: Experiment, islands: Mapping[int, Island | Arena]
 ) -> list[str]:
-    """Return lines on the last population; its best robot goes to a file."""
+    """Describe the last population; write its best robot to a file."""
     births = sum(island.births for island in islands.values())
     extinct = [
         number
@@ -70,7 +70,7 @@ def _results(
         if isinstance(island, Arena) and island.is_extinct
     ]
     if len(extinct) == len(islands):
-        return [f"after {births} births too few are left to mate"]
+        return [f"extinct after {births} births: too few robots are left to mate"]
     judged = [
         one
         for number, island in sorted(islands.items())
@@ -78,7 +78,7 @@ def _results(
         for one in island.judged
     ]
     if not judged:
-        return [f"{births} births; nobody of the last population has been judged"]
+        return [f"{births} births; no robot of the last population has a fitness"]
     best = fittest_first(judged)[0]
     mean = sum(one.fitness for one in judged) / len(judged)
     space = body_space(experiment.space)
@@ -89,7 +89,7 @@ def _results(
     return [
         f"{births} births; mean fitness of the last population {mean:.4f}",
         (
-            f"its best robot: birth {best.birth.number}{where}, fitness "
+            f"best robot: birth {best.birth.number}{where}, fitness "
             f"{best.fitness:.4f}, rank {best.rank}, {len(robot.parts)} parts, "
             f"{motors} motors"
         ),
@@ -97,35 +97,35 @@ def _results(
     ]
 
 
-def failures(folder: Path) -> tuple[str, bool]:
-    """Return a line on who could not be judged, and whether anybody could.
-
-    Args:
-        folder: of a finished run.
+def has_evaluated(folder: Path) -> bool:
+    """Return whether at least one evaluation of a finished run succeeded.
 
     Raises:
         RunFolderError: a table cannot be read.
     """
     evaluations = read_table(folder, "evaluations")
+    is_success = pc.not_equal(evaluations["status"], "failed")
+    return bool(pc.any(is_success).as_py() or read_table(folder, "fitness").num_rows)
+
+
+def _failures(folder: Path) -> str:
+    """Return a line about failed evaluations and deaths; empty if there are none."""
+    evaluations = read_table(folder, "evaluations")
     failed = evaluations.filter(pc.field("status") == "failed")
     deaths = read_table(folder, "deaths")
-    lost = deaths.filter(pc.field("reason") == "diverged")
-    told = []
+    diverged = deaths.filter(pc.field("reason") == "diverged")
+    lines = []
     if failed.num_rows:
-        what = f"{failed.num_rows} of {evaluations.num_rows} evaluations failed"
-        told.append(f"{what}, {_most_often(failed['reason'])}")
-    if lost.num_rows:
-        what = f"{lost.num_rows} of {deaths.num_rows} deaths were failures"
-        told.append(f"{what}, {_most_often(lost['detail'])}")
-    is_judged = (
-        failed.num_rows < evaluations.num_rows
-        or read_table(folder, "fitness").num_rows > 0
-    )
-    return "; ".join(told), is_judged
+        counts = f"{failed.num_rows} of {evaluations.num_rows} evaluations failed"
+        lines.append(f"{counts}, {_most_frequent(failed['reason'])}")
+    if diverged.num_rows:
+        counts = f"{diverged.num_rows} of {deaths.num_rows} deaths were failures"
+        lines.append(f"{counts}, {_most_frequent(diverged['detail'])}")
+    return "; ".join(lines)
 
 
-def _most_often(reasons: pa.ChunkedArray) -> str:
-    """Return the most frequent of some reasons, and how many it is of."""
+def _most_frequent(reasons: pa.ChunkedArray) -> str:
+    """Return the most frequent of some reasons and its count."""
     ((reason, count),) = Counter(reasons.to_pylist()).most_common(1)
     share = "all" if count == len(reasons) else f"{count} of them"
     return f"{share}: {reason}"

@@ -1,8 +1,8 @@
-"""Several experiments, each repeated, as one undertaking in one folder.
+"""A campaign: several experiments, each repeated, in one folder.
 
-``campaign.toml`` in it says all that its runs are a function of, so that the folder
-alone is enough to go on. Each run has an ordinary run folder below it, named after
-experiment and repeat; one that was made by itself is as good as one made here.
+``campaign.toml`` describes everything that determines its runs, so that the folder
+alone is enough to resume it. Each run has an ordinary run folder below it, named after
+experiment and repeat; a run that was made separately is used as it is.
 """
 
 import tomllib
@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from msgspec.structs import replace
 
-from coordinator.storage.disk import replace_durably, storage_error
-from coordinator.storage.folder import RunDetails, holds_run, lock_folder, unlock_folder
+from coordinator.storage.disk import replace_text
+from coordinator.storage.folder import RunDetails, holds_run
 from coordinator.storage.hints import command
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.document import Experiment
@@ -33,12 +32,12 @@ CAMPAIGN = "campaign.toml"
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
-    """What is run, how often, and from which seed.
+    """Description of a campaign.
 
     Attributes:
-        experiments: in the order in which they are begun, names differing.
-        repeats: of each; run numbers are 0 to ``repeats - 1``.
-        seed: of all runs; their numbers tell their streams apart.
+        experiments: experiments in the order of their runs; their names differ.
+        repeats: runs of each experiment, numbered from 0 to ``repeats - 1``.
+        seed: random seed of all runs; the run number selects the random streams.
     """
 
     experiments: tuple[Experiment, ...]
@@ -46,7 +45,7 @@ class Campaign:
     seed: int
 
     def runs(self, folder: Path) -> list[tuple[Path, RunDetails]]:
-        """Return folder and details of each run, all first repeats first."""
+        """Return folder and details of each run, repeat by repeat."""
         return [
             (
                 folder / f"{experiment.name}-{repeat}",
@@ -59,45 +58,13 @@ class Campaign:
         ]
 
 
-class CampaignFolder:
-    """A campaign's folder that this process holds.
-
-    Attributes:
-        path: where it is.
-    """
-
-    def __init__(self, path: Path) -> None:
-        """Take the folder.
-
-        Raises:
-            RunFolderError: another coordinator holds it (named), or a disk that fails.
-        """
-        self.path = path
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-            self._lock = lock_folder(path)
-        except OSError as error:
-            raise storage_error(path, error) from None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        unlock_folder(self._lock)
-
-
 def is_campaign(folder: Path) -> bool:
-    """Return whether a folder is one of a campaign."""
+    """Return whether a folder holds a campaign."""
     return (folder / CAMPAIGN).exists()
 
 
 def shipped_campaigns() -> dict[str, tuple[str, ...]]:
-    """Return the experiments of each campaign that comes with the package."""
+    """Return the names of the experiments of each shipped campaign."""
     folder = resources.files("coordinator") / "campaigns"
     return {
         entry.name.removesuffix(".toml"): tuple(
@@ -109,14 +76,14 @@ def shipped_campaigns() -> dict[str, tuple[str, ...]]:
 
 
 def read_experiments(sources: Sequence[str]) -> tuple[Experiment, ...]:
-    """Return the experiments that words name; a campaign's name stands for all of it.
+    """Return the experiments of some names; a campaign stands for its experiments.
 
     Args:
         sources: names of shipped experiments or campaigns, or paths to .toml files.
 
     Raises:
-        ExperimentError: no such experiment, a document that is not one, or two
-            experiments of one name.
+        ExperimentError: there is no such experiment, its document is invalid, or two
+            experiments have the same name.
     """
     shipped = shipped_campaigns()
     for source in sources:
@@ -127,25 +94,26 @@ def read_experiments(sources: Sequence[str]) -> tuple[Experiment, ...]:
     for name in names:
         if names.count(name) > 1:
             raise ExperimentError(
-                f"name: the experiments of a campaign need names of their own, and "
-                f"{names.count(name)} of these are called {name!r}"
+                f"name: the experiments of a campaign must have different names, but "
+                f"{names.count(name)} are called {name!r}"
             )
         if "/" in name or name.startswith("."):
             raise ExperimentError(
-                f"name: a campaign's folder cannot hold one called {name!r}"
+                f"name: a campaign's experiment cannot be called {name!r}: its name "
+                "becomes a folder's name"
             )
     return experiments
 
 
 def refuse_used(folder: Path) -> None:
-    """Raise if a folder holds a campaign already, or a single run.
+    """Raise if a folder already holds a campaign or a single run.
 
     Raises:
-        RunFolderError: it does.
+        RunFolderError: it holds one.
     """
     if is_campaign(folder):
         raise RunFolderError(
-            f"{folder}: already holds a campaign; to go on with it: "
+            f"{folder}: already holds a campaign; to resume it: "
             f"{command('resume', folder)}; or choose another folder"
         )
     if holds_run(folder):
@@ -155,31 +123,28 @@ def refuse_used(folder: Path) -> None:
 
 
 def write_campaign(folder: Path, campaign: Campaign) -> None:
-    """Write down what is run in a folder.
+    """Write the description of a campaign to its folder.
 
     Raises:
         RunFolderError: the disk is full or failed.
     """
     lines = [
-        f"# Go on with it:  {command('resume', folder)}",
+        f"# To resume it:  {command('resume', folder)}",
         f"seed = {campaign.seed}",
         f"repeats = {campaign.repeats}",
     ]
     for experiment in campaign.experiments:
-        # JSON with every default: no line of it can end a TOML literal string.
+        # JSON with all defaults; without a single quote it cannot end the literal.
         document = experiment_text(experiment).replace("'", "\\u0027")
         lines += ["", "[[experiments]]", f"document = '''\n{document}'''"]
-    text = "\n".join(lines) + "\n"
-    replace_durably(
-        folder / CAMPAIGN, lambda file: file.write_text(text, encoding="utf-8")
-    )
+    replace_text(folder / CAMPAIGN, "\n".join(lines) + "\n")
 
 
 def read_campaign(folder: Path) -> Campaign:
-    """Return what is run in a folder.
+    """Return the campaign of a folder.
 
     Raises:
-        RunFolderError: no campaign is there, or its description is damaged.
+        RunFolderError: there is no campaign, or its description is damaged.
     """
     file = folder / CAMPAIGN
     try:
@@ -193,26 +158,26 @@ def read_campaign(folder: Path) -> Campaign:
             int(document["seed"]),
         )
     except (OSError, ValueError, KeyError, TypeError, ExperimentError) as error:
-        raise RunFolderError(f"{file}: is not one of a campaign: {error}") from None
+        raise RunFolderError(f"{file}: is not a valid campaign: {error}") from None
 
 
 def forget_campaign(folder: Path) -> None:
-    """Let a folder be one of no campaign again."""
+    """Remove the description of a campaign from its folder."""
     (folder / CAMPAIGN).unlink(missing_ok=True)
 
 
 def check_adopted(folder: Path, found: RunDetails, wanted: RunDetails) -> None:
-    """Raise unless the run that a folder holds is the one that is wanted.
+    """Raise unless a folder holds the run that a campaign expects.
 
-    A number of births of its own is all in which it may differ.
+    The run may only have a different number of births.
 
     Args:
-        folder: of the run, to name it.
-        found: what it holds.
-        wanted: what it shall hold.
+        folder: run folder, for the message.
+        found: description of its run.
+        wanted: description of the expected run.
 
     Raises:
-        RunFolderError: another run is there.
+        RunFolderError: it is a different run.
     """
     ours = experiment_from_text(wanted.document)
     theirs = experiment_from_text(found.document)
@@ -226,5 +191,5 @@ def check_adopted(folder: Path, found: RunDetails, wanted: RunDetails) -> None:
         what = f"run {found.run} of seed {found.seed}"
     raise RunFolderError(
         f"{folder}: must be run {wanted.run} of seed {wanted.seed} of "
-        f"{wanted.name}, and holds {what}: choose another folder"
+        f"{wanted.name}, but holds {what}: choose another folder"
     )

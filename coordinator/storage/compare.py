@@ -1,4 +1,4 @@
-"""Are two runs the same, in every column that must repeat?"""
+"""Comparison of two runs in all columns that the same seed repeats."""
 
 from pathlib import Path
 from typing import Any
@@ -17,20 +17,20 @@ LONGEST = 60
 
 
 def compare(first: Path, second: Path) -> list[str]:
-    """Return how two runs differ in their repeatable columns.
+    """Return the differences of two runs in their repeatable columns.
 
     Args:
         first: a run folder, finished or not.
-        second: the other.
+        second: another run folder.
 
     Returns:
         One line for each run without births, for each table whose number of rows
-        differs, and for the first row and column of each table that does; nothing
-        if the runs are equal. If they are not and ran on different platforms, a
-        last line says so, for equality is only promised on one.
+        differs, and for the first differing row and column of each table; nothing
+        if the runs are equal. If they differ and ran on different platforms, a last
+        line says so, because equality is only guaranteed on one platform.
 
     Raises:
-        RunFolderError: a folder without a run, or a table that cannot be read.
+        RunFolderError: a folder holds no run, or a table cannot be read.
     """
     for folder in (first, second):
         read_details(folder)
@@ -43,7 +43,7 @@ def compare(first: Path, second: Path) -> list[str]:
         lines += _differences(name, tables, repeatable(schema))
         if name == "births":
             lines += [
-                f"{folder}: nobody has been born yet, so there is nothing to compare"
+                f"{folder}: has no births yet, so there is nothing to compare"
                 for folder, table in zip((first, second), tables, strict=True)
                 if not table.num_rows
             ]
@@ -53,14 +53,14 @@ def compare(first: Path, second: Path) -> list[str]:
     if lines and platforms[0] != platforms[1]:
         ours, theirs = (", ".join(sorted(each)) or "none" for each in platforms)
         lines.append(
-            f"platforms differ: {ours} against {theirs}; equality is only promised "
-            "on equal ones"
+            f"platforms differ: {ours} against {theirs}; only runs on the same "
+            "platform are guaranteed to be equal"
         )
     return lines
 
 
 def _read(folder: Path, name: str) -> pa.Table:
-    """Return a table; documents of older versions say all that they left unsaid.
+    """Return a table; experiment documents of older versions get all defaults.
 
     Raises:
         RunFolderError: it cannot be read.
@@ -69,14 +69,14 @@ def _read(folder: Path, name: str) -> pa.Table:
     if name != "runs":
         return table
     index = table.schema.get_field_index("document")
-    whole = [_whole(text) for text in table["document"].to_pylist()]
+    documents = [_with_defaults(text) for text in table["document"].to_pylist()]
     return table.set_column(
-        index, table.schema.field(index), pa.array(whole, pa.string())
+        index, table.schema.field(index), pa.array(documents, pa.string())
     )
 
 
-def _whole(document: str) -> str:
-    """Return a document with the defaults of keys that it is older than."""
+def _with_defaults(document: str) -> str:
+    """Return a document with the defaults of keys that it lacks."""
     try:
         return experiment_text(experiment_from_text(document))
     except ExperimentError:
@@ -84,7 +84,7 @@ def _whole(document: str) -> str:
 
 
 def _differences(name: str, tables: list[pa.Table], columns: list[str]) -> list[str]:
-    """Return what is different between two tables of one name."""
+    """Return the differences of two tables of one name."""
     lines = []
     rows = [table.num_rows for table in tables]
     if rows[0] != rows[1]:
@@ -110,7 +110,7 @@ def _differences(name: str, tables: list[pa.Table], columns: list[str]) -> list[
 def _first_difference(ours: list[Any], theirs: list[Any]) -> tuple[int, Any, Any]:
     """Return row and values of the first difference; row -1 if there is none.
 
-    Values are told apart by how they are written: a NaN equals itself.
+    Values are equal if their representations are: a NaN equals itself.
     """
     for row, (one, other) in enumerate(zip(ours, theirs, strict=True)):
         if repr(one) != repr(other):

@@ -1,4 +1,4 @@
-"""Files that survive a kill, and say so plainly when the disk is full."""
+"""Durable files: appended or replaced as a whole, with clear errors on a full disk."""
 
 import contextlib
 import errno
@@ -12,18 +12,18 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class AppendedFile:
-    """A file that only grows, by whole pieces or not at all.
+    """File that grows by whole pieces.
 
-    Unbuffered: what ``append`` took survives the death of this process; with
-    ``fsync`` also that of the machine.
+    Writes are unbuffered: an appended piece survives a kill of this process, and with
+    ``fsync`` also a power loss.
 
     Attributes:
-        path: where it is.
+        path: its path.
         size: its length [bytes].
     """
 
     def __init__(self, path: Path, *, fsync: bool = False) -> None:
-        """Open a file at its end; a file that is not there is made.
+        """Open a file for appending; create it if it is missing.
 
         Raises:
             RunFolderError: it cannot be opened.
@@ -35,39 +35,39 @@ class AppendedFile:
             self._descriptor = os.open(path, flags, 0o644)
             self.size = os.fstat(self._descriptor).st_size
             if fsync:
-                sync_folder(path.parent)
+                _sync_folder(path.parent)
         except OSError as error:
             raise storage_error(path, error) from None
 
     def append(self, piece: bytes) -> None:
-        """Add a piece at the end; on any failure nothing of it stays.
+        """Append a piece; remove it again if a part of it cannot be written.
 
-        Unless somebody else has written behind it: what they wrote stays.
+        It stays if another process has appended to the file meanwhile.
 
         Raises:
             RunFolderError: the disk is full or failed.
         """
         rest = memoryview(piece)
         try:
-            # Not as it is remembered: whoever replaced this process may have written.
+            # Read again: a process that replaced this one may have appended.
             self.size = os.fstat(self._descriptor).st_size
             while rest:
                 rest = rest[os.write(self._descriptor, rest) :]
             if self._fsync:
                 os.fsync(self._descriptor)
         except OSError as error:
-            self._take_back(len(piece) - len(rest))
+            self._remove_end(len(piece) - len(rest))
             raise storage_error(self.path, error) from None
         self.size += len(piece)
 
-    def _take_back(self, written: int) -> None:
-        """Drop what was written of a piece, if it is the last in the file."""
+    def _remove_end(self, written: int) -> None:
+        """Remove the written part of a piece if it is the end of the file."""
         with contextlib.suppress(OSError):
             if os.fstat(self._descriptor).st_size == self.size + written:
                 self.cut(self.size)
 
     def cut(self, size: int) -> None:
-        """Drop everything from ``size`` on; a file that will not be cut is closed."""
+        """Cut the file to ``size`` bytes; close it if that fails."""
         try:
             os.ftruncate(self._descriptor, size)
         except OSError:
@@ -75,7 +75,7 @@ class AppendedFile:
         self.size = size
 
     def close(self) -> None:
-        """Close the file; whatever is appended later fails."""
+        """Close the file; later calls of ``append`` fail."""
         descriptor, self._descriptor = self._descriptor, -1
         if descriptor >= 0:
             with contextlib.suppress(OSError):
@@ -83,35 +83,44 @@ class AppendedFile:
 
 
 def replace_durably(path: Path, write: Callable[[Path], object]) -> None:
-    """Make a file appear at once and whole, even if power fails.
+    """Create or replace a file atomically, even across a power loss.
 
     Args:
-        path: its name; a file that is there is replaced.
-        write: writes the content to the path that it is given.
+        path: the file.
+        write: function that writes the content to the path it is given.
 
     Raises:
-        RunFolderError: the disk is full or failed; the old file still stands.
+        RunFolderError: the disk is full or failed; an old file is unchanged.
     """
     temporary = path.with_name(f".{path.name}.new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write(temporary)
-        descriptor = os.open(temporary, os.O_RDONLY | os.O_CLOEXEC)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+        _sync(temporary, os.O_RDONLY)
         temporary.replace(path)
-        sync_folder(path.parent)
+        _sync_folder(path.parent)
     except OSError as error:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
         raise storage_error(path, error) from None
 
 
-def sync_folder(folder: Path) -> None:
-    """Make names in a folder durable."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+def replace_text(path: Path, text: str) -> None:
+    """Create or replace a UTF-8 file as ``replace_durably`` does.
+
+    Raises:
+        RunFolderError: the disk is full or failed; an old file is unchanged.
+    """
+    replace_durably(path, lambda file: file.write_text(text, encoding="utf-8"))
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make the names in a folder durable."""
+    _sync(folder, os.O_RDONLY | os.O_DIRECTORY)
+
+
+def _sync(path: Path, flags: int) -> None:
+    descriptor = os.open(path, flags | os.O_CLOEXEC)
     try:
         os.fsync(descriptor)
     finally:
@@ -119,11 +128,11 @@ def sync_folder(folder: Path) -> None:
 
 
 def storage_error(path: Path, error: OSError) -> RunFolderError:
-    """Return what a failed write means to the user."""
+    """Return the error to report for a failed write."""
     why = error.strerror or str(error)
     if error.errno in _FULL:
         return RunFolderError(
-            f"{path}: disk full ({why}); nothing recorded before is lost: "
-            "resume the run when there is space"
+            f"{path}: disk full ({why}); all recorded data is intact: free some space "
+            "and resume the run"
         )
     return RunFolderError(f"{path}: cannot be written: {why}")

@@ -1,26 +1,22 @@
-"""A run's folder: whose it is, what is run there, and for the how-manieth time.
+"""A run folder: its lock, its description, its epoch, its state.
 
-One coordinator at a time holds its lock. Every opening raises the epoch, which
-stands in every job, so that answers to an earlier incarnation are told apart and
-a coordinator that slept through its replacement finds out.
+One coordinator at a time holds the lock. Each opening increments the epoch, which is
+part of every job: answers to an earlier coordinator of the run are recognised, and a
+coordinator that was replaced while it was suspended notices it.
 """
 
-import contextlib
-import fcntl
 import json
-import os
 import secrets
 import socket
-import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, Self
 
-from coordinator.storage.disk import replace_durably, storage_error
+from coordinator.storage.disk import replace_text, storage_error
 from coordinator.storage.hints import command
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.journal import newest_epoch
+from coordinator.storage.lock import LOCK, FolderLock
 from schema.errors import RunFolderError
 from schema.experiment.identity import Origin
 
@@ -30,23 +26,18 @@ STATES: tuple[State, ...] = ("running", "stopped", "finished")
 DETAILS = "run.json"
 EPOCH = "epoch"
 STATE = "state"
-LOCK = "lock"
 _NONCE = "nonce"
-
-# Who looks who holds a folder has its lock for an instant: no reason to be refused.
-_LOOKED_AT_S = 0.2
-_TRY_AGAIN_S = 0.005
 
 
 @dataclass(frozen=True, slots=True)
 class RunDetails:
-    """What a run is: everything that its births are a function of.
+    """Description of a run: everything that determines its births.
 
     Attributes:
-        name: of the experiment.
+        name: name of the experiment.
         run: number of the repeat, from 0.
-        seed: of the whole execution.
-        document: the experiment, every default written out.
+        seed: random seed of the run or campaign.
+        document: the experiment as JSON, with all defaults.
     """
 
     name: str
@@ -56,31 +47,31 @@ class RunDetails:
 
     @property
     def origin(self) -> Origin:
-        """The run, as what noise is drawn by; of its island 0."""
+        """Origin of the random streams of sensor and motor noise, for island 0."""
         return Origin(seed=self.seed, run=self.run)
 
 
 class RunFolder:
-    """A run folder that this process holds.
+    """A run folder that this process has locked.
 
     Attributes:
-        path: where it is.
-        details: what is run here.
-        epoch: how many coordinators have opened it, this one included.
-        name: of this run among all that workers may ever hear of: a folder that is
-            begun anew is another run, whose epochs count from 1 again.
+        path: the folder.
+        details: description of the run.
+        epoch: how often the folder has been opened, this time included.
+        name: unique name of the run for workers. A new run in the folder of a removed
+            one gets another name, because its epochs start at 1 again.
     """
 
     def __init__(self, path: Path, details: RunDetails | None = None) -> None:
-        """Take a new folder for a run, or take an old one again.
+        """Create the folder of a new run, or open that of an existing run.
 
         Args:
             path: the folder.
-            details: what to run in a new folder; None opens one that has a run.
+            details: description of a new run; None opens an existing run.
 
         Raises:
-            RunFolderError: another coordinator holds it (named), a new run in a
-                used folder, no run in an old one, or a disk that fails.
+            RunFolderError: another coordinator has locked it (named), a new run's
+                folder is used, there is no run to open, or the disk fails.
         """
         self.path = path
         self._is_new = details is not None
@@ -90,81 +81,75 @@ class RunFolder:
             if details is not None:
                 path.mkdir(parents=True, exist_ok=True)
                 _refuse_foreign(path)
-            self._lock = lock_folder(path)
         except OSError as error:
             raise storage_error(path, error) from None
+        self._lock = FolderLock(path)
         try:
             if details is not None:
                 _refuse_used(path)
                 entries = {**asdict(details), _NONCE: secrets.token_hex(4)}
-                _replace_text(path / DETAILS, json.dumps(entries, indent=1))
+                replace_text(path / DETAILS, json.dumps(entries, indent=1))
             self.details = read_details(path)
             nonce = _read_entries(path).get(_NONCE, "")
             self.name = f"{socket.gethostname()}:{nonce}:{path.resolve()}"
-            # The journal's, too: a lost or older file would have it void what comes.
+            # The journal's epoch counts, too: with a lower one, as a lost or older
+            # file gives, all new records would be void.
             self.epoch = max(_read_epoch(path), newest_epoch(path)) + 1
-            _replace_text(path / EPOCH, str(self.epoch))
+            replace_text(path / EPOCH, str(self.epoch))
         except BaseException:
             self.close()
             raise
 
     def set_state(self, state: State) -> None:
-        """Say how far the run is, for those who look from outside.
+        """Write the run's state for other processes.
 
         Raises:
             RunFolderError: the disk is full or failed.
         """
-        _replace_text(self.path / STATE, state)
+        replace_text(self.path / STATE, state)
 
     def confirm(self) -> None:
-        """Raise if the run went on without us.
+        """Check that no other coordinator has taken over the run.
 
         Raises:
-            RunFolderError: a later coordinator has opened the folder.
+            RunFolderError: one has opened the folder, or the folder is gone.
         """
         epoch = _read_epoch(self.path)
         if not epoch:
             raise RunFolderError(
-                f"{self.path}: moved or removed, or its file {EPOCH!r} is: stop"
+                f"{self.path}: the folder or its file {EPOCH!r} was moved or removed"
             )
         if epoch != self.epoch:
             raise RunFolderError(
-                f"{self.path}: this is coordinator {self.epoch} of the run, and "
-                f"coordinator {epoch} has taken it over: stop"
+                f"{self.path}: this is coordinator {self.epoch} of the run, but "
+                f"coordinator {epoch} has taken it over"
             )
 
     def forget(self) -> None:
-        """Leave no trace of a run that this process described and did not begin.
+        """Remove the description of a new run that has not started.
 
-        The lock stays: whoever waits for it would have one that nobody else sees.
+        The lock file stays: another process may already wait for this very file.
         """
         if self._is_new and not (self.path / JOURNAL).exists():
             for name in (EPOCH, DETAILS):
                 (self.path / name).unlink(missing_ok=True)
 
     def close(self) -> None:
-        """Let go of the folder."""
-        lock, self._lock = self._lock, -1
-        if lock >= 0:
-            unlock_folder(lock)
+        """Unlock the folder."""
+        self._lock.close()
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.close()
 
 
 def holds_run(path: Path) -> bool:
-    """Return whether a folder is one of a run, be it damaged.
+    """Return whether a folder holds a run, damaged or not.
 
     Raises:
-        RunFolderError: it cannot be looked into.
+        RunFolderError: the folder cannot be read.
     """
     try:
         return (path / DETAILS).exists()
@@ -173,14 +158,14 @@ def holds_run(path: Path) -> bool:
 
 
 def read_details(path: Path) -> RunDetails:
-    """Return what is run in a folder; nobody need hold it.
+    """Return the description of a folder's run, locked or not.
 
     Raises:
-        RunFolderError: no run is there, or its description is damaged.
+        RunFolderError: there is no run, or its description is damaged.
     """
     file = path / DETAILS
     entries = _read_entries(path)
-    entries.pop(_NONCE, None)  # runs of before have none
+    entries.pop(_NONCE, None)  # older runs have none
     types = {"name": str, "run": int, "seed": int, "document": str}
     if entries.keys() != types.keys():
         raise RunFolderError(
@@ -195,7 +180,7 @@ def read_details(path: Path) -> RunDetails:
 
 
 def _read_entries(path: Path) -> dict[str, Any]:
-    """Return what stands in a run's description."""
+    """Return all entries of a run's description file."""
     file = path / DETAILS
     try:
         entries = json.loads(file.read_text(encoding="utf-8"))
@@ -211,7 +196,7 @@ def _read_entries(path: Path) -> dict[str, Any]:
 
 
 def read_state(path: Path) -> State:
-    """Return how far a run is; "running" may also have died since.
+    """Return a run's state; after a kill it is still "running".
 
     Raises:
         RunFolderError: the file is damaged.
@@ -229,92 +214,24 @@ def read_state(path: Path) -> State:
     raise RunFolderError(f"{file}: must be one of {', '.join(STATES)}, got {text!r}")
 
 
-def read_holder(path: Path) -> str:
-    """Return who holds a folder, "process PID on HOST", or nothing if nobody does."""
-    try:
-        descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CLOEXEC)
-    except OSError:
-        return ""
-    try:
-        # Shared: two who look at a time shall not take each other for a holder.
-        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return _holder(descriptor)
-    finally:
-        os.close(descriptor)
-    return ""
-
-
-def lock_folder(path: Path) -> int:
-    """Return the descriptor of a folder's lock file, locked and signed.
-
-    Raises:
-        RunFolderError: another process holds it (named).
-    """
-    descriptor = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    try:
-        _lock(descriptor)
-    except BlockingIOError:
-        holder = _holder(descriptor)
-        os.close(descriptor)
-        raise RunFolderError(
-            f"{path}: in use by {holder}; stop that one first, or wait for it"
-        ) from None
-    signature = f"process {os.getpid()} on {socket.gethostname()}".encode()
-    # A full disk must not keep anybody from opening: the name is a courtesy.
-    with contextlib.suppress(OSError):
-        os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, signature, 0)
-    return descriptor
-
-
-def _lock(descriptor: int) -> None:
-    """Lock a file for this process alone.
-
-    Raises:
-        BlockingIOError: it stays locked by another.
-    """
-    until_s = time.monotonic() + _LOOKED_AT_S
-    while True:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            if time.monotonic() >= until_s:
-                raise
-            time.sleep(_TRY_AGAIN_S)
-        else:
-            return
-
-
-def unlock_folder(descriptor: int) -> None:
-    """Let go of a folder."""
-    # Closing alone would wait for a child that is just being started.
-    fcntl.flock(descriptor, fcntl.LOCK_UN)
-    os.close(descriptor)
-
-
-def _holder(descriptor: int) -> str:
-    return os.pread(descriptor, 500, 0).decode(errors="replace") or "another process"
-
-
 def _refuse_used(path: Path) -> None:
-    """Raise if a folder holds a run, or anything that is not ours."""
+    """Raise if a folder holds a run or a foreign file."""
     if holds_run(path):
         raise RunFolderError(
-            f"{path}: already holds a run; to go on with it: "
+            f"{path}: already holds a run; to resume it: "
             f"{command('resume', path)}; or choose another folder"
         )
     _refuse_foreign(path)
 
 
 def _refuse_foreign(path: Path) -> None:
-    """Raise if a folder that holds no run holds anything that is not ours."""
+    """Raise if a folder without a run holds a foreign file."""
     names = sorted(entry.name for entry in path.iterdir())
-    # What a kill between taking the folder and describing the run may leave.
+    # A kill between locking the folder and describing the run may leave these.
     foreign = [name for name in names if name not in (LOCK, f".{DETAILS}.new")]
     if foreign and DETAILS not in names:
         raise RunFolderError(
-            f"{path}: not empty ({foreign[0]!r} is there): choose another folder"
+            f"{path}: not empty (contains {foreign[0]!r}): choose another folder"
         )
 
 
@@ -326,10 +243,6 @@ def _read_epoch(path: Path) -> int:
         return 0
     except (OSError, ValueError) as error:
         raise RunFolderError(
-            f"{file}: cannot be read ({error}): write a number into it that is greater "
-            "than any before"
+            f"{file}: cannot be read ({error}): replace its content by a number that "
+            "is greater than any before"
         ) from None
-
-
-def _replace_text(path: Path, text: str) -> None:
-    replace_durably(path, lambda file: file.write_text(text, encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""How far a run is by its folder alone, whoever has it in hand."""
+"""Status of a run, read from its folder."""
 
 from pathlib import Path
 
@@ -6,9 +6,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from msgspec.structs import replace
 
-from coordinator.storage.folder import RunDetails, read_details, read_holder, read_state
+from coordinator.storage.folder import RunDetails, read_details, read_state
 from coordinator.storage.hints import command
 from coordinator.storage.journal import is_begun
+from coordinator.storage.lock import read_holder
 from schema.errors import RunFolderError
 from schema.experiment.document import island_count, island_experiment
 from schema.experiment.file import experiment_from_text
@@ -17,10 +18,10 @@ from schema.wire.status import IslandStatus, RunStatus
 
 
 def folder_status(folder: Path) -> RunStatus:
-    """Return how far the run of a folder is; "running" only if somebody holds it.
+    """Return the status of a folder's run; "running" only if a process has locked it.
 
     Raises:
-        RunFolderError: no run is there, or a file is damaged or lost.
+        RunFolderError: there is no run, or a file is damaged or missing.
         ExperimentError: its experiment cannot be read.
     """
     details = read_details(folder)
@@ -31,10 +32,9 @@ def folder_status(folder: Path) -> RunStatus:
     births = _by_island(read_table(folder, "births").select(["island"]), "count")
     if state == "finished" and not births:
         check_rewritable(folder, details)
-        again = command("resume", folder)
         raise RunFolderError(
-            f"{folder}: is finished, and its tables are gone; to have them written "
-            f"anew: {again}"
+            f"{folder}: is finished, but its tables are missing; to write them again: "
+            f"{command('resume', folder)}"
         )
     population = read_table(folder, "population").select(
         ["island", "births", "fitness"]
@@ -60,16 +60,16 @@ def folder_status(folder: Path) -> RunStatus:
 
 
 def check_rewritable(folder: Path, details: RunDetails) -> None:
-    """Raise unless lost tables of a finished run can be written anew.
+    """Raise unless missing tables of a finished run can be written again.
 
-    The journal has all rows but an arena's poses.
+    The journal determines all rows except an arena's poses.
 
     Args:
-        folder: of the run.
-        details: what it is.
+        folder: run folder.
+        details: description of the run.
 
     Raises:
-        RunFolderError: they cannot.
+        RunFolderError: the journal or an arena's poses are missing, too.
     """
     experiment = experiment_from_text(details.document)
     has_arena = any(
@@ -78,13 +78,13 @@ def check_rewritable(folder: Path, details: RunDetails) -> None:
     )
     if not is_begun(folder) or (has_arena and not has_rows(folder, "poses")):
         raise RunFolderError(
-            f"{folder}: is finished, and its tables are gone: put a copy of them in "
-            "their place"
+            f"{folder}: is finished, but its tables are missing, and the journal "
+            "cannot restore them: put a copy of the tables in their place"
         )
 
 
 def _by_island(table: pa.Table, what: str) -> dict[int, int]:
-    """Return, of each island, the count or the maximum of a table's last column."""
+    """Return the count or the maximum of a table's last column by island."""
     column = table.schema.names[-1]
     grouped = table.group_by("island").aggregate([(column, what)])
     found = grouped[f"{column}_{what}"].to_pylist()
@@ -92,11 +92,11 @@ def _by_island(table: pa.Table, what: str) -> dict[int, int]:
 
 
 def unbegun_status(folder: Path, details: RunDetails) -> RunStatus:
-    """Return how far a run is that nobody has begun.
+    """Return the status of a run that has not started.
 
     Args:
-        folder: where it will be kept.
-        details: what it is.
+        folder: its future run folder.
+        details: description of the run.
     """
     experiment = experiment_from_text(details.document)
     islands = tuple(

@@ -1,18 +1,20 @@
-"""The journal: every answer that a run was given, in the order it acted on them.
+"""The journal: all answers and orders of a run, in the order the run acted on them.
 
-All else is a function of experiment, seed and journal. A record is its number, its
-length, a CRC32 of all three, and an ``Entry`` message. A record that a kill cut short
-can only be the last; it is dropped, for nobody has acted on it.
+All other data is a function of experiment, seed and journal. A record is a number, a
+length, a CRC32 of number, length and payload, and the payload, an ``Entry`` message.
+Only the last record can be incomplete after a kill; opening the journal drops it, which
+is safe because the run never acted on it.
 
-A number is that of the coordinator's epoch and that of the record. One that slept
-between finding the run its own and writing may write after another has taken the run
-over. What it writes is void: the other went on from where it found the journal.
+A number combines the coordinator's epoch and the sequence number of the record. A
+coordinator that stalls between checking its epoch and writing may write after a later
+one has taken over the run. Its records are void: the later coordinator continued from
+the records that it found.
 """
 
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 from zlib import crc32
 
@@ -28,31 +30,39 @@ _HEAD = struct.Struct("<QI")
 _CHECK = struct.Struct("<I")
 _FRAME = _HEAD.size + _CHECK.size
 _RECORDS = 1 << 40
-"""Records of one epoch have numbers below this; epochs count in multiples of it."""
+"""Upper bound of sequence numbers; a record's number is epoch * _RECORDS + sequence."""
 
 
 class Journal:
-    """An open journal: what it held, and a place for what comes.
+    """A journal that is open for writing.
 
     Attributes:
-        dropped: bytes of a cut tail that opening took away.
+        dropped: bytes of an incomplete last record that opening removed.
     """
 
     def __init__(self, path: Path, *, epoch: int = 0, fsync: bool = False) -> None:
-        """Open a journal, or begin one.
+        """Open a journal; create it if it is missing.
 
         Args:
             path: the file.
-            epoch: of the coordinator that is to write, not less than any before it.
-            fsync: survive power loss, too, and not only the death of the process.
+            epoch: epoch of the writing coordinator, at least that of every record.
+            fsync: survive power loss, too, not only a kill of the process.
 
         Raises:
-            RunFolderError: not a journal, damage before intact records, or a disk
-                that fails.
+            RunFolderError: the file is no journal, is damaged before intact records,
+                or the disk fails.
         """
         data = _read(path)
-        payloads, end = _intact(path, data)
-        self._history = [_event(path, payload) for payload in payloads]
+        end = 0
+        payloads: list[bytes] = []
+        if not is_empty(path, data):
+            position = Position()
+            for sequence, payload in read_records(data, position):
+                del payloads[sequence:]  # void records
+                payloads.append(payload)
+            check_gap(path, data, position)
+            end = position.end
+        self._history = [decode_record(path, payload) for payload in payloads]
         self._epoch = epoch
         self._sequence = len(payloads)
         self._file = AppendedFile(path, fsync=fsync)
@@ -68,24 +78,23 @@ class Journal:
         return cls(folder / NAME, epoch=epoch, fsync=fsync)
 
     def replay(self) -> list[JournalledEvent]:
-        """Return what it held when it was opened, oldest first; only once."""
+        """Return the events found at opening, oldest first; empty when called again."""
         history, self._history = self._history, []
         return history
 
     def append(self, events: Iterable[JournalledEvent]) -> None:
-        """Keep events before anybody acts on them: all, or on failure none.
+        """Write events before the run acts on them: all, or none on failure.
 
         Raises:
             RunFolderError: the disk is full or failed.
         """
-        sequence = self._sequence
-        frames = []
-        for event in events:
-            number = self._epoch * _RECORDS + sequence
-            frames.append(_frame(number, encode_entry(event)))
-            sequence += 1
+        first = self._epoch * _RECORDS + self._sequence
+        frames = [
+            _frame(number, encode_entry(event))
+            for number, event in enumerate(events, start=first)
+        ]
         self._file.append(b"".join(frames))
-        self._sequence = sequence
+        self._sequence += len(frames)
 
     def close(self) -> None:
         """Close the file."""
@@ -94,34 +103,128 @@ class Journal:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.close()
 
 
+@dataclass(slots=True)
+class Position:
+    """Position of a reader in a journal.
+
+    Attributes:
+        end: end of the last intact record, counted from the start of the file [bytes].
+        records: number of records that are not void.
+        epoch: newest epoch so far.
+    """
+
+    end: int = len(MAGIC)
+    records: int = 0
+    epoch: int = 0
+
+
+def read_records(
+    data: bytes, position: Position, start: int = 0
+) -> Iterator[tuple[int, bytes]]:
+    """Yield sequence number and payload of intact records; advance the position.
+
+    A sequence number below ``position.records`` makes the records from it on void.
+
+    Args:
+        data: bytes of the file from ``start`` on.
+        position: position in the file, at least ``start``.
+        start: where the bytes begin in the file.
+    """
+    while found := _record_at(data, position.end - start):
+        (epoch, sequence), end = divmod(found[0], _RECORDS), found[1]
+        begin = position.end - start + _FRAME
+        if epoch > position.epoch and sequence <= position.records:
+            position.epoch, position.records = epoch, sequence
+        is_void = epoch < position.epoch
+        if not is_void and (epoch, sequence) != (position.epoch, position.records):
+            return
+        position.end = start + end
+        if not is_void:
+            position.records += 1
+            yield sequence, data[begin:end]
+
+
 def is_begun(folder: Path) -> bool:
-    """Return whether the journal of a run folder is there and not empty."""
+    """Return whether a run folder has a journal that is not empty."""
     path = folder / NAME
     return path.exists() and path.stat().st_size > 0
 
 
 def newest_epoch(folder: Path) -> int:
-    """Return the newest epoch in which a run's journal was written, from 0.
+    """Return the newest epoch in a run's journal, 0 if it has no records.
 
-    Only of what stands before any damage; to refuse that is for who opens it.
+    Records behind damage do not count; ``Journal`` refuses such a file.
 
     Raises:
-        RunFolderError: it cannot be read.
+        RunFolderError: the file cannot be read.
     """
-    data = _read(folder / NAME)
-    position, newest = len(MAGIC), 0
-    while found := _record_at(data, position):
-        newest, position = max(newest, found[0] // _RECORDS), found[1]
-    return newest
+    position = Position()
+    for _ in read_records(_read(folder / NAME), position):
+        pass
+    return position.epoch
+
+
+def is_empty(path: Path, data: bytes) -> bool:
+    """Return whether a journal has no complete header yet.
+
+    Args:
+        path: the file, for the message.
+        data: its first bytes, as many as the header has or more.
+
+    Raises:
+        RunFolderError: the file is no journal.
+    """
+    if data.startswith(MAGIC):
+        return False
+    if MAGIC.startswith(data):
+        return True
+    raise RunFolderError(f"{path}: not a journal of this version of Revolve")
+
+
+def check_gap(path: Path, data: bytes, position: Position, start: int = 0) -> None:
+    """Raise if an intact record stands anywhere behind the position.
+
+    Args:
+        path: the file, for the message.
+        data: bytes of the file from ``start`` on.
+        position: behind the last intact record.
+        start: where the bytes begin in the file.
+
+    Raises:
+        RunFolderError: the bytes at the position are damaged.
+    """
+    for offset in range(position.end - start, len(data) - _FRAME + 1):
+        found = _record_at(data, offset)
+        if found is not None:
+            raise RunFolderError(
+                f"{path}: damaged at byte {position.end} (record {position.records}), "
+                f"but record {found[0] % _RECORDS} is intact at byte {start + offset}: "
+                "restore a sound copy of the file, or give up everything behind the "
+                f"damage ('truncate -s {position.end} {path}') and resume; lost "
+                "results are computed again"
+            )
+
+
+def decode_record(path: Path, payload: bytes) -> JournalledEvent:
+    """Return the event of a record.
+
+    Args:
+        path: the journal, for the message.
+        payload: of an intact record.
+
+    Raises:
+        RunFolderError: this version cannot decode it.
+    """
+    try:
+        return decode_entry(payload)
+    except MalformedMessage as error:
+        raise RunFolderError(
+            f"{path}: this version cannot decode an intact record: {error}"
+        ) from None
 
 
 def _read(path: Path) -> bytes:
@@ -137,7 +240,7 @@ def _frame(number: int, payload: bytes) -> bytes:
 
 
 def _record_at(data: bytes, start: int) -> tuple[int, int] | None:
-    """Return number and end of the intact record at ``start``, if any."""
+    """Return number and end of the intact record at ``start``, if there is one."""
     begin = start + _FRAME
     if begin > len(data):
         return None
@@ -150,56 +253,3 @@ def _record_at(data: bytes, start: int) -> tuple[int, int] | None:
     if crc32(data[begin:end], crc32(head)) != check:
         return None
     return number, end
-
-
-def _intact(path: Path, data: bytes) -> tuple[list[bytes], int]:
-    """Return the payloads of all that counts, and where the last record ends.
-
-    Raises:
-        RunFolderError: not a journal, or damage with intact records behind it.
-    """
-    if not data.startswith(MAGIC):
-        if MAGIC.startswith(data):
-            return [], 0
-        raise RunFolderError(f"{path}: not a journal of this version of Revolve")
-    payloads: list[bytes] = []
-    position, newest = len(MAGIC), 0
-    while found := _record_at(data, position):
-        (epoch, sequence), end = divmod(found[0], _RECORDS), found[1]
-        if epoch > newest and sequence <= len(payloads):
-            # What was written after this one had read the journal is void.
-            newest = epoch
-            del payloads[sequence:]
-        if epoch == newest:
-            if sequence != len(payloads):
-                break
-            payloads.append(data[position + _FRAME : end])
-        elif epoch > newest:
-            break
-        position = end
-    if position < len(data):
-        _refuse_gap(path, data, position, len(payloads))
-    return payloads, position
-
-
-def _refuse_gap(path: Path, data: bytes, position: int, sequence: int) -> None:
-    """Raise if an intact record stands anywhere behind a damaged place."""
-    for start in range(position, len(data) - _FRAME + 1):
-        found = _record_at(data, start)
-        if found is not None:
-            raise RunFolderError(
-                f"{path}: damaged at byte {position} (record {sequence}), and record "
-                f"{found[0] % _RECORDS} stands intact at byte {start}: put a sound "
-                "copy of the file in its place, or give up what follows the damage "
-                f"('truncate -s {position} {path}') and resume; what is lost is "
-                "computed anew"
-            )
-
-
-def _event(path: Path, payload: bytes) -> JournalledEvent:
-    try:
-        return decode_entry(payload)
-    except MalformedMessage as error:
-        raise RunFolderError(
-            f"{path}: an intact record that this version cannot read: {error}"
-        ) from None

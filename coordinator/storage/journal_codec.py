@@ -1,4 +1,4 @@
-"""What a journal's records hold: events as bytes, and back."""
+"""Events of the journal as Protobuf bytes, and back."""
 
 from coordinator.islands.events import (
     Advanced,
@@ -41,7 +41,7 @@ from schema.wire.messages import finite, genome_from_message, genome_to_message
 
 
 def encode_entry(event: JournalledEvent) -> bytes:
-    """Return the bytes of one event; of an advance all but its poses."""
+    """Return an event as bytes; the poses of an advance are left out."""
     entry = pb.Entry()
     match event:
         case Advanced():
@@ -63,10 +63,10 @@ def encode_entry(event: JournalledEvent) -> bytes:
 
 
 def decode_entry(data: bytes) -> JournalledEvent:
-    """Return the event of some bytes.
+    """Return the event of an entry's bytes.
 
     Raises:
-        MalformedMessage: not an entry's bytes, or no event in it.
+        MalformedMessage: the bytes are no entry, or it holds no event.
     """
     return decoded(data, pb.Entry(), _journalled)
 
@@ -79,23 +79,22 @@ def _journalled(entry: pb.Entry) -> JournalledEvent:
 def _write_answer(
     event: Vetted | VettingFailed | Evaluated | EvaluationFailed, entry: pb.Entry
 ) -> None:
+    if isinstance(event, Vetted | VettingFailed):
+        entry.attempt = event.attempt
+    else:
+        entry.trial = event.trial
+        if event.requester is not None:
+            entry.requester = event.requester
+        _sign(entry, event.provenance)
     match event:
         case Vetted():
-            entry.attempt = event.attempt
             write_report(event.report, entry.vetted)
         case VettingFailed():
-            entry.attempt = event.attempt
             entry.vetting_failed = event.reason
         case Evaluated():
-            entry.trial = event.trial
-            _address(entry, event.requester)
             entry.evaluated.CopyFrom(evaluation_to_message(event.evaluation))
-            _sign(entry, event.provenance)
         case EvaluationFailed():
-            entry.trial = event.trial
-            _address(entry, event.requester)
             entry.evaluation_failed = event.reason
-            _sign(entry, event.provenance)
 
 
 def _write_advance(event: Advanced, entry: pb.AdvanceEntry) -> None:
@@ -141,18 +140,20 @@ def _event(entry: pb.Entry) -> ExternalEvent:
             reason = entry.evaluation_failed
             return EvaluationFailed(birth, reason, signed, entry.trial, requester)
         case "advanced":
-            told = entry.advanced
-            advance = advance_from_message(told.advance)
-            return Advanced(entry.island, told.number, advance, told.pose_rows, signed)
+            message = entry.advanced
+            advance = advance_from_message(message.advance)
+            return Advanced(
+                entry.island, message.number, advance, message.pose_rows, signed
+            )
         case "commanded":
-            given = entry.commanded
-            order = _order(given)
-            return Commanded(entry.island, given.command_id, given.step, order)
+            command = entry.commanded
+            order = _order(command)
+            return Commanded(entry.island, command.command_id, command.step, order)
     raise MalformedMessage("entry: holds no event")
 
 
-def _audited(told: pb.AuditEntry) -> Audited:
-    first, second = _event(told.first), _event(told.second)
+def _audited(message: pb.AuditEntry) -> Audited:
+    first, second = _event(message.first), _event(message.second)
     kinds = Evaluated | EvaluationFailed
     if not (isinstance(first, kinds) and isinstance(second, kinds)):
         raise MalformedMessage("entry: an audit must hold two evaluations")
@@ -166,11 +167,11 @@ def _order(command: pb.Command) -> Order:
         case "resume":
             return Resume()
         case "insert":
-            told = command.insert
-            genome = genome_from_message(told.genome)
-            if not told.has_place:
+            insert = command.insert
+            genome = genome_from_message(insert.genome)
+            if not insert.has_place:
                 return Insert(genome)
-            place = finite(told.x, "insert.x"), finite(told.y, "insert.y")
+            place = finite(insert.x, "insert.x"), finite(insert.y, "insert.y")
             return Insert(genome, place)
         case "remove":
             return Remove(birth_from_message(command.remove))
@@ -178,11 +179,6 @@ def _order(command: pb.Command) -> Order:
             change = read_brain_change(command.replace_brain)
             return ReplaceBrain(change.birth, change.brain)
     raise MalformedMessage("command: holds no order")
-
-
-def _address(entry: pb.Entry, requester: int | None) -> None:
-    if requester is not None:
-        entry.requester = requester
 
 
 def _sign(entry: pb.Entry, provenance: Provenance) -> None:

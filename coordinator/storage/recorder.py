@@ -1,7 +1,7 @@
-"""Table rows to disk: segments while a run lives, Parquet when it is done.
+"""Writer of all tables of a run: Arrow segments while it runs, Parquet at its end.
 
-Rows are a function of the journal: a replay hands in the same rows again in the
-same order, and those that already stand on disk are passed over by their number.
+Rows are a function of the journal. A replay passes the same rows in the same order, and
+those that are already on disk are skipped by their number.
 """
 
 import contextlib
@@ -14,25 +14,25 @@ from coordinator.storage.table_file import TableFile
 from schema.tables.columns import TABLES
 from schema.tables.files import SEGMENTS, parquet_path, segments_of
 
-WAITING = 64
-"""Rows of one table that wait for each other before they are written."""
+BUFFERED = 64
+"""Rows of a table that are buffered before they are written together."""
 
 
 class Recorder:
-    """Takes rows in their repeatable order and brings them to disk."""
+    """Writer of a run's tables; rows arrive in their repeatable order."""
 
     def __init__(
         self, folder: Path, details: RunDetails, *, fsync: bool = False
     ) -> None:
-        """Open the tables of a run folder that this process holds.
+        """Open the tables of a run folder that this process has locked.
 
         Args:
-            folder: the run folder.
-            details: names the finished tables.
+            folder: run folder.
+            details: description of the run; names the Parquet files.
             fsync: survive power loss, too.
 
         Raises:
-            RunFolderError: a segment of another version, or a disk that fails.
+            RunFolderError: a segment has another version, or the disk fails.
         """
         self._folder = folder
         paths = {
@@ -48,43 +48,43 @@ class Recorder:
         }
 
     def write(self, record: Record) -> None:
-        """Take one row; it may wait for others before it is on disk.
+        """Add one row; it may be buffered before it is written to disk.
 
         Args:
-            record: ``row`` has every column of the table but ``record``.
+            record: ``row`` has every column of the table except ``record``.
 
         Raises:
-            RunFolderError: the disk is full or failed; the row still waits.
+            RunFolderError: the disk is full or failed; the row stays buffered.
         """
         table = self._tables[record.table]
         table.take(record.row)
-        if len(table.waiting) >= WAITING:
+        if len(table.buffered) >= BUFFERED:
             table.flush()
 
     def store(self, rows: Append) -> None:
-        """Bring bulk rows to disk before the journal has what they belong to.
+        """Write bulk rows to disk before the journal gets the event they belong to.
 
-        Rows that a process before this one stored, and died before its journal
-        told of them, are cut off.
+        Rows that an earlier process stored without their event in the journal are
+        removed first.
 
         Raises:
-            MalformedMessage: the columns are none of this table.
+            MalformedMessage: the columns are not those of the table.
             RunFolderError: the disk is full or failed.
         """
         self._tables[rows.table].store(rows.rows, rows.columns)
 
     def append(self, rows: Append) -> None:
-        """Take bulk rows that the journal has; those stored before just count.
+        """Add bulk rows whose event is in the journal; stored rows are only counted.
 
         Raises:
-            MalformedMessage: the columns are none of this table.
-            RunFolderError: they are not on disk and do not come again, or the disk
-                is full or failed.
+            MalformedMessage: the columns are not those of the table.
+            RunFolderError: rows are missing on disk and the journal does not hold
+                them, or the disk is full or failed.
         """
         self._tables[rows.table].take_columns(rows.rows, rows.columns)
 
     def flush(self) -> None:
-        """Bring all rows to disk.
+        """Write all buffered rows to disk.
 
         Raises:
             RunFolderError: the disk is full or failed; no row is lost.
@@ -93,13 +93,13 @@ class Recorder:
             table.flush()
 
     def finish(self) -> None:
-        """Turn all segments into Parquet; they go when all of it is durable.
+        """Convert all segments to Parquet, then remove them.
 
-        A kill at any point leaves either form of every table whole: open the run
-        again, replay, and finish again.
+        After a kill at any point, each table is complete in one of the two forms: open
+        the run again, replay, and finish again.
 
         Raises:
-            RunFolderError: the disk is full or failed; the segments still stand.
+            RunFolderError: the disk is full or failed; the segments are intact.
         """
         self.flush()
         for table in self._tables.values():
@@ -109,13 +109,13 @@ class Recorder:
             for name in TABLES:
                 for _, path in segments_of(self._folder, name):
                     path.unlink()
-            # Nothing of ours is left in it; whatever else is there may stay.
+            # Fails if the folder holds foreign files; they stay.
             with contextlib.suppress(OSError):
                 (self._folder / SEGMENTS).rmdir()
         except OSError as error:
             raise storage_error(self._folder / SEGMENTS, error) from None
 
     def close(self) -> None:
-        """Close all files; rows that wait are dropped, a replay brings them again."""
+        """Close all files; buffered rows are dropped, a replay adds them again."""
         for table in self._tables.values():
             table.close()

@@ -1,4 +1,4 @@
-"""One table of a run on disk: segments while it lives, Parquet when it is done."""
+"""One table of a run on disk: Arrow segments while it runs, Parquet at its end."""
 
 import os
 from collections.abc import Mapping
@@ -25,13 +25,12 @@ ROW_GROUP = 50_000
 
 
 class TableFile:
-    """One table: rows that wait, rows on disk, and the segment that grows.
+    """Writer of one table.
 
-    Rows come one by one, and wait for each other, or in bulk as columns; the rows
-    of one table all come in the same way.
+    A table gets either single rows, which are buffered, or bulk rows as columns.
 
     Attributes:
-        waiting: rows that are not on disk yet.
+        buffered: rows that are not on disk yet.
     """
 
     def __init__(self, folder: Path, name: str, parquet: Path, *, fsync: bool) -> None:
@@ -44,7 +43,7 @@ class TableFile:
         self._segment: AppendedFile | None = None
         self._seen = 0
         self._ahead = 0
-        self.waiting: list[Mapping[str, Any]] = []
+        self.buffered: list[Mapping[str, Any]] = []
         if parquet.exists():
             self._stored: int = read_table(folder, name).num_rows
             return
@@ -56,43 +55,43 @@ class TableFile:
             raise storage_error(folder, error) from None
 
     def take(self, row: Mapping[str, Any]) -> None:
-        """Take the next row, unless it stands on disk already."""
+        """Add the next row, unless it is already on disk."""
         if self._seen >= self._stored:
-            self.waiting.append(row)
+            self.buffered.append(row)
         self._seen += 1
 
     def store(self, rows: int, columns: bytes) -> None:
-        """Write bulk rows that nobody has counted yet."""
+        """Write bulk rows ahead of the count; remove rows on disk that do not count."""
         known = self._seen + self._ahead
         if self._stored > known:
-            cut_chain(self._folder, self._name, known)
+            _remove_rows(self._folder, self._name, known)
             self._stored = known
         if rows:
             self._write(self._bulk(rows, columns))
             self._ahead += rows
 
     def take_columns(self, rows: int, columns: bytes) -> None:
-        """Count the next bulk rows; write them unless they stand on disk already."""
+        """Count the next bulk rows; write them unless they are already on disk."""
         end = self._seen + rows
         if self._stored < end:
             if not columns:
                 raise RunFolderError(
                     f"{self._folder / SEGMENTS}: {self._name}: rows {self._stored} to "
-                    f"{end - 1} are missing, and the journal does not hold them: put "
-                    "a sound copy of the segments in their place"
+                    f"{end - 1} are missing, and the journal does not hold them: "
+                    "restore a sound copy of the segments"
                 )
             self.store(rows, columns)
         self._seen = end
         self._ahead = max(0, self._ahead - rows)
 
     def flush(self) -> None:
-        """Write the waiting rows as one batch, whole or not at all."""
-        if self.waiting:
+        """Write the buffered rows as one batch, all or none."""
+        if self.buffered:
             self._write(self._batch())
-            self.waiting = []
+            self.buffered = []
 
     def finish(self) -> None:
-        """Write all rows as Parquet, unless that is done."""
+        """Write all rows as Parquet, unless the file exists."""
         if self._parquet.exists():
             return
         rows, _ = stored_rows(self._folder, self._name)
@@ -109,22 +108,22 @@ class TableFile:
             self._segment.close()
 
     def _write_parquet(self, path: Path) -> None:
-        """Write all rows, a group of them in memory at a time."""
+        """Write all rows, one row group in memory at a time."""
         with pa.parquet.ParquetWriter(path, self._schema, compression="zstd") as file:
-            waiting = self._schema.empty_table()
+            rows = self._schema.empty_table()
             for batch in batches_by_island(self._folder, self._name):
-                waiting = pa.concat_tables([waiting, pa.Table.from_batches([batch])])
-                while waiting.num_rows >= ROW_GROUP:
-                    file.write_table(waiting.slice(0, ROW_GROUP))
-                    waiting = waiting.slice(ROW_GROUP)
-            if waiting.num_rows:
-                file.write_table(waiting)
+                rows = pa.concat_tables([rows, pa.Table.from_batches([batch])])
+                while rows.num_rows >= ROW_GROUP:
+                    file.write_table(rows.slice(0, ROW_GROUP))
+                    rows = rows.slice(ROW_GROUP)
+            if rows.num_rows:
+                file.write_table(rows)
 
     def _write(self, batch: pa.RecordBatch) -> None:
-        """Add a batch to the segment, whole or not at all."""
+        """Append a batch to the segment, all or nothing."""
         if self._parquet.exists():
             raise RunFolderError(
-                f"{self._parquet}: finished with {self._stored} rows, and more came"
+                f"{self._parquet}: finished with {self._stored} rows, got more"
             )
         if self._segment is None:
             self._segment = self._opened()
@@ -132,7 +131,7 @@ class TableFile:
         self._stored += batch.num_rows
 
     def _bulk(self, rows: int, columns: bytes) -> pa.RecordBatch:
-        """Return bulk rows as one batch with their numbers."""
+        """Return bulk rows as one batch with record numbers."""
         table = read_columns(self._name, columns)
         if table.num_rows != rows:
             raise MalformedMessage(
@@ -143,7 +142,7 @@ class TableFile:
         return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
 
     def _opened(self) -> AppendedFile:
-        """Return a new segment that holds the schema."""
+        """Return a new segment that contains the schema."""
         numbers = [number for number, _ in segments_of(self._folder, self._name)]
         number = max(numbers, default=-1) + 1
         path = segment_path(self._folder, self._name, number)
@@ -152,8 +151,8 @@ class TableFile:
         return segment
 
     def _batch(self) -> pa.RecordBatch:
-        """Return the waiting rows as columns."""
-        rows = self.waiting
+        """Return the buffered rows as one batch with record numbers."""
+        rows = self.buffered
         numbers = range(self._stored, self._stored + len(rows))
         arrays = [pa.array(numbers, self._schema.field(0).type)]
         for index, column in enumerate(self._columns, start=1):
@@ -162,11 +161,11 @@ class TableFile:
         return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
 
 
-def cut_chain(folder: Path, table: str, rows: int) -> None:
-    """Drop all rows of a table from a number on; it is the first of a batch.
+def _remove_rows(folder: Path, table: str, rows: int) -> None:
+    """Remove all rows of a table from a number on, which must start a batch.
 
     Raises:
-        RunFolderError: it is not, or the disk fails.
+        RunFolderError: it does not start a batch, or the disk fails.
     """
     seen = 0
     try:
@@ -183,5 +182,5 @@ def cut_chain(folder: Path, table: str, rows: int) -> None:
         raise storage_error(folder / SEGMENTS, error) from None
     if seen != rows:
         raise RunFolderError(
-            f"{folder / SEGMENTS}: {table}: row {rows} must begin a batch, got {seen}"
+            f"{folder / SEGMENTS}: {table}: row {rows} must start a batch, got {seen}"
         )

@@ -11,6 +11,8 @@ import sys
 import numpy as np
 import pytest
 
+from analyzer.report import analyze
+from coordinator.evolution.generation import generate
 from schema.experiment.file import read_experiment
 from tests.benchmarks.arena_timing import (
     ArenaTiming,
@@ -18,7 +20,7 @@ from tests.benchmarks.arena_timing import (
     even_places,
     time_arena,
 )
-from worker.bench.arena_bench import arena_settings_of, vetted_robots
+from worker.bench.arena_bench import RobotSource, arena_settings_of
 from worker.bench.arena_timing import insertions, quadratic_fit
 
 EXPERIMENT = read_experiment("scenario3")
@@ -31,7 +33,7 @@ def timed(count: int, seconds: int, *, threads: int = 1, bare: bool) -> ArenaTim
     """Return the timing of random robots at 30 per disc of 2 m, with births."""
     radius_m = 2.0 * math.sqrt(count / 30)
     born = math.ceil(seconds * count / 30 / BIRTH_S)
-    robots = vetted_robots(EXPERIMENT, count + born, seed=3)
+    robots = RobotSource(generate, analyze).vetted(EXPERIMENT, count + born, seed=3)
     rng = np.random.default_rng(3)
     found = time_arena(
         SETTINGS,

@@ -121,7 +121,7 @@ def test_two_workers_of_a_campaign_are_busy(tmp_path: Path) -> None:
 
 def test_null_evaluations() -> None:
     best = max(
-        (null_rate(worker.serve.null.process, 1, 3.0) for _ in range(3)),
+        (null_rate(worker.serve.null.process, 3.0) for _ in range(3)),
         key=lambda rate: rate.per_s,
     )
     print(f"\n{best.per_s:.0f} null evaluations/s, {1e3 * best.cpu_s:.3f} ms CPU each")

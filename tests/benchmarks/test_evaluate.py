@@ -2,9 +2,12 @@
 
 import pytest
 
+from analyzer.report import analyze
+from coordinator.evolution.generation import generate
 from schema.experiment.document import Experiment
 from schema.experiment.settings import EvaluationSettings
-from worker.bench.command import LEAST_RATIO, Timing, random_robots, time_evaluations
+from worker.bench.arena_bench import RobotSource
+from worker.bench.command import LEAST_RATIO, Timing, time_evaluations
 
 EXPERIMENT = Experiment(name="test")
 SETTINGS = EvaluationSettings(
@@ -17,7 +20,8 @@ SETTINGS = EvaluationSettings(
 @pytest.mark.benchmark
 @pytest.mark.slow
 def test_engine_steps_are_most_of_the_time_of_an_evaluation() -> None:
-    timing = time_evaluations(random_robots(EXPERIMENT, 30, seed=1), SETTINGS)
+    robots = RobotSource(generate, analyze).random(EXPERIMENT, 30, seed=1)
+    timing = time_evaluations(robots, SETTINGS)
     assert timing.ratio >= LEAST_RATIO, timing
 
 

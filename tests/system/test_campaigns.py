@@ -97,11 +97,13 @@ def test_a_killed_campaign_goes_on_and_takes_what_is_there(
     assert "stopped" in stage.run("status", "campaign")
     said = stage.run("resume", "campaign", "--workers", "1", "--quiet")
     assert "4 runs are finished" in said
-    assert "is taken as it is" not in said  # it has as many births as the others
+    assert (
+        "keeps its own number of births" not in said
+    )  # it has as many births as the others
     _check_equal(whole, campaign)
     assert taken.stat().st_mtime_ns == before
     again = stage.run("resume", "campaign", "--workers", "1", "--quiet")
-    assert "4 of 4 runs are finished already" in again
+    assert "4 of 4 runs are already finished" in again
 
 
 def test_ctrl_c_stops_all_runs_and_says_how_to_go_on(
@@ -173,9 +175,9 @@ def test_status_of_all_who_share_a_hub(stage: Stage, until: Until) -> None:
     [
         (("status",), "either a folder or --connect"),
         (("status", "nowhere"), "no run and no campaign"),
-        (("run", "thesis", "scenario1"), "names of their own"),
+        (("run", "thesis", "scenario1"), "must have different names"),
         (("run", "scenario1", "--repeats", "0"), "must be a whole number >= 1"),
-        (("run", "scenario1", "--connect", HUB, "--listen", HUB), "here or elsewhere"),
+        (("run", "scenario1", "--connect", HUB, "--listen", HUB), "exclude each other"),
         (("run", "scenario1", "--connect", "tcp/127.0.0.1:9"), "no hub"),
     ],
 )

@@ -132,7 +132,7 @@ def test_the_campaign_of_the_campaigns_page(tmp_path: Path) -> None:
     for line in block.splitlines():
         done = _python(("-m", *line.split()), tmp_path)
         assert done.returncode == 0, f"{line}\n{done.stderr}"
-    assert "4 of 4 runs are finished already" in done.stderr
+    assert "4 of 4 runs are already finished" in done.stderr
 
 
 def test_every_command_that_a_page_names_exists() -> None:

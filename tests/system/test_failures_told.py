@@ -79,7 +79,7 @@ def _run(stage: Stage, *words: str, code: int = 0) -> str:
 def test_a_run_that_judged_nobody_names_no_best_robot(stage: Stage) -> None:
     source = _write(stage, "blind", "judge:none")
     said = _run(stage, source, "--out", "a b", code=1)
-    assert "12 births; nobody of the last population has been judged" in said
+    assert "12 births; no robot of the last population has a fitness" in said
     assert "12 of 12 evaluations failed, all: " in said
     assert "nobody looked" in said
     assert "best robot" not in said
@@ -94,7 +94,7 @@ def test_a_run_tells_how_many_evaluations_failed_and_why(stage: Stage) -> None:
     assert len(failed) == 1
     assert "too fast to see" in failed[0]
     assert "of 12 evaluations failed, all: " in failed[0]
-    assert "its best robot: birth " in said
+    assert "best robot: birth " in said
     assert (stage.folder / "a" / "best.yaml").exists()
 
 
@@ -108,7 +108,7 @@ def test_a_campaign_tells_which_of_its_runs_judged_nobody(stage: Stage) -> None:
     assert "seeing-0" not in said
     assert "2 runs are finished" in said
     again = stage.run("resume", "both", "--in-process", "--quiet", code=1)
-    assert "2 of 2 runs are finished already" in again
+    assert "2 of 2 runs are already finished" in again
     # A campaign of one run has a reason to tell, too.
     (stage.folder / "both" / "blind-0" / "state").write_text("tired")
     shutil.rmtree(stage.folder / "both" / "seeing-0")
@@ -153,7 +153,7 @@ def test_a_damaged_run_hides_none_beside_it(stage: Stage, made: Path) -> None:
     [
         ("state", "", "must be one of running, stopped, finished, got ''"),
         ("births.parquet", "", "births.parquet: cannot be read"),
-        ("births.parquet", None, "is finished, and its tables are gone"),
+        ("births.parquet", None, "is finished, but its tables are missing"),
     ],
     ids=["state", "births.parquet", "no tables"],
 )
@@ -179,7 +179,7 @@ def test_a_narrow_terminal_cuts_nothing_of_how_far_runs_are(
     assert status(["status", str(made)]) == 0
     said = capsys.readouterr().out
     assert "2 of 2 runs finished, 24 of 24 births" in said
-    assert "nobody is at it" not in said
+    assert "no coordinator is running" not in said
     for name in ("twice/seeing-0", "twice/seeing-1"):
         (line,) = [line for line in said.splitlines() if name in line]
         assert line.split()[1:6] == ["finished", "12", "of", "12", "best"]
@@ -189,10 +189,10 @@ def test_tables_that_are_gone_are_written_anew(stage: Stage, made: Path) -> None
     run = stage.folder / "run"
     shutil.copytree(made / "twice" / "seeing-0", run)
     words = ("resume", "run", "--in-process", "--quiet")
-    assert "nothing is left to do" in stage.run(*words)
+    assert "already finished" in stage.run(*words)
     shutil.rmtree(run / "tables")
     said = stage.run(*words)
-    assert "its tables are gone: the journal gives them again" in said
+    assert "tables are missing; writing them again from the journal" in said
     assert "12 births" in said
     assert compare(run, made / "twice" / "seeing-0") == []
 
@@ -210,7 +210,7 @@ def test_a_run_whose_journal_is_lost_does_not_begin_anew(
         told = "journal.bin: is lost"
     else:
         shutil.rmtree(run / "tables")
-        told = "its tables are gone: put a copy of them in their place"
+        told = "put a copy of the tables in their place"
     assert told in stage.run(*words, code=2)
     (run / "journal.bin").touch()
     assert told in stage.run(*words, code=2)
@@ -242,15 +242,15 @@ def test_an_arenas_tables_are_promised_only_with_its_poses(tmp_path: Path) -> No
     with RunFolder(tmp_path, details), Journal.open(tmp_path):
         pass
     (tmp_path / "state").write_text("finished")
-    with pytest.raises(RunFolderError, match="put a copy of them in their place"):
+    with pytest.raises(RunFolderError, match="put a copy of the tables in their place"):
         check_rewritable(tmp_path, details)
-    with pytest.raises(RunFolderError, match="put a copy of them in their place"):
+    with pytest.raises(RunFolderError, match="put a copy of the tables in their place"):
         folder_status(tmp_path)
     poses = parquet_path(tmp_path, "scenario3", 0, "poses")
     poses.parent.mkdir(parents=True)
     poses.touch()
     check_rewritable(tmp_path, details)
-    with pytest.raises(RunFolderError, match="to have them written anew"):
+    with pytest.raises(RunFolderError, match="to write them again"):
         folder_status(tmp_path)
 
 
@@ -274,7 +274,7 @@ def test_an_arena_that_judged_nobody_says_why(stage: Stage) -> None:
     assert "too few are left to mate" in said
     assert "deaths were failures, all: " in said
     assert "nobody looked" in said
-    assert "nothing is left to do" in stage.run("resume", "a", "--in-process", code=1)
+    assert "already finished" in stage.run("resume", "a", "--in-process", code=1)
 
 
 @pytest.mark.parametrize("repeats", [(), ("--repeats", "2")])
@@ -293,7 +293,7 @@ def test_a_folder_with_something_else_gets_no_lock(stage: Stage) -> None:
     (stage.folder / "mine" / "thesis.tex").write_text("years of work")
     source = _write(stage, "seeing", "worker.fitness:thesis")
     said = stage.run("run", source, "--out", "mine", code=2)
-    assert "not empty ('thesis.tex' is there)" in said
+    assert "not empty (contains 'thesis.tex')" in said
     assert [path.name for path in (stage.folder / "mine").iterdir()] == ["thesis.tex"]
 
 
@@ -307,6 +307,6 @@ def test_a_folder_that_is_removed_is_said_to_be_gone(
     (stage.folder / "gone").rename(stage.folder / "elsewhere")
     _, err = process.communicate(timeout=60)
     assert process.returncode == 2
-    assert "gone: moved or removed" in err
+    assert "was moved or removed" in err
     details = json.loads((stage.folder / "elsewhere" / "run.json").read_text())
     assert details["name"] == "scenario1"

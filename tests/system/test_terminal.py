@@ -44,7 +44,7 @@ def test_ctrl_c_pressed_twice_while_processes_start(
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=60)
     assert "Traceback" not in said
-    assert f"stopped; to go on: revolve resume {run}" in said
+    assert f"stopped; to resume: revolve resume {run}" in said
     assert process.returncode == 130
 
 

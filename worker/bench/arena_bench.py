@@ -7,8 +7,9 @@ import argparse
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -16,12 +17,12 @@ import pyarrow.parquet as pq
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError, RevolveError
-from schema.experiment.document import Experiment, body_space
+from schema.experiment.document import Experiment, Vetting, body_space
 from schema.experiment.file import read_experiment
-from schema.experiment.plugin import load
 from schema.experiment.settings import ArenaSettings
 from schema.flags import add_count, whole_number
-from schema.robot.genome import develop
+from schema.parts import BodySpace
+from schema.robot.genome import Genome, develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Report
 from schema.robot.robot import Robot
@@ -48,6 +49,38 @@ RESULTS = pa.schema(
 """One row per repetition; ``factor`` is simulated over wall time."""
 
 Row = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSource:
+    """Random robots, from the generator and the analyzer of the other rooms.
+
+    Attributes:
+        generate: returns a random genome of an experiment.
+        analyze: vets a robot.
+    """
+
+    generate: Callable[[np.random.Generator, Experiment, BirthId], Genome]
+    analyze: Callable[[Robot, BodySpace, Vetting], Report]
+
+    def random(self, experiment: Experiment, count: int, seed: int) -> list[Robot]:
+        """Return random robots that are not vetted."""
+        rng, space = np.random.default_rng(seed), body_space(experiment.space)
+        return [
+            develop(self.generate(rng, experiment, BirthId(0, number)), space)
+            for number in range(count)
+        ]
+
+    def vetted(self, experiment: Experiment, count: int, seed: int) -> list[Robot]:
+        """Return random robots that can be built, as founders are."""
+        rng, space = np.random.default_rng(seed), body_space(experiment.space)
+        robots: list[Robot] = []
+        while len(robots) < count:
+            genome = self.generate(rng, experiment, BirthId(0, len(robots)))
+            robot = develop(genome, space)
+            if self.analyze(robot, space, experiment.vetting).is_viable:
+                robots.append(robot)
+        return robots
 
 
 def add_commands(kinds: Any) -> None:  # noqa: ANN401 - argparse hides its type
@@ -84,11 +117,12 @@ def add_experiment(parser: argparse.ArgumentParser, default: str) -> None:
     )
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, robots: RobotSource) -> int:
     """Run one of the two and say what came out.
 
     Args:
         options: as ``add_commands`` parses them.
+        robots: source of random robots.
 
     Returns:
         0.
@@ -98,11 +132,14 @@ def run(options: argparse.Namespace) -> int:
         RevolveError: a file for the results that cannot be written.
     """
     experiment = read_experiment(options.experiment)
-    source = _spiders if options.what == "spider" else _random
     rows: list[Row] = []
     with _kept(options.out) as keep:
         for size in options.sizes:
-            timings = source(experiment, size, options)
+            timings = (
+                _spiders(experiment, size, options)
+                if options.what == "spider"
+                else _random(experiment, size, options, robots)
+            )
             new = [_row(options, number, each) for number, each in enumerate(timings)]
             keep(new)
             rows += new
@@ -153,33 +190,13 @@ def arena_settings_of(experiment: Experiment) -> ArenaSettings:
     )
 
 
-def vetted_robots(experiment: Experiment, count: int, seed: int) -> list[Robot]:
-    """Return random robots that can be built, as founders are made.
-
-    Generator and analyzer belong to other rooms, so they are named, as plug-ins are.
-    """
-    generate = cast(
-        "Callable[..., Any]",
-        load("coordinator.evolution.generation:generate", "generator"),
-    )
-    analyze = cast("Callable[..., Report]", load("analyzer.report:analyze", "analyzer"))
-    rng, space = np.random.default_rng(seed), body_space(experiment.space)
-    robots: list[Robot] = []
-    while len(robots) < count:
-        genome = generate(rng, experiment, BirthId(0, len(robots)))
-        robot = develop(genome, space)
-        if analyze(robot, space, experiment.vetting).is_viable:
-            robots.append(robot)
-    return robots
-
-
 def _random(
-    experiment: Experiment, size: int, options: argparse.Namespace
+    experiment: Experiment, size: int, options: argparse.Namespace, source: RobotSource
 ) -> Iterable[timing.ArenaTiming]:
     settings = arena_settings_of(experiment)
     for number in range(options.repetitions):
         seed = options.seed + 1000 * size + number
-        robots = vetted_robots(experiment, size, seed)
+        robots = source.vetted(experiment, size, seed)
         rng = np.random.default_rng(seed)
         places = timing.birth_places(rng, size, settings)
         yield timing.time_arena(

@@ -9,13 +9,11 @@ time step five times finer (``worker.bench.fidelity``); ``revolve bench arena`` 
 import argparse
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
 import mujoco
-import numpy as np
 from msgspec.structs import replace
 from rich.console import Console
 from rich.progress import track
@@ -23,12 +21,9 @@ from rich.progress import track
 from schema.errors import SimulationDiverged
 from schema.experiment.document import Experiment, Simulation, body_space
 from schema.experiment.file import parse_experiment, read_experiment
-from schema.experiment.plugin import load
 from schema.experiment.settings import EvaluationSettings
 from schema.flags import Flags, add_count
 from schema.mjcf.model import solo_model
-from schema.robot.genome import Genome, develop
-from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.bench import arena_bench, fidelity
@@ -128,37 +123,21 @@ def _replay(
     return time.thread_time() - start
 
 
-def random_robots(experiment: Experiment, count: int, seed: int) -> list[Robot]:
-    """Return robots of the experiment's own generator, unvetted.
-
-    The generator belongs to another room, so it is named, as any plug-in is.
-    """
-    generate = cast(
-        "Callable[[np.random.Generator, Experiment, BirthId], Genome]",
-        load("coordinator.evolution.generation:generate", "generator"),
-    )
-    rng = np.random.default_rng(seed)
-    space = body_space(experiment.space)
-    return [
-        develop(generate(rng, experiment, BirthId(0, number)), space)
-        for number in range(count)
-    ]
-
-
-def main(arguments: list[str]) -> int:
+def main(arguments: list[str], robots: arena_bench.RobotSource) -> int:
     """Run one of the commands ``revolve bench ...``.
 
     Args:
         arguments: the command's name first.
+        robots: source of random robots.
 
     Returns:
         0 if the measurement keeps the promise, 1 if not.
     """
     options = _parser().parse_args(arguments[1:])
     if options.what == "evaluate":
-        return _evaluate(options)
+        return _evaluate(options, robots)
     if options.what in ("arena", "spider"):
-        return arena_bench.run(options)
+        return arena_bench.run(options, robots)
     return _fidelity(options)
 
 
@@ -188,9 +167,9 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _evaluate(options: argparse.Namespace) -> int:
+def _evaluate(options: argparse.Namespace, source: arena_bench.RobotSource) -> int:
     experiment = read_experiment(options.experiment)
-    robots = random_robots(experiment, options.robots, options.seed)
+    robots = source.random(experiment, options.robots, options.seed)
     settings = EvaluationSettings(
         space=experiment.space,
         simulation=experiment.simulation,

@@ -21,7 +21,7 @@ from worker.robot.controller import Widths
 BLOCK_TICKS = 64
 """Ticks that are drawn at once, because starting a generator costs more than a draw."""
 _PURPOSE = 11
-"""Keeps these streams distinct from ``coordinator.evolution.random_streams.Purpose``."""
+"""Differs from every ``coordinator.evolution.random_streams.Purpose``."""
 
 
 @dataclass(frozen=True, slots=True)

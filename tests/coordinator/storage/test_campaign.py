@@ -11,7 +11,6 @@ from coordinator.cli.format import about_arenas, best_of, duration
 from coordinator.run.rate import RateMeter
 from coordinator.storage.campaign import (
     Campaign,
-    CampaignFolder,
     check_adopted,
     is_campaign,
     read_campaign,
@@ -22,6 +21,7 @@ from coordinator.storage.campaign import (
 )
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.hints import command
+from coordinator.storage.lock import FolderLock
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.wire.status import IslandStatus, RunStatus
@@ -72,16 +72,16 @@ def test_a_used_folder_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_second_coordinator_is_refused(tmp_path: Path) -> None:
-    with CampaignFolder(tmp_path), pytest.raises(RunFolderError, match="process"):
-        CampaignFolder(tmp_path)
-    with CampaignFolder(tmp_path):
+    with FolderLock(tmp_path), pytest.raises(RunFolderError, match="process"):
+        FolderLock(tmp_path)
+    with FolderLock(tmp_path):
         pass
 
 
 @pytest.mark.parametrize("text", ["", "seed = 1", "seed = ", "experiments = 3"])
 def test_a_damaged_campaign_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "campaign.toml").write_text(text)
-    with pytest.raises(RunFolderError, match="is not one of a campaign"):
+    with pytest.raises(RunFolderError, match="is not a valid campaign"):
         read_campaign(tmp_path)
 
 
@@ -89,7 +89,7 @@ def test_a_damaged_campaign_is_refused(tmp_path: Path, text: str) -> None:
     "sources", [["scenario1", "scenario1"], ["thesis", "scenario3"]]
 )
 def test_names_must_differ(sources: list[str]) -> None:
-    with pytest.raises(ExperimentError, match="names of their own"):
+    with pytest.raises(ExperimentError, match="must have different names"):
         read_experiments(sources)
 
 

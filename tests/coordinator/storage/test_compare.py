@@ -129,8 +129,8 @@ def test_different_platforms_are_named_beside_a_difference(
     assert compare(first, second) == [
         "evaluations: first at record 0, column fitness: 0.0 against 9.0",
         (
-            "platforms differ: linux-x86 against arm; equality is only promised on "
-            "equal ones"
+            "platforms differ: linux-x86 against arm; only runs on the same "
+            "platform are guaranteed to be equal"
         ),
     ]
 

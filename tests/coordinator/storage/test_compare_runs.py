@@ -71,5 +71,8 @@ def test_where_nothing_is_evaluated_the_platforms_are_the_runs_(
     first = written(tmp_path / "a", birth)
     lines = compare(first, written(tmp_path / "b", other, platform="there"))
     assert lines[1:] == [
-        "platforms differ: here against there; equality is only promised on equal ones"
+        (
+            "platforms differ: here against there; only runs on the same platform are "
+            "guaranteed to be equal"
+        )
     ]

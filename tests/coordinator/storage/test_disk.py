@@ -38,7 +38,7 @@ def test_a_piece_for_which_there_is_no_room_leaves_nothing(small_disk: Path) -> 
     while (taken + 1) * len(piece) < ROOM - 4 * PAGE:
         file.append(piece)
         taken += 1
-    with pytest.raises(RunFolderError, match=r"f: disk full .*resume the run when"):
+    with pytest.raises(RunFolderError, match=r"f: disk full .*free some space"):
         file.append(b"x" * ROOM)
     assert (small_disk / "f").read_bytes() == piece * taken
     assert file.size == len(piece) * taken

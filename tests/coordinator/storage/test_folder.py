@@ -18,10 +18,10 @@ from coordinator.storage.folder import (
     RunDetails,
     RunFolder,
     read_details,
-    read_holder,
     read_state,
 )
 from coordinator.storage.journal import Journal
+from coordinator.storage.lock import read_holder
 from schema.errors import RunFolderError
 from schema.robot.ids import BirthId
 
@@ -103,7 +103,7 @@ def test_a_lost_epoch_voids_nothing_that_is_written_later(
 def test_a_used_folder_is_refused(tmp_path: Path) -> None:
     RunFolder(tmp_path / "run", DETAILS).close()
     with pytest.raises(
-        RunFolderError, match="already holds a run; to go on with it: revolve "
+        RunFolderError, match="already holds a run; to resume it: revolve "
     ):
         RunFolder(tmp_path / "run", DETAILS)
     assert RunFolder(tmp_path / "run").epoch == 2
@@ -132,7 +132,7 @@ def test_a_folder_with_something_else_is_refused_and_left_alone(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(RunFolderError, match=r"not empty \('thesis.tex' is there\)"):
+    with pytest.raises(RunFolderError, match=r"not empty \(contains 'thesis.tex'\)"):
         RunFolder(tmp_path, DETAILS)
     assert (tmp_path / "thesis.tex").read_text() == "years of work"
 
@@ -187,7 +187,7 @@ def test_who_looks_at_a_folder_is_no_reason_to_refuse_it(tmp_path: Path) -> None
 
 def test_a_child_process_does_not_keep_the_lock(tmp_path: Path) -> None:
     folder = RunFolder(tmp_path / "run", DETAILS)
-    assert not os.get_inheritable(folder._lock)
+    assert not os.get_inheritable(folder._lock._descriptor)
     with subprocess.Popen(
         [sys.executable, "-c", "import sys; sys.stdin.read()"],
         stdin=subprocess.PIPE,

@@ -11,7 +11,7 @@ import pytest
 
 from coordinator.islands.events import Record
 from coordinator.storage.folder import RunDetails
-from coordinator.storage.recorder import WAITING, Recorder
+from coordinator.storage.recorder import BUFFERED, Recorder
 from schema.errors import RunFolderError
 from schema.tables.columns import BIRTHS, POPULATION, TABLES
 from schema.tables.files import (
@@ -48,12 +48,12 @@ def test_enough_rows_are_on_disk_without_a_flush(
     tmp_path: Path, make_records: Make
 ) -> None:
     recorder = Recorder(tmp_path, DETAILS)
-    births = [record for record in make_records(WAITING) if record.table == "births"]
+    births = [record for record in make_records(BUFFERED) if record.table == "births"]
     for record in births[:-1]:
         recorder.write(record)
     assert read_table(tmp_path, "births").num_rows == 0
     recorder.write(births[-1])
-    assert read_table(tmp_path, "births").num_rows == WAITING
+    assert read_table(tmp_path, "births").num_rows == BUFFERED
     recorder.close()
 
 

@@ -89,7 +89,7 @@ def test_rows_after_the_end_are_refused(
 ) -> None:
     feed_rows(tmp_path, make_records(5)).finish()
     recorder = feed_rows(tmp_path, make_records(6), every=1000)
-    with pytest.raises(RunFolderError, match="finished with 5 rows, and more came"):
+    with pytest.raises(RunFolderError, match="finished with 5 rows, got more"):
         recorder.flush()
 
 

@@ -6,6 +6,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from analyzer.report import analyze
+from coordinator.evolution.generation import generate
 from schema.errors import RevolveError
 from schema.experiment.document import Simulation
 from schema.experiment.environment import FLAT
@@ -13,8 +15,10 @@ from schema.mjcf.model import solo_model
 from schema.parts import BUILT_IN
 from schema.robot.robot import check_robot
 from worker.bench import command as bench
-from worker.bench.arena_bench import RESULTS
+from worker.bench.arena_bench import RESULTS, RobotSource
 from worker.bench.spider import grid, spider
+
+ROBOTS = RobotSource(generate, analyze)
 
 
 def test_the_spider_is_the_thesis_s() -> None:
@@ -40,7 +44,7 @@ def test_a_benchmark_writes_a_row_per_repetition(
 ) -> None:
     out = tmp_path / "results.parquet"
     words = ["--sizes", "1", "2", "3", "--seconds", "1", "--repetitions", "2", "--out"]
-    assert bench.main(["bench", what, *words, str(out)]) == 0
+    assert bench.main(["bench", what, *words, str(out)], ROBOTS) == 0
     table = pq.read_table(out)
     assert table.schema.equals(RESULTS, check_metadata=True)
     assert table["population"].to_pylist() == [1, 1, 2, 2, 3, 3]
@@ -59,5 +63,5 @@ def test_a_file_that_cannot_be_written_is_told_before_the_minutes(
 ) -> None:
     out = str(tmp_path / "nowhere" / "results.parquet")
     with pytest.raises(RevolveError, match="cannot be written: No such file"):
-        bench.main(["bench", "arena", "--out", out])
+        bench.main(["bench", "arena", "--out", out], ROBOTS)
     assert capsys.readouterr().out == ""

@@ -1,0 +1,117 @@
+"""Deployment of a run: its network, its own processes, its viewer."""
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from coordinator.dispatch.events import AgentKind
+from coordinator.network.local import LocalAgents
+from coordinator.network.service import Network
+from coordinator.run.cross_checks import NO_CHECKS, Checks
+from coordinator.run.live_server import open_viewer
+from coordinator.storage.disk import replace_text
+from schema.agent.network import THIS_MACHINE, Agent, Tls
+from schema.agent.platform_tag import platform_tag
+from schema.agent.service import tell_user
+from schema.agent.supervision import CPU_LIMIT_S, ProcessSlot
+from schema.agent.supervisor import ProcessPool
+from schema.agent.topics import unique_name
+
+ADDRESS = "address"
+"""File of a run or campaign folder that holds the hub's address while it runs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Deployment:
+    """Processes and network of a run; none of these settings changes a birth.
+
+    Attributes:
+        workers: worker processes to start here; one analyzer starts with them.
+        bodies: function that a process of each kind runs.
+        answers: functions that replace processes and network, or None.
+        listen: address of the hub; None: a free port of this machine.
+        connect: address of an existing hub; None: this process is the hub.
+        fleet: name of the fleet whose agents do the work.
+        tls: certificate files for a ``tls/`` address.
+        quiet: show no progress.
+        fsync: survive power loss, too.
+        threads: threads of a worker process that advance one arena together.
+        speed: limit of simulated seconds per second for arenas; None: no limit.
+        view: open a viewer; the run does not wait for it.
+        cpu_limit_s: CPU time of a job after which its process here is ended [s].
+        checks: cross-checks of workers, and the reaction to quarantined robots.
+        allows_drift: an arena may continue on another platform if its own is gone.
+    """
+
+    workers: int
+    bodies: Mapping[AgentKind, Callable[[Agent, ProcessSlot], None]]
+    answers: Mapping[AgentKind, Callable[[bytes], bytes]] | None
+    listen: str | None
+    connect: str | None
+    fleet: str
+    tls: Tls | None
+    quiet: bool
+    fsync: bool
+    threads: int = 1
+    speed: float | None = None
+    view: bool = False
+    cpu_limit_s: float = CPU_LIMIT_S
+    checks: Checks = NO_CHECKS
+    allows_drift: bool = False
+
+
+@contextmanager
+def connected_agents(
+    folder: Path, deployment: Deployment
+) -> Iterator[tuple[Network | LocalAgents, list[ProcessPool]]]:
+    """Open the connection to agents and start the processes of a deployment.
+
+    Args:
+        folder: of the run or campaign; gets the file with the hub's address.
+        deployment: what to open and start.
+
+    Yields:
+        The connection, and the process pools that need regular supervision.
+    """
+    if deployment.answers is not None:
+        yield LocalAgents(deployment.answers, platform_tag()), []
+        return
+    with ExitStack() as stack:
+        network = stack.enter_context(
+            Network(
+                name=unique_name("coordinator"),
+                fleet=deployment.fleet,
+                listen=(deployment.listen or THIS_MACHINE,),
+                connect=deployment.connect or "",
+                tls=deployment.tls,
+            )
+        )
+        file = folder / ADDRESS
+        # Written whole: other processes wait for the file and read it at once.
+        text = f"{network.address}\n"
+        replace_text(file, text)
+        stack.callback(_remove, file, text)
+        if deployment.view:
+            open_viewer(network.address, deployment.fleet, deployment.tls)
+        sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
+        pools = []
+        for kind, size in sizes.items() if deployment.workers else ():
+            agent = Agent(
+                kind, f"own-{kind}", network.address, deployment.fleet,
+                tls=deployment.tls, threads=deployment.threads,
+                cpu_limit_s=deployment.cpu_limit_s,
+            )  # fmt: skip
+            pool = ProcessPool(deployment.bodies[kind], (agent,), size=size)
+            pools.append(stack.enter_context(pool))
+        if deployment.listen is not None:
+            tell_user(f"listening on {network.address}")
+        yield network, pools
+
+
+def _remove(file: Path, text: str) -> None:
+    """Remove a file, unless a later coordinator has replaced its text."""
+    with contextlib.suppress(OSError):
+        if file.read_text(encoding="utf-8") == text:
+            file.unlink()

@@ -1,0 +1,191 @@
+"""``revolve log``: the journal of a run as text, one line per event."""
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from coordinator.cli.log_lines import HEADER, Selection, describe, line
+from coordinator.islands.events import JournalledEvent
+from coordinator.storage.campaign import is_campaign
+from coordinator.storage.folder import holds_run, read_state
+from coordinator.storage.journal import (
+    MAGIC,
+    NAME,
+    Position,
+    check_gap,
+    decode_record,
+    is_empty,
+    read_records,
+)
+from schema.errors import RunFolderError
+from schema.flags import Flags, whole_number
+
+POLL_S = 0.5
+"""Time between two looks at a journal that is followed [s]."""
+
+
+def main(arguments: list[str]) -> int:
+    """Print the events of a run's journal; only read its files.
+
+    Args:
+        arguments: the command's name first.
+
+    Returns:
+        0 if all events are printed, 1 if the journal is damaged behind them.
+
+    Raises:
+        RunFolderError: the folder holds no run, or the run no journal.
+    """
+    options = _flags().parse_args(arguments[1:])
+    selection = Selection(options.island, *options.birth)
+    path = _journal_of(options.folder, is_followed=options.follow)
+    if not options.json:
+        print(HEADER, flush=True)
+    try:
+        for record, event in _events(path, is_followed=options.follow):
+            for fields in describe(event, selection):
+                row = {"record": record, **fields}
+                print(json.dumps(row) if options.json else line(row))
+    except RunFolderError as error:
+        sys.stdout.flush()
+        print(f"revolve: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _journal_of(folder: Path, *, is_followed: bool) -> Path:
+    """Return the path of a run's journal.
+
+    Raises:
+        RunFolderError: there is none, and none to wait for.
+    """
+    path = folder / NAME
+    if not folder.is_dir():
+        raise RunFolderError(f"{folder}: no such folder")
+    if path.exists() or (is_followed and holds_run(folder)):
+        return path
+    if is_campaign(folder):
+        runs = [str(each.parent) for each in sorted(folder.glob(f"*/{NAME}"))]
+        such = f", such as {runs[0]}" if runs else ""
+        raise RunFolderError(f"{folder}: is a campaign; give one of its runs{such}")
+    what = "the run has no journal" if holds_run(folder) else "no run is there"
+    raise RunFolderError(f"{folder}: {what} ({NAME} is missing)")
+
+
+def _events(path: Path, *, is_followed: bool) -> Iterator[tuple[int, JournalledEvent]]:
+    """Yield record number and event of all records that are not void.
+
+    Args:
+        path: the journal.
+        is_followed: wait for more records until the run is finished.
+
+    Raises:
+        RunFolderError: the journal is damaged or cannot be read.
+    """
+    position = Position()
+    is_last = False
+    while not is_last:
+        # The state first: no record follows it once it says "finished".
+        is_last = not is_followed or read_state(path.parent) == "finished"
+        start, first = position.end, position.records
+        data = _read(path, start, is_followed=is_followed)
+        payloads: list[bytes] = []
+        for record, payload in read_records(data, position, start):
+            if record < first:
+                _warn(
+                    f"{path}: records from {record} on are void: another coordinator "
+                    "has taken over the run"
+                )
+                first = record
+            del payloads[record - first :]  # void records
+            payloads.append(payload)
+        for record, payload in enumerate(payloads, start=first):
+            yield record, decode_record(path, payload)
+        check_gap(path, data, position, start)
+        if is_last and (rest := start + len(data) - position.end) > 0:
+            _warn(
+                f"{path}: ends with an incomplete record of {rest} bytes: it is being "
+                "written, or a kill cut it and resume will drop it"
+            )
+        if not is_last:
+            sys.stdout.flush()
+            time.sleep(POLL_S)
+
+
+def _read(path: Path, start: int, *, is_followed: bool) -> bytes:
+    """Return the bytes of a journal from ``start`` on.
+
+    Raises:
+        RunFolderError: it is no journal, was cut, or cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            if is_empty(path, file.read(len(MAGIC))):
+                return b""
+            if file.seek(0, 2) < start:
+                raise RunFolderError(f"{path}: was cut while it was read")
+            file.seek(start)
+            return file.read()
+    except FileNotFoundError:
+        if is_followed and start == len(MAGIC):
+            return b""
+        raise RunFolderError(f"{path}: was removed while it was read") from None
+    except OSError as error:
+        raise RunFolderError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def _warn(line: str) -> None:
+    sys.stdout.flush()
+    print(line, file=sys.stderr)
+
+
+def _birth(text: str) -> tuple[int | None, int]:
+    """Return island and number of a birth; the island is optional."""
+    island, colon, number = text.rpartition(":")
+    read = whole_number(0)
+    try:
+        return read(island) if colon else None, read(number)
+    except argparse.ArgumentTypeError:
+        raise argparse.ArgumentTypeError(
+            f"must be N or ISLAND:N in whole numbers >= 0, got {text!r}"
+        ) from None
+
+
+def _flags() -> Flags:
+    flags = Flags(
+        prog="revolve log",
+        description="Print the journal of a run, one line per event: the answers of "
+        "analyzers and workers and the orders of operators, in the order in which the "
+        "run acted on them. A birth is ISLAND:NUMBER; try counts the attempts of "
+        "a birth and the evaluations of a robot. Only reads, also beside a running "
+        "coordinator.",
+        epilog="example: revolve log runs/scenario1-seed1 --birth 12 --follow",
+        allow_abbrev=False,
+    )
+    flags.add_argument("folder", type=Path, metavar="RUN", help="run folder")
+    flags.add_argument(
+        "--island",
+        type=whole_number(0),
+        metavar="N",
+        help="only events that island N handles (default: all)",
+    )
+    flags.add_argument(
+        "--birth",
+        type=_birth,
+        default=(None, None),
+        metavar="N|ISLAND:N",
+        help="only events of the robot of birth N, on any island or of island ISLAND; "
+        "of an advance only that robot's state (default: all)",
+    )
+    flags.add_argument(
+        "--json", action="store_true", help="print one JSON object per line"
+    )
+    flags.add_argument(
+        "--follow",
+        action="store_true",
+        help="wait for more events until the run is finished; press Ctrl-C to stop",
+    )
+    return flags

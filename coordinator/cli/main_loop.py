@@ -1,0 +1,122 @@
+"""Main loop of a coordinator process: runs, operators, viewers, display."""
+
+import math
+import resource
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from coordinator.cli.deployment import Deployment, connected_agents
+from coordinator.cli.progress import Display
+from coordinator.dispatch.fleet import Fleet
+from coordinator.network.service import Network
+from coordinator.run.live_server import LiveServer
+from coordinator.run.operators import OperatorServer
+from coordinator.run.scheduler import Planned, RunScheduler
+from coordinator.run.session import RunSession
+from coordinator.storage.folder import RunDetails
+from schema.agent.supervisor import stop_on_signals
+from schema.errors import RevolveError
+
+_TURN_S = 0.2
+_CHORES_S = 1.0
+# Journal, lock and table segments of a run; and what the process itself needs.
+_FILES_PER_RUN = 24
+_OTHER_FILES = 200
+
+
+def execute_runs(
+    folder: Path,
+    planned: Sequence[Planned],
+    deployment: Deployment,
+    conclude: Callable[[RunSession], object],
+    report: Callable[[RunDetails, RevolveError], None],
+) -> RunScheduler:
+    """Execute runs until all are finished or a signal stops them.
+
+    Args:
+        folder: of the run or campaign; gets the file with the hub's address.
+        planned: the runs.
+        deployment: processes and network.
+        conclude: called with each finished run.
+        report: called with each run that failed, and the error.
+
+    Returns:
+        The scheduler, stopped: what is finished and what failed.
+    """
+    stop = stop_on_signals()
+    with ExitStack() as stack:
+        agents, pools = stack.enter_context(connected_agents(folder, deployment))
+        network = agents if isinstance(agents, Network) else None
+        scheduler = RunScheduler(
+            planned,
+            Fleet(agents, allows_drift=deployment.allows_drift),
+            open_run=lambda held, is_watched: RunSession(
+                held,
+                scheduler.fleet,
+                fsync=deployment.fsync,
+                speed=deployment.speed,
+                is_watched=is_watched and network is not None,
+                checks=deployment.checks,
+            ),
+            most=_most_open_runs(),
+            conclude=conclude,
+            report=report,
+        )
+        stack.callback(scheduler.close)
+        server = None if network is None else _Server(scheduler, network)
+        with Display(scheduler, quiet=deployment.quiet) as display:
+            shown_s = done_s = -math.inf
+            while not (scheduler.is_finished or stop.is_set()):
+                scheduler.turn(_TURN_S, time.monotonic)
+                now_s = time.monotonic()
+                if server is not None:
+                    server.serve(now_s)
+                if now_s - shown_s >= _TURN_S:
+                    shown_s = now_s
+                    display.update(now_s)
+                if now_s - done_s >= _CHORES_S:
+                    done_s = now_s
+                    scheduler.do_chores(now_s)
+                    for pool in pools:
+                        pool.look_after()
+        scheduler.stop()
+    return scheduler
+
+
+class _Server:
+    """Answers operators of all runs and viewers of the watched run."""
+
+    def __init__(self, scheduler: RunScheduler, network: Network) -> None:
+        self._scheduler = scheduler
+        self._network = network
+        self._operator_server = OperatorServer(scheduler)
+        self._watched: RunSession | None = None
+        self._live: LiveServer | None = None
+
+    def serve(self, now_s: float) -> None:
+        """Answer what has arrived.
+
+        Args:
+            now_s: the time, of any clock that only goes forward [s].
+        """
+        for order in self._network.orders():
+            order.reply(self._operator_server.answer(order.data, now_s))
+        run = self._scheduler.watched
+        if run is not self._watched:
+            if self._live is not None:
+                self._live.close()
+            self._watched, self._live = run, None
+            if run is not None and run.feed is not None:
+                fleet = self._scheduler.fleet
+                self._live = LiveServer(run.feed, run.loop, fleet, self._network)
+        if self._live is not None:
+            self._live.serve(now_s)
+
+
+def _most_open_runs() -> int:
+    """Raise the limit of open files; return how many runs it allows at a time."""
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    return max(1, (hard - _OTHER_FILES) // _FILES_PER_RUN)

@@ -1,0 +1,102 @@
+"""Exclusive lock on a run or campaign folder."""
+
+import contextlib
+import fcntl
+import os
+import socket
+import time
+from pathlib import Path
+from typing import Self
+
+from coordinator.storage.disk import storage_error
+from schema.errors import RunFolderError
+
+LOCK = "lock"
+
+# `read_holder` locks the file for an instant, which must not refuse a coordinator.
+_RETRY_FOR_S = 0.2
+_RETRY_EVERY_S = 0.005
+
+
+class FolderLock:
+    """Exclusive lock on a folder; the operating system releases it at a kill."""
+
+    def __init__(self, folder: Path) -> None:
+        """Create the folder if it is missing, lock it and write down the holder.
+
+        Raises:
+            RunFolderError: another process holds it (named), or the disk fails.
+        """
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC
+            self._descriptor = os.open(folder / LOCK, flags, 0o644)
+            try:
+                _lock(self._descriptor)
+            except BlockingIOError:
+                holder = _holder(self._descriptor)
+                os.close(self._descriptor)
+                raise RunFolderError(
+                    f"{folder}: in use by {holder}; stop that process first, or wait "
+                    "for it"
+                ) from None
+        except OSError as error:
+            raise storage_error(folder, error) from None
+        # A full disk must not refuse a coordinator: only messages show the name.
+        with contextlib.suppress(OSError):
+            os.ftruncate(self._descriptor, 0)
+            signature = f"process {os.getpid()} on {socket.gethostname()}"
+            os.pwrite(self._descriptor, signature.encode(), 0)
+
+    def close(self) -> None:
+        """Release the lock; a second call does nothing."""
+        descriptor, self._descriptor = self._descriptor, -1
+        if descriptor >= 0:
+            # A child process that is just starting may share the descriptor: closing
+            # alone would keep the lock until the child replaces its image.
+            fcntl.flock(descriptor, fcntl.LOCK_UN)
+            os.close(descriptor)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+
+def read_holder(folder: Path) -> str:
+    """Return the holder of a folder's lock, "process PID on HOST"; "" if it is free."""
+    try:
+        descriptor = os.open(folder / LOCK, os.O_RDWR | os.O_CLOEXEC)
+    except OSError:
+        return ""
+    try:
+        # Shared: two processes that look at the same time do not see each other.
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return _holder(descriptor)
+    finally:
+        os.close(descriptor)
+    return ""
+
+
+def _lock(descriptor: int) -> None:
+    """Lock a file exclusively.
+
+    Raises:
+        BlockingIOError: another process keeps it locked.
+    """
+    until_s = time.monotonic() + _RETRY_FOR_S
+    while True:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= until_s:
+                raise
+            time.sleep(_RETRY_EVERY_S)
+        else:
+            return
+
+
+def _holder(descriptor: int) -> str:
+    return os.pread(descriptor, 500, 0).decode(errors="replace") or "another process"

@@ -1,0 +1,372 @@
+"""``revolve log`` on journals made here, and on killed runs of an older version."""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+import zipfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coordinator.cli.log import main
+from coordinator.islands.events import (
+    Advanced,
+    Audited,
+    Commanded,
+    Evaluated,
+    EvaluationFailed,
+    Insert,
+    JournalledEvent,
+    Remove,
+    Vetted,
+    VettingFailed,
+)
+from coordinator.storage.journal import NAME, Journal
+from revolve import main as revolve
+from schema.robot.genome import Node
+from schema.robot.ids import BirthId
+from schema.robot.results import Evaluation, Provenance, Report
+from schema.wire.arena import Advance, Casualty, Judgement, Touch
+
+ROOT = Path(__file__).parents[3]
+OLD = ROOT / "tests" / "data" / "runs-3063df1"
+ZERO = (0.0, 0.0, 0.0)
+VIABLE = Report(
+    is_viable=True, reason="", intersections=(), lower=ZERO, upper=ZERO, mass=0.5,
+    motors=3,
+)  # fmt: skip
+REFUSED = Report(
+    is_viable=False, reason="parts 1 and 3 intersect", intersections=((1, 3),),
+    lower=ZERO, upper=ZERO, mass=0.25, motors=1,
+)  # fmt: skip
+GOOD = Evaluation(0.125, 0.5, 0.25, 30.0)
+WORKER = Provenance("hal", "linux", 0.05)
+OTHER = Provenance("eve", "linux", 0.06)
+ADVANCE = Advance(
+    6000,
+    bytes(range(32)),
+    (Judgement(BirthId(0, 3), 15.0, 0.1, 0.2, 0.1, is_mature=True, place=ZERO),),
+    (Casualty(BirthId(0, 2), 5999, "height 1e9 m", ZERO),),
+    (Touch(BirthId(0, 2), BirthId(0, 3), 0.25),),
+    b"",
+)
+FAILED = EvaluationFailed(BirthId(0, 1), "diverged\nat 3.2 s", WORKER, 2, 1)
+EVENTS: list[JournalledEvent] = [
+    Vetted(BirthId(0, 0), 0, REFUSED),
+    Vetted(BirthId(0, 0), 1, VIABLE),
+    VettingFailed(BirthId(1, 7), 4, "KeyError: 'Wheel'"),
+    Evaluated(BirthId(0, 0), GOOD, WORKER),
+    FAILED,
+    Advanced(0, 17, ADVANCE, 120, WORKER),
+    Commanded(0, "x", 6200, Insert(Node("Core", -1, 0, ()), (0.5, -1.0))),
+    Commanded(0, "y", 6400, Remove(BirthId(0, 3))),
+    Audited(FAILED, Evaluated(BirthId(0, 1), GOOD, OTHER, 2, 1)),
+]
+LINES = [
+    (
+        "     0  vetted                  0  0:0         0  "
+        "not viable, parts 1 and 3 intersect, motors 1, 0.250 kg"
+    ),
+    "     1  vetted                  0  0:0         1  viable, motors 3, 0.500 kg",
+    "     2  vetting-failed          1  1:7         4  KeyError: 'Wheel'",
+    (
+        "     3  evaluated               0  0:0         0  "
+        "fitness 0.1250, 30.0 s simulated, worker hal, in 0.050 s"
+    ),
+    (
+        "     4  evaluation-failed       1  0:1         2  "
+        "diverged at 3.2 s, worker hal, in 0.050 s"
+    ),
+    (
+        "     5  advanced                0                 "
+        "advance 17, step 6000, robots 1, diverged: 0:2, contacts 1, poses 120, "
+        "state 00010203, worker hal, in 0.050 s"
+    ),
+    (
+        "     6  operator-order          0                 "
+        "insert at (0.5, -1) m, step 6200"
+    ),
+    "     7  operator-order          0  0:3            remove, step 6400",
+    (
+        "     8  audited                 1  0:1            "
+        "results differ, diverged at 3.2 s and 0.125, workers hal and eve"
+    ),
+]
+ROBOT_3 = (
+    "     5  advanced                0  0:3            "
+    "fitness 0.1000, age 15.0 s, advance 17, step 6000"
+)
+ROBOT_2 = (
+    "     5  advanced                0  0:2            "
+    "diverged, height 1e9 m, advance 17, step 6000"
+)
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    """Return a run folder with a journal of all kinds of events."""
+    with Journal.open(tmp_path, epoch=1) as journal:
+        journal.append(EVENTS)
+    return tmp_path
+
+
+def printed(
+    capsys: pytest.CaptureFixture[str], *words: object, code: int = 0
+) -> list[str]:
+    """Return the lines that the command prints below its header."""
+    assert main(["log", *map(str, words)]) == code
+    header, *lines = capsys.readouterr().out.splitlines()
+    assert header.split() == ["record", "event", "island", "birth", "try", "details"]
+    return lines
+
+
+def test_every_event_is_one_aligned_line(
+    run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert printed(capsys, run) == LINES
+
+
+@pytest.mark.parametrize(
+    ("flags", "expected"),
+    [
+        (["--island", "1"], [LINES[2], LINES[4], LINES[8]]),
+        (["--birth", "0"], [LINES[0], LINES[1], LINES[3]]),
+        (["--birth", "0:1"], [LINES[4], LINES[8]]),
+        (["--birth", "1:1"], []),
+        (["--birth", "3"], [ROBOT_3, LINES[7]]),
+        (["--birth", "2", "--island", "0"], [ROBOT_2]),
+        (["--birth", "2", "--island", "1"], []),
+    ],
+)
+def test_flags_select_events(
+    run: Path,
+    capsys: pytest.CaptureFixture[str],
+    flags: Sequence[str],
+    expected: list[str],
+) -> None:
+    assert printed(capsys, run, *flags) == expected
+
+
+def test_json_is_one_object_per_line(
+    run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["log", str(run), "--json"]) == 0
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [row["record"] for row in rows] == list(range(len(EVENTS)))
+    assert rows[3] == {
+        "record": 3, "event": "evaluated", "island": 0, "birth": "0:0", "trial": 0,
+        "fitness": 0.125, "path_velocity": 0.5, "straight_velocity": 0.25,
+        "simulated_s": 30.0, "worker": "hal", "platform": "linux", "wall_s": 0.05,
+    }  # fmt: skip
+    assert rows[5]["state"] == bytes(range(32)).hex()
+    assert rows[8]["outcomes"] == ["diverged\nat 3.2 s", 0.125]
+
+
+@pytest.mark.parametrize(
+    ("flag", "complaint"),
+    [
+        (["--birth", "x:1"], "--birth: must be N or ISLAND:N"),
+        (["--birth", "1:"], "--birth: must be N or ISLAND:N"),
+        (["--island", "-1"], "--island: must be a whole number >= 0"),
+    ],
+)
+def test_wrong_flags_are_refused(
+    flag: list[str], complaint: str, capsys: pytest.CaptureFixture[str], run: Path
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["log", str(run), *flag])
+    assert end.value.code == 2
+    assert complaint in capsys.readouterr().err
+
+
+def test_damage_ends_the_log_with_one_line(
+    run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = run / NAME
+    data = bytearray(path.read_bytes())
+    with Journal.open(run, epoch=1) as journal:
+        journal.append(EVENTS[:1])
+    whole = path.read_bytes()
+    data[-5] ^= 1
+    path.write_bytes(bytes(data) + whole[len(data) :])
+    before = path.read_bytes()
+    assert main(["log", str(run)]) == 1
+    out, err = capsys.readouterr()
+    assert out.splitlines()[1:] == LINES[:-1]
+    assert len(err.splitlines()) == 1
+    assert f"{path}: damaged at byte" in err
+    assert "(record 8)" in err
+    assert path.read_bytes() == before
+
+
+def test_an_incomplete_last_record_is_noted_and_kept(
+    run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = run / NAME
+    cut = path.read_bytes()[:-3]
+    path.write_bytes(cut)
+    assert main(["log", str(run)]) == 0
+    out, err = capsys.readouterr()
+    assert out.splitlines()[1:] == LINES[:-1]
+    assert "ends with an incomplete record of" in err
+    assert path.read_bytes() == cut
+
+
+def test_void_records_are_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with Journal.open(tmp_path, epoch=1) as old:
+        old.append(EVENTS[:2])
+        with Journal.open(tmp_path, epoch=2) as new:
+            old.append(EVENTS[5:7])
+            new.append(EVENTS[2:4])
+            old.append(EVENTS[7:8])
+    assert printed(capsys, tmp_path) == LINES[:4]
+
+
+def test_folders_without_a_journal_are_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refused(folder: Path) -> str:
+        assert revolve(["log", str(folder)]) == 2
+        (line,) = capsys.readouterr().err.splitlines()
+        return line
+
+    assert refused(tmp_path / "none").endswith("none: no such folder")
+    assert "no run is there (journal.bin is missing)" in refused(tmp_path)
+    (tmp_path / "run.json").write_text("{}")
+    assert "the run has no journal" in refused(tmp_path)
+    campaign = tmp_path / "campaign"
+    (campaign / "a-0").mkdir(parents=True)
+    (campaign / "campaign.toml").touch()
+    assert refused(campaign).endswith("is a campaign; give one of its runs")
+    (campaign / "a-0" / NAME).touch()
+    assert refused(campaign).endswith(f"such as {campaign / 'a-0'}")
+    (tmp_path / NAME).write_text("something else")
+    assert main(["log", str(tmp_path)]) == 1
+    assert "not a journal" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["off-line", "arena", "archipelago"])
+def test_killed_runs_of_an_older_version_are_printed(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with zipfile.ZipFile(OLD / f"{name}.zip") as archive:
+        archive.extractall(tmp_path)
+    folder = tmp_path / "killed"
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert main(["log", str(folder), "--json"]) == 0
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    after = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert after == before
+    with Journal.open(folder) as journal:
+        assert len(rows) == len(journal.replay())
+    wanted = {
+        "off-line": {"vetted", "evaluated", "audited"},
+        "arena": {"vetted", "advanced"},
+        "archipelago": {"vetted", "evaluated", "advanced"},
+    }[name]
+    assert {row["event"] for row in rows} == wanted
+
+
+def test_follow_prints_what_another_process_appends_until_the_run_is_finished(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "run.json").write_text("{}")
+    looks = 0
+    journal: list[Journal] = []
+    rest = b""
+
+    def pause(seconds: float) -> None:
+        """Write between two looks, in place of another process."""
+        nonlocal looks, rest
+        assert seconds >= 0.5
+        looks += 1
+        match looks:
+            case 1:
+                journal.append(Journal.open(tmp_path, epoch=1))
+            case 2:
+                journal[0].append(EVENTS[:2])
+            case 3:
+                size = (tmp_path / NAME).stat().st_size + 10
+                journal[0].append(EVENTS[2:3])
+                rest = (tmp_path / NAME).read_bytes()[size:]
+                os.truncate(tmp_path / NAME, size)
+            case 4:
+                with (tmp_path / NAME).open("ab") as file:
+                    file.write(rest)
+            case 5:
+                journal[0].append(EVENTS[3:])
+                (tmp_path / "state").write_text("finished")
+
+    monkeypatch.setattr("time.sleep", pause)
+    assert printed(capsys, tmp_path, "--follow") == LINES
+    assert looks == 5
+
+
+def test_follow_warns_of_printed_records_that_become_void(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with (
+        Journal.open(tmp_path, epoch=1) as old,
+        Journal.open(tmp_path, epoch=2) as new,
+    ):
+        old.append(EVENTS[:2])
+
+        def pause(_seconds: float) -> None:
+            new.append(EVENTS[:1])
+            (tmp_path / "state").write_text("finished")
+
+        monkeypatch.setattr("time.sleep", pause)
+        assert main(["log", str(tmp_path), "--follow"]) == 0
+    out, err = capsys.readouterr()
+    assert out.splitlines()[1:] == [*LINES[:2], LINES[0]]
+    assert "records from 0 on are void" in err
+
+
+def _command(*words: str, **more: Any) -> subprocess.Popen[str]:  # noqa: ANN401
+    return subprocess.Popen(
+        [sys.executable, "-m", "revolve", *words],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **more,
+    )
+
+
+def test_a_closed_pipe_ends_the_command_quietly(run: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        [sys.executable, "-m", "revolve", "log", str(run)],
+        cwd=ROOT,
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        check=False,
+    )
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (1, b"")
+
+
+def test_follow_reads_beside_a_writing_process(tmp_path: Path) -> None:
+    with Journal.open(tmp_path, epoch=1) as journal:
+        process = _command("log", str(tmp_path), "--follow")
+        assert process.stdout is not None
+        with process:
+            process.stdout.readline()
+            journal.append(EVENTS[:1])
+            assert process.stdout.readline() == f"{LINES[0]}\n"
+            journal.append(EVENTS[1:])
+            end = threading.Timer(0.2, (tmp_path / "state").write_text, ["finished"])
+            end.start()
+            began_s = time.monotonic()
+            assert process.stdout.read().splitlines() == LINES[1:]
+            assert process.wait(30) == 0
+            assert time.monotonic() - began_s < 20
+            end.join()
