@@ -31,7 +31,6 @@ from coordinator.dispatch.events import (
     Returned,
     Ticked,
 )
-from schema.robot.ids import BirthId
 
 LEAST_UTILISATION = 0.95
 _ROUNDS = 10
@@ -171,7 +170,7 @@ class FleetModel:
 
     def _request(self) -> None:
         number = next(self._jobs)
-        job = Job(number, "evaluate", BirthId(0, number), 0, b"")
+        job = Job(number, "evaluate", b"")
         self._tell(Requested(job))
 
     def _tick(self) -> None:

@@ -4,10 +4,9 @@ Nothing waits for a viewer, and nobody who watches changes a row. What is told i
 remembered in short, so that one who comes late, or missed something, is told all.
 """
 
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import replace
 
-from coordinator.islands.events import Append, Record
+from coordinator.islands.events import Record
 from coordinator.storage.folder import RunDetails
 from schema.robot.ids import BirthId
 from schema.tables.columns import Row
@@ -25,42 +24,12 @@ from schema.wire.news import (
 )
 
 
-class Rows(Protocol):
-    """Where a run's rows go."""
-
-    def write(self, record: Record) -> None:
-        """Take one row."""
-
-    def store(self, rows: Append) -> None:
-        """Bring bulk rows to disk."""
-
-    def append(self, rows: Append) -> None:
-        """Take bulk rows."""
-
-
-@dataclass(frozen=True, slots=True)
-class TeeRows:
-    """Passes rows on, and lets a feed hear of those that come one by one."""
-
-    rows: Rows
-    feed: "Feed"
-
-    def write(self, record: Record) -> None:
-        """Pass a row on; then tell of it."""
-        self.rows.write(record)
-        self.feed.note(record)
-
-    def store(self, rows: Append) -> None:
-        """Pass bulk rows on."""
-        self.rows.store(rows)
-
-    def append(self, rows: Append) -> None:
-        """Pass bulk rows on."""
-        self.rows.append(rows)
-
-
 class Feed:
-    """What there is to tell of one run; a replay of its journal fills it, too."""
+    """What there is to tell of one run; a replay of its journal fills it, too.
+
+    Attributes:
+        unread: rows that the next call of ``read`` or ``news`` takes.
+    """
 
     def __init__(self, run: str, epoch: int, details: RunDetails) -> None:
         """Know of nothing yet.
@@ -70,6 +39,7 @@ class Feed:
             epoch: of the coordinator.
             details: of the run.
         """
+        self.unread: list[Record] = []
         self._past = News(
             run, epoch, 0, is_whole=True, experiment=details.name,
             document=details.document,
@@ -88,8 +58,13 @@ class Feed:
         self._new_migrants: list[Migrant] = []
         self._workers: tuple[Crewman, ...] = ()
 
-    def note(self, record: Record) -> None:
-        """Hear of a row."""
+    def read(self) -> None:
+        """Note the rows that are unread."""
+        for record in self.unread:
+            self._note(record)
+        self.unread.clear()
+
+    def _note(self, record: Record) -> None:
         row = record.row
         match record.table:
             case "births":
@@ -106,6 +81,7 @@ class Feed:
 
     def news(self, workers: tuple[Crewman, ...]) -> News | None:
         """Return what is new since the last call; None if nothing is."""
+        self.read()
         fresh = levels(self._new_rows)
         is_new = self._new_births or self._new_deaths or fresh or self._new_migrants
         if not is_new and workers == self._workers:

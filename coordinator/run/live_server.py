@@ -71,11 +71,11 @@ class LiveServer:
         self._replies.put(None)
 
     def _workers(self) -> tuple[Crewman, ...]:
-        dispatch, advances = self._fleet.dispatch, self._loop.advances
+        dispatch, requests = self._fleet.dispatch, self._loop.shard_requests
         shards: dict[str, list[int]] = {}
         for number, island in sorted(self._loop.islands.items()):
             if isinstance(island, Arena):
-                shards.setdefault(advances.holder(number), []).append(number)
+                shards.setdefault(requests.holder(number), []).append(number)
         return tuple(
             Crewman(name, dispatch.platform(name), tuple(shards.get(name, ())))
             for name in dispatch.names("worker")

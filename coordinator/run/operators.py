@@ -67,7 +67,7 @@ class Desk:
             if isinstance(wish, ListWish):
                 text = self._list(arena, request.island)
             elif isinstance(wish, SnapshotWish):
-                self._loop.advances.wish_snapshot(request.island)
+                self._loop.shard_requests.wish_snapshot(request.island)
                 text = "the state is kept at the end of the next advance"
             else:
                 order = self._order(wish, arena)

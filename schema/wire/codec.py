@@ -195,6 +195,31 @@ def decode_answer(data: bytes) -> Answer:
     return decoded(data, pb.Answer(), _answer_from_message)
 
 
+def decode_answer_to(
+    data: bytes, *, epoch: int, number: int, unfit: type[Report | Evaluation]
+) -> Answer:
+    """Return the answer of some bytes to a certain request.
+
+    Args:
+        data: the bytes.
+        epoch: of the request.
+        number: of the request.
+        unfit: type of result that this kind of request cannot have.
+
+    Raises:
+        MalformedMessage: not an answer; the answer to another request or kind of it.
+    """
+    answer = decode_answer(data)
+    if (answer.epoch, answer.number) != (epoch, number):
+        raise MalformedMessage(
+            f"answer must be to (epoch, job) {(epoch, number)}, "
+            f"got {(answer.epoch, answer.number)}"
+        )
+    if isinstance(answer.result, unfit):
+        raise MalformedMessage(f"the answer is of type {unfit.__name__}")
+    return answer
+
+
 def write_report(report: Report, message: pb.Report) -> None:
     """Put a report into an empty message: half of the time that copying takes."""
     message.is_viable, message.reason = report.is_viable, report.reason

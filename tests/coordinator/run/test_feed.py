@@ -46,7 +46,7 @@ def _death(number: int) -> Record:
 def _feed(*records: Record) -> Feed:
     feed = Feed("run", 1, RunDetails("experiment", 0, 1, "{}"))
     for record in records:
-        feed.note(record)
+        feed.unread.append(record)
     return feed
 
 
@@ -58,7 +58,7 @@ def _told(news: News | None) -> News:
 def test_news_are_numbered_and_tell_each_row_once() -> None:
     feed = _feed(_birth(0), _birth(1))
     first = _told(feed.news(()))
-    feed.note(_birth(2, None, 0, 1))
+    feed.unread.append(_birth(2, None, 0, 1))
     second = _told(feed.news(()))
     assert (first.sequence, second.sequence) == (1, 2)
     assert [one.birth.number for one in first.births] == [0, 1]
@@ -79,7 +79,7 @@ def test_all_of_it_is_the_sum_of_the_news() -> None:
     feed = _feed(_birth(0), _birth(1), *_population(2, 0, 1))
     parts = [_told(feed.news(WORKERS))]
     for record in (_birth(2, None, 0, 1), *_population(3, 1, 2)):
-        feed.note(record)
+        feed.unread.append(record)
     parts.append(_told(feed.news(WORKERS)))
     whole = feed.whole()
     assert (whole.sequence, whole.is_whole) == (2, True)
@@ -93,14 +93,14 @@ def test_all_of_it_is_the_sum_of_the_news() -> None:
 def test_all_of_it_says_nothing_that_the_news_have_not_said() -> None:
     feed = _feed(_birth(0))
     feed.news(())
-    feed.note(_birth(1))
+    feed.unread.append(_birth(1))
     assert len(feed.whole().births) == 1
 
 
 def test_the_dead_leave_no_body_on_line() -> None:
     feed = _feed(_birth(0, 0.0), _birth(1, 1.0), *_population(2, 0, 1))
     feed.news(())
-    feed.note(_death(0))
+    feed.unread.append(_death(0))
     news = _told(feed.news(()))
     assert [gone.birth for gone in news.deaths] == [BirthId(0, 0)]
     assert [one.body for one in feed.whole().births] == [None, CORE]
@@ -110,7 +110,7 @@ def test_who_is_not_selected_leaves_no_body_off_line() -> None:
     feed = _feed(_birth(0), _birth(1), *_population(2, 0, 1), _birth(2), _birth(3))
     feed.news(())
     for record in (*_population(4, 1, 3), _birth(4)):
-        feed.note(record)
+        feed.unread.append(record)
     feed.news(())
     bodies = {one.birth.number: one.body for one in feed.whole().births}
     assert bodies == {0: None, 1: CORE, 2: None, 3: CORE, 4: CORE}
