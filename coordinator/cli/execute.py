@@ -315,16 +315,17 @@ def _conduct(
             shown_s = done_s = -math.inf
             while not (scheduler.is_finished or stop.is_set()):
                 scheduler.turn(_LOOK_S, time.monotonic)
-                serve()
                 now_s = time.monotonic()
                 if now_s - shown_s >= _LOOK_S:
                     shown_s = now_s
+                    serve(now_s)
                     display.update(now_s)
                 if now_s - done_s >= _CHORES_S:
                     done_s = now_s
                     scheduler.do_chores(now_s)
                     for look_after in process_pools:
                         look_after()
+            serve(time.monotonic())
         scheduler.stop()
     return scheduler
 
@@ -340,15 +341,14 @@ def _most_at_once() -> int:
     return max(1, (hard - _OTHER_FILES) // _FILES_OF_A_RUN)
 
 
-def _servant(scheduler: RunScheduler, agents: Agents) -> Callable[[], None]:
+def _servant(scheduler: RunScheduler, agents: Agents) -> Callable[[float], None]:
     """Return what serves operators and viewers; a run without a network has none."""
     if not isinstance(agents, Network):
-        return lambda: None
+        return lambda _: None
     reception = Reception(scheduler)
     live_server: list[tuple[RunSession, LiveServer]] = []
 
-    def serve() -> None:
-        now_s = time.monotonic()
+    def serve(now_s: float) -> None:
         for order in agents.orders():
             order.reply(reception.answer(order.data, now_s))
         run = scheduler.watched

@@ -19,7 +19,7 @@ from schema.agent.network import Tls
 from schema.wire.news import Crewman
 from schema.wire.news_codec import encode_news
 
-_NEWS_S = 0.25
+_NEWS_S = 0.2
 _WHOLE_S = 1.0
 
 

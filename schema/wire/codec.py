@@ -173,6 +173,16 @@ def decode_request(
     return decoded(data, pb.Request(), lambda message: _request(message, read))
 
 
+def is_advance_request(data: bytes) -> bool:
+    """Return whether a job is about an arena, and not about a single robot.
+
+    Raises:
+        MalformedMessage: bytes that are no request of either kind.
+    """
+    # Only a request about an arena has changes, even if they are empty.
+    return decoded(data, pb.AdvanceRequest(), lambda found: found.HasField("changes"))
+
+
 def encode_answer(answer: Answer) -> bytes:
     """Return the bytes of an answer."""
     message = pb.Answer(epoch=answer.epoch, number=answer.number, wall_s=answer.wall_s)
