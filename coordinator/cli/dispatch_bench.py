@@ -24,7 +24,7 @@ from coordinator.cli.fleet_model import (
     Setting,
     most_workers,
 )
-from coordinator.dispatch.events import AgentKind, Deliver, Job, Returned
+from coordinator.dispatch.events import AgentKind, Client, Deliver, Job
 from coordinator.dispatch.fleet import Fleet
 from coordinator.evolution.generation import generate
 from coordinator.network.service import Network
@@ -38,7 +38,6 @@ from schema.experiment.document import body_space
 from schema.experiment.file import experiment_text, read_experiment
 from schema.experiment.settings import evaluation_settings
 from schema.robot.genome import develop
-from schema.robot.ids import BirthId
 from schema.wire.codec import encode_request, encode_robot
 
 Body = Callable[[Agent, ProcessSlot], None]
@@ -49,6 +48,7 @@ MOST_NULL_CPU_S = 0.4e-3
 LEAST_WORKERS = 1000
 """Workers that one coordinator must keep busy with evaluations of 10 s."""
 
+_CLIENT = Client("bench", 1)
 _IN_FLIGHT = 64
 _ROBOTS = 50
 _TIMEOUT_S = 60.0
@@ -98,33 +98,24 @@ class Stream:
 
     def _ask(self) -> None:
         number = self._fleet.new_number()
+        robot = self._robots[number % _ROBOTS]
+        run, epoch = _CLIENT
         payload = encode_request(
-            run="bench",
-            epoch=1,
-            number=number,
-            settings=self._settings,
-            robot=self._robots[number % _ROBOTS],
+            run=run, epoch=epoch, number=number, settings=self._settings, robot=robot
         )
-        self._fleet.ask(Job(number, "evaluate", BirthId(0, number), 0, payload), self)
+        self._fleet.request(Job(number, "evaluate", payload, client=_CLIENT))
 
-    def is_of(self, run: str, epoch: int) -> bool:
-        """Return whether a job belongs to this stream."""
-        return (run, epoch) == ("bench", 1)
-
-    def checked(self, event: Returned) -> Returned:
-        """Return the answer unchecked: the benchmark does not use it."""
-        return event
-
-    def deliver(self, command: Deliver) -> None:
-        """Count an answer and request the next evaluation.
+    def listen(self, timeout_s: float, now_s: float) -> None:
+        """Count the answers, and send a request for each.
 
         Raises:
-            RuntimeError: the workers cannot do the job.
+            RuntimeError: the workers cannot do a job.
         """
-        if command.reason:
-            raise RuntimeError(command.reason)
-        self.done += 1
-        self._ask()
+        for end in self._fleet.listen(timeout_s, now_s).get(_CLIENT, ()):
+            if isinstance(end, Deliver) and end.reason:
+                raise RuntimeError(end.reason)
+            self.done += 1
+            self._ask()
 
 
 @contextmanager
@@ -153,20 +144,19 @@ def real_fleet(bodies: dict[AgentKind, tuple[Body, int]]) -> Iterator[Fleet]:
         yield fleet
 
 
-def measure(fleet: Fleet, done: Callable[[], int], seconds: float) -> Rate:
+def measure(stream: Stream, seconds: float) -> Rate:
     """Measure for some time, after a tenth of it to warm up.
 
     Args:
-        fleet: fleet to listen to.
-        done: returns the number of finished jobs.
+        stream: evaluations to count.
         seconds: duration of the measurement [s].
     """
     for share in (0.1, 1.0):
-        before, wall_s, cpu_s = done(), time.perf_counter(), time.process_time()
+        before, wall_s, cpu_s = stream.done, time.perf_counter(), time.process_time()
         end_s = time.monotonic() + share * seconds
         while (now_s := time.monotonic()) < end_s:
-            fleet.listen(0.1, now_s)
-        count = max(1, done() - before)
+            stream.listen(0.1, now_s)
+        count = max(1, stream.done - before)
         rate = Rate(
             count / (time.perf_counter() - wall_s),
             (time.process_time() - cpu_s) / count,
@@ -177,8 +167,7 @@ def measure(fleet: Fleet, done: Callable[[], int], seconds: float) -> Rate:
 def null_rate(body: Body, seconds: float) -> Rate:
     """Measure null evaluations over the network."""
     with real_fleet({"worker": (body, 1)}) as fleet:
-        stream = Stream(fleet, _IN_FLIGHT)
-        return measure(fleet, lambda: stream.done, seconds)
+        return measure(Stream(fleet, _IN_FLIGHT), seconds)
 
 
 def birth_cost(null: Body, analyzer: Body, births: int) -> Rate:
@@ -195,8 +184,8 @@ def birth_cost(null: Body, analyzer: Body, births: int) -> Rate:
         wall_s, cpu_s = time.perf_counter(), time.process_time()
         while not run.loop.is_finished:
             now_s = time.monotonic()
-            fleet.listen(0.1, now_s)
-            run.loop.act(now_s)
+            ends = fleet.listen(0.1, now_s)
+            run.loop.act(now_s, ends.get(run.loop.client, ()))
         wall_s, cpu_s = time.perf_counter() - wall_s, time.process_time() - cpu_s
         run.close()
     return Rate(births / wall_s, cpu_s / births)
@@ -223,8 +212,7 @@ def run(options: argparse.Namespace, null: Body, timed: Body, analyzer: Body) ->
     )
     is_met = rate.per_s >= LEAST_NULL_PER_S and rate.cpu_s <= MOST_NULL_CPU_S
     with real_fleet({"worker": (timed, options.workers)}) as fleet:
-        stream = Stream(fleet, 3 * options.workers)
-        slow = measure(fleet, lambda: stream.done, seconds)
+        slow = measure(Stream(fleet, 3 * options.workers), seconds)
     _say(
         f"evaluations of 40 ms, real network, {options.workers} workers: "
         f"{slow.per_s:.0f}/s, utilisation "

@@ -31,7 +31,6 @@ from coordinator.dispatch.events import (
     Returned,
     Ticked,
 )
-from schema.robot.ids import BirthId
 
 LEAST_UTILISATION = 0.95
 _ROUNDS = 10
@@ -169,8 +168,7 @@ class FleetModel:
 
     def _request(self) -> None:
         number = next(self._jobs)
-        job = Job(number, "evaluate", BirthId(0, number), 0, b"")
-        self._handle_event(Requested(job))
+        self._handle_event(Requested(Job(number, "evaluate", b"")))
 
     def _tick(self) -> None:
         self._handle_event(Ticked(self._now_s))

@@ -18,8 +18,8 @@ from coordinator.islands.events import (
     Resume,
     Vetted,
     VettingFailed,
-    requester_of,
 )
+from coordinator.run.requests import requester_of
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.wire.arena import Casualty, Judgement

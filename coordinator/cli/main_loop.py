@@ -71,16 +71,18 @@ def execute_runs(
             while not (scheduler.is_finished or stop.is_set()):
                 scheduler.turn(_TURN_S, time.monotonic)
                 now_s = time.monotonic()
-                if server is not None:
-                    server.serve(now_s)
                 if now_s - shown_s >= _TURN_S:
                     shown_s = now_s
+                    if server is not None:
+                        server.serve(now_s)
                     display.update(now_s)
                 if now_s - done_s >= _CHORES_S:
                     done_s = now_s
                     scheduler.do_chores(now_s)
                     for pool in pools:
                         pool.look_after()
+            if server is not None:
+                server.serve(time.monotonic())
         scheduler.stop()
     return scheduler
 

@@ -13,8 +13,8 @@ from rich.progress import (
 )
 
 from coordinator.cli.format import about_arenas, best_of, duration, run_details
-from coordinator.run.rate import SPAN_S
 from coordinator.run.scheduler import RunScheduler
+from coordinator.run.session import SPAN_S
 from schema.wire.status import IslandStatus, RunStatus, Status
 
 MOST_BARS = 16
@@ -110,7 +110,7 @@ class Display:
         waiting = {
             f"arena {shard} of {run.held.path.name}": platform
             for run in self._scheduler.active
-            for shard, platform in run.loop.advances.waiting.items()
+            for shard, platform in run.loop.shard_requests.waiting.items()
         }
         if "worker" not in missing and waiting != self._shown_waiting:
             self._shown_waiting = waiting

@@ -21,10 +21,12 @@ from coordinator.dispatch.events import (
     AgentKind,
     Assign,
     Cancel,
+    Client,
     Deliver,
     Died,
     DispatchCommand,
     DispatchEvent,
+    Job,
     JobKind,
     Joined,
     Left,
@@ -33,9 +35,15 @@ from coordinator.dispatch.events import (
     Ticked,
     Withdrawn,
 )
-from coordinator.dispatch.pool import AgentState, Backoff, PairedJobs, Pending, Pool
-from coordinator.dispatch.stragglers import Stragglers
-from schema.errors import UnexpectedEvent
+from coordinator.dispatch.pool import (
+    AgentState,
+    Backoff,
+    PairedJobs,
+    Pending,
+    Pool,
+    Stragglers,
+)
+from schema.errors import MalformedMessage, UnexpectedEvent
 
 AGENT_OF: dict[JobKind, AgentKind] = {"vet": "analyzer", "evaluate": "worker"}
 MAX_ERRORS = 3
@@ -45,9 +53,14 @@ VETS_AT_HAND = 16
 
 
 class Dispatch:
-    """The machine; ``handle`` is its only door."""
+    """The machine; events enter only through ``handle``.
+
+    Attributes:
+        malformed: answers that did not decode or did not fit their job.
+    """
 
     def __init__(self) -> None:
+        self.malformed = 0
         self._jobs: dict[int, Pending] = {}
         self._pools: dict[AgentKind, Pool] = {
             "worker": Pool(),
@@ -74,6 +87,10 @@ class Dispatch:
     def pending(self) -> int:
         """How many jobs are asked for and not delivered."""
         return len(self._jobs)
+
+    def jobs_of(self, client: Client) -> list[int]:
+        """Return the numbers of a client's jobs that are not delivered."""
+        return [n for n, each in self._jobs.items() if each.job.client == client]
 
     def agents(self, kind: AgentKind) -> int:
         """Return how many agents of a kind are there."""
@@ -177,27 +194,47 @@ class Dispatch:
         if event.number not in agent.held:
             return
         del agent.held[event.number]
-        # A copy that came too late says nothing of the agent but that it is free.
+        # A late copy only shows that the agent is free.
         if pending := self._jobs.get(event.number):
-            yield from self._outcome(pending, event)
-            if event.outcome == "ok":
+            answer, reason = self._read(pending.job, event)
+            if event.outcome == "ok" and not reason:
                 agent.failures = 0
+                self._learn(pending, agent)
+                platform = agent.joined.platform
+                yield Deliver(pending.job, event.agent, platform, answer)
+                yield from self._close(pending)
             else:
+                yield from self._fail(pending, event, reason)
                 self._backoff.begin(agent, self._now_s or 0.0)
         pool.offer(event.agent, next(self._stamps))
         yield from self._assign(pool)
 
-    def _outcome(self, pending: Pending, event: Returned) -> Iterator[DispatchCommand]:
-        """Deliver a job, or see to it that another agent gets it."""
-        pending.errors += event.outcome == "error"
-        if event.outcome == "ok" or pending.errors == MAX_ERRORS:
-            since_s, place = pending.holders.pop(event.agent)
-            if event.outcome == "ok" and self._now_s is not None:
-                elapsed_s = self._now_s - since_s
-                self._stragglers.learn(pending.job.kind, elapsed_s)
-                pool = self._pools[AGENT_OF[pending.job.kind]]
-                pool.agents[event.agent].learn(elapsed_s / place)
-            yield Deliver(pending.job, event.agent, event.answer, event.reason)
+    def _read(self, job: Job, event: Returned) -> tuple[object, str]:
+        """Return the decoded answer, or the reason why there is none."""
+        if event.outcome != "ok":
+            return None, event.reason
+        try:
+            return job.read(event.answer), ""
+        except MalformedMessage as error:
+            self.malformed += 1
+            return None, str(error)
+
+    def _learn(self, pending: Pending, agent: AgentState) -> None:
+        """Note how long an agent took for a job, which it no longer holds."""
+        since_s, place = pending.holders.pop(agent.joined.agent)
+        if self._now_s is not None:
+            elapsed_s = self._now_s - since_s
+            self._stragglers.learn(pending.job.kind, elapsed_s)
+            agent.learn(elapsed_s / place)
+
+    def _fail(
+        self, pending: Pending, event: Returned, reason: str
+    ) -> Iterator[DispatchCommand]:
+        """Give a job to another agent, or give it up after several errors."""
+        pending.errors += event.outcome != "lost"
+        if pending.errors == MAX_ERRORS:
+            del pending.holders[event.agent]
+            yield Deliver(pending.job, event.agent, reason=reason)
             yield from self._close(pending)
             return
         if event.agent not in pending.avoid:
@@ -215,7 +252,7 @@ class Dispatch:
 
     def _died(self, event: Died) -> Iterator[DispatchCommand]:
         pending = self._jobs.get(event.number)
-        if pending is None:
+        if pending is None or pending.job.client != (event.run, event.epoch):
             return
         pending.killed[event.agent] = event.cause
         if len(pending.killed) < MAX_DEATHS:
@@ -225,7 +262,7 @@ class Dispatch:
             pool.drop(event.number)
         causes = ", ".join(sorted(set(pending.killed.values())))
         reason = f"ended its own process {MAX_DEATHS} times, by {causes}"
-        yield Deliver(pending.job, event.agent, b"", reason, is_deadly=True)
+        yield Deliver(pending.job, event.agent, reason=reason, is_deadly=True)
         yield from self._close(pending)
 
     def _ticked(self, event: Ticked) -> Iterator[DispatchCommand]:

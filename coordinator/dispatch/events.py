@@ -4,17 +4,28 @@ Jobs are single requests, to any agent of a kind; shards are arenas, each of whi
 lives in one worker.
 """
 
-from dataclasses import dataclass
-from typing import Literal
-
-from schema.robot.ids import BirthId
-
-# --- Jobs
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
 
 AgentKind = Literal["worker", "analyzer"]
 
-
 JobKind = Literal["vet", "evaluate"]
+
+Read = Callable[[bytes], object]
+"""Decodes an answer and checks it; raises ``MalformedMessage`` if it is unfit."""
+
+
+class Client(NamedTuple):
+    """A coordinator's incarnation of a run: requests jobs and advances."""
+
+    run: str
+    epoch: int
+
+
+NO_CLIENT = Client("", 0)
+
+# --- Jobs
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,26 +33,28 @@ class Job:
     """One piece of work, a pure function of its payload.
 
     Attributes:
-        number: unique within the coordinator's incarnation, ascending.
-        kind: what it asks for; "vet" goes to analyzers, "evaluate" to workers.
-        birth: whom it is about.
-        attempt: mating attempt, for "vet"; trial, for "evaluate".
-        payload: the encoded request (schema.wire.codec).
-        twin: number of a job that somebody else is to do, if there is anybody
-            else; -1 if none is.
+        number: unique within the process, ascending.
+        kind: "vet" goes to analyzers, "evaluate" to workers.
+        payload: the encoded request.
+        twin: number of the same request's other job, which another agent does if
+            there is one; -1 if there is no other job.
+        client: the run that requested it.
+        subject: the client's own description of the job.
+        read: decodes and checks an answer.
     """
 
     number: int
     kind: JobKind
-    birth: BirthId
-    attempt: int
     payload: bytes
     twin: int = -1
+    client: Client = NO_CLIENT
+    subject: object = None
+    read: Read = field(default=bytes, compare=False)
 
 
 @dataclass(frozen=True, slots=True)
 class Joined:
-    """A worker or an analyzer is there and takes jobs."""
+    """A worker or an analyzer is ready for jobs."""
 
     agent: str
     kind: AgentKind
@@ -51,21 +64,21 @@ class Joined:
 
 @dataclass(frozen=True, slots=True)
 class Left:
-    """A worker or an analyzer is gone; whatever it held is lost."""
+    """A worker or an analyzer is gone; the jobs that it held are lost."""
 
     agent: str
 
 
 @dataclass(frozen=True, slots=True)
 class Requested:
-    """Somebody wants a job done."""
+    """A client wants a job done."""
 
     job: Job
 
 
 @dataclass(frozen=True, slots=True)
 class Withdrawn:
-    """Nobody wants a job done any more; it may be done."""
+    """A job is no longer wanted; it may be done already."""
 
     number: int
 
@@ -75,10 +88,10 @@ class Returned:
     """A job came back from an agent.
 
     Attributes:
-        number: the job's.
-        agent: who had it.
+        number: of the job.
+        agent: that had it.
         outcome: "ok" with an answer, "error" with a reason (the agent could not
-            do it), or "lost" (no word: the agent died, froze or was cut off).
+            do it), or "lost" (no reply: the agent died, froze or was cut off).
         answer: encoded answer; empty unless ok.
         reason: empty unless error.
     """
@@ -92,12 +105,12 @@ class Returned:
 
 @dataclass(frozen=True, slots=True)
 class Died:
-    """A process ended by the doing of the job that it was at, not of its machine.
+    """A job crashed the process that did it.
 
     Attributes:
-        run, epoch: whose job.
-        number: the job's.
-        agent: the process, which never comes back.
+        run, epoch: of the client that requested the job.
+        number: of the job.
+        agent: name of the process, which is never used again.
         cause: such as "SIGSEGV".
     """
 
@@ -110,7 +123,7 @@ class Died:
 
 @dataclass(frozen=True, slots=True)
 class Ticked:
-    """Time passed [s]; any monotonic origin."""
+    """Time passed: the time now, of a monotonic clock [s]."""
 
     now_s: float
 
@@ -128,26 +141,28 @@ class Assign:
 
 @dataclass(frozen=True, slots=True)
 class Deliver:
-    """A job is done for good: with an answer, or with a reason why never.
+    """A job is done, or given up for a reason.
 
     Attributes:
-        job: which.
-        agent: who had it last.
-        answer: empty if there is a reason.
-        reason: why nobody can do it.
-        is_deadly: it ends whoever tries it.
+        job: that ended.
+        agent: that had it last.
+        platform: of the agent; empty for a job that is given up.
+        answer: what ``job.read`` returned; None if there is a reason.
+        reason: why no agent can do it.
+        is_deadly: it crashes every process that tries it.
     """
 
     job: Job
     agent: str
-    answer: bytes
+    platform: str = ""
+    answer: object = None
     reason: str = ""
     is_deadly: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Cancel:
-    """Nobody waits for this job of this agent any more."""
+    """The agent's work on a job is no longer needed."""
 
     job: Job
     agent: str
@@ -161,7 +176,7 @@ DispatchCommand = Assign | Deliver | Cancel
 
 @dataclass(frozen=True, slots=True)
 class ShardSeen:
-    """A journal tells on what platform a shard has been advanced."""
+    """A shard was advanced on a platform, according to the journal."""
 
     shard: int
     platform: str
@@ -169,42 +184,44 @@ class ShardSeen:
 
 @dataclass(frozen=True, slots=True)
 class ShardRequested:
-    """A shard is to be advanced; comes again only after ``ShardDone``."""
+    """A shard is to be advanced; may be repeated only after ``ShardDone``."""
 
     shard: int
 
 
 @dataclass(frozen=True, slots=True)
 class ShardReturned:
-    """What became of an advance that was handed out.
+    """An assigned advance came back from its worker.
 
     Attributes:
         number: of the ``AssignShard``.
         outcome: "done"; "stateless" (the worker does not have the state); "error"
-            with a reason; "lost" (no word).
+            with a reason; "lost" (no reply).
         reason: empty unless error.
+        answer: decoded; None unless done.
     """
 
     number: int
     outcome: Literal["done", "stateless", "error", "lost"]
     reason: str = ""
+    answer: object = None
 
 
 @dataclass(frozen=True, slots=True)
 class Released:
-    """A shard needs nothing more; whoever holds it may take another."""
+    """A shard needs no more advances; its holder is free for another one."""
 
     shard: int
 
 
 @dataclass(frozen=True, slots=True)
 class Killed:
-    """An advance that was handed out ended its worker, by its own doing.
+    """An assigned advance crashed its worker.
 
     Attributes:
         number: of the ``AssignShard``.
-        agent: who died, once.
-        cause: of what.
+        agent: that died.
+        cause: such as "SIGSEGV".
     """
 
     number: int
@@ -230,28 +247,37 @@ class AssignShard:
 
     Attributes:
         number: of the job, used once.
-        shard: whose advance.
+        shard: to advance.
         agent: the worker.
-        is_whole: with what it takes to rebuild the state.
+        platform: of the worker.
+        is_whole: the request includes what is needed to rebuild the state.
     """
 
     number: int
     shard: int
     agent: str
+    platform: str
     is_whole: bool
 
 
 @dataclass(frozen=True, slots=True)
 class ShardDone:
-    """The advance of a shard is done, by this worker."""
+    """The advance of a shard is done.
+
+    Attributes:
+        shard: that was advanced.
+        agent: the worker that did it.
+        answer: decoded.
+    """
 
     shard: int
     agent: str
+    answer: object = None
 
 
 @dataclass(frozen=True, slots=True)
 class ShardFailed:
-    """Several workers cannot advance a shard, the last of them this one."""
+    """The advance of a shard is given up, last tried by an agent."""
 
     shard: int
     agent: str

@@ -1,11 +1,11 @@
-"""The agents that all runs of this process share, and who of them does what.
+"""The agents that all runs of this process share, and the routing of their jobs.
 
-Jobs of all runs go through the same machines, under numbers of one kind, so that no
-run knows of the others and none of them can take all workers for itself. Whose a job
-is stands here; what it means is known to who asked.
+Jobs of all runs go through the same machines, with numbers from one sequence, so that
+runs do not know of each other and none of them can take all workers. The client of a
+job is noted here; only the client knows what an answer means.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import count
 from typing import Protocol
 
@@ -14,6 +14,7 @@ from coordinator.dispatch.events import (
     Assign,
     AssignShard,
     Cancel,
+    Client,
     Deliver,
     Died,
     DispatchCommand,
@@ -22,10 +23,10 @@ from coordinator.dispatch.events import (
     Joined,
     Killed,
     Left,
+    Read,
     Released,
     Requested,
     Returned,
-    ShardCommand,
     ShardDone,
     ShardEvent,
     ShardFailed,
@@ -36,82 +37,67 @@ from coordinator.dispatch.events import (
     Withdrawn,
 )
 from coordinator.dispatch.shards import ShardDispatch
+from schema.errors import MalformedMessage
 
 
 class Agents(Protocol):
-    """Where jobs go and answers come from: a network, or this process."""
+    """Connection to the agents: a network, or functions in this process."""
 
     def send(self, number: int, agent: str, payload: bytes) -> None:
-        """Hand a job to an agent; its outcome comes by ``receive``."""
+        """Send a job to an agent; ``receive`` returns its outcome."""
 
     def cancel(self, _agent: str, _payload: bytes, /) -> None:
-        """Tell an agent that nobody waits for a job, by the job's own request."""
+        """Tell an agent, by the job's request, that a job is no longer wanted."""
 
     def receive(
         self, timeout_s: float, pause_s: float = 0.0, /
     ) -> Sequence[DispatchEvent]:
-        """Return what happened: during a pause, and if nothing did, thereafter."""
+        """Return events: those of a pause, or else the first ones after it."""
 
 
-class JobClient(Protocol):
-    """One that asks questions about single robots."""
+Encode = Callable[[AssignShard], tuple[bytes, Read]]
+"""Returns the request of an advance, and what decodes and checks its answer."""
 
-    def is_of(self, run: str, epoch: int) -> bool:
-        """Return whether the questions are those of a run's incarnation."""
-
-    def checked(self, event: Returned) -> Returned:
-        """Return what came of a job; an answer of no use becomes an error."""
-
-    def deliver(self, command: Deliver) -> None:
-        """Take the end of a job."""
-
-
-class ShardClient(Protocol):
-    """One that has arenas advanced."""
-
-    def is_of(self, run: str, epoch: int) -> bool:
-        """Return whether the arenas are those of a run's incarnation."""
-
-    def payload(self, command: AssignShard) -> bytes:
-        """Return the request that a worker is handed."""
-
-    def understood(self, event: Returned) -> ShardReturned:
-        """Return what a worker's word means."""
-
-    def settle(self, command: ShardDone | ShardFailed) -> None:
-        """Take the end of an advance."""
+End = Deliver | ShardDone | ShardFailed
+"""What a client is told about a job or an advance."""
 
 
 class Fleet:
     """Workers and analyzers, the jobs of all runs, and the way between them.
 
     Attributes:
-        dispatch: who does what, of single robots' questions.
-        shards: who holds which arena; its numbers are this process's own.
+        dispatch: assigns jobs about single robots.
+        shards: assigns arena shards; their numbers are unique within this process.
     """
 
     def __init__(self, agents: Agents, *, allows_drift: bool = False) -> None:
-        """Share out agents; nobody has asked for anything yet.
+        """Share out agents.
 
         Args:
-            agents: what leads to them.
-            allows_drift: an arena may go on by another platform where its own is gone.
+            agents: the connection to them.
+            allows_drift: an arena may move to another platform if its own is gone.
         """
         self._numbers = count(1)
         self.dispatch = Dispatch()
         self.shards = ShardDispatch(self._numbers, allows_drift=allows_drift)
+        self._malformed = 0
         self._agents = agents
         self._shard_numbers = count()
-        self._job_clients: dict[int, JobClient] = {}
-        self._shard_clients: dict[int, ShardClient] = {}
+        self._shard_clients: dict[int, tuple[Client, Encode]] = {}
+        self._advance_reads: dict[int, Read] = {}
         self._credits: dict[str, int] = {}
-        self._news: dict[JobClient | ShardClient, None] = {}
+        self._ends: dict[Client, list[End]] = {}
         self._advancing: set[int] = set()
 
     @property
+    def malformed(self) -> int:
+        """Answers that did not decode or did not fit their request."""
+        return self._malformed + self.dispatch.malformed
+
+    @property
     def open(self) -> int:
-        """How many jobs and advances are asked for and not done."""
-        return len(self._job_clients) + len(self._advancing)
+        """How many jobs and advances are requested and not done."""
+        return self.dispatch.pending + len(self._advancing)
 
     @property
     def credits(self) -> int:
@@ -122,115 +108,114 @@ class Fleet:
         """Return a number for a job."""
         return next(self._numbers)
 
-    def ask(self, job: Job, requester: JobClient) -> None:
+    def request(self, job: Job) -> None:
         """Have a job done."""
-        self._job_clients[job.number] = requester
         self._obey(self.dispatch.handle(Requested(job)))
 
-    def new_shard(self, owner: ShardClient) -> int:
-        """Return a number for an arena's shard."""
+    def new_shard(self, client: Client, encode: Encode, platform: str) -> int:
+        """Return a number for an arena's shard.
+
+        Args:
+            client: the run of the arena.
+            encode: returns the request of each advance when it is assigned.
+            platform: on which the shard has been advanced; empty if never.
+        """
         shard = next(self._shard_numbers)
-        self._shard_clients[shard] = owner
+        self._shard_clients[shard] = (client, encode)
+        self._move(ShardSeen(shard, platform))
         return shard
 
-    def place(self, shard: int, platform: str) -> None:
-        """Note on what platform a shard has been advanced."""
-        self._move(ShardSeen(shard, platform))
-
     def advance(self, shard: int) -> None:
-        """Have a shard advanced; its owner knows how far."""
+        """Have a shard advanced; its client knows how far."""
         self._advancing.add(shard)
         self._move(ShardRequested(shard))
 
-    def release(self, shard: int) -> None:
-        """Forget a shard that needs nothing more."""
-        self._shard_clients.pop(shard, None)
-        self._advancing.discard(shard)
-        self._move(Released(shard))
-
-    def leave(self, requester: JobClient) -> None:
-        """Let nobody work for one that asks no more."""
-        for number in [n for n, each in self._job_clients.items() if each is requester]:
-            del self._job_clients[number]
+    def leave(self, client: Client) -> None:
+        """Drop all jobs and shards of a client."""
+        for number in self.dispatch.jobs_of(client):
             self._obey(self.dispatch.handle(Withdrawn(number)))
+        for shard, (owner, _) in list(self._shard_clients.items()):
+            if owner == client:
+                del self._shard_clients[shard]
+                self._advancing.discard(shard)
+                self._move(Released(shard))
 
-    def listen(self, timeout_s: float, now_s: float) -> list[JobClient | ShardClient]:
-        """Return who has news, after waiting for some.
+    def listen(self, timeout_s: float, now_s: float) -> dict[Client, list[End]]:
+        """Return what ended for each client, after waiting for something to end.
 
         Args:
-            timeout_s: how long to wait when nothing is there [s].
-            now_s: the time, of any clock that only goes forward [s].
+            timeout_s: how long to wait for the first event [s].
+            now_s: the time, of a monotonic clock [s].
         """
-        for wake_s in (self.dispatch.wake_s, self.shards.wake_s):
+        wakes = [self.dispatch.wake_s]
+        if self._shard_clients:
+            wakes.append(self.shards.wake_s)
+        for wake_s in wakes:
             if wake_s is not None:
                 timeout_s = min(timeout_s, max(0.0, wake_s - now_s))
         self.tell(Ticked(now_s))
-        # Woken for each answer, one spends more on waking up than on answers.
+        # Waking up for each answer would cost more than the answers themselves.
         pause_s = 0.0 if self._advancing else self.dispatch.leisure_s
         for event in self._agents.receive(timeout_s, min(timeout_s, pause_s)):
             self.tell(event)
-        news, self._news = list(self._news), {}
-        return news
+        ends, self._ends = self._ends, {}
+        return ends
 
     def tell(self, event: DispatchEvent) -> None:
-        """Take news of agents, of jobs or of time."""
+        """Handle an event of agents, of jobs or of time."""
         if isinstance(event, Returned):
-            self._returned(event)
-            return
-        if isinstance(event, Joined) and event.kind == "worker":
-            self._credits[event.agent] = event.slots + 1
+            read = self._advance_reads.pop(event.number, None)
+            if read is not None:
+                self._move(self._read_advance(event, read))
+                return
+        elif isinstance(event, Died):
+            shard = self.shards.shard_that_lost(event.number)
+            if shard is not None:
+                if self._shard_clients[shard][0] == (event.run, event.epoch):
+                    self._move(Killed(event.number, event.agent, event.cause))
+                return
+        elif isinstance(event, Joined):
+            if event.kind == "worker":
+                self._credits[event.agent] = event.slots + 1
+                self._move(event)
         elif isinstance(event, Left):
             self._credits.pop(event.agent, None)
-        if isinstance(event, Joined | Left | Ticked):
             self._move(event)
-        if not (isinstance(event, Died) and self._is_shards(event)):
-            self._obey(self.dispatch.handle(event))
+        elif self._shard_clients and isinstance(event, Ticked):
+            self._move(event)
+        self._obey(self.dispatch.handle(event))
 
-    def _is_shards(self, event: Died) -> bool:
-        """Pass on whom an advance killed; True also for another coordinator's job."""
-        shard = self.shards.shard_that_lost(event.number)
-        requester = (
-            self._job_clients.get(event.number)
-            if shard is None
-            else self._shard_clients[shard]
-        )
-        if requester is None or not requester.is_of(event.run, event.epoch):
-            return True
-        if shard is not None:
-            self._move(Killed(event.number, event.agent, event.cause))
-        return shard is not None
-
-    def _returned(self, event: Returned) -> None:
-        if self.shards.has_out(event.number):
-            owner = self._shard_clients[self.shards.shard_of(event.number)]
-            self._move(owner.understood(event))
-            return
-        requester = self._job_clients.get(event.number)
-        checked = event if requester is None else requester.checked(event)
-        self._obey(self.dispatch.handle(checked))
+    def _read_advance(self, event: Returned, read: Read) -> ShardReturned:
+        """Return the outcome of an advance; an unfit answer is the worker's error."""
+        if event.outcome != "ok":
+            return ShardReturned(event.number, event.outcome, event.reason)
+        try:
+            answer = read(event.answer)
+        except MalformedMessage as error:
+            self._malformed += 1
+            return ShardReturned(event.number, "error", str(error))
+        if answer is None:
+            return ShardReturned(event.number, "stateless")
+        return ShardReturned(event.number, "done", answer=answer)
 
     def _obey(self, commands: Sequence[DispatchCommand]) -> None:
         for command in commands:
+            job = command.job
             if isinstance(command, Assign):
-                job = command.job
                 self._agents.send(job.number, command.agent, job.payload)
             elif isinstance(command, Deliver):
-                requester = self._job_clients.pop(command.job.number, None)
-                if requester is not None:
-                    requester.deliver(command)
-                    self._news[requester] = None
+                self._ends.setdefault(job.client, []).append(command)
             elif isinstance(command, Cancel):
-                self._agents.cancel(command.agent, command.job.payload)
+                self._agents.cancel(command.agent, job.payload)
 
     def _move(self, event: ShardEvent) -> None:
-        """Tell the machine that has the shards, and do what it says."""
-        commands: list[ShardCommand] = self.shards.handle(event)
-        for command in commands:
-            owner = self._shard_clients[command.shard]
+        """Pass an event to the machine that assigns shards, and do what it says."""
+        for command in self.shards.handle(event):
+            client, encode = self._shard_clients[command.shard]
             if isinstance(command, AssignShard):
-                payload = owner.payload(command)
+                payload, read = encode(command)
+                self._advance_reads[command.number] = read
                 self._agents.send(command.number, command.agent, payload)
             else:
                 self._advancing.discard(command.shard)
-                owner.settle(command)
-                self._news[owner] = None
+                self._ends.setdefault(client, []).append(command)

@@ -6,7 +6,7 @@ from heapq import heapify, heappop, heappush
 from itertools import count
 from math import inf
 
-from coordinator.dispatch.events import Job, Joined
+from coordinator.dispatch.events import Job, JobKind, Joined
 
 MOST_AHEAD = 16
 """Jobs more than the one that is always at hand."""
@@ -264,3 +264,39 @@ class PairedJobs:
         """Forget a pair, both of which are done."""
         self._doers.pop(job.number, None)
         self._doers.pop(job.twin, None)
+
+
+PATIENCE = 4.0
+"""A job is late after so many times the typical duration of its kind."""
+LEAST_S = 1.0
+"""And never before [s]: a second copy costs more than waiting so long."""
+LOOK_S = 0.25
+"""Time between two looks for jobs that are late [s]."""
+
+
+class Stragglers:
+    """How long jobs of each kind take, from when they are given out [s]."""
+
+    def __init__(self) -> None:
+        """Know of no job yet."""
+        self._typical_s: dict[JobKind, float] = {}
+        self._next_look_s = 0.0
+
+    def learn(self, kind: JobKind, duration_s: float) -> None:
+        """Note how long a job took."""
+        known = self._typical_s.get(kind, duration_s)
+        self._typical_s[kind] = known + _NEWEST_WEIGHT * (duration_s - known)
+
+    def is_time(self, now_s: float) -> bool:
+        """Return whether to look for late jobs now; if so, not again for a while."""
+        if now_s < self._next_look_s:
+            return False
+        self._next_look_s = now_s + LOOK_S
+        return True
+
+    def is_late(self, kind: JobKind, elapsed_s: float) -> bool:
+        """Return whether a job that is out is late; never before one came back."""
+        typical_s = self._typical_s.get(kind)
+        if typical_s is None:
+            return False
+        return elapsed_s > max(LEAST_S, PATIENCE * typical_s)

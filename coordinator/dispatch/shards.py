@@ -100,19 +100,6 @@ class ShardDispatch:
         known = self._shards.get(shard)
         return known.holder if known else ""
 
-    def platform(self, agent: str) -> str:
-        """Return what a worker's machine is; empty once it has left."""
-        worker = self._workers.get(agent)
-        return worker.platform if worker else ""
-
-    def has_out(self, number: int) -> bool:
-        """Return whether a job of this number is out."""
-        return number in self._out
-
-    def shard_of(self, number: int) -> int:
-        """Return whose advance a job is that is out."""
-        return self._out[number]
-
     def shard_that_lost(self, number: int) -> int | None:
         """Return whose present advance a job was of which no word came."""
         for shard, state in self._shards.items():
@@ -197,7 +184,7 @@ class ShardDispatch:
             shard.has_state, shard.is_wanted = True, False
             self._forgive(shard)
             shard.failures = 0
-            return [ShardDone(number, agent)]
+            return [ShardDone(number, agent, event.answer)]
         if event.outcome == "stateless" and not shard.is_whole:
             shard.has_state = False
             return []
@@ -252,7 +239,10 @@ class ShardDispatch:
                 shard.number = next(self._numbers)
                 shard.is_whole = not shard.has_state
                 self._out[shard.number] = number
-                yield AssignShard(shard.number, number, shard.holder, shard.is_whole)
+                platform = self._workers[shard.holder].platform
+                yield AssignShard(
+                    shard.number, number, shard.holder, platform, shard.is_whole
+                )
 
     def _fit(self, shard: _Shard) -> list[str]:
         """Return the workers that may hold a shard, by name."""

@@ -324,10 +324,3 @@ class Finish:
 IslandCommand = Vet | Evaluate | Record | Emigrate | Finish
 
 ArenaCommand = Vet | AdvanceShard | Record | Append | Emigrate | Finish
-
-
-def requester_of(about: Vet | Evaluate | Answered) -> int:
-    """Return the island that sent a request, or that an answer goes to."""
-    if isinstance(about, Vet | Vetted | VettingFailed) or about.requester is None:
-        return about.birth.island
-    return about.requester

@@ -20,15 +20,11 @@ class Membership:
 
     def __init__(self, version: str) -> None:
         """Begin with nobody; ``version`` is the one that agents must have."""
+        self.members: dict[str, Member] = {}
         self.refused: dict[str, str] = {}
         self._version = version
-        self._members: dict[str, Member] = {}
         self._joined: set[str] = set()
         self._mourned: set[str] = set()
-
-    def find(self, agent: str) -> Member | None:
-        """Return where an agent is reached; None if it is not there."""
-        return self._members.get(agent)
 
     def appear(self, key: str) -> Member | None:
         """Note a token; return whom to ask what it is, None if that is known.
@@ -37,9 +33,9 @@ class Membership:
             MalformedMessage: no agent's token.
         """
         member = member_of(key)
-        if member.name in self._members:
+        if member.name in self.members:
             return None
-        self._members[member.name] = member
+        self.members[member.name] = member
         return member
 
     def vanish(self, key: str) -> Left | None:
@@ -49,7 +45,7 @@ class Membership:
             MalformedMessage: no agent's token.
         """
         name = member_of(key).name
-        self._members.pop(name, None)
+        self.members.pop(name, None)
         self.refused.pop(name, None)
         if name not in self._joined:
             return None
@@ -59,7 +55,7 @@ class Membership:
     def is_stranger(self, agent: str) -> bool:
         """Return whether an agent is there that has not said yet what it is."""
         known = agent in self._joined or agent in self.refused
-        return agent in self._members and not known
+        return agent in self.members and not known
 
     def refuse(self, agent: str, why: str) -> Left | None:
         """Let an agent take part no more; return what that means for jobs.
@@ -88,7 +84,7 @@ class Membership:
         Raises:
             MalformedMessage: not such bytes, no slots, or it says it is another.
         """
-        member = self._members[agent]
+        member = self.members[agent]
         try:
             info = pb.AgentInfo.FromString(data)
         except DecodeError as error:

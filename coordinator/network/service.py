@@ -194,7 +194,7 @@ class Network:
             payload: an encoded request.
         """
         asked = _Asked(agent, number, self._inbox)
-        if member := self._membership.find(agent):
+        if member := self._membership.members.get(agent):
             self._ask(asked, member.jobs, payload, JOB_TIMEOUT_S)
         else:
             asked.end()
@@ -206,7 +206,7 @@ class Network:
             agent: that was given the job, and may have left.
             payload: an encoded request that need name only the job.
         """
-        if member := self._membership.find(agent):
+        if member := self._membership.members.get(agent):
             self._session.put(member.cancelled, payload)
 
     def _ask(
@@ -296,7 +296,7 @@ class Network:
         return []
 
     def _ask_info(self, agent: str) -> None:
-        if member := self._membership.find(agent):
+        if member := self._membership.members.get(agent):
             asked = _Asked(agent, -1, self._inbox)
             self._ask(asked, member.info, None, ASK_TIMEOUT_S)
 

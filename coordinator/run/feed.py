@@ -4,12 +4,9 @@ No run waits for a viewer. The feed keeps a short form of everything that it sen
 so that a viewer that connects late or lost an update gets the whole.
 """
 
-from dataclasses import dataclass
-from typing import Protocol
-
 from msgspec.structs import replace
 
-from coordinator.islands.events import Append, Record
+from coordinator.islands.events import Record
 from coordinator.storage.folder import RunDetails
 from schema.robot.ids import BirthId
 from schema.tables.columns import Row
@@ -27,42 +24,12 @@ from schema.wire.updates import (
 )
 
 
-class Rows(Protocol):
-    """Sink of a run's rows."""
-
-    def write(self, record: Record) -> None:
-        """Write one row."""
-
-    def store(self, rows: Append) -> None:
-        """Store bulk rows on disk."""
-
-    def append(self, rows: Append) -> None:
-        """Append bulk rows."""
-
-
-@dataclass(frozen=True, slots=True)
-class TeeRows:
-    """Forwards rows to a sink, and single rows to a feed, too."""
-
-    rows: Rows
-    feed: "Feed"
-
-    def write(self, record: Record) -> None:
-        """Write a row, then note it in the feed."""
-        self.rows.write(record)
-        self.feed.note(record)
-
-    def store(self, rows: Append) -> None:
-        """Store bulk rows on disk."""
-        self.rows.store(rows)
-
-    def append(self, rows: Append) -> None:
-        """Append bulk rows."""
-        self.rows.append(rows)
-
-
 class Feed:
-    """Updates of one run; a replay of its journal fills it, too."""
+    """Updates of one run; a replay of its journal fills it, too.
+
+    Attributes:
+        unread: rows that the next call of ``read`` or ``update`` takes.
+    """
 
     def __init__(self, run: str, epoch: int, details: RunDetails) -> None:
         """Initialise without rows.
@@ -72,6 +39,7 @@ class Feed:
             epoch: of the coordinator.
             details: of the run.
         """
+        self.unread: list[Record] = []
         self._past = Update(
             run, epoch, 0, is_whole=True, experiment=details.name,
             document=details.document,
@@ -90,8 +58,13 @@ class Feed:
         self._new_migrants: list[Migrant] = []
         self._workers: tuple[WorkerInfo, ...] = ()
 
-    def note(self, record: Record) -> None:
-        """Add a row."""
+    def read(self) -> None:
+        """Note the rows that are unread."""
+        for record in self.unread:
+            self._note(record)
+        self.unread.clear()
+
+    def _note(self, record: Record) -> None:
         row = record.row
         match record.table:
             case "births":
@@ -107,6 +80,7 @@ class Feed:
 
     def update(self, workers: tuple[WorkerInfo, ...]) -> Update | None:
         """Return what is new since the last call; None if nothing is new."""
+        self.read()
         fresh = read_levels(self._new_rows)
         is_new = self._new_births or self._new_deaths or fresh or self._new_migrants
         if not is_new and workers == self._workers:

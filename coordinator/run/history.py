@@ -11,7 +11,7 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Append, JournalledEvent, Record
 from coordinator.run.archipelago import archipelago
 from coordinator.run.loop import Loop
-from coordinator.run.requests import RunContext
+from coordinator.run.run_context import RunContext
 from coordinator.storage.folder import read_details
 from coordinator.storage.journal import NAME, Journal
 from coordinator.storage.snapshots import Snapshots
@@ -57,7 +57,7 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
         shutil.copy(folder / NAME, place)
         with Journal.open(Path(place)) as journal:
             loop.start(journal.replay())
-    return context.arena[island], loop.advances.past(island)
+    return context.arena[island], loop.shard_requests.past(island)
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from coordinator.run.loop import Loop
 from schema.agent.network import Tls
 from schema.wire.updates import WorkerInfo, encode_update
 
-_UPDATE_S = 0.25
+_UPDATE_S = 0.2
 """Least time between two updates [s]."""
 _WHOLE_S = 1.0
 """Least time between two encodings of the whole [s]."""
@@ -72,11 +72,11 @@ class LiveServer:
         self._replies.put(None)
 
     def _workers(self) -> tuple[WorkerInfo, ...]:
-        dispatch, advances = self._fleet.dispatch, self._loop.advances
+        dispatch, requests = self._fleet.dispatch, self._loop.shard_requests
         shards: dict[str, list[int]] = {}
         for number, island in sorted(self._loop.islands.items()):
             if isinstance(island, Arena):
-                shards.setdefault(advances.holder(number), []).append(number)
+                shards.setdefault(requests.holder(number), []).append(number)
         return tuple(
             WorkerInfo(name, dispatch.platform(name), tuple(shards.get(name, ())))
             for name in dispatch.names("worker")

@@ -1,18 +1,18 @@
-"""Drives a run: answers in, journal first, then the machines' decisions.
+"""Drives a run: journals answers first, then carries out the machines' decisions.
 
-The machines decide and this loop carries out. Nothing that an answer changes is
-acted on before the journal has it, so a coordinator that is killed at any point
-comes back to the same decisions by replaying its journal.
+The machines decide and this loop carries out their commands. No effect of an answer
+is acted on before the journal has the answer, so a coordinator that is killed at any
+point makes the same decisions again when it replays its journal.
 """
 
 import logging
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from math import inf
 from typing import Protocol
 
 from coordinator.arena.arena import Arena
-from coordinator.dispatch.fleet import Fleet, JobClient, ShardClient
+from coordinator.dispatch.events import Deliver, ShardFailed
+from coordinator.dispatch.fleet import End, Fleet
 from coordinator.islands.events import (
     Advanced,
     AdvanceShard,
@@ -36,12 +36,12 @@ from coordinator.islands.events import (
     Vet,
     Vetted,
     VettingFailed,
-    requester_of,
 )
 from coordinator.islands.island import Island
-from coordinator.run.advances import Advances, SnapshotStore, Terms
 from coordinator.run.cross_checks import NO_CHECKS, Checks, audit_records, describe
-from coordinator.run.requests import Requests, RunContext, is_quarantined
+from coordinator.run.requests import Requests, is_quarantined, requester_of
+from coordinator.run.run_context import RunContext
+from coordinator.run.shard_requests import Reached, ShardRequests, SnapshotStore
 from coordinator.run.throttle import RealTimeThrottle
 from schema.errors import RunPaused, UnexpectedEvent
 from schema.robot.ids import BirthId
@@ -49,41 +49,43 @@ from schema.robot.ids import BirthId
 _LOG = logging.getLogger(__name__)
 
 Key = tuple[str, int, BirthId, int]
-"""What an open question is known by: kind, requester, birth, attempt or trial."""
+"""Identifies an open request: kind, requester, birth, attempt or trial."""
 
-Asked = Vet | Evaluate | AdvanceShard
-"""What islands and arenas have others do."""
+Request = Vet | Evaluate | AdvanceShard
+"""Commands of islands and arenas that agents carry out."""
 
-Told = Started | ExternalEvent | MigrationEvent
-"""What islands and arenas are told."""
+Event = Started | ExternalEvent | MigrationEvent
+"""Events of islands and arenas."""
 
 
 class Log(Protocol):
-    """What survives a crash of this process."""
+    """Storage of events that survives a crash of this process."""
 
     def append(self, events: Sequence[JournalledEvent]) -> None:
-        """Keep events, durably, before anybody acts on them."""
+        """Store events, durably."""
 
 
 class Rows(Protocol):
-    """Where table rows go."""
+    """Storage of table rows."""
 
     def write(self, record: Record) -> None:
         """Take one row."""
 
     def store(self, rows: Append) -> None:
-        """Bring bulk rows to disk before the journal has what they belong to."""
+        """Bring bulk rows to disk before the journal has their event."""
 
     def append(self, rows: Append) -> None:
-        """Take bulk rows that the journal has."""
+        """Take bulk rows whose event the journal has."""
 
 
 class Loop:
-    """One run's machines and what connects them to the world.
+    """The islands of a run and their connection to agents, journal and tables.
 
     Attributes:
         islands: the machines, by their numbers.
-        advances: those of the arenas.
+        shard_requests: the advances of the arenas.
+        client: identifies this run to the fleet.
+        throttle: limits the speed of arenas; None: no limit.
     """
 
     def __init__(
@@ -98,25 +100,34 @@ class Loop:
         throttle: RealTimeThrottle | None = None,
         checks: Checks = NO_CHECKS,
         confirm: Callable[[], None] = lambda: None,
+        watch: Callable[[Record], None] | None = None,
     ) -> None:
-        """Connect machines; nothing happens before ``start``.
+        """Connect the machines; ``start`` starts them.
 
-        ``confirm`` raises if this process may not write to the run any more.
+        Args:
+            islands: the machines, by their numbers.
+            context: what all requests have in common.
+            fleet: the agents.
+            log: the journal.
+            rows: the tables.
+            snapshot_store: the snapshots of arenas.
+            throttle: limits the speed of arenas; None: no limit.
+            checks: cross-checks to make.
+            confirm: raises if this process may no longer write to the run.
+            watch: called with each row, for viewers; None: no viewers.
         """
         self.islands = dict(islands)
-        self.advances = Advances(
-            Terms(context.run, context.epoch, context.arena),
-            snapshot_store,
-            fleet,
-        )
+        self.client = context.client
+        self.throttle = throttle
+        self.shard_requests = ShardRequests(context, snapshot_store, fleet)
         self._requests = Requests(context, fleet, checks.audit)
         self._checks = checks
         self._confirm = confirm
         self._fleet = fleet
         self._log = log
         self._rows = rows
-        self._throttle = throttle
-        self._held_back: dict[int, float] = {}
+        self._snapshot_store = snapshot_store
+        self._watch = watch
         self._now_s = 0.0
 
     @property
@@ -124,28 +135,8 @@ class Loop:
         """Every island is done."""
         return all(island.is_finished for island in self.islands.values())
 
-    @property
-    def is_throttled(self) -> bool:
-        """Arenas may be held back."""
-        return self._throttle is not None
-
-    @property
-    def clients(self) -> tuple[JobClient, ShardClient]:
-        """Whom the fleet names if there is news for this run."""
-        return self._requests, self.advances
-
-    @property
-    def wake_s(self) -> float:
-        """When ``act`` is due though nothing came, for the sake of the pace [s]."""
-        return min(self._held_back.values(), default=inf)
-
-    @property
-    def malformed(self) -> int:
-        """Answers that did not decode or did not fit their question."""
-        return self._requests.malformed + self.advances.malformed
-
     def start(self, history: Iterable[JournalledEvent]) -> None:
-        """Begin, or come back: replay a journal, then ask what is still open.
+        """Start or resume: replay a journal, then send the requests that are open.
 
         Args:
             history: the journalled events, oldest first; empty for a new run.
@@ -155,12 +146,12 @@ class Loop:
         """
         unanswered: dict[Key, Vet | Evaluate] = {}
 
-        def note(commands: Iterable[Asked]) -> None:
-            for command in commands:
-                if isinstance(command, AdvanceShard):
-                    self.advances.note(command)
+        def note(requests: Iterable[Request]) -> None:
+            for request in requests:
+                if isinstance(request, AdvanceShard):
+                    self.shard_requests.note(request)
                 else:
-                    unanswered[_key(command)] = command
+                    unanswered[_key(request)] = request
 
         for number in sorted(self.islands):
             note(self._tell(number, Started()))
@@ -171,38 +162,50 @@ class Loop:
             if not isinstance(event, Advanced | Commanded):
                 unanswered.pop(_key(event), None)
             note(self._tell(_island(event), event))
-        for command in unanswered.values():
-            self._requests.ask(command)
-        for number in sorted(self.islands):
-            self.advances.request(number)
+        for request in unanswered.values():
+            self._requests.send(request)
+        self.shard_requests.send_noted()
 
-    def act(self, now_s: float) -> None:
-        """Take what came and act on it.
+    def act(self, now_s: float, ends: Iterable[End] = ()) -> None:
+        """Act on the ends of jobs and advances.
 
         Args:
-            now_s: the time, of any clock that only goes forward [s].
+            now_s: the time, of a monotonic clock [s].
+            ends: what the fleet returned for this run.
 
         Raises:
-            JobRefused: nobody can do a job; the run stops as it is.
+            JobRefused: no agent can do a job; the run stops as it is.
             ExperimentError: restrictions that no robot meets.
             RunFolderError: the disk is full or failed, or another coordinator has
                 taken the run over.
-            RunPaused: something is to be seen by the user first.
+            RunPaused: the user has to decide first.
         """
         self._now_s = now_s
-        for shard, due_s in sorted(self._held_back.items()):
-            if due_s <= now_s:
-                del self._held_back[shard]
-                self.advances.request(shard)
-        self._take([*self._requests.take(), *self.advances.come()])
+        if self.throttle is not None:
+            for command in self.throttle.due(now_s):
+                self.shard_requests.send(command)
+        events: list[JournalledEvent] = []
+        for end in ends:
+            if isinstance(end, Deliver):
+                events += self._requests.events(end)
+            elif isinstance(end, ShardFailed):
+                raise self.shard_requests.refusal(end)
+            else:
+                assert isinstance(end.answer, Reached)
+                event, snapshot = end.answer.event, end.answer.snapshot
+                if snapshot:
+                    # It must be on disk before the journal has the advance.
+                    step = event.advance.step
+                    self._snapshot_store.write(event.island, step, snapshot)
+                events.append(event)
+        self._take(events)
 
     def leave(self) -> None:
-        """Ask no more, and wait for nothing."""
-        self._fleet.leave(self._requests)
-        self.advances.release()
+        """Drop all open requests."""
+        self._fleet.leave(self.client)
 
     def order(self, event: Commanded) -> None:
-        """Take what an operator ordered; the journal has it on return.
+        """Take an operator's order; the journal has it on return.
 
         Raises:
             UnexpectedEvent: it is not for an arena of this run.
@@ -212,10 +215,10 @@ class Loop:
         self._take([event])
 
     def _take(self, events: Sequence[JournalledEvent]) -> None:
-        """Keep events, then act on them."""
+        """Store events, then act on them."""
         if not events:
             return
-        # One that slept through its replacement must not write a byte.
+        # A process that was suspended while another took over must not write a byte.
         self._confirm()
         for event in events:
             if isinstance(event, Advanced) and event.pose_rows:
@@ -226,24 +229,23 @@ class Loop:
             if isinstance(event, Audited):
                 self._note_audit(event)
                 continue
-            for command in self._tell(_island(event), event):
-                if isinstance(command, AdvanceShard):
-                    self._advance(command)
+            for request in self._tell(_island(event), event):
+                if isinstance(request, AdvanceShard):
+                    self._advance(request)
                 else:
-                    self._requests.ask(command)
-
-        self._take_care(events)
+                    self._requests.send(request)
+        self._warn(events)
 
     def _note_audit(self, event: Audited) -> None:
         for record in audit_records(event):
             self._rows.write(record)
 
-    def _take_care(self, events: Sequence[JournalledEvent]) -> None:
-        """Tell the user what is not as it should be.
+    def _warn(self, events: Sequence[JournalledEvent]) -> None:
+        """Warn the user about cross-checks that failed and robots that crash workers.
 
         Raises:
             RunPaused: two workers do not agree, or a robot is quarantined and the
-                user wanted to know of that first.
+                user wanted the run to stop then.
         """
         for event in events:
             if isinstance(event, Audited) and not event.agrees:
@@ -256,53 +258,58 @@ class Loop:
                 _LOG.warning("%s", line)
 
     def _advance(self, command: AdvanceShard) -> None:
-        """Ask for an advance, now or when it is due."""
-        shard = command.island
-        self.advances.note(command)
-        if self._throttle is not None:
-            step = self.advances.step(shard)
-            due_s = self._throttle.due_s(shard, step, self._now_s)
-            if due_s > self._now_s:
-                self._held_back[shard] = due_s
+        """Request an advance, now or when it is due."""
+        if self.throttle is not None:
+            step = self.shard_requests.step(command.island)
+            if self.throttle.holds_back(command, step, self._now_s):
                 return
-        self.advances.request(shard)
+        self.shard_requests.send(command)
 
-    def _tell(self, number: int, event: Started | ExternalEvent) -> list[Asked]:
-        """Give an island its event, and others what comes of it; return the questions.
+    def _tell(self, number: int, event: Started | ExternalEvent) -> list[Request]:
+        """Deliver an event, carry out the commands, return the requests to send.
 
         Raises:
-            UnexpectedEvent: nobody here takes such an event.
+            UnexpectedEvent: no island takes such an event.
         """
-        asked: list[Asked] = []
-        told: deque[tuple[int, Told]] = deque([(number, event)])
-        while told:
-            for command in self._handled(*told.popleft()):
+        requests: list[Request] = []
+        events: deque[tuple[int, Event]] = deque([(number, event)])
+        while events:
+            for command in self._handled(*events.popleft()):
                 match command:
                     case Record():
-                        self._rows.write(command)
+                        self._write(command)
                     case Append():
                         self._rows.append(command)
                     case Vet() | Evaluate() | AdvanceShard():
-                        asked.append(command)
+                        requests.append(command)
                     case Emigrate(island, to, epoch, migrants):
-                        told.append((to, Immigrated(to, island, epoch, migrants)))
+                        events.append((to, Immigrated(to, island, epoch, migrants)))
                     case Finish(island, neighbours):
-                        told += [(to, NeighbourClosed(to, island)) for to in neighbours]
-        return asked
+                        events += [
+                            (to, NeighbourClosed(to, island)) for to in neighbours
+                        ]
+        return requests
+
+    def _write(self, record: Record) -> None:
+        self._rows.write(record)
+        if self._watch is not None:
+            self._watch(record)
 
     def _handled(
-        self, number: int, event: Told
+        self, number: int, event: Event
     ) -> Iterable[IslandCommand | ArenaCommand]:
-        """Return what an island answers to an event.
+        """Return the commands of an island for an event.
 
         Raises:
-            UnexpectedEvent: nobody here takes such an event.
+            UnexpectedEvent: no island takes such an event.
         """
         machine = self.islands.get(number)
         if isinstance(machine, Arena):
-            if isinstance(event, Advanced) and (drift := self.advances.take(event)):
+            if isinstance(event, Advanced) and (
+                drift := self.shard_requests.commit(event)
+            ):
                 _LOG.warning("%s", drift)
-                self._rows.write(drift.record)
+                self._write(drift.record)
             if not isinstance(event, Evaluated | EvaluationFailed):
                 return machine.handle(event)
         elif machine is not None and not isinstance(event, Advanced | Commanded):
@@ -311,7 +318,7 @@ class Loop:
 
 
 def _island(event: ExternalEvent) -> int:
-    """Return whose event it is."""
+    """Return the number of the island that an event is for."""
     if isinstance(event, Advanced | Commanded):
         return event.island
     return requester_of(event)
@@ -320,7 +327,7 @@ def _island(event: ExternalEvent) -> int:
 def _key(
     about: Vet | Evaluate | Vetted | VettingFailed | Evaluated | EvaluationFailed,
 ) -> Key:
-    """Return what a question and its answer have in common."""
+    """Return what a request and its answer have in common."""
     if isinstance(about, Vet | Vetted | VettingFailed):
         return ("vet", about.birth.island, about.birth, about.attempt)
     return ("evaluate", requester_of(about), about.birth, about.trial)

@@ -9,12 +9,13 @@ them, the other on its way to or from the analyzers and this process.
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from msgspec.structs import replace
 
-from coordinator.dispatch.fleet import Fleet, JobClient, ShardClient
-from coordinator.run.rate import RateMeter
-from coordinator.run.session import RunSession
+from coordinator.dispatch.events import Client
+from coordinator.dispatch.fleet import End, Fleet
+from coordinator.run.session import RateMeter, RunSession
 from coordinator.storage.folder import RunDetails, RunFolder
 from schema.errors import RevolveError
 from schema.wire.status import RunStatus, Status
@@ -81,7 +82,7 @@ class RunScheduler:
             if one.status.state != "finished"
         )
         self._places: dict[RunSession, int] = {}
-        self._run_of: dict[JobClient | ShardClient, RunSession] = {}
+        self._run_of: dict[Client, RunSession] = {}
         self._rate = RateMeter()
         self._is_stopped = False
 
@@ -105,17 +106,17 @@ class RunScheduler:
         while self._planned and self._has_room():
             self._begin(*self._planned.popleft())
         now_s = clock()
-        throttled = [run for run in self.active if run.loop.is_throttled]
-        for run in throttled:
-            timeout_s = min(timeout_s, max(0.0, run.loop.wake_s - now_s))
-        news = [
-            *self.fleet.listen(timeout_s, now_s),
-            *(r.loop.clients[0] for r in throttled),
-        ]
-        acting = {self._run_of[each]: None for each in news if each in self._run_of}
+        acting: dict[RunSession, list[End]] = {}
+        for run in self.active:
+            if (throttle := run.loop.throttle) is not None:
+                acting[run] = []
+                timeout_s = min(timeout_s, max(0.0, throttle.wake_s - now_s))
+        for client, ends in self.fleet.listen(timeout_s, now_s).items():
+            if client in self._run_of:
+                acting[self._run_of[client]] = ends
         now_s = clock()
-        for run in acting:
-            self.guard(run, lambda: run.loop.act(now_s))  # noqa: B023 - at once
+        for run, ends in acting.items():
+            self.guard(run, partial(run.loop.act, now_s, ends))
 
     def _has_room(self) -> bool:
         if not self.active:
@@ -131,7 +132,7 @@ class RunScheduler:
             return
         self.active.append(run)
         self._places[run] = place
-        self._run_of.update(dict.fromkeys(run.loop.clients, run))
+        self._run_of[run.loop.client] = run
         self.guard(run, run.start)
 
     def guard(self, run: RunSession, act: Callable[[], None]) -> None:
@@ -158,8 +159,7 @@ class RunScheduler:
         run.close()
         self.active.remove(run)
         del self._places[run]
-        for requester in run.loop.clients:
-            del self._run_of[requester]
+        del self._run_of[run.loop.client]
 
     def do_chores(self, now_s: float) -> None:
         """Bring all rows to disk; find out which runs went on without us.

@@ -1,6 +1,8 @@
 """A run that this process has in hand, from opening its folder to its last row."""
 
 import json
+from collections import deque
+from collections.abc import Iterator
 from contextlib import ExitStack
 from datetime import UTC, datetime
 from importlib import metadata
@@ -8,14 +10,13 @@ from pathlib import Path
 
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.fleet import Fleet
-from coordinator.islands.events import Record
+from coordinator.islands.events import JournalledEvent, Record
 from coordinator.islands.island import Island
 from coordinator.run.archipelago import archipelago
 from coordinator.run.cross_checks import NO_CHECKS, Checks
-from coordinator.run.feed import Feed, TeeRows
+from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
-from coordinator.run.rate import RateMeter
-from coordinator.run.requests import RunContext
+from coordinator.run.run_context import RunContext
 from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.folder import DETAILS, STATE, RunFolder
 from coordinator.storage.journal import NAME as JOURNAL
@@ -32,6 +33,35 @@ from schema.tables.files import has_rows
 from schema.wire.status import IslandStatus, RunStatus
 
 _LIBRARIES = ("mujoco-core", "eclipse-zenoh", "numpy", "pyarrow", "protobuf")
+SPAN_S = 10.0
+"""Over how long a rate is taken [s]."""
+
+
+class RateMeter:
+    """The rate of a count that somebody looks at now and then."""
+
+    def __init__(self) -> None:
+        """Have seen nothing."""
+        self._seen: deque[tuple[float, float]] = deque()
+
+    def note(self, now_s: float, count: float) -> None:
+        """See how far the count is.
+
+        Args:
+            now_s: the time, of any clock that only goes forward [s].
+            count: that only grows.
+        """
+        self._seen.append((now_s, count))
+        while now_s - self._seen[0][0] > SPAN_S:
+            self._seen.popleft()
+
+    @property
+    def per_s(self) -> float:
+        """Growth per second over the last seconds; 0 if less than two were seen."""
+        if not self._seen:
+            return 0.0
+        (first_s, first), (last_s, last) = self._seen[0], self._seen[-1]
+        return (last - first) / (last_s - first_s) if last_s > first_s else 0.0
 
 
 class RunSession:
@@ -84,7 +114,6 @@ class RunSession:
             stack.callback(self._recorder.close)
             self.experiment = experiment_from_text(details.document)
             self.feed = Feed(held.name, held.epoch, details) if is_watched else None
-            rows = TeeRows(self._recorder, self.feed) if self.feed else self._recorder
             self.loop = Loop(
                 archipelago(self.experiment, details.seed, details.run),
                 context=RunContext.of(
@@ -92,11 +121,12 @@ class RunSession:
                 ),
                 fleet=fleet,
                 log=self._journal,
-                rows=rows,
+                rows=self._recorder,
                 snapshot_store=Snapshots(held.path),
                 throttle=_throttle(self.experiment, speed),
                 checks=checks,
                 confirm=held.confirm,
+                watch=self.feed.unread.append if self.feed else None,
             )
             self._births, self._simulated = RateMeter(), RateMeter()
             self._owns = {
@@ -111,8 +141,15 @@ class RunSession:
         Raises:
             RevolveError: the run cannot go on; see ``Loop.start``.
         """
-        self.loop.start(self._journal.replay())
+        self.loop.start(self._replay())
         self.held.set_state("running")
+
+    def _replay(self) -> Iterator[JournalledEvent]:
+        """Yield the journalled events; the feed condenses the rows of each."""
+        for event in self._journal.replay():
+            yield event
+            if self.feed is not None:
+                self.feed.read()
 
     def do_chores(self) -> None:
         """Find out whether the folder is still ours; bring rows to disk.

@@ -1,14 +1,19 @@
-"""Simulated time held back to a multiple of real time, for those who watch.
+"""Simulated time held back to a multiple of real time, for viewers.
 
-Nothing that happens depends on it: it only says when an arena may go on.
+Results do not depend on it: it only delays the advances of arenas.
 """
+
+from heapq import heappop, heappush
+from math import inf
+
+from coordinator.islands.events import AdvanceShard
 
 
 class RealTimeThrottle:
-    """How fast arenas may go at most."""
+    """Limit of the speed at which arenas advance."""
 
     def __init__(self, speed: float, timestep_s: float) -> None:
-        """Hold nobody back yet.
+        """Initialise the throttle.
 
         Args:
             speed: simulated seconds per second; > 0.
@@ -16,16 +21,32 @@ class RealTimeThrottle:
         """
         self._step_s = timestep_s / speed
         self._last: dict[int, tuple[int, float]] = {}
+        self._held_back: list[tuple[float, int, AdvanceShard]] = []
 
-    def due_s(self, shard: int, step: int, now_s: float) -> float:
-        """Return when an arena may go on from a step [s].
+    @property
+    def wake_s(self) -> float:
+        """When the next arena that is held back may go on [s]."""
+        return self._held_back[0][0] if self._held_back else inf
+
+    def holds_back(self, command: AdvanceShard, step: int, now_s: float) -> bool:
+        """Return whether an advance has to wait; if so, ``due`` returns it later.
 
         Args:
-            shard: the arena's number.
-            step: where it stands; asked once for each step that it goes on from.
-            now_s: the time; one that came late does not catch up.
+            command: requests the advance.
+            step: at which it begins; each step is passed once.
+            now_s: the time; an arena that is late does not catch up [s].
         """
+        shard = command.island
         last_step, last_s = self._last.get(shard, (step, now_s))
         due_s = max(now_s, last_s + (step - last_step) * self._step_s)
         self._last[shard] = (step, due_s)
-        return due_s
+        if due_s > now_s:
+            heappush(self._held_back, (due_s, shard, command))
+        return due_s > now_s
+
+    def due(self, now_s: float) -> list[AdvanceShard]:
+        """Return the advances that need not wait any longer, earliest first."""
+        due: list[AdvanceShard] = []
+        while self.wake_s <= now_s:
+            due.append(heappop(self._held_back)[2])
+        return due

@@ -4,8 +4,10 @@ It refuses who was replaced, what it has not the plug-ins for and what nobody wa
 for any more, and counts. Whatever a peer sends or a plug-in raises becomes a reply.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 from google.protobuf.message import DecodeError
 
@@ -16,6 +18,65 @@ from schema.experiment.plugin_source import check_plugins
 from schema.wire import revolve_pb2 as pb
 
 _MOST_CANCELLED = 1000
+
+T = TypeVar("T")
+
+MOST_SOURCES = 1000
+"""Accounts that are kept of those who have nothing waiting."""
+
+
+class FairQueue(Generic[T]):
+    """What waits, by who sent it."""
+
+    def __init__(self) -> None:
+        """Have nothing waiting."""
+        self._waiting: dict[bytes, deque[T]] = {}
+        self._accounts: dict[bytes, float] = {}
+        self._served = b""
+        self._level_s = 0.0
+
+    def __len__(self) -> int:
+        """Return how many items wait."""
+        return sum(map(len, self._waiting.values()))
+
+    def put(self, source: bytes, item: T) -> None:
+        """Let an item wait."""
+        if source not in self._waiting:
+            account_s = max(self._accounts.pop(source, 0.0), self._level_s)
+            self._accounts[source] = account_s
+            self._waiting[source] = deque()
+        self._waiting[source].append(item)
+
+    def take(self) -> T:
+        """Return the item whose turn it is.
+
+        Raises:
+            IndexError: nothing waits.
+        """
+        if not self._waiting:
+            raise IndexError("nothing waits")
+        source = min(self._waiting, key=self._accounts.__getitem__)
+        self._served, self._level_s = source, self._accounts[source]
+        queue = self._waiting[source]
+        item = queue.popleft()
+        if not queue:
+            del self._waiting[source]
+            self._forget()
+        return item
+
+    def spent(self, seconds: float) -> None:
+        """Note how long the item that was taken last took."""
+        if self._served in self._accounts:
+            self._accounts[self._served] += seconds
+
+    def _forget(self) -> None:
+        """Drop the oldest accounts of those who have nothing waiting."""
+        if len(self._accounts) - len(self._waiting) > MOST_SOURCES:
+            for source in [
+                each for each in self._accounts if each not in self._waiting
+            ]:
+                if source != self._served:
+                    del self._accounts[source]
 
 
 @dataclass(slots=True)
@@ -108,9 +169,8 @@ class Server:
                 del self._cancelled[task]
                 self.tally.skipped += 1
                 return Reply(reason="nobody waits for this job any more")
-            answer = self.slot.do(
-                lambda: self.compute(data), task, self.agent.cpu_limit_s
-            )
+            with self.slot.doing(task, self.agent.cpu_limit_s):
+                answer = self.compute(data)
         except (UnknownPlugin, PluginDiffers) as error:
             self.tally.refused += 1
             return Reply(reason=f"{UNFIT}{error}")

@@ -15,10 +15,9 @@ from typing import Any
 
 import zenoh
 
-from schema.agent.fair_queue import FairQueue
 from schema.agent.network import Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
-from schema.agent.request_handler import Server, Tally
+from schema.agent.request_handler import FairQueue, Server, Tally
 from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name

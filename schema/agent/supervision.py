@@ -8,7 +8,8 @@ are nobody's doing, and say nothing of the job.
 
 import signal
 import struct
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from ctypes import Array, c_char
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -125,23 +126,21 @@ class ProcessSlot:
     note: CurrentJob | None = None
     deaths: tuple[Death, ...] = ()
 
-    def do(self, job: Callable[[], bytes], task: Task, cpu_limit_s: float) -> bytes:
-        """Return what a job comes to, if it leaves this process alive.
+    @contextmanager
+    def doing(self, task: Task, cpu_limit_s: float) -> Iterator[None]:
+        """Note a job while it is done.
 
         Args:
-            job: what to do.
-            task: what that is, for whoever looks after this process.
+            task: the job, for the process that supervises this one.
             cpu_limit_s: CPU time after which this process is ended [s].
-
-        Raises:
-            Exception: what the job raised.
         """
         if self.note is None:
-            return job()
+            yield
+            return
         self.note.begin(task)
         signal.setitimer(signal.ITIMER_PROF, cpu_limit_s)
         try:
-            answer = job()
+            yield
         except Exception:
             self.note.end()
             raise
@@ -149,4 +148,3 @@ class ProcessSlot:
             signal.setitimer(signal.ITIMER_PROF, 0.0)
         # Not if the job ends the process: SystemExit is no Exception.
         self.note.end()
-        return answer

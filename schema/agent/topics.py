@@ -8,7 +8,7 @@ again has a new one, so nothing meant for the dead reaches the living.
 
 import re
 import secrets
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from schema.errors import MalformedMessage, NetworkError
@@ -29,11 +29,17 @@ class Member:
         fleet: name of the fleet.
         role: what the process is.
         name: its own, never used again.
+        jobs: key that takes one ``Request`` and gives one ``Answer``.
     """
 
     fleet: str
     role: Role
     name: str
+    jobs: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        # Once per process and not for each job.
+        object.__setattr__(self, "jobs", f"{self._prefix}/jobs")
 
     @property
     def alive(self) -> str:
@@ -44,11 +50,6 @@ class Member:
     def info(self) -> str:
         """Key that tells what the process is (an ``AgentInfo``)."""
         return f"{self._prefix}/info"
-
-    @property
-    def jobs(self) -> str:
-        """Key that takes one ``Request`` and gives one ``Answer``."""
-        return f"{self._prefix}/jobs"
 
     @property
     def cancelled(self) -> str:

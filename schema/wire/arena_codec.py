@@ -154,16 +154,6 @@ def decode_advance_request(data: bytes) -> AdvanceRequest:
     return decoded(data, pb.AdvanceRequest(), _request)
 
 
-def is_advance_request(data: bytes) -> bool:
-    """Return whether a job is about an arena, and not about a single robot.
-
-    Raises:
-        MalformedMessage: bytes that are no request of either kind.
-    """
-    # Only a request about an arena speaks of changes, if only to say: none.
-    return decoded(data, pb.AdvanceRequest(), lambda said: said.HasField("changes"))
-
-
 def encode_advance_answer(answer: AdvanceAnswer) -> bytes:
     """Return the bytes of an answer."""
     message = pb.AdvanceAnswer(

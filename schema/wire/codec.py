@@ -173,6 +173,16 @@ def decode_request(
     return decoded(data, pb.Request(), lambda message: _request(message, read))
 
 
+def is_advance_request(data: bytes) -> bool:
+    """Return whether a job is about an arena, and not about a single robot.
+
+    Raises:
+        MalformedMessage: bytes that are no request of either kind.
+    """
+    # Only a request about an arena has changes, even if they are empty.
+    return decoded(data, pb.AdvanceRequest(), lambda found: found.HasField("changes"))
+
+
 def encode_answer(answer: Answer) -> bytes:
     """Return the bytes of an answer."""
     message = pb.Answer(epoch=answer.epoch, number=answer.number, wall_s=answer.wall_s)
@@ -193,6 +203,31 @@ def decode_answer(data: bytes) -> Answer:
             not finite.
     """
     return decoded(data, pb.Answer(), _answer_from_message)
+
+
+def decode_answer_to(
+    data: bytes, *, epoch: int, number: int, unfit: type[Report | Evaluation]
+) -> Answer:
+    """Return the answer of some bytes to a certain request.
+
+    Args:
+        data: the bytes.
+        epoch: of the request.
+        number: of the request.
+        unfit: type of result that this kind of request cannot have.
+
+    Raises:
+        MalformedMessage: not an answer; the answer to another request or kind of it.
+    """
+    answer = decode_answer(data)
+    if (answer.epoch, answer.number) != (epoch, number):
+        raise MalformedMessage(
+            f"answer must be to (epoch, job) {(epoch, number)}, "
+            f"got {(answer.epoch, answer.number)}"
+        )
+    if isinstance(answer.result, unfit):
+        raise MalformedMessage(f"the answer is of type {unfit.__name__}")
+    return answer
 
 
 def write_report(report: Report, message: pb.Report) -> None:

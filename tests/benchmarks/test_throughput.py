@@ -29,7 +29,7 @@ from coordinator.islands.island import Island
 from coordinator.islands.rows import evaluation_record
 from coordinator.network.service import Network
 from coordinator.run.loop import Loop
-from coordinator.run.requests import RunContext
+from coordinator.run.run_context import RunContext
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.journal import Journal
 from coordinator.storage.recorder import Recorder
@@ -119,8 +119,8 @@ class Bench:
         before = self.journal.evaluations
         wall_s, cpu_s = time.perf_counter(), time.process_time()
         while not is_enough():
-            self.fleet.listen(0.2, time.monotonic())
-            self.loop.act(time.monotonic())
+            ends = self.fleet.listen(0.2, time.monotonic())
+            self.loop.act(time.monotonic(), ends.get(self.loop.client, ()))
         wall_s = time.perf_counter() - wall_s
         cpu_s = time.process_time() - cpu_s
         done = self.journal.evaluations - before

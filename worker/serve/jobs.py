@@ -8,8 +8,13 @@ from schema.experiment.document import body_space
 from schema.experiment.settings import lasting, read_evaluation_settings
 from schema.robot.results import Evaluation
 from schema.robot.robot import check_types
-from schema.wire.arena_codec import Live, is_advance_request
-from schema.wire.codec import Answer, decode_request, encode_answer
+from schema.wire.arena_codec import Live
+from schema.wire.codec import (
+    Answer,
+    decode_request,
+    encode_answer,
+    is_advance_request,
+)
 from worker.arena.world import World
 from worker.robot.evaluation import evaluate
 from worker.serve.shards import Shards

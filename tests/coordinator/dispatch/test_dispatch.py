@@ -12,6 +12,7 @@ from coordinator.dispatch.events import (
     AgentKind,
     Assign,
     Cancel,
+    Client,
     Deliver,
     Died,
     DispatchCommand,
@@ -25,14 +26,19 @@ from coordinator.dispatch.events import (
     Ticked,
     Withdrawn,
 )
-from coordinator.dispatch.pool import LONGEST_REST_S, MOST_AHEAD, PAUSE_S, REST_S
-from coordinator.dispatch.stragglers import LEAST_S, PATIENCE
+from coordinator.dispatch.pool import (
+    LEAST_S,
+    LONGEST_REST_S,
+    MOST_AHEAD,
+    PATIENCE,
+    PAUSE_S,
+    REST_S,
+)
 from schema.errors import UnexpectedEvent
-from schema.robot.ids import BirthId
 
 
 def job(number: int, kind: JobKind = "evaluate") -> Job:
-    return Job(number, kind, BirthId(0, number), 0, b"%d" % number)
+    return Job(number, kind, b"%d" % number, client=Client("run", 1))
 
 
 def worker(name: str, slots: int = 1) -> Joined:
@@ -189,7 +195,7 @@ def test_lost_after_left_is_no_news() -> None:
     assert given_out(dispatch.handle(Left("a"))) == [(0, "b")]
     assert dispatch.handle(lost(0, "a")) == []
     assert dispatch.handle(Left("a")) == []
-    assert dispatch.handle(ok(0, "b")) == [Deliver(job(0), "b", b"a0")]
+    assert dispatch.handle(ok(0, "b")) == [Deliver(job(0), "b", "p", b"a0")]
 
 
 def test_an_agent_that_lost_a_job_rests_before_it_gets_it_back() -> None:
@@ -233,7 +239,7 @@ def test_three_errors_are_delivered_with_the_last_reason() -> None:
     dispatch = told(worker("a"), worker("b"), worker("c"), *requests(0))
     assert given_out(dispatch.handle(error(0, "a"))) == [(0, "b")]
     assert given_out(dispatch.handle(error(0, "b"))) == [(0, "c")]
-    assert dispatch.handle(error(0, "c")) == [Deliver(job(0), "c", b"", "c cannot")]
+    assert dispatch.handle(error(0, "c")) == [Deliver(job(0), "c", reason="c cannot")]
     assert dispatch.pending == 0
 
 
@@ -245,7 +251,7 @@ def test_a_lonely_agent_is_asked_again() -> None:
         assert given_out(dispatch.handle(Ticked(10.0 * tries))) == (
             [(0, "a")] if tries < MAX_ERRORS else []
         )
-    assert delivered == [Deliver(job(0), "a", b"", "a cannot")]
+    assert delivered == [Deliver(job(0), "a", reason="a cannot")]
 
 
 def test_losses_never_end_a_job() -> None:
@@ -286,7 +292,7 @@ def test_what_cannot_be_changes_nothing(event: DispatchEvent) -> None:
     dispatch = told(Ticked(1.0), worker("a"), Requested(job(5)))
     with pytest.raises(UnexpectedEvent):
         dispatch.handle(event)
-    assert dispatch.handle(ok(5, "a")) == [Deliver(job(5), "a", b"a5")]
+    assert dispatch.handle(ok(5, "a")) == [Deliver(job(5), "a", "p", b"a5")]
     assert dispatch.pending == 0
 
 
@@ -317,7 +323,7 @@ def test_who_answers_first_is_heard_and_the_other_may_stop() -> None:
     dispatch = late()
     dispatch.handle(Ticked(9.0))
     first = dispatch.handle(ok(1, "b"))
-    assert first == [Deliver(job(1), "b", b"a1"), Cancel(job(1), "a")]
+    assert first == [Deliver(job(1), "b", "p", b"a1"), Cancel(job(1), "a")]
     assert given_out(dispatch.handle(Ticked(19.0))) == [(2, "b")]
     # The loser keeps its credit busy until it has answered, too; then it is free.
     assert given_out(dispatch.handle(Requested(job(3)))) == [(3, "b")]
@@ -347,7 +353,7 @@ def test_a_copy_survives_the_loss_of_the_other() -> None:
         dispatch.handle(Ticked(9.0))
         dispatch.handle(Left(gone))
         (other,) = {"a", "b"} - {gone}
-        assert dispatch.handle(ok(1, other))[0] == Deliver(job(1), other, b"a1")
+        assert dispatch.handle(ok(1, other))[0] == Deliver(job(1), other, "p", b"a1")
 
 
 def test_nobody_is_given_a_copy_of_what_it_has_or_failed_at() -> None:
@@ -355,7 +361,7 @@ def test_nobody_is_given_a_copy_of_what_it_has_or_failed_at() -> None:
     dispatch.handle(Ticked(9.0))
     assert given_out(dispatch.handle(lost(1, "b"))) == []
     assert given_out(dispatch.handle(Ticked(99.0))) == [(2, "b")]
-    assert dispatch.handle(ok(2, "b"))[0] == Deliver(job(2), "b", b"a2")
+    assert dispatch.handle(ok(2, "b"))[0] == Deliver(job(2), "b", "p", b"a2")
     assert given_out(dispatch.handle(Ticked(199.0))) == []
 
 
@@ -369,7 +375,7 @@ def test_a_job_that_ends_three_processes_is_given_to_nobody_more() -> None:
     dispatch.handle(Left("c"))
     reason = "ended its own process 3 times, by SIGPROF, SIGSEGV"
     assert dispatch.handle(died(0, "c", "SIGPROF")) == [
-        Deliver(job(0), "c", b"", reason, is_deadly=True)
+        Deliver(job(0), "c", reason=reason, is_deadly=True)
     ]
     assert dispatch.pending == dispatch.waiting("worker") == 0
     assert dispatch.handle(died(0, "d")) == []
@@ -382,8 +388,8 @@ def test_who_is_at_a_deadly_job_may_stop() -> None:
 
 
 def test_twins_go_to_two_workers_if_there_are_two() -> None:
-    first = Job(1, "evaluate", BirthId(0, 1), 0, b"1", twin=2)
-    second = Job(2, "evaluate", BirthId(0, 1), 0, b"2", twin=1)
+    first = Job(1, "evaluate", b"1", twin=2)
+    second = Job(2, "evaluate", b"2", twin=1)
     dispatch = told(worker("a"))
     assert given_out(dispatch.handle(Requested(first))) == [(1, "a")]
     assert given_out(dispatch.handle(Requested(second))) == [(2, "a")]

@@ -1,58 +1,37 @@
-"""One fleet for several runs: whose an answer is, and who hears of it."""
+"""One fleet for several runs: answers are routed to the clients of their jobs."""
 
 import pytest
 
 from coordinator.dispatch.events import (
     AssignShard,
+    Client,
     Deliver,
     Died,
     DispatchEvent,
     Job,
     Joined,
     Left,
+    Read,
     Returned,
     ShardDone,
     ShardFailed,
-    ShardReturned,
+    Ticked,
 )
 from coordinator.dispatch.fleet import Fleet
-from schema.robot.ids import BirthId
+from schema.errors import MalformedMessage
+
+CLIENT, OTHER, ARENA = Client("run", 1), Client("other", 1), Client("arena", 1)
 
 
-class JobClient:
-    """Keeps what it is told."""
-
-    def __init__(self, run: str = "run") -> None:
-        self.run = run
-        self.ends: list[Deliver] = []
-
-    def is_of(self, run: str, epoch: int) -> bool:
-        return (run, epoch) == (self.run, 1)
-
-    def checked(self, event: Returned) -> Returned:
-        return event
-
-    def deliver(self, command: Deliver) -> None:
-        self.ends.append(command)
+def read(data: bytes) -> object:
+    """Decode the answer to an advance; "stateless" says that the state is missing."""
+    if data == b"bad":
+        raise MalformedMessage("bad bytes")
+    return None if data == b"stateless" else data
 
 
-class ShardClient:
-    """Has one arena."""
-
-    def __init__(self) -> None:
-        self.ends: list[ShardDone | ShardFailed] = []
-
-    def is_of(self, run: str, epoch: int) -> bool:
-        return (run, epoch) == ("arena", 1)
-
-    def payload(self, command: AssignShard) -> bytes:
-        return f"whole {command.is_whole}".encode()
-
-    def understood(self, event: Returned) -> ShardReturned:
-        return ShardReturned(event.number, "done" if event.outcome == "ok" else "lost")
-
-    def settle(self, command: ShardDone | ShardFailed) -> None:
-        self.ends.append(command)
+def encode(command: AssignShard) -> tuple[bytes, Read]:
+    return f"whole {command.is_whole}".encode(), read
 
 
 class Agents:
@@ -89,25 +68,31 @@ def agents() -> Agents:
 @pytest.fixture
 def fleet(agents: Agents) -> Fleet:
     made = Fleet(agents)
-    assert made.listen(0.0, 0.0) == []
+    assert made.listen(0.0, 0.0) == {}
     return made
 
 
-def ask(fleet: Fleet, requester: JobClient) -> int:
+def request(fleet: Fleet, client: Client = CLIENT) -> int:
     number = fleet.new_number()
-    fleet.ask(Job(number, "evaluate", BirthId(0, number), 0, b""), requester)
+    fleet.request(Job(number, "evaluate", b"", client=client))
     return number
 
 
-def test_an_answer_goes_to_who_asked(fleet: Fleet, agents: Agents) -> None:
-    first, second = JobClient(), JobClient()
-    numbers = [ask(fleet, requester) for requester in (first, second, first)]
+def new_shard(fleet: Fleet, client: Client = ARENA) -> int:
+    return fleet.new_shard(client, encode, "")
+
+
+def test_an_answer_goes_to_its_client(fleet: Fleet, agents: Agents) -> None:
+    numbers = [request(fleet, client) for client in (CLIENT, OTHER, CLIENT)]
     assert fleet.open == 3
     agents.news = [Returned(n, agent, "ok", b"x") for n, agent, _ in agents.sent[:2]]
-    assert fleet.listen(0.0, 1.0) == [first, second]
-    assert [end.job.number for end in (*first.ends, *second.ends)] == numbers[:2]
+    (first,), (second,) = fleet.listen(0.0, 1.0).values()
+    assert isinstance(first, Deliver)
+    assert isinstance(second, Deliver)
+    assert [first.job.client, second.job.client] == [CLIENT, OTHER]
+    assert [first.job.number, second.job.number] == numbers[:2]
     assert fleet.open == 1
-    assert fleet.listen(0.0, 2.0) == []
+    assert fleet.listen(0.0, 2.0) == {}
 
 
 def test_credits_are_those_of_the_workers_that_are_there(fleet: Fleet) -> None:
@@ -117,33 +102,29 @@ def test_credits_are_those_of_the_workers_that_are_there(fleet: Fleet) -> None:
     assert fleet.credits == 2
 
 
-def test_nobody_hears_of_jobs_of_one_that_left(fleet: Fleet, agents: Agents) -> None:
-    requester = JobClient()
-    ask(fleet, requester)
-    fleet.leave(requester)
+def test_jobs_of_a_client_that_left_are_withdrawn(fleet: Fleet, agents: Agents) -> None:
+    request(fleet)
+    fleet.leave(CLIENT)
     assert fleet.open == 0
     number, agent, payload = agents.sent[0]
     assert agents.cancelled == [(agent, payload)]
     agents.news = [Returned(number, agent, "ok", b"x")]
-    assert fleet.listen(0.0, 1.0) == []
-    assert requester.ends == []
-    # And its worker is free for others.
-    others = JobClient()
+    assert fleet.listen(0.0, 1.0) == {}
+    # And its worker is free for other clients.
     for _ in range(5):
-        ask(fleet, others)
+        request(fleet, OTHER)
     assert len(agents.sent) == 6
 
 
-def test_a_deadly_job_of_one_that_left_kills_nobody_more(
+def test_a_deadly_job_of_a_client_that_left_is_not_repeated(
     fleet: Fleet, agents: Agents
 ) -> None:
-    requester, others = JobClient(), JobClient()
-    ask(fleet, requester)
-    waiting = [
-        ask(fleet, each) for each in (requester, others, others, others, requester)
-    ][-1]
+    request(fleet)
+    waiting = [request(fleet, each) for each in (CLIENT, OTHER, OTHER, OTHER, CLIENT)][
+        -1
+    ]
     assert waiting not in [number for number, _, _ in agents.sent]
-    fleet.leave(requester)
+    fleet.leave(CLIENT)
     (number, agent, _), *rest = agents.sent
     fleet.tell(Left(agent))
     fleet.tell(Died("run", 1, number, agent, "SIGSEGV"))
@@ -154,55 +135,95 @@ def test_a_deadly_job_of_one_that_left_kills_nobody_more(
     assert fleet.dispatch.pending == 3
 
 
-def test_deaths_by_jobs_of_other_coordinators_are_not_ours(
+def test_deaths_by_jobs_of_other_coordinators_do_not_count(
     fleet: Fleet, agents: Agents
 ) -> None:
-    requester = JobClient()
-    number = ask(fleet, requester)
+    number = request(fleet)
     for name in ("x", "y", "z"):
         fleet.tell(Died("another run", 1, number, name, "SIGSEGV"))
-    assert requester.ends == []
+    assert fleet.listen(0.0, 1.0) == {}
     for name in ("x", "y", "z"):
         fleet.tell(Died("run", 1, number, name, "SIGSEGV"))
-    assert [end.is_deadly for end in requester.ends] == [True]
-    assert fleet.listen(0.0, 1.0) == [requester]
+    (end,) = fleet.listen(0.0, 1.0)[CLIENT]
+    assert isinstance(end, Deliver)
+    assert end.is_deadly
     assert agents.sent
 
 
 def test_arenas_of_all_runs_share_the_workers(fleet: Fleet, agents: Agents) -> None:
-    owners = [ShardClient(), ShardClient()]
-    shards = [fleet.new_shard(owner) for owner in owners]
+    shards = [new_shard(fleet, ARENA), new_shard(fleet, OTHER)]
     for shard in shards:
         fleet.advance(shard)
     assert sorted(agent for _, agent, _ in agents.sent) == ["one", "two"]
     assert fleet.open == 2
     number, agent, payload = agents.sent[1]
     assert payload == b"whole True"
-    agents.news = [Returned(number, agent, "ok", b"")]
-    assert fleet.listen(0.0, 1.0) == [owners[1]]
-    assert owners[1].ends == [ShardDone(shards[1], agent)]
+    agents.news = [Returned(number, agent, "ok", b"answer")]
+    ends = fleet.listen(0.0, 1.0)
+    assert ends == {OTHER: [ShardDone(shards[1], agent, b"answer")]}
     assert fleet.open == 1
+
+
+def test_an_unfit_answer_to_an_advance_is_the_workers_error(
+    fleet: Fleet, agents: Agents
+) -> None:
+    shard = new_shard(fleet)
+    fleet.advance(shard)
+    for now_s in range(1, 4):
+        number, agent, _ = agents.sent[-1]
+        agents.news = [Returned(number, agent, "ok", b"bad")]
+        ends = fleet.listen(0.0, float(10 * now_s))
+        assert fleet.malformed == now_s
+        fleet.tell(Ticked(10 * now_s + 5.0))
+    assert ends == {ARENA: [ShardFailed(shard, agent, "bad bytes")]}
+
+
+def test_a_worker_without_the_state_is_given_it(fleet: Fleet, agents: Agents) -> None:
+    shard = new_shard(fleet)
+    for data in (b"answer", b"stateless"):
+        fleet.advance(shard)
+        number, agent, _ = agents.sent[-1]
+        agents.news = [Returned(number, agent, "ok", data)]
+        fleet.listen(0.0, 1.0)
+    payloads = [payload for _, _, payload in agents.sent]
+    assert payloads == [b"whole True", b"whole False", b"whole True"]
+    assert {agent for _, agent, _ in agents.sent} == {agent}
+
+
+def test_an_advance_that_crashes_three_workers_is_given_up(
+    fleet: Fleet, agents: Agents
+) -> None:
+    shard = new_shard(fleet)
+    fleet.advance(shard)
+    for name in ("three", "four", "five"):
+        number, agent, _ = agents.sent[-1]
+        fleet.tell(Joined(name, "worker", 1, "p"))
+        fleet.tell(Left(agent))
+        fleet.tell(Died("another run", 1, number, agent, "SIGSEGV"))
+        assert fleet.listen(0.0, 1.0) == {}
+        fleet.tell(Died("arena", 1, number, agent, "SIGSEGV"))
+    (end,) = fleet.listen(0.0, 1.0)[ARENA]
+    assert isinstance(end, ShardFailed)
+    assert (end.shard, end.agent) == (shard, agent)
 
 
 def test_a_released_arena_leaves_room_for_another(fleet: Fleet, agents: Agents) -> None:
-    busy, gone = fleet.new_shard(ShardClient()), fleet.new_shard(ShardClient())
-    fleet.advance(busy)
-    fleet.advance(gone)
+    fleet.advance(new_shard(fleet, ARENA))
+    fleet.advance(new_shard(fleet, OTHER))
     freed = agents.sent[1][1]
-    fleet.release(gone)
+    fleet.leave(OTHER)
     assert fleet.open == 1
-    fleet.advance(fleet.new_shard(ShardClient()))
+    fleet.advance(new_shard(fleet, CLIENT))
     assert agents.sent[2][1] == freed
-    # What the released one had out comes back to nobody.
+    # The answer to the released arena's request is dropped.
     agents.news = [Returned(agents.sent[1][0], freed, "ok", b"")]
-    assert fleet.listen(0.0, 1.0) == []
+    assert fleet.listen(0.0, 1.0) == {}
 
 
 def test_it_pauses_while_all_workers_have_more_than_enough(
     fleet: Fleet, agents: Agents
 ) -> None:
-    requester = JobClient()
-    numbers = [ask(fleet, requester) for _ in range(200)]
+    numbers = [request(fleet) for _ in range(200)]
     fleet.listen(0.2, 0.0)
     assert agents.pauses_s[-1] == 0.0  # how long a job takes is not known yet
     agents.news = [
@@ -216,6 +237,6 @@ def test_it_pauses_while_all_workers_have_more_than_enough(
     assert agents.pauses_s[-1] == pytest.approx(0.08)
     fleet.listen(0.01, 0.04)
     assert agents.pauses_s[-1] == 0.01  # no longer than whoever asked wants to wait
-    fleet.advance(fleet.new_shard(ShardClient()))
+    fleet.advance(new_shard(fleet))
     fleet.listen(0.2, 0.05)
     assert agents.pauses_s[-1] == 0.0  # an arena waits for each answer

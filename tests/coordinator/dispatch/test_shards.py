@@ -33,10 +33,12 @@ def fleet(*names: str) -> ShardDispatch:
 
 def test_first_advance_is_whole_and_the_next_goes_on() -> None:
     dispatch = fleet("b", "a")
-    assert dispatch.handle(ShardRequested(0)) == [AssignShard(1, 0, "a", is_whole=True)]
+    assert dispatch.handle(ShardRequested(0)) == [
+        AssignShard(1, 0, "a", "p", is_whole=True)
+    ]
     assert dispatch.handle(ShardReturned(1, "done")) == [ShardDone(0, "a")]
     assert dispatch.handle(ShardRequested(0)) == [
-        AssignShard(2, 0, "a", is_whole=False)
+        AssignShard(2, 0, "a", "p", is_whole=False)
     ]
 
 
@@ -45,7 +47,7 @@ def test_waits_for_a_worker() -> None:
     assert dispatch.handle(ShardRequested(0)) == []
     assert dispatch.waiting == {0: ""}
     assert dispatch.handle(joined("x", kind="analyzer")) == []
-    assert dispatch.handle(joined("a")) == [AssignShard(1, 0, "a", is_whole=True)]
+    assert dispatch.handle(joined("a")) == [AssignShard(1, 0, "a", "p", is_whole=True)]
     assert dispatch.waiting == {}
 
 
@@ -61,7 +63,7 @@ def test_shards_spread_over_workers() -> None:
 def test_dead_holder_is_replaced_at_once_with_the_whole_state() -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(ShardRequested(0))
-    assert dispatch.handle(Left("a")) == [AssignShard(2, 0, "b", is_whole=True)]
+    assert dispatch.handle(Left("a")) == [AssignShard(2, 0, "b", "p", is_whole=True)]
     # Its own end as a job comes late and says nothing new.
     assert dispatch.handle(ShardReturned(1, "lost")) == []
     assert dispatch.handle(ShardReturned(1, "done")) == []
@@ -73,7 +75,9 @@ def test_holder_that_dies_between_advances() -> None:
     dispatch.handle(ShardRequested(0))
     dispatch.handle(ShardReturned(1, "done"))
     assert dispatch.handle(Left("a")) == []
-    assert dispatch.handle(ShardRequested(0)) == [AssignShard(2, 0, "b", is_whole=True)]
+    assert dispatch.handle(ShardRequested(0)) == [
+        AssignShard(2, 0, "b", "p", is_whole=True)
+    ]
 
 
 def test_one_that_has_not_the_state_is_given_it() -> None:
@@ -82,13 +86,13 @@ def test_one_that_has_not_the_state_is_given_it() -> None:
     dispatch.handle(ShardReturned(1, "done"))
     dispatch.handle(ShardRequested(0))
     assert dispatch.handle(ShardReturned(2, "stateless")) == [
-        AssignShard(3, 0, "a", is_whole=True)
+        AssignShard(3, 0, "a", "p", is_whole=True)
     ]
     # Asking again is an error.
     assert dispatch.handle(ShardReturned(3, "stateless")) == []
     assert dispatch.wake_s is not None
     hands = dispatch.handle(Ticked(dispatch.wake_s))
-    assert hands == [AssignShard(4, 0, "b", is_whole=True)]
+    assert hands == [AssignShard(4, 0, "b", "p", is_whole=True)]
 
 
 @pytest.mark.parametrize("outcome", ["error", "lost"])
@@ -98,14 +102,16 @@ def test_after_a_failure_another_one_has_its_turn(outcome: str) -> None:
     dispatch.handle(ShardRequested(0))
     assert dispatch.handle(ShardReturned(1, outcome, "why")) == []  # type: ignore[arg-type]
     assert dispatch.handle(Ticked(10.01)) == []
-    assert dispatch.handle(Ticked(10.05)) == [AssignShard(2, 0, "b", is_whole=True)]
+    assert dispatch.handle(Ticked(10.05)) == [
+        AssignShard(2, 0, "b", "p", is_whole=True)
+    ]
 
 
 def test_an_advance_that_kills_three_is_given_up() -> None:
     dispatch = fleet("a", "b", "c")
     dispatch.handle(ShardRequested(0))
     for number, name, following in ((1, "a", "b"), (2, "b", "c")):
-        hand = AssignShard(number + 1, 0, following, is_whole=True)
+        hand = AssignShard(number + 1, 0, following, "p", is_whole=True)
         assert dispatch.handle(Left(name)) == [hand]
         assert dispatch.shard_that_lost(number) == 0
         assert dispatch.handle(Killed(number, name, "SIGSEGV")) == []
@@ -149,11 +155,13 @@ def test_only_an_equal_platform_may_go_on() -> None:
     dispatch.handle(joined("a", "arm"))
     dispatch.handle(joined("b", "x86"))
     dispatch.handle(ShardSeen(0, "x86"))
-    assert dispatch.handle(ShardRequested(0)) == [AssignShard(1, 0, "b", is_whole=True)]
+    assert dispatch.handle(ShardRequested(0)) == [
+        AssignShard(1, 0, "b", "x86", is_whole=True)
+    ]
     assert dispatch.handle(Left("b")) == []
     assert dispatch.waiting == {0: "x86"}
     assert dispatch.handle(joined("c", "x86")) == [
-        AssignShard(2, 0, "c", is_whole=True)
+        AssignShard(2, 0, "c", "x86", is_whole=True)
     ]
 
 
@@ -191,13 +199,13 @@ def test_another_platform_gets_a_shard_after_a_while_if_that_is_allowed() -> Non
     dispatch = drifting(allows_drift=True)
     assert dispatch.wake_s == 100.0 + DRIFT_S
     assert dispatch.handle(Ticked(99.9 + DRIFT_S)) == []
-    whole = AssignShard(1, 0, "a", is_whole=True)
+    whole = AssignShard(1, 0, "a", "ours", is_whole=True)
     assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == [whole]
     dispatch.handle(ShardReturned(1, "done"))
     # It is at home there now.
     dispatch.handle(joined("c", "theirs"))
     assert dispatch.handle(ShardRequested(0)) == [
-        AssignShard(2, 0, "a", is_whole=False)
+        AssignShard(2, 0, "a", "ours", is_whole=False)
     ]
 
 
@@ -209,14 +217,14 @@ def test_one_that_may_drift_waits_for_whoever_comes_and_not_for_a_time() -> None
     assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == []
     assert dispatch.wake_s is None
     assert dispatch.handle(joined("a", "ours")) == [
-        AssignShard(1, 0, "a", is_whole=True)
+        AssignShard(1, 0, "a", "ours", is_whole=True)
     ]
 
 
 def test_its_own_platform_comes_back_in_time() -> None:
     dispatch = drifting(allows_drift=True)
     assert dispatch.handle(joined("z", "theirs")) == [
-        AssignShard(1, 0, "z", is_whole=True)
+        AssignShard(1, 0, "z", "theirs", is_whole=True)
     ]
     dispatch.handle(Left("z"))
     # The while begins anew.

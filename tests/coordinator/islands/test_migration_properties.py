@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordinator.arena.arena import Arena
-from coordinator.islands.events import Evaluated, EvaluationFailed, requester_of
+from coordinator.islands.events import Evaluated, EvaluationFailed
+from coordinator.run.requests import requester_of
 from coordinator.storage.journal_codec import decode_entry, encode_entry
 from schema.errors import ExperimentError
 from schema.experiment.check import check_experiment

@@ -35,7 +35,7 @@ def test_an_agent_joins_by_saying_what_it_is_and_leaves(membership: Membership) 
     assert not membership.is_stranger("w")
     assert membership.appear(WORKER.alive) is None
     assert membership.vanish(WORKER.alive) == Left("w")
-    assert membership.find("w") is None
+    assert "w" not in membership.members
 
 
 def test_who_vanishes_unknown_is_no_news(membership: Membership) -> None:
@@ -64,7 +64,7 @@ def test_who_is_refused_takes_no_more_part_until_it_comes_again(
     assert membership.refuse("w", "told twice") is None
     assert not membership.is_stranger("w")
     assert membership.vanish(WORKER.alive) is None
-    assert (membership.refused, membership.find("w")) == ({}, None)
+    assert (membership.refused, membership.members) == ({}, {})
 
 
 def test_each_death_is_told_once_and_before_who_took_the_place(

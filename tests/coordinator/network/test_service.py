@@ -29,9 +29,8 @@ from coordinator.network.service import Network
 from schema.agent.network import client_config
 from schema.agent.topics import Member
 from schema.errors import NetworkError
-from schema.robot.ids import BirthId
 from schema.wire import revolve_pb2 as pb
-from schema.wire.codec import decode_answer
+from schema.wire.codec import Answer, decode_answer
 
 pytestmark = pytest.mark.system
 
@@ -106,13 +105,14 @@ class Driver:
                 self.network.send(job.number, command.agent, job.payload)
             elif isinstance(command, Deliver):
                 assert job.number not in self.delivered
-                assert decode_answer(command.answer).number == job.number
+                assert isinstance(command.answer, Answer)
+                assert command.answer.number == job.number
                 self.delivered[job.number] = command.agent
 
     def ask(self, *numbers: int) -> None:
         for number in numbers:
             payload = request(number)
-            job = Job(number, "evaluate", BirthId(0, number), 0, payload)
+            job = Job(number, "evaluate", payload, read=decode_answer)
             self.tell(Requested(job))
 
     def run(self, is_enough: Callable[[], bool]) -> None:

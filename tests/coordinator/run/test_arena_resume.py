@@ -20,7 +20,7 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.run.loop import Loop
 from coordinator.run.operators import RunOperator
-from coordinator.run.requests import RunContext
+from coordinator.run.run_context import RunContext
 from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
@@ -129,6 +129,10 @@ class Run:
         self.loop.start(journal.replay())
         self.operator = RunOperator(self.loop, EXPERIMENT)
 
+    def turn(self, now_s: float) -> None:
+        ends = self.fleet.listen(0.0, now_s)
+        self.loop.act(now_s, ends.get(self.loop.client, ()))
+
     def ask(self, action: OperatorAction, name: str = "x") -> str:
         reply = self.operator.reply_to(OperatorRequest(name, 0, action))
         return f"refused: {reply.text}" if reply.is_refused else reply.text
@@ -141,8 +145,7 @@ def run(path: Path, point: Point = lambda _: None, **other: Any) -> bool:  # noq
             one = Run(path, stack, point, **other)
             turns = 0
             while not one.loop.is_finished:
-                one.fleet.listen(0.0, float(turns))
-                one.loop.act(float(turns))
+                one.turn(float(turns))
                 turns += 1
                 if turns % 7 == 0:
                     one.rows.flush()
@@ -276,8 +279,7 @@ def ordered(path: Path, point: Point) -> list[str]:
                 elif one.arena.is_paused:
                     said.append(one.ask(ListRobots()).partition("\n")[0])
                     said.append(one.ask(ResumeArena(), "resume"))
-                one.fleet.listen(0.0, float(turns))
-                one.loop.act(float(turns))
+                one.turn(float(turns))
                 turns += 1
         except Killed:
             return said

@@ -48,7 +48,7 @@ def _death(number: int) -> Record:
 def _feed(*records: Record) -> Feed:
     feed = Feed("run", 1, RunDetails("experiment", 0, 1, "{}"))
     for record in records:
-        feed.note(record)
+        feed.unread.append(record)
     return feed
 
 
@@ -60,7 +60,7 @@ def _sent(update: Update | None) -> Update:
 def test_updates_are_numbered_and_hold_each_row_once() -> None:
     feed = _feed(_birth(0), _birth(1))
     first = _sent(feed.update(()))
-    feed.note(_birth(2, None, 0, 1))
+    feed.unread.append(_birth(2, None, 0, 1))
     second = _sent(feed.update(()))
     assert (first.sequence, second.sequence) == (1, 2)
     assert [one.birth.number for one in first.births] == [0, 1]
@@ -81,7 +81,7 @@ def test_the_whole_is_the_sum_of_the_updates() -> None:
     feed = _feed(_birth(0), _birth(1), *_population(2, 0, 1))
     parts = [_sent(feed.update(WORKERS))]
     for record in (_birth(2, None, 0, 1), *_population(3, 1, 2)):
-        feed.note(record)
+        feed.unread.append(record)
     parts.append(_sent(feed.update(WORKERS)))
     whole = feed.whole()
     assert (whole.sequence, whole.is_whole) == (2, True)
@@ -95,14 +95,14 @@ def test_the_whole_is_the_sum_of_the_updates() -> None:
 def test_the_whole_holds_nothing_that_no_update_held() -> None:
     feed = _feed(_birth(0))
     feed.update(())
-    feed.note(_birth(1))
+    feed.unread.append(_birth(1))
     assert len(feed.whole().births) == 1
 
 
 def test_bodies_of_dead_robots_are_dropped_on_line() -> None:
     feed = _feed(_birth(0, 0.0), _birth(1, 1.0), *_population(2, 0, 1))
     feed.update(())
-    feed.note(_death(0))
+    feed.unread.append(_death(0))
     update = _sent(feed.update(()))
     assert [gone.birth for gone in update.deaths] == [BirthId(0, 0)]
     assert [one.body for one in feed.whole().births] == [None, BODY]
@@ -112,7 +112,7 @@ def test_bodies_of_robots_that_were_not_selected_are_dropped_off_line() -> None:
     feed = _feed(_birth(0), _birth(1), *_population(2, 0, 1), _birth(2), _birth(3))
     feed.update(())
     for record in (*_population(4, 1, 3), _birth(4)):
-        feed.note(record)
+        feed.unread.append(record)
     feed.update(())
     bodies = {one.birth.number: one.body for one in feed.whole().births}
     assert bodies == {0: None, 1: BODY, 2: None, 3: BODY, 4: BODY}

@@ -6,6 +6,8 @@ import pytest
 from msgspec.structs import replace
 
 from coordinator.dispatch.events import (
+    Client,
+    Deliver,
     Died,
     DispatchEvent,
     Joined,
@@ -24,7 +26,8 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.run.requests import QUARANTINED, REMEMBERED, Requests, RunContext
+from coordinator.run.requests import QUARANTINED, REMEMBERED, Requests
+from coordinator.run.run_context import RunContext
 from schema.errors import JobRefused
 from schema.experiment.identity import NOBODY, Identity, Origin
 from schema.robot.brain import Brain, Connection, Neuron
@@ -42,6 +45,7 @@ from schema.wire.codec import (
 )
 
 EPOCH = 3
+CLIENT = Client("run", EPOCH)
 ORIGIN = Origin(seed=5, run=2)
 BIRTH = BirthId(0, 7)
 ROBOT = Robot(
@@ -65,9 +69,7 @@ class Desk:
         self.sent: list[tuple[int, str, bytes]] = []
         self.cancelled: list[tuple[int, str]] = []
         self.fleet = Fleet(self)
-        context = RunContext(
-            "run", EPOCH, ORIGIN, b"vetting", {0: evaluation, 2: evaluation}
-        )
+        context = RunContext(CLIENT, ORIGIN, b"vetting", {0: evaluation, 2: evaluation})
         self.requests = Requests(context, self.fleet, audit)
         for name in ("one", "two"):
             self.tell(Joined(name, "worker", 1, f"platform-{name}"))
@@ -87,9 +89,14 @@ class Desk:
         return []
 
     def tell(self, event: DispatchEvent) -> list[Answered | Audited]:
-        """Tell the fleet; return the answers that this comes to."""
+        """Pass an event to the fleet; return the island's events that follow."""
         self.fleet.tell(event)
-        return self.requests.take()
+        ends = self.fleet.listen(0.0, 0.0).get(CLIENT, ())
+        found = []
+        for end in ends:
+            assert isinstance(end, Deliver)
+            found += self.requests.events(end)
+        return found
 
     def reply(self, result: Evaluation | Report | str, **changes: int) -> Returned:
         """Return the answer to the newest job."""
@@ -105,8 +112,8 @@ def desk() -> Desk:
 
 
 def test_a_request_carries_the_run_its_settings_and_the_robot(desk: Desk) -> None:
-    desk.requests.ask(Vet(BIRTH, 2, ROBOT))
-    desk.requests.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.send(Vet(BIRTH, 2, ROBOT))
+    desk.requests.send(Evaluate(BIRTH, ROBOT))
     (vet, judge, vetting), (_, worker, evaluation) = desk.sent
     assert (judge, worker) == ("judge", "one")
     asked = decode_request(vetting, decode_body)
@@ -120,12 +127,12 @@ def test_a_body_is_vetted_and_a_robot_evaluated_vetted_before_or_not(
     desk: Desk,
 ) -> None:
     other = Robot(ROBOT.parts, Brain(ROBOT.brain.neurons))
-    desk.requests.ask(Vet(BIRTH, 0, ROBOT))
-    desk.requests.ask(Evaluate(BIRTH, ROBOT))
-    desk.requests.ask(Evaluate(BIRTH, ROBOT, trial=1))
-    desk.requests.ask(Vet(BirthId(0, 8), 0, ROBOT))
+    desk.requests.send(Vet(BIRTH, 0, ROBOT))
+    desk.requests.send(Evaluate(BIRTH, ROBOT))
+    desk.requests.send(Evaluate(BIRTH, ROBOT, trial=1))
+    desk.requests.send(Vet(BirthId(0, 8), 0, ROBOT))
     # Of the same birth, and yet not the one that was vetted.
-    desk.requests.ask(Evaluate(BirthId(0, 8), other))
+    desk.requests.send(Evaluate(BirthId(0, 8), other))
     for number, agent, _ in desk.sent[:2]:
         result = VIABLE if agent == "judge" else JUDGED
         data = encode_answer(Answer(EPOCH, number, 0.5, result))
@@ -151,7 +158,7 @@ def test_noise_is_drawn_by_who_is_judged_for_whom_and_how_often(desk: Desk) -> N
         Evaluate(guest, ROBOT, trial=4, requester=2),
         Vet(BIRTH, 1, ROBOT),
     ):
-        desk.requests.ask(context)
+        desk.requests.send(context)
     found = [
         decode_request(payload, decode_body).identity for _, _, payload in desk.sent
     ]
@@ -161,14 +168,14 @@ def test_noise_is_drawn_by_who_is_judged_for_whom_and_how_often(desk: Desk) -> N
 
 def test_the_two_of_an_audit_draw_the_same_noise() -> None:
     desk = Desk(audit=1.0)
-    desk.requests.ask(Evaluate(BIRTH, ROBOT, trial=1))
+    desk.requests.send(Evaluate(BIRTH, ROBOT, trial=1))
     first, second = (decode_request(payload) for _, _, payload in desk.sent)
     assert first.number != second.number
     assert first.identity == second.identity == Identity(ORIGIN, BIRTH, 1)
 
 
 def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:
-    desk.requests.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.send(Evaluate(BIRTH, ROBOT))
     (event,) = desk.tell(desk.reply(JUDGED))
     assert isinstance(event, Evaluated)
     assert (event.birth, event.evaluation) == (BIRTH, JUDGED)
@@ -180,7 +187,7 @@ def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:
 def test_robots_that_are_never_evaluated_are_forgotten(desk: Desk) -> None:
     """An arena's robots are vetted, born and gone: 3000 of them in a run."""
     for number in range(REMEMBERED + 50):
-        desk.requests.ask(Vet(BirthId(0, number), 0, ROBOT))
+        desk.requests.send(Vet(BirthId(0, number), 0, ROBOT))
         (event,) = desk.tell(desk.reply(VIABLE))
         assert isinstance(event, Vetted)
     assert len(desk.requests._bodies) == REMEMBERED
@@ -190,7 +197,7 @@ def test_a_request_names_its_plug_ins_by_what_they_are() -> None:
     desk = Desk(
         b'{"fitness":{"function":"plugged:speed"},"space":["schema.parts:CORE"]}'
     )
-    desk.requests.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.send(Evaluate(BIRTH, ROBOT))
     sent = pb.Request.FromString(desk.sent[0][2])
     assert sent.plugins == "plugged="  # it is not here
 
@@ -198,7 +205,7 @@ def test_a_request_names_its_plug_ins_by_what_they_are() -> None:
 @pytest.mark.parametrize("kind", ["evaluate", "vet"])
 def test_a_robot_that_ends_three_processes_is_told_apart(desk: Desk, kind: str) -> None:
     ask = Vet(BIRTH, 2, ROBOT) if kind == "vet" else Evaluate(BIRTH, ROBOT)
-    desk.requests.ask(ask)
+    desk.requests.send(ask)
     (number, agent, _) = desk.sent[0]
     of_others = [Died("another", EPOCH, number, "x", "SIGBUS")]
     of_others += [Died("run", EPOCH - 1, number, "x", "SIGBUS")]
@@ -217,22 +224,22 @@ def test_a_robot_that_ends_three_processes_is_told_apart(desk: Desk, kind: str) 
 
 
 def test_a_failed_simulation_is_a_result(desk: Desk) -> None:
-    desk.requests.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.send(Evaluate(BIRTH, ROBOT))
     (event,) = desk.tell(desk.reply("diverged"))
     assert isinstance(event, EvaluationFailed)
     assert event.reason == "diverged"
 
 
 def test_a_report_is_a_verdict_and_a_failure_a_failed_attempt(desk: Desk) -> None:
-    desk.requests.ask(Vet(BIRTH, 4, ROBOT))
+    desk.requests.send(Vet(BIRTH, 4, ROBOT))
     assert desk.tell(desk.reply(VIABLE)) == [Vetted(BIRTH, 4, VIABLE)]
-    desk.requests.ask(Vet(BIRTH, 5, ROBOT))
+    desk.requests.send(Vet(BIRTH, 5, ROBOT))
     failed = VettingFailed(BIRTH, 5, "no box")
     assert desk.tell(desk.reply("no box")) == [failed]
 
 
 def test_a_second_answer_and_one_to_nothing_change_nothing(desk: Desk) -> None:
-    desk.requests.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.send(Evaluate(BIRTH, ROBOT))
     reply = desk.reply(JUDGED)
     assert len(desk.tell(reply)) == 1
     assert desk.tell(reply) == []
@@ -252,16 +259,16 @@ def test_a_second_answer_and_one_to_nothing_change_nothing(desk: Desk) -> None:
 def test_a_useless_answer_is_counted_and_the_job_goes_to_another(
     desk: Desk, spoil: Callable[[Desk], Returned]
 ) -> None:
-    desk.requests.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.send(Evaluate(BIRTH, ROBOT))
     assert desk.tell(spoil(desk)) == []
-    assert desk.requests.malformed == 1
+    assert desk.fleet.dispatch.malformed == 1
     assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
     (event,) = desk.tell(desk.reply(JUDGED))
     assert isinstance(event, Evaluated)
 
 
 def test_a_lost_job_goes_to_another(desk: Desk) -> None:
-    desk.requests.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.send(Evaluate(BIRTH, ROBOT))
     assert desk.tell(Left("one")) == []
     assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
 
@@ -270,7 +277,7 @@ def test_a_job_that_several_refuse_stops_the_run_and_is_no_result(
     desk: Desk,
 ) -> None:
     desk.tell(Joined("three", "worker", 1, ""))
-    desk.requests.ask(Evaluate(BIRTH, ROBOT))
+    desk.requests.send(Evaluate(BIRTH, ROBOT))
     for _ in range(2):
         number, agent, _ = desk.sent[-1]
         refusal = Returned(number, agent, "error", reason="no such plug-in")

@@ -16,7 +16,7 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.island import Island
 from coordinator.network.local import LocalAgents
 from coordinator.run.loop import Loop
-from coordinator.run.requests import RunContext
+from coordinator.run.run_context import RunContext
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.journal import NAME, Journal
@@ -79,8 +79,7 @@ def run(path: Path, *, answers: int = 10**9) -> int:
         try:
             loop.start(journal.replay())
             while not loop.is_finished:
-                fleet.listen(0.0, 0.0)
-                loop.act(0.0)
+                loop.act(0.0, fleet.listen(0.0, 0.0).get(loop.client, ()))
                 rows.flush()
         except Killed:
             rows.close()

@@ -1,27 +1,42 @@
-"""How arenas are held back for those who watch."""
+"""How arenas are held back for viewers."""
 
 import pytest
 
+from coordinator.islands.events import AdvanceShard
 from coordinator.run.throttle import RealTimeThrottle
+from schema.wire.arena import Changes
+
+
+def advance(shard: int = 0) -> AdvanceShard:
+    return AdvanceShard(shard, 0, 1000, Changes(), wants_snapshot=False)
 
 
 def test_each_advance_waits_for_its_time() -> None:
     throttle = RealTimeThrottle(2.0, 0.005)
-    assert throttle.due_s(0, 0, 100.0) == 100.0
+    assert not throttle.holds_back(advance(), 0, 100.0)
     # 5 s of the arena are 2.5 s of ours.
-    assert throttle.due_s(0, 1000, 100.1) == pytest.approx(102.5)
-    assert throttle.due_s(0, 2000, 102.6) == pytest.approx(105.0)
+    assert throttle.holds_back(advance(), 1000, 100.1)
+    assert throttle.wake_s == pytest.approx(102.5)
+    assert throttle.due(102.4) == []
+    assert throttle.due(102.6) == [advance()]
+    assert throttle.due(102.6) == []
+    assert throttle.holds_back(advance(), 2000, 102.6)
+    assert throttle.wake_s == pytest.approx(105.0)
 
 
-def test_who_comes_late_does_not_catch_up() -> None:
+def test_late_arena_does_not_catch_up() -> None:
     throttle = RealTimeThrottle(1.0, 0.005)
-    throttle.due_s(0, 0, 0.0)
-    assert throttle.due_s(0, 1000, 60.0) == 60.0
-    assert throttle.due_s(0, 2000, 60.5) == pytest.approx(65.0)
+    throttle.holds_back(advance(), 0, 0.0)
+    assert not throttle.holds_back(advance(), 1000, 60.0)
+    assert throttle.holds_back(advance(), 2000, 60.5)
+    assert throttle.wake_s == pytest.approx(65.0)
 
 
-def test_arenas_have_their_own_time() -> None:
+def test_arenas_are_held_back_independently() -> None:
     throttle = RealTimeThrottle(1.0, 0.005)
-    throttle.due_s(0, 0, 0.0)
-    assert throttle.due_s(1, 4000, 7.0) == 7.0
-    assert throttle.due_s(0, 1000, 1.0) == pytest.approx(5.0)
+    throttle.holds_back(advance(0), 0, 0.0)
+    assert not throttle.holds_back(advance(1), 4000, 7.0)
+    assert throttle.holds_back(advance(0), 1000, 1.0)
+    assert throttle.wake_s == pytest.approx(5.0)
+    assert throttle.holds_back(advance(1), 4600, 7.0)
+    assert throttle.due(20.0) == [advance(0), advance(1)]

@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from coordinator.cli.format import about_arenas, best_of, duration
-from coordinator.run.rate import RateMeter
+from coordinator.run.session import RateMeter
 from coordinator.storage.campaign import (
     Campaign,
     check_adopted,

@@ -65,7 +65,8 @@ def test_a_job_is_noted_while_it_is_done_and_limited() -> None:
         seen.append(signal.getitimer(signal.ITIMER_PROF)[0] > 1000.0)
         return b"done"
 
-    assert slot.do(job, TASK, 2000.0) == b"done"
+    with slot.doing(TASK, 2000.0):
+        assert job() == b"done"
     assert seen == [TASK, True]
     assert slot.note.read() is None
     assert signal.getitimer(signal.ITIMER_PROF)[0] == 0.0
@@ -82,8 +83,8 @@ def test_an_error_is_no_death_but_leaving_is(
     def job() -> bytes:
         raise error
 
-    with pytest.raises(error):
-        slot.do(job, TASK, 100.0)
+    with pytest.raises(error), slot.doing(TASK, 100.0):
+        job()
     assert slot.note is not None
     assert (slot.note.read() == TASK) is is_noted
 
@@ -93,7 +94,8 @@ def die(signal_number: int, log: str, slot: ProcessSlot) -> None:
     with Path(log).open("a", encoding="utf-8") as file:
         file.write(f"{[death.cause for death in slot.deaths]}\n")
     if len(slot.deaths) < 2:
-        slot.do(lambda: _kill(signal_number), TASK, 100.0)
+        with slot.doing(TASK, 100.0):
+            _kill(signal_number)
 
 
 def _kill(signal_number: int) -> bytes:

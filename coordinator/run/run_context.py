@@ -1,0 +1,53 @@
+"""What all requests of a run have in common."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Self
+
+from msgspec import structs
+
+from coordinator.dispatch.events import Client
+from schema.experiment.document import Experiment, island_count, island_experiment
+from schema.experiment.identity import Origin
+from schema.experiment.settings import (
+    arena_settings,
+    evaluation_settings,
+    vetting_settings,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class RunContext:
+    """What every request of a run carries beside the robot or the changes.
+
+    Attributes:
+        client: name of the run, and epoch of its coordinator.
+        origin: seeds the noise; each request sets its own island.
+        vetting: settings for analyzers, as JSON.
+        evaluation, arena: settings for workers, as JSON, by island.
+    """
+
+    client: Client
+    origin: Origin
+    vetting: bytes
+    evaluation: Mapping[int, bytes]
+    arena: Mapping[int, bytes] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, run: str, epoch: int, experiment: Experiment, origin: Origin) -> Self:
+        """Return the context of a run of an experiment."""
+        experiments = {
+            number: island_experiment(experiment, number)
+            for number in range(island_count(experiment))
+        }
+        return cls(
+            Client(run, epoch),
+            origin,
+            vetting_settings(experiment),
+            {number: evaluation_settings(own) for number, own in experiments.items()},
+            {
+                number: arena_settings(own, structs.replace(origin, island=number))
+                for number, own in experiments.items()
+                if own.arena
+            },
+        )

@@ -1,0 +1,316 @@
+"""Requests to advance the arena shards of a run, and their results.
+
+The changes and advances since a shard's newest snapshot are kept, so that another
+worker can rebuild its state. Nothing here decides what happens in an arena.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Protocol
+
+import pyarrow as pa
+import pyarrow.compute
+
+from coordinator.dispatch.events import AssignShard, Read, ShardFailed
+from coordinator.dispatch.fleet import Fleet
+from coordinator.islands.events import Advanced, AdvanceShard
+from coordinator.run.drift import Drift, with_losses
+from coordinator.run.run_context import RunContext
+from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
+from schema.experiment.plugin_source import plugins_of
+from schema.parts import Vector
+from schema.robot.ids import BirthId
+from schema.robot.results import Provenance
+from schema.tables.columns import read_columns
+from schema.wire.arena import Advance
+from schema.wire.arena_codec import (
+    AdvanceRequest,
+    PastAdvance,
+    Rebuild,
+    decode_advance_answer,
+    encode_advance_request,
+)
+
+
+class SnapshotStore(Protocol):
+    """Storage of shard snapshots."""
+
+    def has(self, shard: int, step: int, digest: bytes) -> bool:
+        """Return whether there is a snapshot of this digest at a step."""
+
+    def write(self, shard: int, step: int, data: bytes) -> None:
+        """Store the state of a shard at a step, durably."""
+
+    def read(self, shard: int, step: int) -> bytes:
+        """Return the state of a shard at a step."""
+
+    def drop_before(self, shard: int, step: int) -> None:
+        """Remove the snapshots before a step."""
+
+
+@dataclass(slots=True)
+class _Past:
+    """What has happened to a shard.
+
+    Its state at ``step`` is that of the newest snapshot, at ``base`` (0 is the empty
+    arena), after ``history``. ``platform`` is that of the last advance, empty before
+    the first; ``places`` are those of the robots that lived after it.
+    """
+
+    step: int = 0
+    platform: str = ""
+    digest: bytes = b""
+    base: int = 0
+    history: list[PastAdvance] = field(default_factory=list)
+    places: dict[BirthId, Vector] = field(default_factory=dict)
+    requested: AdvanceShard | None = None
+    wants_snapshot: bool = False
+
+    def drifts_to(self, platform: str) -> bool:
+        """Return whether a platform differs from that of the last advance."""
+        return self.platform not in ("", platform)
+
+
+@dataclass(frozen=True, slots=True)
+class Reached:
+    """A decoded answer to a request to advance a shard.
+
+    Attributes:
+        event: for the arena.
+        snapshot: the state that was reached; empty if it was not wanted.
+    """
+
+    event: Advanced
+    snapshot: bytes
+
+
+class ShardRequests:
+    """The advances of all arenas of a run."""
+
+    def __init__(
+        self, context: RunContext, snapshot_store: SnapshotStore, fleet: Fleet
+    ) -> None:
+        """Initialise without shards.
+
+        Args:
+            context: what all requests have in common.
+            snapshot_store: storage of the snapshots.
+            fleet: the workers.
+        """
+        self._context = context
+        self._snapshot_store = snapshot_store
+        self._fleet = fleet
+        self._pasts: dict[int, _Past] = {}
+        # A shard has its island's number here and another one in the fleet.
+        self._numbers: dict[int, int] = {}
+        self._islands: dict[int, int] = {}
+
+    @property
+    def waiting(self) -> dict[int, str]:
+        """Platforms of the shards that wait for a worker; "" is any platform."""
+        return {
+            self._islands[number]: platform
+            for number, platform in self._fleet.shards.waiting.items()
+            if number in self._islands
+        }
+
+    def holder(self, shard: int) -> str:
+        """Return the name of the worker that holds a shard; empty if none does."""
+        number = self._numbers.get(shard)
+        return "" if number is None else self._fleet.shards.holder(number)
+
+    def step(self, shard: int) -> int:
+        """Return the step that a shard has reached."""
+        return self._past(shard).step
+
+    def past(self, shard: int) -> Rebuild:
+        """Return what a worker needs to rebuild a shard's state."""
+        past = self._past(shard)
+        base = self._snapshot_store.read(shard, past.base) if past.base else b""
+        return Rebuild(base, tuple(past.history))
+
+    def note(self, command: AdvanceShard) -> None:
+        """Remember the advance that an arena requests, but do not send it yet."""
+        self._past(command.island).requested = command
+
+    def send_noted(self) -> None:
+        """Request all advances that were noted."""
+        for _, past in sorted(self._pasts.items()):
+            if past.requested is not None:
+                self.send(past.requested)
+
+    def send(self, command: AdvanceShard) -> None:
+        """Request an advance."""
+        shard = command.island
+        past = self._past(shard)
+        past.requested = command
+        if shard not in self._numbers:
+            number = self._fleet.new_shard(
+                self._context.client, self._encode, past.platform
+            )
+            self._numbers[shard], self._islands[number] = number, shard
+        self._fleet.advance(self._numbers[shard])
+
+    def wish_snapshot(self, shard: int) -> None:
+        """Have the state stored at the end of the next advance that is assigned."""
+        self._past(shard).wants_snapshot = True
+
+    def commit(self, event: Advanced) -> Drift | None:
+        """Remember the result of an advance, now that the journal has it.
+
+        Returns:
+            The drift, if it was made on another platform than the one before.
+
+        Raises:
+            UnexpectedEvent: no such advance was requested.
+        """
+        past, advance = self._past(event.island), event.advance
+        requested = past.requested
+        if requested is None or requested.number != event.number:
+            raise UnexpectedEvent(f"no such advance was asked for: {event}")
+        past.requested = None
+        past.step, past.digest = advance.step, advance.digest
+        agent, platform = event.provenance.agent, event.provenance.platform
+        drift: Drift | None = None
+        if past.drifts_to(platform):
+            before = past.platform
+            drift = Drift(event.island, advance.step, before, platform, agent)
+        past.platform = platform
+        past.history.append(
+            PastAdvance(requested.changes, requested.until, advance.digest)
+        )
+        past.places = {one.birth: one.place for one in advance.judgements}
+        if self._snapshot_store.has(event.island, past.step, past.digest):
+            past.base, past.history = past.step, []
+            self._snapshot_store.drop_before(event.island, past.step)
+        return drift
+
+    def refusal(self, end: ShardFailed) -> JobRefused:
+        """Return the error that stops a run whose arena cannot be advanced."""
+        return JobRefused(
+            f"arena {self._islands[end.shard]}: several workers cannot advance it, the "
+            f"last of them {end.agent}: {end.reason}; mend that and resume"
+        )
+
+    def _past(self, shard: int) -> _Past:
+        return self._pasts.setdefault(shard, _Past())
+
+    def _encode(self, command: AssignShard) -> tuple[bytes, Read]:
+        """Return the request for a worker, and what reads the answer."""
+        shard = self._islands[command.shard]
+        past, settings = self._past(shard), self._context.arena[shard]
+        requested = past.requested
+        assert requested is not None
+        is_drift = past.drifts_to(command.platform)
+        # Nothing from before a drift is ever repeated.
+        wants_snapshot = requested.wants_snapshot or past.wants_snapshot or is_drift
+        past.wants_snapshot = False
+        past.requested = replace(requested, wants_snapshot=wants_snapshot)
+        rebuild: Rebuild | None = None
+        if command.is_whole:
+            rebuild = self.past(shard)
+            if is_drift:
+                rebuild = replace(rebuild, living=tuple(past.places))
+        request = AdvanceRequest(
+            run=self._context.client.run,
+            epoch=self._context.client.epoch,
+            number=command.number,
+            settings=settings,
+            shard=shard,
+            from_step=past.step,
+            from_digest=past.digest,
+            changes=requested.changes,
+            until=requested.until,
+            wants_snapshot=wants_snapshot,
+            rebuild=rebuild,
+        )
+        complete: Callable[[Advance], Advance] | None = None
+        if is_drift:
+            complete = partial(
+                with_losses,
+                step=past.step,
+                places=past.places,
+                removals=requested.changes.removals,
+            )
+        read = partial(
+            _read_answer,
+            requested=past.requested,
+            expected=(request.epoch, request.number),
+            provenance=Provenance(command.agent, command.platform),
+            complete=complete,
+        )
+        return encode_advance_request(request, plugins_of(settings)), read
+
+
+def _read_answer(
+    data: bytes,
+    *,
+    requested: AdvanceShard,
+    expected: tuple[int, int],
+    provenance: Provenance,
+    complete: Callable[[Advance], Advance] | None,
+) -> Reached | None:
+    """Return the decoded answer to a request; None if the worker lacks the state.
+
+    Args:
+        data: bytes of the answer.
+        requested: the arena's command.
+        expected: epoch and number of the request.
+        provenance: of the answer, but for the time that it took.
+        complete: adds what a drift between platforms lost; None without a drift.
+
+    Raises:
+        MalformedMessage: no answer, or the answer to another request.
+    """
+    answer = decode_advance_answer(data)
+    if (answer.epoch, answer.number) != expected:
+        raise MalformedMessage(
+            f"answer must be to (epoch, job) {expected}, got "
+            f"{(answer.epoch, answer.number)}"
+        )
+    advance, island = answer.advance, requested.island
+    if advance is None:
+        return None
+    if advance.step != requested.until:
+        raise MalformedMessage(
+            f"advance: must reach step {requested.until}, got {advance.step}"
+        )
+    if requested.wants_snapshot and not answer.snapshot:
+        raise MalformedMessage("advance: a snapshot was wanted, got none")
+    poses, rows = place_poses(advance.poses, island)
+    advance = replace(advance, poses=poses)
+    if complete is not None:
+        advance = complete(advance)
+    signed = replace(provenance, wall_s=answer.wall_s)
+    event = Advanced(island, requested.number, advance, rows, signed)
+    return Reached(event, answer.snapshot)
+
+
+def place_poses(columns: bytes, island: int) -> tuple[bytes, int]:
+    """Return the poses of an arena as the table has them, and their number.
+
+    Args:
+        columns: Arrow IPC stream; ``island`` is where each robot was born.
+        island: where the robots live; ``birth_island`` is set for immigrants only.
+
+    Raises:
+        MalformedMessage: the columns are not those of poses.
+    """
+    poses = read_columns("poses", columns)
+    born = poses["island"]
+    if pa.compute.all(pa.compute.equal(born, island), min_count=0).as_py():
+        return columns, poses.num_rows
+    is_immigrant = pa.compute.not_equal(born, island)
+    absent = pa.scalar(None, pa.int32())
+    schema = poses.schema
+    here = pa.repeat(pa.scalar(island, pa.int32()), poses.num_rows)
+    poses = poses.set_column(
+        schema.get_field_index("birth_island"),
+        schema.field("birth_island"),
+        pa.compute.if_else(is_immigrant, born, absent),
+    ).set_column(schema.get_field_index("island"), schema.field("island"), here)
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, schema) as writer:
+        writer.write_table(poses)
+    return bytes(sink.getvalue().to_pybytes()), poses.num_rows
