@@ -1,6 +1,6 @@
 """Draw the rooms, their packages and imports: docs/pictures/architecture.svg.
 
-    python docs/architecture.py
+    python -m docs.architecture
 
 Layers are those of the import contracts in pyproject.toml. Arrows are the imports of
 the source files. The same sources give the same bytes.

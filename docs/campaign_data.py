@@ -83,11 +83,9 @@ _FINAL = {
     **dict.fromkeys(("rank", "ancestors", *BODY), pa.int64()),
     "genome": pa.binary(),
 }
+_MEASURES = ("outcomes", "populations", "extremities", "variability")
 TABLES = {
-    **{
-        name: _of_analysis(name)
-        for name in ("outcomes", "populations", "extremities", "variability")
-    },
+    **{name: _of_analysis(name) for name in _MEASURES},
     "final": pa.schema([*_WHOSE, *_FINAL.items()]),
     "runs": pa.schema([*_WHOSE, *_RUNS.items()]),
 }
@@ -190,6 +188,8 @@ def _mistake(rows: pa.Table, table: str, part: Part, name: str) -> str:
 def read_rows(data: Path, table: str, name: str) -> pa.Table:
     """Return the rows of a repeat; damaged pages raise.
 
+    Measures that were added after the rows were written are null.
+
     Args:
         data: where rows are kept.
         table: a key of ``TABLES``.
@@ -199,7 +199,14 @@ def read_rows(data: Path, table: str, name: str) -> pa.Table:
     with pq.ParquetFile(
         pa.BufferReader(content), page_checksum_verification=True
     ) as file:
-        return file.read()
+        rows = file.read()
+    lacking = [one for one in TABLES[table] if one.name not in rows.column_names]
+    if table not in _MEASURES or not lacking:
+        return rows
+    for one in lacking:
+        rows = rows.append_column(one, pa.nulls(rows.num_rows, one.type))
+    known = TABLES[table].names
+    return rows.select([*known, *(set(rows.column_names) - set(known))])
 
 
 def _kept_repeats(data: Path, part: Part, experiment: str) -> list[int]:

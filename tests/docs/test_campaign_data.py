@@ -303,6 +303,16 @@ def test_courses_are_those_of_the_runs(place: Path, parts: Parts, data: Path) ->
     assert courses.num_rows > ours.num_rows > 40
 
 
+def test_measures_newer_than_the_rows_are_null(data: Path, parts: Parts) -> None:
+    for table in ("outcomes", "populations"):
+        rows = read_rows(data, table, "scenario2-00").drop_columns(["rank"])
+        path_of(data, table, "scenario2-00").write_bytes(parquet(rows))
+        found = read_rows(data, table, "scenario2-00")
+        assert found.schema == TABLES[table]
+        assert found["rank"].null_count == found.num_rows > 0
+    assert check(data, parts) == 0
+
+
 def test_committed_rows_are_whole() -> None:
     assert check(DATA) == 0
 

@@ -43,7 +43,7 @@ def paths(text: str) -> list[str]:
 def test_picture_is_drawn_from_the_imports_of_today() -> None:
     drawn = draw()
     assert drawn == draw()
-    assert PICTURE.read_text("utf-8") == drawn, "run python docs/architecture.py"
+    assert PICTURE.read_text("utf-8") == drawn, "run python -m docs.architecture"
 
 
 def test_files_named_on_the_page_exist() -> None:
