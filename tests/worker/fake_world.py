@@ -1,6 +1,6 @@
-"""A world without physics that keeps the promises of a real one.
+"""A world without physics that keeps the contract of a real one.
 
-What it tells depends on all that ever happened in it, and its snapshot holds that.
+Its advances depend on all earlier ones, and its snapshot holds that past.
 """
 
 import hashlib
@@ -14,13 +14,12 @@ from tests.coordinator.arena_world import DT, MATURE, poses
 
 
 class FakeWorld:
-    """Everybody stands where the past of the whole world puts them."""
+    """World whose robots' fitness is drawn from its past."""
 
     made = 0
-    """Worlds that were ever begun or restored; reset it before use."""
+    """Number of worlds that were made or restored; reset it before use."""
 
     def __init__(self, settings: ArenaSettings, threads: int = 1) -> None:
-        """Begin with nobody."""
         del settings
         assert threads >= 1
         type(self).made += 1
@@ -92,7 +91,7 @@ class FakeWorld:
 
 
 class OddWorld(FakeWorld):
-    """A machine that computes otherwise."""
+    """World on a machine whose results differ."""
 
     def advance(self, until: int) -> Advance:
         self._happened("oddly")
