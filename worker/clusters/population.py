@@ -72,7 +72,7 @@ class ArenaPopulation:
         added = sorted(newborn, key=lambda robot: robot.birth)
         robots = sorted((*self.robots, *added), key=lambda robot: robot.birth)
         self.robot_rows = RobotRows(robots)
-        self._settle([*self.clusters, *(robot.body.home for robot in added)])
+        self._settle([*self.clusters, *(robot.body.solo for robot in added)])
 
     def remove(self, births: Iterable[BirthId]) -> None:
         """Remove robots; the other members of their clusters stay together."""
@@ -87,9 +87,9 @@ class ArenaPopulation:
             if rest == cluster.members:
                 kept.append(cluster)
             elif rest:
-                home = self._move(rest)
-                mujoco.mj_kinematics(home.model, home.data)
-                kept.append(home)
+                moved = self._move(rest)
+                mujoco.mj_kinematics(moved.model, moved.data)
+                kept.append(moved)
         for birth in sorted(gone):
             self.model_cache.forget(birth)
         self._settle(kept)

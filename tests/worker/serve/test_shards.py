@@ -226,8 +226,8 @@ def test_malformed_request_is_rejected() -> None:
 def test_history_of_another_platform_is_approximated() -> None:
     """Robots lost only here are ignored, robots lost only there are removed."""
     requester = lived(Shards(FakeWorld))
-    fallen = Changes(removals=(BirthId(0, 9),), insertions=insertion(2).insertions)
-    requester.history.append(PastAdvance(fallen, 300, b"\0" * 32))
+    changes = Changes(removals=(BirthId(0, 9),), insertions=insertion(2).insertions)
+    requester.history.append(PastAdvance(changes, 300, b"\0" * 32))
     requester.step, requester.digest = 300, b"\1" * 32
     with pytest.raises(KeyError):
         requester.ask(Shards(FakeWorld), 10, None, requester.whole())
@@ -235,5 +235,6 @@ def test_history_of_another_platform_is_approximated() -> None:
     gone = Changes(removals=(BirthId(0, 7),))
     advance = requester.ask(Shards(FakeWorld), 10, gone, rebuild).advance
     assert advance is not None
-    reported = {*advance.judgements, *advance.casualties}
-    assert {each.birth for each in reported} == {BirthId(0, 0)}
+    births = {judgement.birth for judgement in advance.judgements}
+    births |= {casualty.birth for casualty in advance.casualties}
+    assert births == {BirthId(0, 0)}
