@@ -56,7 +56,7 @@ class Oracle:
         for a, b in sorted({(a, b) for a, b in owners.tolist() if a != b}):
             self.pair_steps += 1
             first, second = self._births[a], self._births[b]
-            if population.cluster_of(first) is not population.cluster_of(second):
+            if population.cluster_of[first] is not population.cluster_of[second]:
                 self.missed.append((step, first, second))
 
     def _build(self) -> None:

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from schema.errors import ExperimentError, RunFolderError, SimulationDiverged
 from schema.experiment.document import Experiment, Simulation, body_space
 from schema.experiment.file import experiment_from_text
-from schema.experiment.settings import EvaluationSettings
+from schema.formats.files import settings_of
 from schema.robot.genome import develop
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
@@ -146,12 +146,7 @@ def compare(
 
 
 def _fitness(robot: Robot, experiment: Experiment, world: Simulation) -> float:
-    settings = EvaluationSettings(
-        space=experiment.space,
-        simulation=world,
-        fitness=experiment.fitness,
-        environment=experiment.environment,
-    )
+    settings = replace(settings_of(experiment), simulation=world)
     try:
         return evaluate(robot, settings).fitness
     except SimulationDiverged:

@@ -173,7 +173,7 @@ def test_contacts_of_two_robots_are_recorded(turtle: Robot) -> None:
     [touch] = together.touches
     assert (touch.first, touch.second) == (A, B)
     assert 0.5 < touch.duration_s < 2.0
-    assert world.population.cluster_of(A) is world.population.cluster_of(B)
+    assert world.population.cluster_of[A] is world.population.cluster_of[B]
 
 
 def light_robot() -> Robot:

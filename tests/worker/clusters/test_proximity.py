@@ -24,7 +24,7 @@ def measured(world: World, scene: Scene, gap_m: float) -> Pairs:
         for first, here in enumerate(births)
         for second, there in enumerate(births)
         if first < second
-        and population.cluster_of(here) is not population.cluster_of(there)
+        and population.cluster_of[here] is not population.cluster_of[there]
         and scene.distances([(first, second)])[0, 0]
         < moves[first] + moves[second] + gap_m
     ]
