@@ -171,7 +171,7 @@ def bare_time(world: World, pool: Pool, steps: int, clock: Clock) -> float:
     tick = world.population.model_cache.settings.simulation.brain_steps
     jobs = []
     for robot in world.population.robots:
-        model = robot.body.home.model
+        model = robot.body.solo.model
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = robot.view.qpos, robot.view.qvel
         data.ctrl[:] = robot.view.ctrl

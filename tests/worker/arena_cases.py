@@ -1,4 +1,4 @@
-"""Arenas for tests: settings, newcomers, and how to go on with two of them."""
+"""Arenas for tests: settings, newborns, worlds and advances."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -16,7 +16,7 @@ from worker.arena.world import World
 
 EXPERIMENT = Experiment(name="test")
 SECOND = 200
-"""Physics steps."""
+"""Physics steps of a simulated second."""
 Robots = Callable[[int], Robot]
 
 
@@ -36,15 +36,15 @@ SETTINGS = settings_of()
 def crowd(
     robot_of: Robots, count: int, radius_m: float, *, seed: int = 1, first: int = 0
 ) -> tuple[Insertion, ...]:
-    """Return newcomers at random places and headings, never on top of each other."""
+    """Return newborns at random places and headings, at some distance."""
     rng = np.random.default_rng(seed)
     found: list[Insertion] = []
     places: list[tuple[float, float]] = []
     least = 0.3
     while len(found) < count:
         angle, share = rng.uniform(0.0, 2.0 * math.pi), rng.uniform()
-        reach = radius_m * math.sqrt(share)
-        place = (reach * math.cos(angle), reach * math.sin(angle))
+        radius = radius_m * math.sqrt(share)
+        place = (radius * math.cos(angle), radius * math.sin(angle))
         heading = float(rng.uniform(0.0, 2.0 * math.pi))
         least *= 0.999
         if all(math.dist(place, other) >= least for other in places):
@@ -55,16 +55,16 @@ def crowd(
 
 
 def populated(
-    settings: ArenaSettings, newcomers: Sequence[Insertion], threads: int = 1
+    settings: ArenaSettings, newborns: Sequence[Insertion], threads: int = 1
 ) -> World:
-    """Return a world into which robots have just been dropped."""
+    """Return a world into which robots have just been inserted."""
     world = World(settings, threads)
-    world.apply(Changes(insertions=tuple(newcomers)))
+    world.apply(Changes(insertions=tuple(newborns)))
     return world
 
 
 def state_of(world: World, birth: BirthId) -> bytes:
-    """Return a robot's physics, readings and mind as bytes."""
+    """Return a robot's physics, readings and network states as bytes."""
     one = world.population.find(birth)
     arrays = (one.view.qpos, one.view.qvel, one.view.ctrl, one.view.sensors.readings)
     return b"".join(np.asarray(a).tobytes() for a in (*arrays, one.states))

@@ -1,4 +1,4 @@
-"""A joint model of all robots of an arena: what the clusters must not overlook."""
+"""One model of all robots of an arena, to detect contacts that clusters miss."""
 
 import mujoco
 import numpy as np
@@ -12,12 +12,11 @@ from worker.clusters.rollout import Rollout
 
 
 class Oracle:
-    """Sees every contact between robots at every physics step of a world.
+    """Detects every contact between robots at every physics step of a world.
 
     Attributes:
         pair_steps: pairs of robots in contact, summed over steps.
-        missed: those of them whose robots did not live together.
-        merges: of the world, also before a reset of its counts.
+        missed: those of them whose robots were in different clusters.
     """
 
     def __init__(self, world: World) -> None:
@@ -29,16 +28,16 @@ class Oracle:
         schedule = world._schedule
         self._moments, self._arrive = schedule.moments, world._arrive
         schedule.moments = self._every_step  # type: ignore[method-assign]
-        world._arrive = self._watched_arrival  # type: ignore[method-assign]
+        world._arrive = self._observed_arrive  # type: ignore[method-assign]
 
     def _every_step(self, step: int, until: int) -> tuple[int, ...]:
         return tuple(range(step + 1, self._moments(step, until)[-1] + 1))
 
-    def _watched_arrival(self, rollout: Rollout) -> None:
+    def _observed_arrive(self, rollout: Rollout) -> None:
         self._arrive(rollout)
-        self._look(self.world.step, rollout.state)
+        self._check(self.world.step, rollout.state)
 
-    def _look(self, step: int, state: Floats) -> None:
+    def _check(self, step: int, state: Floats) -> None:
         population = self.world.population
         if self.world.births != self._births:
             self._build()
@@ -57,7 +56,7 @@ class Oracle:
         for a, b in sorted({(a, b) for a, b in owners.tolist() if a != b}):
             self.pair_steps += 1
             first, second = self._births[a], self._births[b]
-            if population.cluster_of(first) is not population.cluster_of(second):
+            if population.cluster_of[first] is not population.cluster_of[second]:
                 self.missed.append((step, first, second))
 
     def _build(self) -> None:

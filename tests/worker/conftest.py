@@ -1,4 +1,4 @@
-"""Robots for the worker's tests: hand-made ones, and random ones of its own."""
+"""Robots for the worker's tests: hand-made and random ones."""
 
 from collections.abc import Callable
 
@@ -28,7 +28,7 @@ def random_robot(seed: int, size: int = 12) -> Robot:
 def _random_body(
     rng: np.random.Generator, size: int, space: BodySpace
 ) -> tuple[Part, ...]:
-    """Grow depth first with a random number of children, so that order holds."""
+    """Return parts in depth-first order, with random numbers of children."""
     parts = [Part("Core", -1, -1, -1, 0, GREY)]
     motors = pads = 0
 

@@ -1,6 +1,6 @@
-"""A world without physics that keeps the promises of a real one.
+"""A world without physics that keeps the contract of a real one.
 
-What it tells depends on all that ever happened in it, and its snapshot holds that.
+Its advances depend on all earlier ones, and its snapshot holds that past.
 """
 
 import hashlib
@@ -14,13 +14,12 @@ from tests.coordinator.arena_world import DT, MATURE, poses
 
 
 class FakeWorld:
-    """Everybody stands where the past of the whole world puts them."""
+    """World whose robots' fitness is drawn from its past."""
 
     made = 0
-    """Worlds that were ever begun or restored; reset it before use."""
+    """Number of worlds that were made or restored; reset it before use."""
 
     def __init__(self, settings: ArenaSettings, threads: int = 1) -> None:
-        """Begin with nobody."""
         del settings
         assert threads >= 1
         type(self).made += 1
@@ -45,24 +44,22 @@ class FakeWorld:
             del self.born[birth]
         for each in changes.insertions:
             self.born[each.birth] = self.step
-        self._happened(repr((changes.removals, [i.place for i in changes.insertions])))
+        self._record(repr((changes.removals, [i.place for i in changes.insertions])))
 
     def advance(self, until: int) -> Advance:
         assert until > self.step
         assert not self.is_closed
         self.step = until
-        self._happened(str(until))
-        fallen = [one for one in sorted(self.born) if self._chance(one) < 0.01]
-        for one in fallen:
+        self._record(str(until))
+        lost = [one for one in sorted(self.born) if self._chance(one) < 0.01]
+        for one in lost:
             del self.born[one]
         living = sorted(self.born)
         return Advance(
             step=until,
             digest=self.digest(),
-            judgements=tuple(map(self._judged, living)),
-            casualties=tuple(
-                Casualty(o, until, "fell", (0.0, 0.0, 0.1)) for o in fallen
-            ),
+            judgements=tuple(map(self._judgement, living)),
+            casualties=tuple(Casualty(o, until, "fell", (0.0, 0.0, 0.1)) for o in lost),
             touches=(),
             poses=poses(living, until * DT),
         )
@@ -77,14 +74,14 @@ class FakeWorld:
     def close(self) -> None:
         self.is_closed = True
 
-    def _happened(self, what: str) -> None:
-        self.past = hashlib.sha256((self.past + what).encode()).hexdigest()
+    def _record(self, event: str) -> None:
+        self.past = hashlib.sha256((self.past + event).encode()).hexdigest()
 
     def _chance(self, birth: BirthId) -> float:
         drawn = hashlib.sha256(f"{self.past}{birth}".encode()).digest()
         return int.from_bytes(drawn[:6], "big") / 2**48
 
-    def _judged(self, birth: BirthId) -> Judgement:
+    def _judgement(self, birth: BirthId) -> Judgement:
         age = self.step - self.born[birth]
         fitness = self._chance(birth)
         place = (fitness, -fitness, 0.02)
@@ -92,8 +89,8 @@ class FakeWorld:
 
 
 class OddWorld(FakeWorld):
-    """A machine that computes otherwise."""
+    """World on a machine whose results differ."""
 
     def advance(self, until: int) -> Advance:
-        self._happened("oddly")
+        self._record("different")
         return super().advance(until)

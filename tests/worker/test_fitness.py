@@ -1,4 +1,4 @@
-"""Fitness of hand-made tracks, exact, and the contract of every function."""
+"""Exact fitness of hand-made tracks, and the contract of fitness functions."""
 
 from typing import cast
 
@@ -25,34 +25,34 @@ def track(*points: tuple[float, float, float], interval_s: float = 0.25) -> Trac
     return Track(interval_s, np.array(points))
 
 
-def test_along_a_line_both_velocities_are_equal() -> None:
+def test_both_velocities_are_equal_along_a_line() -> None:
     """0.5 m in two steps of 0.25 s: v = s = 1 m/s."""
     found = track((0, 0, 0), (0.25, 0, 0), (0.5, 0, 0))
     assert (path_velocity(found), straight_velocity(found)) == (1.0, 1.0)
 
 
-def test_a_detour_counts_for_the_path_only() -> None:
+def test_detour_counts_for_the_path_only() -> None:
     """Legs of 3 and 4 make a path of 7 and a distance of 5, in 0.5 s."""
     found = track((1, 1, 0), (4, 1, 0), (4, 5, 0))
     assert (path_velocity(found), straight_velocity(found)) == (14.0, 10.0)
 
 
-def test_height_earns_nothing() -> None:
+def test_height_does_not_count() -> None:
     found = track((0, 0, 5), (0, 0, 2), (0, 0, 0))
     assert thesis(found, WEIGHTS) == 0.0
 
 
-def test_coming_home_earns_the_path_alone() -> None:
+def test_closed_path_counts_for_the_path_only() -> None:
     found = track((0, 0, 0), (0.125, 0, 0), (0, 0, 0))
     assert thesis(found, WEIGHTS) == 0.5
 
 
-def test_the_straight_way_counts_five_times() -> None:
+def test_straight_velocity_counts_five_times() -> None:
     """V = s = 0.125 m/s: f = 0.125 + 5 * 0.125."""
     assert thesis(track((0, 0, 0), (0.03125, 0, 0)), WEIGHTS) == 0.75
 
 
-def test_a_fitness_of_one_is_real_and_more_is_not() -> None:
+def test_fitness_above_the_limit_is_zero() -> None:
     weights = Fitness(path_weight=1.0, straight_weight=1.0)
     assert thesis(track((0, 0, 0), (0.125, 0, 0)), weights) == 1.0
     assert thesis(track((0, 0, 0), (0.126, 0, 0)), weights) == 0.0
@@ -65,7 +65,7 @@ def test_only_differences_of_position_count() -> None:
     assert thesis(here, weights) == thesis(there, weights) > 0
 
 
-def test_what_an_experiment_names_by_default_keeps_the_contract() -> None:
+def test_default_function_keeps_the_contract() -> None:
     fitness = Experiment(name="test").fitness
     function = fitness_function(fitness)
     assert function is thesis
@@ -104,7 +104,7 @@ def _counts_calls() -> FitnessFunction:
         (_counts_calls(), "must return the same for the same track"),
     ],
 )
-def test_a_function_that_breaks_the_contract_is_told(
+def test_function_that_breaks_the_contract_is_rejected(
     function: FitnessFunction, message: str
 ) -> None:
     with pytest.raises(ExperimentError, match=message):

@@ -1,4 +1,4 @@
-"""``revolve robot simulate``: from one MJCF file alone, the same result."""
+"""``revolve robot simulate``: equal results from all file formats."""
 
 from pathlib import Path
 
@@ -11,14 +11,14 @@ from worker.robot.evaluation import evaluate
 from worker.robot_command import main
 
 
-def test_a_file_is_judged_as_its_robot_is(
+def test_file_has_the_evaluation_of_its_robot(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     expected = evaluate(spider(), settings_of(None))
     for name in ("spider.xml", "spider.yaml", "spider.pb"):
         write_robot(spider(), tmp_path / name, BUILT_IN)
         assert main(["robot simulate", str(tmp_path / name)]) == 0
-        told = capsys.readouterr().out.splitlines()
-        assert told[0] == f"fitness:           {expected.fitness!r}"
-        assert told[1] == f"path velocity:     {expected.path_velocity!r} m/s"
-        assert told[3] == "simulated:         12.0 s"
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[0] == f"fitness:           {expected.fitness!r}"
+        assert lines[1] == f"path velocity:     {expected.path_velocity!r} m/s"
+        assert lines[3] == "simulated:         12.0 s"

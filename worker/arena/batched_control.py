@@ -135,9 +135,9 @@ class BatchedIO:
         self._orientations = layout.roots[self._simple, 3:]
         self._motions = layout.motions[self._simple]
         self._angles = layout.starts[self._motor_rows] + self._motor_offsets
-        homes = layout.homes.tolist()
+        cluster_indices = layout.cluster_indices.tolist()
         self._pads = [
-            (row, views[row].sensors.pads, layout.clusters[homes[row]])
+            (row, views[row].sensors.pads, layout.clusters[cluster_indices[row]])
             for row in self._padded
         ]
 

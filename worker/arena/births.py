@@ -103,7 +103,7 @@ def newborn(
     except ValueError as error:
         reason = f"cannot be built: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, (x, y, 0.0))
-    view, half = body.home.views[0], 0.5 * insertion.heading
+    view, half = body.solo.views[0], 0.5 * insertion.heading
     place = (x, y, cache.height(body, insertion.place, insertion.heading))
     view.qpos[:3] = place
     if half:
@@ -133,7 +133,7 @@ def arena_robot(
         phenotype=phenotype,
         encoded=encode_robot(phenotype),
         body=body,
-        view=body.home.views[0],
+        view=body.solo.views[0],
         network=pack(phenotype.brain, population.model_cache.width),
         states=np.zeros(population.model_cache.width.states),
         brain_start=0,

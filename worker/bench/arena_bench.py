@@ -30,7 +30,7 @@ from worker.bench import arena_timing as timing
 from worker.bench.spider import CLEARANCE_M, grid, spider
 
 THESIS = (-0.26, 34.78, 20.41)
-"""The thesis's real-time factor: a + b / p + c / p^2 on an i7-4790K."""
+"""Real-time factor in the thesis: a + b / p + c / p^2 on an i7-4790K."""
 SIZES = tuple(range(5, 51, 5))
 
 RESULTS = pa.schema(
@@ -101,24 +101,24 @@ def add_commands(kinds: Any) -> None:  # noqa: ANN401 - argparse hides its type
         )
         add_count(parser, "--seconds", seconds, "simulated in each repetition")
         add_count(parser, "--repetitions", repetitions, "of each size")
-        add_count(parser, "--threads", 1, "that advance the arena together")
+        add_count(parser, "--threads", 1, "that step clusters of the arena")
         add_count(parser, "--seed", 1, "of the robots and their places", least=0)
         parser.add_argument("--out", type=Path, help="Parquet file for the results")
 
 
 def add_experiment(parser: argparse.ArgumentParser, default: str) -> None:
-    """Add the experiment that a benchmark takes its settings from."""
+    """Add the argument for the experiment of a benchmark."""
     parser.add_argument(
         "experiment",
         nargs="?",
         default=default,
-        help="whose settings to use, a .toml file or a shipped one "
+        help="experiment whose settings to use, a .toml file or a shipped one "
         "(default: %(default)s)",
     )
 
 
 def run(options: argparse.Namespace, robots: RobotSource) -> int:
-    """Run one of the two and say what came out.
+    """Run one of the two benchmarks and print the results.
 
     Args:
         options: as ``add_commands`` parses them.
@@ -128,8 +128,8 @@ def run(options: argparse.Namespace, robots: RobotSource) -> int:
         0.
 
     Raises:
-        ExperimentError: one that is none, or off-line.
-        RevolveError: a file for the results that cannot be written.
+        ExperimentError: an invalid or off-line experiment.
+        RevolveError: the file for the results cannot be written.
     """
     experiment = read_experiment(options.experiment)
     rows: list[Row] = []
@@ -157,10 +157,10 @@ def run(options: argparse.Namespace, robots: RobotSource) -> int:
 
 @contextmanager
 def _kept(path: Path | None) -> Iterator[Callable[[Sequence[Row]], None]]:
-    """Give what writes rows to a file, if there is to be one, as they come.
+    """Yield a function that appends rows to the file, if there is one.
 
     Raises:
-        RevolveError: the file cannot be written; better said before the minutes.
+        RevolveError: the file cannot be written; raised before the first measurement.
     """
     if path is None:
         yield lambda _rows: None

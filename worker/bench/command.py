@@ -1,9 +1,9 @@
-"""Measures this machine, and how far the physics can be trusted on it.
+"""Benchmarks of simulation: its speed on this machine, and its fidelity.
 
-``revolve bench evaluate`` compares whole evaluations with the bare engine doing
-the same steps; ``revolve bench fidelity RUN`` simulates a run's robots anew with a
-time step five times finer (``worker.bench.fidelity``); ``revolve bench arena`` and
-``revolve bench spider`` repeat the thesis's benchmarks (``worker.bench.arena_bench``).
+``revolve bench evaluate`` compares evaluations with bare physics steps;
+``revolve bench fidelity RUN`` re-simulates a run's robots with a time step five times
+finer (``worker.bench.fidelity``); ``revolve bench arena`` and ``revolve bench spider``
+repeat the thesis's benchmarks (``worker.bench.arena_bench``).
 """
 
 import argparse
@@ -30,9 +30,9 @@ from worker.bench import arena_bench, fidelity
 from worker.robot import evaluation
 
 LEAST_RATIO = 0.85
-"""Of bare engine time to evaluation time: the promise of the design, section 9."""
+"""Goal for the ratio of bare engine time to evaluation time (design, section 9)."""
 LEAST_SPEARMAN = 0.95
-"""Of fitness against a time step five times finer."""
+"""Goal for the rank correlation of fitness with a time step five times finer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +40,9 @@ class Timing:
     """CPU time of whole evaluations and of their engine steps alone.
 
     Attributes:
-        robots: how many were timed.
+        robots: number of robots.
         evaluation_s: build, control, sensors, fitness and steps [s].
-        engine_s: the same steps with the same controls, nothing else [s].
+        engine_s: the same steps with the same controls only [s].
     """
 
     robots: int
@@ -51,22 +51,22 @@ class Timing:
 
     @property
     def ratio(self) -> float:
-        """Share of an evaluation that the engine needs; 1 would be perfect."""
+        """Share of an evaluation that the engine needs; at most 1."""
         return self.engine_s / self.evaluation_s
 
 
 def time_evaluations(
     robots: Iterable[Robot], settings: EvaluationSettings, repeats: int = 7
 ) -> Timing:
-    """Return how long evaluations take beside the bare engine.
+    """Return the time of evaluations and of their bare engine steps.
 
-    Both are timed in turn, now one first, now the other, and of each robot the
-    least time of either counts: a busy machine only adds. Diverging ones are left out.
+    Both are timed alternately, and the least time of each counts, as other load on the
+    machine only adds time. Robots that diverge are left out.
 
     Args:
         robots: checked robots.
         settings: of their evaluation.
-        repeats: of each measurement.
+        repeats: number of measurements of each.
     """
     count, whole, bare = 0, 0.0, 0.0
     for robot in robots:
@@ -94,7 +94,7 @@ def _whole(robot: Robot, settings: EvaluationSettings) -> float:
 
 
 def _commands(robot: Robot, settings: EvaluationSettings) -> list[Floats]:
-    """Return the controls of each tick of a robot's life."""
+    """Return the controls of each tick of a robot's evaluation."""
     found: list[Floats] = []
     evaluation.simulate(
         robot,
@@ -131,7 +131,7 @@ def main(arguments: list[str], robots: arena_bench.RobotSource) -> int:
         robots: source of random robots.
 
     Returns:
-        0 if the measurement keeps the promise, 1 if not.
+        0 if the measurement meets its goal, 1 if not.
     """
     options = _parser().parse_args(arguments[1:])
     if options.what == "evaluate":
@@ -148,13 +148,13 @@ def _parser() -> argparse.ArgumentParser:
         "evaluate", help="time evaluations against the bare engine"
     )
     arena_bench.add_experiment(timing, "scenario1")
-    add_count(timing, "--robots", 30, "random ones")
+    add_count(timing, "--robots", 30, "number of random robots")
     add_count(timing, "--seed", 1, "of the robots that are drawn", least=0)
     study = kinds.add_parser(
-        "fidelity", help="simulate a run's robots anew with another world"
+        "fidelity", help="re-simulate a run's robots with other settings"
     )
     study.add_argument("run", type=Path, help="folder of a run")
-    add_count(study, "--per-third", 20, "robots of each third of the fitness")
+    add_count(study, "--per-third", 20, "robots drawn from each third of the fitness")
     add_count(study, "--seed", 1, "of the robots that are drawn", least=0)
     study.add_argument(
         "--against",
@@ -221,7 +221,7 @@ def _fidelity(options: argparse.Namespace) -> int:
 
 
 def _changed(experiment: Experiment, settings: Sequence[str]) -> Simulation:
-    """Return the experiment's world with some keys set, checked as a document."""
+    """Return the experiment's simulation with some keys set, checked."""
     changes = "\n".join(settings)
     text = f'name = "against"\n[simulation]\n{changes}'
     wanted = parse_experiment(text, "--against").simulation
@@ -230,8 +230,8 @@ def _changed(experiment: Experiment, settings: Sequence[str]) -> Simulation:
 
 
 def _shown(robots: Sequence[Robot], what: str) -> Iterable[Robot]:
-    """Give robots one by one, and show on the terminal how many are done."""
-    # Nothing is drawn meanwhile: it would be measured, too.
+    """Yield robots one by one and show progress on the terminal."""
+    # No automatic refresh, as its time would be measured.
     console = Console(stderr=True)
     return track(robots, what, console=console, transient=True, auto_refresh=False)
 

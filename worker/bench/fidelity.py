@@ -1,7 +1,7 @@
-"""How far fitness depends on the numbers that the simulator asks for.
+"""Sensitivity of fitness to the numerical settings of the simulator.
 
-Robots of a run, drawn from each third of its fitness, are simulated anew with a
-finer time step, or with any other setting changed; their ranks are compared.
+Robots of a run, drawn from each third of its fitness, are re-simulated with a finer
+time step, or with another changed setting; the two rankings are compared.
 """
 
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from schema.errors import ExperimentError, RunFolderError, SimulationDiverged
 from schema.experiment.document import Experiment, Simulation, body_space
 from schema.experiment.file import experiment_from_text
-from schema.experiment.settings import EvaluationSettings
+from schema.formats.files import settings_of
 from schema.robot.genome import develop
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
@@ -28,7 +28,7 @@ WINNERS = 10
 
 @dataclass(frozen=True, slots=True)
 class Population:
-    """The births of a run: its experiment, robots, and their fitness (N,)."""
+    """Evaluated robots of a run: its experiment, N robots, and their fitness (N,)."""
 
     experiment: Experiment
     robots: tuple[Robot, ...]
@@ -53,14 +53,14 @@ class Agreement:
 
 
 def read_population(folder: Path) -> Population:
-    """Return the robots of a run and what they were found to be worth.
+    """Return the robots of a run and their fitness.
 
     Args:
         folder: of a run, finished or not; failed evaluations are left out.
 
     Raises:
-        RunFolderError: no such folder, or not a run's.
-        MalformedMessage: a genome that is none.
+        RunFolderError: no such folder, or not of a run that has started.
+        MalformedMessage: an invalid genome.
     """
     runs = read_table(folder, "runs")
     if not runs.num_rows:
@@ -72,7 +72,7 @@ def read_population(folder: Path) -> Population:
         (row["island"], row["birth"]): row["genome"] for row in births.to_pylist()
     }
     columns = ["island", "birth", "fitness"]
-    judged = [
+    evaluated = [
         row
         for row in read_table(folder, "evaluations").select(columns).to_pylist()
         if row["fitness"] is not None
@@ -81,9 +81,9 @@ def read_population(folder: Path) -> Population:
         experiment,
         tuple(
             develop(decode_genome(genomes[row["island"], row["birth"]]), space)
-            for row in judged
+            for row in evaluated
         ),
-        np.array([row["fitness"] for row in judged]),
+        np.array([row["fitness"] for row in evaluated]),
     )
 
 
@@ -92,7 +92,7 @@ def sample_thirds(fitness: Floats, per_third: int, seed: int = 1) -> list[int]:
 
     Args:
         fitness: (N,) of all.
-        per_third: how many of each third, without repetition.
+        per_third: number drawn from each third, without replacement.
         seed: of the draw.
 
     Raises:
@@ -116,7 +116,7 @@ def winners(fitness: Floats) -> list[int]:
 
 
 def finer(simulation: Simulation, factor: int = 5) -> Simulation:
-    """Return the same world with a time step so many times finer."""
+    """Return the simulation with a time step that many times finer."""
     return replace(
         simulation,
         timestep_s=simulation.timestep_s / factor,
@@ -130,12 +130,12 @@ def finer(simulation: Simulation, factor: int = 5) -> Simulation:
 def compare(
     robots: Iterable[Robot], experiment: Experiment, other: Simulation
 ) -> Agreement:
-    """Return the fitness of robots in their experiment's world and in another.
+    """Return the fitness of robots in their experiment's simulation and in another.
 
     Args:
         robots: checked robots.
-        experiment: limits, world and fitness.
-        other: the world to compare with; a robot that diverges there counts 0.
+        experiment: limits, simulation and fitness.
+        other: simulation to compare with; a robot that diverges has fitness 0.
     """
     worlds = (experiment.simulation, other)
     found = [
@@ -146,12 +146,7 @@ def compare(
 
 
 def _fitness(robot: Robot, experiment: Experiment, world: Simulation) -> float:
-    settings = EvaluationSettings(
-        space=experiment.space,
-        simulation=world,
-        fitness=experiment.fitness,
-        environment=experiment.environment,
-    )
+    settings = replace(settings_of(experiment), simulation=world)
     try:
         return evaluate(robot, settings).fitness
     except SimulationDiverged:
@@ -165,7 +160,7 @@ def spearman(first: Floats, second: Floats) -> float:
         first: (N,), not all equal.
         second: (N,), not all equal.
 
-    Source: Spearman, 1904; tested against scipy in tests/worker/test_fidelity.py.
+    Source: Spearman, 1904; tested against scipy in tests/worker/bench/test_fidelity.py.
     """
     return float(np.corrcoef(_ranks(first), _ranks(second))[0, 1])
 

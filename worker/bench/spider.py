@@ -1,7 +1,7 @@
-"""The robot of the thesis's second benchmark: a spider of eight oscillators.
+"""Robot of the thesis's second benchmark: a spider with eight oscillators.
 
-Source: Hupkes 2016, section 7.1, and its published code. Phases are in periods, so
-the negative ones stand here a whole period later.
+Source: Hupkes 2016, section 7.1, and its published code. Phases are in periods, modulo
+a period.
 """
 
 from schema.robot.brain import INPUT, Brain, Neuron
@@ -28,7 +28,7 @@ _COLUMNS = 5
 
 
 def spider() -> Robot:
-    """Return the spider: four legs of hip, brick, knee, brick; two of them feel."""
+    """Return the spider: legs of hip, brick, knee, brick; two with touch sensors."""
     parts = [Part("Core", -1, -1, -1, 0, _GREY)]
     inputs = [Neuron("input", INPUT, 0) for _ in range(6)]
     outputs: list[Neuron] = []
@@ -50,7 +50,7 @@ def spider() -> Robot:
 
 
 def grid(count: int) -> list[tuple[float, float]]:
-    """Return places for spiders, rows of five (trap B22: the first row as well)."""
+    """Return places in rows of five (trap B22: the first row, too)."""
     return [
         (SPACING_M * (number % _COLUMNS), SPACING_M * (number // _COLUMNS))
         for number in range(count)

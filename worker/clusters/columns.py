@@ -76,7 +76,7 @@ class Layout:
     Attributes:
         robot_rows: the robots.
         clusters: in the order of the state.
-        homes: (R,) index of each robot's cluster.
+        cluster_indices: (R,) index of each robot's cluster.
         starts: (R,) first index of each one's position.
         roots: (R, 7) of position and quaternion of the core.
         motions: (R, 6) of velocity and angular velocity of the core.
@@ -105,7 +105,7 @@ class Layout:
         offsets += np.array(own, dtype=np.intp).reshape(-1, _PARTS)
         order = np.argsort(np.array(rows, dtype=np.intp))
         self.starts, dofs, first_places, first_rotations = offsets[order].T
-        self.homes: Indices = np.repeat(np.arange(len(counts)), counts)[order]
+        self.cluster_indices: Indices = np.repeat(np.arange(len(counts)), counts)[order]
         self.roots = self.starts[:, None] + np.arange(_FREE)
         self.motions = dofs[:, None] + np.arange(_FREE_DOFS)
         self.joints = runs(self.starts + _FREE, robot_rows.sizes - _FREE)

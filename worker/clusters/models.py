@@ -29,12 +29,12 @@ class Body:
     Attributes:
         robot: the robot; its brain is not used.
         bounds: bounding spheres.
-        home: the cluster in which it is alone.
+        solo: the cluster in which it is alone.
     """
 
     robot: Robot
     bounds: BoundingSpheres
-    home: Cluster
+    solo: Cluster
 
 
 class ModelCache:
@@ -73,8 +73,8 @@ class ModelCache:
             furnish=self._furnish,
         )
         members = [Member("", robot, model)]
-        home = Cluster((birth,), members, model, self._view_settings)
-        return Body(robot, bounding_spheres(model), home)
+        solo = Cluster((birth,), members, model, self._view_settings)
+        return Body(robot, bounding_spheres(model), solo)
 
     def height(self, body: Body, place: tuple[float, float], heading: float) -> float:
         """Return the height of a robot's core when the arena drops it [m].
@@ -84,7 +84,7 @@ class ModelCache:
             place: of the core's centre in the ground plane, world frame [m].
             heading: rotation about z [rad].
         """
-        environment, model = self.settings.environment, body.home.model
+        environment, model = self.settings.environment, body.solo.model
         if environment.is_even:
             return float(model.qpos0[2])
         boxes = footprint(model)
@@ -100,7 +100,7 @@ class ModelCache:
             bodies: of the robots.
         """
         if len(births) == 1:
-            found = bodies[0].home
+            found = bodies[0].solo
         elif births in self._clusters:
             self._clusters.move_to_end(births)
             found = self._clusters[births]
@@ -123,7 +123,7 @@ class ModelCache:
         for birth, body in zip(births, bodies, strict=True):
             prefix = f"{birth.island}.{birth.number}/"
             specs.append((prefix, self._spec(birth, body.robot)))
-            members.append(Member(prefix, body.robot, body.home.model))
+            members.append(Member(prefix, body.robot, body.solo.model))
         model = shared_model(
             specs, self._simulation, self.settings.environment, furnish=self._furnish
         )

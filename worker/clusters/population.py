@@ -33,6 +33,7 @@ class ArenaPopulation:
         robot_rows: the living robots.
         clusters: of all of them.
         by_cost: the same clusters, most expensive first.
+        cluster_of: the cluster of each birth.
         layout: indices into the clusters' states.
         rollout: the interval that is being handled; None between two intervals.
         merges, splits: numbers of merges and splits of clusters.
@@ -44,11 +45,11 @@ class ArenaPopulation:
         self.robot_rows = RobotRows(())
         self.clusters: tuple[Cluster, ...] = ()
         self.by_cost: list[Cluster] = []
+        self.cluster_of: dict[BirthId, Cluster] = {}
         self.layout = Layout((), self.robot_rows)
         self.rollout: Rollout | None = None
         self.merges = self.splits = 0
         self._proximity = Proximity(settings)
-        self._cluster_of: dict[BirthId, Cluster] = {}
         self._new: list[Cluster] = []
 
     @property
@@ -63,16 +64,12 @@ class ArenaPopulation:
         """Return the robot of a birth."""
         return self.robot_rows.robots[self.robot_rows.rows[birth]]
 
-    def cluster_of(self, birth: BirthId) -> Cluster:
-        """Return the cluster of a robot."""
-        return self._cluster_of[birth]
-
     def add(self, newborn: Iterable[ArenaRobot]) -> None:
         """Add robots, each in its own cluster."""
         added = sorted(newborn, key=lambda robot: robot.birth)
         robots = sorted((*self.robots, *added), key=lambda robot: robot.birth)
         self.robot_rows = RobotRows(robots)
-        self._settle([*self.clusters, *(robot.body.home for robot in added)])
+        self._settle([*self.clusters, *(robot.body.solo for robot in added)])
 
     def remove(self, births: Iterable[BirthId]) -> None:
         """Remove robots; the other members of their clusters stay together."""
@@ -87,9 +84,9 @@ class ArenaPopulation:
             if rest == cluster.members:
                 kept.append(cluster)
             elif rest:
-                home = self._move(rest)
-                mujoco.mj_kinematics(home.model, home.data)
-                kept.append(home)
+                moved = self._move(rest)
+                mujoco.mj_kinematics(moved.model, moved.data)
+                kept.append(moved)
         for birth in sorted(gone):
             self.model_cache.forget(birth)
         self._settle(kept)
@@ -165,7 +162,7 @@ class ArenaPopulation:
             if members in present:
                 settled.append(present.pop(members))
                 continue
-            before = sorted({self._cluster_of[birth].members for birth in members})
+            before = sorted({self.cluster_of[birth].members for birth in members})
             self.merges += len(before) - 1
             divided += before if len(before) == 1 else ()
             settled.append(self._move(members))
@@ -183,7 +180,7 @@ class ArenaPopulation:
         robots = [self.find(birth) for birth in births]
         if self.rollout is not None:
             for birth in births:
-                self._cluster_of[birth].rewind(self.rollout.moment)
+                self.cluster_of[birth].rewind(self.rollout.moment)
         cluster = self.model_cache.cluster(births, [robot.body for robot in robots])
         for robot, view in zip(robots, cluster.views, strict=True):
             view.copy_from(robot.view)
@@ -195,7 +192,7 @@ class ArenaPopulation:
         known = {id(cluster) for cluster in self.clusters}
         rows = self.robot_rows.rows
         self.clusters = tuple(sorted(clusters, key=lambda c: rows[c.members[0]]))
-        self._cluster_of = {
+        self.cluster_of = {
             birth: cluster for cluster in self.clusters for birth in cluster.members
         }
         self.layout = Layout(self.clusters, self.robot_rows)

@@ -96,8 +96,11 @@ class Scene:
         Returns:
             Rows of the first and of the second robots, ascending by both.
         """
-        homes, robot_rows = self._layout.homes, self._layout.robot_rows
-        if not len(homes):
+        cluster_indices, robot_rows = (
+            self._layout.cluster_indices,
+            self._layout.robot_rows,
+        )
+        if not len(cluster_indices):
             return [], []
         low = self._hulls.min(axis=0) - robot_rows.hulls[3]
         high = self._hulls.max(axis=0) + robot_rows.hulls[3]
@@ -109,7 +112,7 @@ class Scene:
         is_beside = low[1][:, None] <= high[1]
         is_near &= is_beside
         is_near &= is_near.T.copy()
-        is_near &= homes[:, None] != homes
+        is_near &= cluster_indices[:, None] != cluster_indices
         first, second = is_near.nonzero()
         is_once = first < second
         return first[is_once].tolist(), second[is_once].tolist()

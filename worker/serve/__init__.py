@@ -1,1 +1,1 @@
-"""Requests in, answers out; the arena shards that this worker holds."""
+"""Handling of requests: evaluations and advances of arena shards."""

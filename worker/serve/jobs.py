@@ -1,4 +1,4 @@
-"""One request in, one answer out: what the service hands to a process."""
+"""Requests of both kinds and their answers, as bytes."""
 
 import time
 from collections.abc import Callable
@@ -21,16 +21,16 @@ from worker.serve.shards import Shards
 
 
 class Jobs:
-    """All that one worker process does: evaluations, and its arena shards."""
+    """Evaluations and arena shards of one worker process."""
 
     def __init__(
         self, *, threads: int = 1, publish: Callable[[Live], None] = lambda _: None
     ) -> None:
-        """Hold no shard yet.
+        """Initialise without shards.
 
         Args:
-            threads: that advance one arena together; the result is the same.
-            publish: told of each advance, for those who watch.
+            threads: that step clusters of an arena; results do not depend on it.
+            publish: called with each advance, for live viewers.
         """
         self._shards = Shards(World, threads=threads, publish=publish)
 
@@ -38,8 +38,7 @@ class Jobs:
         """Return the encoded answer to an encoded request of either kind.
 
         Raises:
-            RevolveError: a request that cannot be done here; see ``answer`` and
-                ``Shards.answer``.
+            RevolveError: see ``answer`` and ``Shards.answer``.
         """
         if is_advance_request(request):
             return self._shards.answer(request)
@@ -49,16 +48,16 @@ class Jobs:
 def answer(request: bytes) -> bytes:
     """Return the encoded answer to an encoded evaluation request.
 
-    A function of its content but for ``wall_s``, which decides nothing. A robot
-    whose physics diverge is answered with the reason, not raised: it is a result.
+    A function of the request but for ``wall_s``, which affects nothing. Diverged
+    physics and an undefined fitness are results, answered with the reason.
 
     Raises:
-        MalformedMessage: bytes that are no request.
-        ExperimentError: settings that are none, a plug-in that nothing answers
-            to, a sensor that the world has nothing for.
+        MalformedMessage: the bytes are no request.
+        ExperimentError: invalid settings, an unknown plug-in, or a sensor that has no
+            stimulus in the environment.
         InvalidRobot: a robot that breaks the rules of its body space.
     """
-    began = time.perf_counter()
+    start = time.perf_counter()
     job = decode_request(request)
     settings = read_evaluation_settings(job.settings)
     check_types(job.robot, body_space(settings.space))
@@ -67,5 +66,5 @@ def answer(request: bytes) -> bytes:
         result = evaluate(job.robot, lasting(settings, job.steps), job.identity)
     except (SimulationDiverged, FitnessUndefined) as error:
         result = str(error)
-    wall_s = time.perf_counter() - began
+    wall_s = time.perf_counter() - start
     return encode_answer(Answer(job.epoch, job.number, wall_s, result))

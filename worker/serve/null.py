@@ -1,7 +1,6 @@
-"""Workers that do not simulate: what everything else costs.
+"""Workers that do not simulate, for benchmarks of dispatch, network and tables.
 
-Every robot is judged 0, at once or after a time in which the processor is free. For
-benchmarks of dispatch, network and tables.
+Every robot has fitness 0, at once or after a fixed time of sleep.
 """
 
 import time
@@ -14,13 +13,13 @@ from schema.wire import revolve_pb2 as pb
 from schema.wire.codec import Answer, encode_answer
 
 TIMED_S = 0.04
-"""How long ``timed_process`` takes for an evaluation [s]."""
+"""Duration of an evaluation by ``timed_process`` [s]."""
 
 
 def answer(request: bytes) -> bytes:
     """Return the encoded answer to an encoded evaluation request: fitness 0.
 
-    The robot stays encoded: to unpack it is part of an evaluation.
+    The robot is not decoded, as decoding is part of an evaluation.
     """
     job = pb.Request.FromString(request)
     nothing = Evaluation(0.0, 0.0, 0.0, 0.0)
@@ -28,12 +27,12 @@ def answer(request: bytes) -> bytes:
 
 
 def process(agent: Agent, slot: ProcessSlot) -> None:
-    """Be one process of a crew of such workers; returns when asked to end."""
+    """Run one process that answers at once; returns when asked to stop."""
     serve_as_process(answer, agent, slot)
 
 
 def timed_process(agent: Agent, slot: ProcessSlot) -> None:
-    """Be one that takes its time; returns when asked to end."""
+    """Run one process that answers after ``TIMED_S``; returns when asked to stop."""
 
     def slow_answer(request: bytes) -> bytes:
         until_s = time.monotonic() + TIMED_S

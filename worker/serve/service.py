@@ -1,4 +1,4 @@
-"""The worker on the network: one process that does jobs until told to end."""
+"""Worker process on the network."""
 
 from schema.agent.network import Agent
 from schema.agent.service import Outlet, own_agent, serve_as_process
@@ -9,7 +9,7 @@ from worker.serve.jobs import Jobs
 
 
 def process(agent: Agent, slot: ProcessSlot) -> None:
-    """Be one process of a crew of workers; returns when asked to end."""
+    """Run one process of a worker; returns when asked to stop."""
     own = own_agent(agent, slot.index)
     member = Member(own.fleet, own.role, own.name)
     outlet = Outlet()

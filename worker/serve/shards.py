@@ -1,8 +1,8 @@
-"""The arena shards that a worker holds, and what it is asked to do with them.
+"""Arena shards of a worker: advancing and rebuilding them.
 
-A shard is long-lived state. A worker that holds the state that a request starts
-from goes on from there; one that does not is told how to rebuild it, and compares
-every step of that with what it was when it happened first.
+A shard is long-lived state. A worker that holds the state that a request starts from
+continues from there. Otherwise it asks for a history, rebuilds the state, and compares
+the digest of each advance with the recorded one.
 """
 
 import time
@@ -30,17 +30,17 @@ from schema.wire.arena_codec import (
 from worker.arena.births import possible
 
 MOST_HELD = 16
-"""Shards that one process keeps; the one that rested longest goes first."""
+"""Shards that one process keeps; the least recently used is dropped first."""
 
 Key = tuple[str, int]
-"""What a shard is known by: its run and its number."""
+"""Name of a shard: its run and its number."""
 
 
 class World(Protocol):
-    """A living arena, as ``worker.arena.world`` has it."""
+    """Interface of ``worker.arena.world.World``."""
 
     def __init__(self, settings: ArenaSettings, threads: int = 1) -> None:
-        """Make an empty arena."""
+        """Initialise an empty arena."""
 
     @classmethod
     def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> Self:
@@ -48,17 +48,17 @@ class World(Protocol):
 
     @property
     def step(self) -> int:
-        """Physics steps since it began."""
+        """Physics steps since the start."""
 
     @property
     def births(self) -> tuple[BirthId, ...]:
-        """The names of the living."""
+        """Births of the living robots."""
 
     def apply(self, changes: Changes) -> None:
-        """Remove, insert, replace."""
+        """Remove robots, insert robots, replace brains."""
 
     def advance(self, until: int) -> Advance:
-        """Go on to a step; say what it came to."""
+        """Advance to a step and report."""
 
     def snapshot(self) -> bytes:
         """Return the whole state."""
@@ -67,12 +67,12 @@ class World(Protocol):
         """Return the SHA-256 of the whole state."""
 
     def close(self) -> None:
-        """Let its threads end."""
+        """Stop its threads."""
 
 
 @dataclass(slots=True)
 class _Held:
-    """A shard as it was left; ``digest`` is empty before its first advance."""
+    """A shard after its latest advance; ``digest`` is empty before the first."""
 
     world: World
     settings: bytes
@@ -80,7 +80,7 @@ class _Held:
 
 
 class Shards:
-    """All shards of one process."""
+    """Arena shards of one process."""
 
     def __init__(
         self,
@@ -89,40 +89,35 @@ class Shards:
         threads: int = 1,
         publish: Callable[[Live], None] = lambda _: None,
     ) -> None:
-        """Hold nothing yet.
+        """Initialise without shards.
 
         Args:
-            world: what makes and restores arenas.
-            threads: that advance one arena together; the result is the same.
-            publish: told of each advance, for those who watch.
+            world: class of the arenas.
+            threads: that step clusters of an arena; results do not depend on it.
+            publish: called with each advance, for live viewers.
         """
         self._world = world
         self._threads = threads
         self._publish = publish
         self._held: OrderedDict[Key, _Held] = OrderedDict()
 
-    @property
-    def held(self) -> list[Key]:
-        """Whose state is here, the one that rested longest first."""
-        return list(self._held)
-
     def answer(self, request: bytes) -> bytes:
         """Return the encoded answer to an encoded request to advance a shard.
 
-        A function of its content but for ``wall_s``, if the state that it starts
-        from is here or comes with it; otherwise the answer asks for that.
+        A function of the request but for ``wall_s``, if the state that it starts from
+        is kept or comes with it. Otherwise the answer asks for the state.
 
         Raises:
-            MalformedMessage: bytes that are no such request.
-            ExperimentError: settings that are none, or a plug-in that is not here.
+            MalformedMessage: the bytes are no such request.
+            ExperimentError: invalid settings or an unknown plug-in.
             InvalidRobot: an insertion that breaks the rules of its body space.
-            StateDiffers: what was rebuilt is not what it was.
+            StateDiffers: the rebuilt state differs from the original one.
         """
-        began = time.perf_counter()
+        start = time.perf_counter()
         job = decode_advance_request(request)
         settings = read_arena_settings(job.settings)
         _check_robots(job.changes, settings)
-        # Out of our hands until it is whole again: whatever fails below leaves none.
+        # Not kept while it changes, so that an error below leaves no broken shard.
         held, changes = self._taken(job), job.changes
         if held is None and job.rebuild is not None:
             held = _Held(self._rebuilt(job, job.rebuild), job.settings, job.from_digest)
@@ -138,23 +133,21 @@ class Shards:
             held.digest = advance.digest
             self._keep((job.run, job.shard), held)
             self._publish(Live(job.run, job.shard, advance))
-        wall_s = time.perf_counter() - began
+        wall_s = time.perf_counter() - start
         return encode_advance_answer(
             AdvanceAnswer(job.epoch, job.number, wall_s, advance, snapshot)
         )
 
     def _taken(self, job: AdvanceRequest) -> _Held | None:
-        """Return the state that a request starts from, if it is here."""
+        """Remove and return the state that a request starts from, if it is kept."""
         held = self._held.pop((job.run, job.shard), None)
-        is_it = (
-            held is not None
-            and held.world.step == job.from_step
-            and held.digest == job.from_digest
-            and held.settings == job.settings
-        )
-        if held is not None and not is_it:
+        if held is None:
+            return None
+        found = (held.world.step, held.digest, held.settings)
+        if found != (job.from_step, job.from_digest, job.settings):
             held.world.close()
-        return held if is_it else None
+            return None
+        return held
 
     def _keep(self, key: Key, held: _Held) -> None:
         self._held[key] = held
@@ -162,10 +155,10 @@ class Shards:
             self._held.popitem(last=False)[1].world.close()
 
     def _rebuilt(self, job: AdvanceRequest, rebuild: Rebuild) -> World:
-        """Return the arena in the state to start from.
+        """Return the arena in the state that a request starts from.
 
         Raises:
-            StateDiffers: somewhere on the way it is not what it was.
+            StateDiffers: a state on the way differs from the original one.
         """
         settings = read_arena_settings(job.settings)
         if rebuild.snapshot:
@@ -176,21 +169,21 @@ class Shards:
             if rebuild.living is None:
                 _repeat(world, rebuild.history)
             else:
-                _imitate(world, rebuild.history, rebuild.living)
+                _approximate(world, rebuild.history, rebuild.living)
             if world.step != job.from_step:
                 raise StateDiffers(
                     f"shard {job.shard}: rebuilt to step {world.step}, must be "
                     f"{job.from_step}"
                 )
-            is_as_it_came = not rebuild.history and rebuild.living is None
-            if is_as_it_came and job.from_digest:
+            is_only_snapshot = not rebuild.history and rebuild.living is None
+            if is_only_snapshot and job.from_digest:
                 _check_digest(world.step, world.digest(), job.from_digest)
         return world
 
 
 @contextmanager
 def _closed_on_error(world: World) -> Iterator[World]:
-    """Give up a world that an error left half-way."""
+    """Close a world if an error occurs."""
     try:
         yield world
     except BaseException:
@@ -205,10 +198,10 @@ def _check_robots(changes: Changes, settings: ArenaSettings) -> None:
 
 
 def _repeat(world: World, history: Sequence[PastAdvance]) -> None:
-    """Do all again, to the last bit.
+    """Repeat a history of the same platform, equal to the last bit.
 
     Raises:
-        StateDiffers: at the first advance that comes to something else.
+        StateDiffers: at the first advance with another digest.
     """
     for past in history:
         world.apply(past.changes)
@@ -216,12 +209,13 @@ def _repeat(world: World, history: Sequence[PastAdvance]) -> None:
         _check_digest(world.step, digest, past.digest)
 
 
-def _imitate(
+def _approximate(
     world: World, history: Sequence[PastAdvance], living: Sequence[BirthId]
 ) -> None:
-    """Do again what happened on another platform, as nearly as it goes here.
+    """Repeat a history of another platform, as far as it is possible here.
 
-    Who fell there and not here goes at the end; who fell here only stays away.
+    Robots that were lost there only are removed at the end. Robots that were lost here
+    only stay lost.
     """
     for past in history:
         world.apply(possible(past.changes, world.births))
@@ -233,5 +227,5 @@ def _check_digest(step: int, digest: bytes, expected: bytes) -> None:
     if digest != expected:
         raise StateDiffers(
             f"at step {step} the arena's digest must be {expected.hex()[:16]}..., "
-            f"got {digest.hex()[:16]}...: this machine computes otherwise"
+            f"got {digest.hex()[:16]}...: this machine's results differ"
         )

@@ -1,4 +1,4 @@
-"""A robot whose physics breaks is gone, with the reason; the others feel nothing."""
+"""Diverged robots are removed with a reason, without effect on others."""
 
 from collections.abc import Callable
 from dataclasses import replace as changed
@@ -46,7 +46,7 @@ ABSURD = replace(SETTINGS, space=SPACE)
 
 
 def with_brick(turtle: Robot, kind: str) -> Robot:
-    """Return the turtle with one of its bricks of another kind."""
+    """Return the turtle with one brick of another type."""
     made = [
         replace(part, kind=kind) if index == 2 else part
         for index, part in enumerate(turtle.parts)
@@ -54,8 +54,8 @@ def with_brick(turtle: Robot, kind: str) -> Robot:
     return Robot(tuple(made), turtle.brain)
 
 
-def test_absurd_weights_break_nothing(turtle: Robot) -> None:
-    """Outputs are clipped before they drive anything, and states stay finite."""
+def test_extreme_weights_do_not_diverge(turtle: Robot) -> None:
+    """Outputs are clipped and states stay finite."""
     neurons = turtle.brain.neurons
     edges = tuple(
         Connection(source, target, 1e300)
@@ -68,7 +68,7 @@ def test_absurd_weights_break_nothing(turtle: Robot) -> None:
 
 
 @pytest.mark.parametrize("kind", ["Heavy", "Nothing"])
-def test_absurd_masses_end_their_robot_and_nobody_else(
+def test_extreme_masses_remove_only_their_robot(
     turtle: Robot, robot_of: Robots, kind: str
 ) -> None:
     others = crowd(robot_of, 4, 0.5)
@@ -85,22 +85,22 @@ def test_absurd_masses_end_their_robot_and_nobody_else(
         assert state_of(struck, birth) == state_of(calm, birth)
 
 
-def test_in_a_cluster_only_the_broken_one_falls(turtle: Robot) -> None:
+def test_only_the_diverged_member_of_a_cluster_is_removed(turtle: Robot) -> None:
     near = [Insertion(BirthId(0, n), turtle, (0.262 * n, 0.0)) for n in range(3)]
     world = populated(SETTINGS, near)
     seconds(world, 1.0)
     middle = world.population.find(BirthId(0, 1))
     assert len(world.population.clusters) == 1
     middle.view.qvel[0] = float("nan")
-    fallen = seconds(world, 1.0).casualties
-    assert [casualty.birth for casualty in fallen] == [middle.birth]
-    assert fallen[0].reason == "physics diverged: state not finite"
-    assert 200 < fallen[0].step <= 208
+    casualties = seconds(world, 1.0).casualties
+    assert [casualty.birth for casualty in casualties] == [middle.birth]
+    assert casualties[0].reason == "physics diverged: state not finite"
+    assert 200 < casualties[0].step <= 208
     assert world.births == (BirthId(0, 0), BirthId(0, 2))
     assert seconds(world, 1.0).casualties == ()
 
 
-def test_a_core_that_flies_off_has_broken_the_physics(turtle: Robot) -> None:
+def test_core_above_the_greatest_speed_is_removed(turtle: Robot) -> None:
     world = populated(SETTINGS, [Insertion(BAD, turtle, (0.0, 0.0))])
     seconds(world, 1.0)
     world.population.find(BAD).view.qvel[:3] = (30.0, 0.0, 30.0)
@@ -109,7 +109,7 @@ def test_a_core_that_flies_off_has_broken_the_physics(turtle: Robot) -> None:
     assert world.births == ()
 
 
-def test_what_cannot_be_built_is_told_even_after_a_restore(turtle: Robot) -> None:
+def test_unbuildable_robot_is_reported_after_a_restore(turtle: Robot) -> None:
     world = World(ABSURD)
     guest = Insertion(BAD, with_brick(turtle, "Nothing"), (1.0, 0.0))
     world.apply(Changes(insertions=(guest,)))
@@ -121,21 +121,21 @@ def test_what_cannot_be_built_is_told_even_after_a_restore(turtle: Robot) -> Non
 
 
 @pytest.mark.parametrize(
-    ("memory", "drop_m", "told"),
+    ("memory", "drop_m", "message"),
     [
         (1 << 9, 0.25, "cannot be built: "),
         (1 << 12, 0.25, "physics diverged: "),
         (1 << 11, 0.0, "physics diverged: "),
     ],
 )
-def test_an_engine_that_gives_up_on_a_robot_ends_it_and_nobody_else(
+def test_engine_failure_removes_only_its_robot(
     turtle: Robot,
     monkeypatch: pytest.MonkeyPatch,
     memory: int,
     drop_m: float,
-    told: str,
+    message: str,
 ) -> None:
-    """When it is built, in the air, or at birth; the world goes on."""
+    """During compilation, in the air, or at birth."""
     world = populated(
         settings_of(drop_m=drop_m), [Insertion(BirthId(0, 1), turtle, (0.0, 0.0))]
     )
@@ -144,23 +144,23 @@ def test_an_engine_that_gives_up_on_a_robot_ends_it_and_nobody_else(
         world.apply(Changes(insertions=(Insertion(BAD, turtle, (1.5, 0.0)),)))
     [casualty] = seconds(world, 1.0).casualties
     assert casualty.birth == BAD
-    assert casualty.reason.startswith(told)
+    assert casualty.reason.startswith(message)
     assert "out of memory" in casualty.reason
     assert "\n" not in casualty.reason
     assert world.births == (BirthId(0, 1),)
     assert seconds(world, 1.0).casualties == ()
 
 
-def never(_track: object, _fitness: object) -> float:
-    """Judge nobody."""
+def raises(_track: object, _fitness: object) -> float:
+    """Raise for every track."""
     raise ZeroDivisionError
 
 
-def test_a_fitness_that_cannot_be_told_is_a_death_with_its_reason(
+def test_undefined_fitness_removes_the_robot_with_the_reason(
     turtle: Robot,
 ) -> None:
     fitness = replace(
-        SETTINGS.fitness, function="tests.worker.arena.test_divergence:never"
+        SETTINGS.fitness, function="tests.worker.arena.test_divergence:raises"
     )
     settings = replace(SETTINGS, fitness=fitness)
     world = populated(settings, [Insertion(BAD, turtle, (0.0, 0.0))])

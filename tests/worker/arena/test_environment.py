@@ -1,4 +1,4 @@
-"""Robots on a slope, on rough ground and among scenery do what physics asks."""
+"""Physics of robots on slopes, on rough ground and among scenery."""
 
 import math
 from collections.abc import Callable
@@ -24,8 +24,8 @@ A, B = BirthId(0, 0), BirthId(0, 1)
 GREY = (0.5, 0.5, 0.5)
 CORE = Part("Core", -1, -1, -1, 0, GREY)
 BOX = Robot((CORE,), Brain(tuple(Neuron("input", INPUT, 0) for _ in range(6))))
-"""A core alone: 9 cm by 9 cm by 4.5 cm, feeling how it is moved."""
-FEELER = Robot(
+"""A core alone, 9 cm by 9 cm by 4.5 cm, with its imu."""
+WITH_PADS = Robot(
     (CORE, Part("TouchSensor", 0, 3, 0, 0, GREY)),
     Brain((*BOX.brain.neurons, *(Neuron("input", INPUT, 1) for _ in range(2)))),
 )
@@ -54,8 +54,10 @@ def arena(environment: Environment, **keys: object) -> ArenaSettings:
 
 
 @pytest.mark.parametrize("slope_deg", [0.0, 20.0, 35.0])
-def test_a_box_at_rest_on_a_slope_feels_that_it_leans(slope_deg: float) -> None:
-    """It is g sin a along x, towards uphill, and g cos a along z; nothing else."""
+def test_imu_at_rest_on_a_slope_reads_the_components_of_gravity(
+    slope_deg: float,
+) -> None:
+    """Namely g sin a along x, uphill, and g cos a along z."""
     world = populated(
         arena(Environment(slope_deg=slope_deg), drop_m=0.01),
         [Insertion(A, BOX, (0.5, 0.0))],
@@ -68,7 +70,7 @@ def test_a_box_at_rest_on_a_slope_feels_that_it_leans(slope_deg: float) -> None:
 
 
 @pytest.mark.parametrize("slope_deg", [5.0, 30.0])
-def test_without_friction_a_box_slides_down_as_on_an_inclined_plane(
+def test_box_without_friction_accelerates_down_the_slope(
     slope_deg: float,
 ) -> None:
     """By g sin(a) t^2 / 2 towards -x: 2.45 m in a second at 30 degrees."""
@@ -81,11 +83,11 @@ def test_without_friction_a_box_slides_down_as_on_an_inclined_plane(
     assert np.ptp(track.core_position[:, 2]) < 1e-3
 
 
-def test_a_wall_stops_what_slides_and_pads_feel_it() -> None:
+def test_wall_stops_a_sliding_robot_and_its_touch_sensors_read_it() -> None:
     """Pads reach 5.5 cm from the core's centre; the wall's face is at x = -1 m."""
     settings = arena(Environment(slope_deg=20.0, scenery=WALL), drop_m=0.0)
     slippery = replace(settings, simulation=replace(settings.simulation, friction=0.0))
-    world = populated(slippery, [Insertion(A, FEELER, (0.0, 0.0))])
+    world = populated(slippery, [Insertion(A, WITH_PADS, (0.0, 0.0))])
     view = world.population.find(A).view
     seconds(world, 0.5)
     assert view.sensors.readings[0, 6:8].tolist() == [0.0, 0.0]
@@ -96,14 +98,14 @@ def test_a_wall_stops_what_slides_and_pads_feel_it() -> None:
     assert np.abs(view.qvel[:3]).max() < 1e-3
     free = populated(
         replace(slippery, environment=Environment(slope_deg=20.0)),
-        [Insertion(A, FEELER, (0.0, 0.0))],
+        [Insertion(A, WITH_PADS, (0.0, 0.0))],
     )
     seconds(free, 3.5)
     assert free.population.find(A).view.qpos[0] < -10.0
 
 
 def test_robots_stay_above_rough_ground(robot_of: Robots) -> None:
-    """They begin clear of it, and sink no deeper than contacts are soft."""
+    """They start without contact; penetration is that of soft contacts."""
     environment = Environment(roughness_m=0.05, patch_m=0.05, extent_m=1.0)
     depths: list[float] = []
 
@@ -121,7 +123,7 @@ def test_robots_stay_above_rough_ground(robot_of: Robots) -> None:
         assert 0.0 < max(depths) < 0.004
 
 
-def test_a_robot_alone_in_an_arena_moves_as_it_does_off_line(robot_of: Robots) -> None:
+def test_robot_alone_in_an_arena_has_the_off_line_track(robot_of: Robots) -> None:
     """On a slope, on rough ground, beside scenery: the same to the last bit."""
     robot, settings = robot_of(3), arena(WILD)
     world = populated(settings, [Insertion(A, robot, (0.0, 0.0))])
@@ -136,17 +138,17 @@ def test_a_robot_alone_in_an_arena_moves_as_it_does_off_line(robot_of: Robots) -
 
 
 @pytest.mark.slow
-def test_a_wild_arena_repeats_with_any_threads_and_after_a_restore(
+def test_rough_arena_is_repeatable_with_threads_and_after_a_restore(
     robot_of: Robots,
 ) -> None:
-    """Births on top of obstacles, merges on rough ground, deaths, all in there."""
+    """With births on obstacles, merges on rough ground, and deaths."""
     settings, found = arena(WILD), []
     for threads in (1, 2):
         world = populated(settings, crowd(robot_of, 10, 0.5), threads)
         seconds(world, 1.5)
         middle = world.snapshot()
-        newcomers = crowd(robot_of, 3, 0.3, seed=2, first=20)
-        changes = Changes(removals=world.births[:2], insertions=newcomers)
+        newborns = crowd(robot_of, 3, 0.3, seed=2, first=20)
+        changes = Changes(removals=world.births[:2], insertions=newborns)
         world.apply(changes)
         found.append((middle, seconds(world, 1.5)))
         assert world.population.merges > 0
@@ -158,8 +160,8 @@ def test_a_wild_arena_repeats_with_any_threads_and_after_a_restore(
     assert seconds(restored, 1.5) == advance
 
 
-def test_two_robots_on_one_rock_do_not_touch_each_other() -> None:
-    """Scenery belongs to nobody: no contact of robots, no cluster of two."""
+def test_robots_on_one_obstacle_are_not_in_contact() -> None:
+    """Contacts with scenery neither count nor merge clusters."""
     slab = scene('<geom type="box" size="2 2 0.1" pos="0 0 0.1"/>')
     settings = arena(Environment(scenery=slab), record_touches=True, drop_m=0.0)
     apart = [Insertion(A, BOX, (-0.3, 0.0)), Insertion(B, BOX, (0.3, 0.0))]
@@ -178,7 +180,7 @@ def test_two_robots_on_one_rock_do_not_touch_each_other() -> None:
         assert core.geoms[1] - core.geoms[0] == 1
 
 
-def test_robots_are_born_on_top_of_what_stands_at_their_place() -> None:
+def test_robots_are_born_on_top_of_obstacles() -> None:
     """A block 0.2 m high and a drop of 0.05 m; a heading of 45 degrees clears it."""
     block = scene('<geom type="box" size="0.1 0.1 0.1" pos="0 0 0.1"/>')
     settings = arena(Environment(scenery=block), drop_m=0.05)

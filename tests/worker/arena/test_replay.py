@@ -1,4 +1,4 @@
-"""What an arena came to, done again: the same, or told to be another."""
+"""Replay of arenas: equal to the original, or reported as different."""
 
 from collections.abc import Callable, Sequence
 
@@ -20,7 +20,7 @@ A, B, C = (BirthId(0, number) for number in range(3))
 
 
 def lived(turns: Sequence[Changes]) -> tuple[PastAdvance, ...]:
-    """Return what became of an arena, with changes at the start of each turn."""
+    """Return the history of an arena, with changes at the start of each turn."""
     world = World(read_arena_settings(SETTINGS))
     history: list[PastAdvance] = []
     for changes in turns:
@@ -37,17 +37,17 @@ def scenes(history: Sequence[PastAdvance], birth: BirthId) -> list[Scene]:
     return found
 
 
-def test_what_happened_here_happens_again(robot_of: Robots) -> None:
-    newcomers = crowd(robot_of, 3, 0.4)
-    found = scenes(lived([Changes((), newcomers), Changes((A,)), Changes()]), A)
+def test_replay_on_one_platform_is_equal(robot_of: Robots) -> None:
+    newborns = crowd(robot_of, 3, 0.4)
+    found = scenes(lived([Changes((), newborns), Changes((A,)), Changes()]), A)
     assert [scene.is_equal for scene in found] == [True] * 3
     assert [scene.motion.num_rows for scene in found] == [TICKS, 0, 0]
 
 
-def test_of_a_drift_it_does_what_is_possible_and_tells_that_it_is_another(
+def test_replay_of_a_drift_is_an_approximation_and_says_so(
     robot_of: Robots,
 ) -> None:
-    """C fell here only; A there only, from where it came back as a migrant."""
+    """C was lost here only; A there only, and returned as a migrant."""
     one, other = crowd(robot_of, 2, 0.4)
     swaps = tuple(BrainChange(birth, robot_of(0).brain) for birth in (A, C))
     there = Changes(removals=(C,), insertions=(one,), brains=swaps)

@@ -1,4 +1,4 @@
-"""A restored world goes on as the one that it was taken from, bit for bit."""
+"""A restored world continues like the original, to the last bit."""
 
 import sys
 import time
@@ -27,10 +27,10 @@ RECORDING = settings_of(record_touches=True)
 
 
 @pytest.mark.slow
-def test_thirty_robots_go_on_after_a_snapshot_in_contact_and_merge(
+def test_thirty_robots_continue_after_a_snapshot(
     robot_of: Robots,
 ) -> None:
-    """Taken within a step of merges and in contacts; size and time are told."""
+    """Taken right after merges, with contacts; prints size and time."""
     world = populated(RECORDING, crowd(robot_of, 30, 0.8))
     taken: list[tuple[int, bytes]] = []
     merges = 0
@@ -61,32 +61,32 @@ def test_thirty_robots_go_on_after_a_snapshot_in_contact_and_merge(
 
 
 def _continued(world: World) -> list[object]:
-    """Return what further life of a world comes to: all of two more advances."""
+    """Return two more advances of a world."""
     first = seconds(world, 0.7)
     world.apply(Changes(removals=(world.births[4],)))
     return [first, seconds(world, 0.5)]
 
 
-def test_an_advance_tells_the_digest_of_its_snapshot(robot_of: Robots) -> None:
-    """By which a coordinator knows whose state a file holds."""
+def test_advance_has_the_digest_of_its_snapshot(robot_of: Robots) -> None:
+    """A coordinator identifies snapshot files by it."""
     world = populated(RECORDING, crowd(robot_of, 14, 0.5))
     advance = seconds(world, 2.0)
     assert advance.touches
     assert sha256(world.snapshot()).digest() == advance.digest
 
 
-def test_a_snapshot_right_after_changes_goes_on_as_well(robot_of: Robots) -> None:
-    """Newborns in the air, a robot that could not be built still untold."""
+def test_snapshot_right_after_changes_continues_equally(robot_of: Robots) -> None:
+    """With newborns in the air."""
     world = populated(SETTINGS, crowd(robot_of, 3, 0.3))
     seconds(world, 1.0)
-    newcomers = crowd(robot_of, 3, 0.3, seed=5, first=10)
-    world.apply(Changes(removals=(BirthId(0, 1),), insertions=newcomers))
+    newborns = crowd(robot_of, 3, 0.3, seed=5, first=10)
+    world.apply(Changes(removals=(BirthId(0, 1),), insertions=newborns))
     restored = World.restore(SETTINGS, world.snapshot())
     assert seconds(restored, 1.0) == seconds(world, 1.0)
 
 
-def test_snapshots_are_equal_whatever_the_cache_has_seen(robot_of: Robots) -> None:
-    """A world restored again and again is one that never was."""
+def test_snapshots_are_independent_of_the_model_cache(robot_of: Robots) -> None:
+    """A world that is restored repeatedly equals one that is not."""
     steady = populated(SETTINGS, crowd(robot_of, 5, 0.3))
     passed = populated(SETTINGS, crowd(robot_of, 5, 0.3))
     for until in range(50, 1001, 50):
@@ -96,7 +96,7 @@ def test_snapshots_are_equal_whatever_the_cache_has_seen(robot_of: Robots) -> No
     assert passed.digest() == steady.digest()
 
 
-def test_no_other_bytes_are_a_snapshot(turtle: Robot) -> None:
+def test_other_bytes_are_rejected_as_snapshot(turtle: Robot) -> None:
     world = populated(SETTINGS, [Insertion(BirthId(0, 0), turtle, (0.0, 0.0))])
     data = world.snapshot()
     rng = np.random.default_rng(1)

@@ -1,4 +1,4 @@
-"""Threads that share out jobs."""
+"""Thread pool."""
 
 import threading
 
@@ -9,7 +9,7 @@ from worker.arena.threads import Pool
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
 @pytest.mark.parametrize("count", [0, 1, 3, 200])
-def test_every_job_is_done_once(threads: int, count: int) -> None:
+def test_every_job_runs_once(threads: int, count: int) -> None:
     pool, done = Pool(threads), [0] * count
 
     def job(number: int) -> None:
@@ -21,8 +21,8 @@ def test_every_job_is_done_once(threads: int, count: int) -> None:
     assert done == [3] * count
 
 
-def test_the_threads_work_at_the_same_time() -> None:
-    """Three jobs that wait for each other end only if three threads do them."""
+def test_threads_run_concurrently() -> None:
+    """Three jobs that wait for each other need three threads."""
     pool, gate = Pool(3), threading.Barrier(3)
 
     def job() -> None:
@@ -32,7 +32,7 @@ def test_the_threads_work_at_the_same_time() -> None:
     pool.close()
 
 
-def test_what_a_job_raises_reaches_the_caller_and_the_pool_lives_on() -> None:
+def test_error_of_a_job_is_raised_and_the_pool_stays_usable() -> None:
     pool, done = Pool(2), []
 
     def bad() -> None:
@@ -45,12 +45,12 @@ def test_what_a_job_raises_reaches_the_caller_and_the_pool_lives_on() -> None:
     assert sorted(done) == [1, 2, 3, 3]
 
 
-def test_a_pool_needs_a_thread() -> None:
+def test_pool_without_threads_is_rejected() -> None:
     with pytest.raises(ValueError, match="got 0"):
         Pool(0)
 
 
-def test_closed_threads_end() -> None:
+def test_close_stops_the_threads() -> None:
     before = threading.enumerate()
     pool = Pool(3)
     others = [t for t in threading.enumerate() if t not in before]

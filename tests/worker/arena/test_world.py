@@ -1,4 +1,4 @@
-"""A world is a function of its settings, changes and advances, and of no more."""
+"""A world is a pure function of its settings, changes and advances."""
 
 import math
 from collections.abc import Callable
@@ -34,8 +34,8 @@ A, B = BirthId(0, 0), BirthId(0, 1)
 
 
 @pytest.mark.slow
-def test_any_number_of_threads_comes_to_the_same(robot_of: Robots) -> None:
-    """Births, deaths, merges and falls included; then the whole advance is equal."""
+def test_advances_are_independent_of_threads(robot_of: Robots) -> None:
+    """With births, deaths, merges and falls."""
     found = []
     for threads in (1, 2, 4):
         world = populated(SETTINGS, crowd(robot_of, 14, 0.7), threads)
@@ -50,9 +50,9 @@ def test_any_number_of_threads_comes_to_the_same(robot_of: Robots) -> None:
     assert found[0] == found[1] == found[2]
 
 
-def test_how_many_advances_it_takes_does_not_matter(robot_of: Robots) -> None:
-    newcomers = crowd(robot_of, 6, 0.4)
-    whole, pieces = populated(SETTINGS, newcomers), populated(SETTINGS, newcomers)
+def test_result_is_independent_of_the_number_of_advances(robot_of: Robots) -> None:
+    newborns = crowd(robot_of, 6, 0.4)
+    whole, pieces = populated(SETTINGS, newborns), populated(SETTINGS, newborns)
     once = whole.advance(700)
     for until in (1, 13, 64, 200, 333, 698, 700):
         last = pieces.advance(until)
@@ -60,7 +60,7 @@ def test_how_many_advances_it_takes_does_not_matter(robot_of: Robots) -> None:
     assert last.judgements == once.judgements
 
 
-def test_a_robot_alone_moves_as_it_does_off_line(turtle: Robot) -> None:
+def test_robot_alone_has_the_track_of_an_off_line_simulation(turtle: Robot) -> None:
     """Same drop, same warm-up, at the origin: the same track to the last bit."""
     world = populated(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
     advance = world.advance(600 + 2400)
@@ -72,7 +72,7 @@ def test_a_robot_alone_moves_as_it_does_off_line(turtle: Robot) -> None:
     assert advance.judgements[0].is_mature
 
 
-def test_those_far_away_do_not_feel_births_and_deaths(robot_of: Robots) -> None:
+def test_births_and_deaths_do_not_affect_distant_robots(robot_of: Robots) -> None:
     far = crowd(robot_of, 4, 0.4)
     calm, busy = populated(SETTINGS, far), populated(SETTINGS, far)
     seconds(calm, 3.0)
@@ -89,7 +89,7 @@ def test_those_far_away_do_not_feel_births_and_deaths(robot_of: Robots) -> None:
         assert state_of(calm, birth) == state_of(busy, birth)
 
 
-def test_changes_that_cannot_be_made_change_nothing(robot_of: Robots) -> None:
+def test_invalid_changes_change_nothing(robot_of: Robots) -> None:
     world = populated(SETTINGS, crowd(robot_of, 2, 1.0))
     before = world.digest()
     guest = Insertion(BirthId(0, 9), robot_of(9), (0.0, 0.0))
@@ -111,7 +111,7 @@ def test_changes_that_cannot_be_made_change_nothing(robot_of: Robots) -> None:
         world.advance(13)
 
 
-def test_poses_tell_where_all_were(turtle: Robot) -> None:
+def test_poses_are_recorded_for_all_robots(turtle: Robot) -> None:
     world = populated(
         SETTINGS,
         [Insertion(A, turtle, (1.0, 2.0), 0.5), Insertion(B, turtle, (9.0, 2.0))],
@@ -127,8 +127,8 @@ def test_poses_tell_where_all_were(turtle: Robot) -> None:
     assert present.equals(rows.slice(2).combine_chunks())
 
 
-def test_another_brain_starts_at_rest_with_its_own_clock(turtle: Robot) -> None:
-    """A turtle whose outputs become constant goes where these tell it."""
+def test_replaced_brain_starts_at_rest_with_its_own_clock(turtle: Robot) -> None:
+    """Constant outputs move the turtle's joints to constant angles."""
     world = populated(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
     seconds(world, 4.0)
     still = Brain(
@@ -148,8 +148,8 @@ def test_another_brain_starts_at_rest_with_its_own_clock(turtle: Robot) -> None:
     assert copy.digest() == world.digest()
 
 
-def test_a_ring_wall_holds_robots_in(turtle: Robot) -> None:
-    """Pushed against it at 1 m/s a robot stays inside; without it, it slides out."""
+def test_ring_wall_confines_robots(turtle: Robot) -> None:
+    """A robot at 1 m/s stays inside; without the wall it slides out."""
     for diameter, is_in in ((1.0, True), (0.0, False)):
         world = populated(
             settings_of(wall_diameter_m=diameter, drop_m=0.0),
@@ -162,8 +162,8 @@ def test_a_ring_wall_holds_robots_in(turtle: Robot) -> None:
         assert (world.population.find(A).place[0] < 0.5) is is_in
 
 
-def test_robots_feel_each_other_and_it_is_counted(turtle: Robot) -> None:
-    """One dropped onto another touches it; their pads and tallies say so."""
+def test_contacts_of_two_robots_are_recorded(turtle: Robot) -> None:
+    """One robot is dropped onto another."""
     settings = settings_of(record_touches=True, drop_m=0.3)
     world = populated(settings, [Insertion(A, turtle, (0.0, 0.0))])
     alone = seconds(world, 1.0)
@@ -173,11 +173,11 @@ def test_robots_feel_each_other_and_it_is_counted(turtle: Robot) -> None:
     [touch] = together.touches
     assert (touch.first, touch.second) == (A, B)
     assert 0.5 < touch.duration_s < 2.0
-    assert world.population.cluster_of(A) is world.population.cluster_of(B)
+    assert world.population.cluster_of[A] is world.population.cluster_of[B]
 
 
-def lamp_bearer() -> Robot:
-    """Return a turned core with a light sensor that looks along world +x."""
+def light_robot() -> Robot:
+    """Return a rotated core with a light sensor that faces world +x."""
     core = Part("Core", -1, -1, -1, 0, (0.5,) * 3)
     hinge = Part("ActiveHinge", 0, 3, 0, 0, (0.5,) * 3)
     lamp = Part("LightSensor", 0, 2, 0, 0, (0.5,) * 3)
@@ -190,7 +190,7 @@ def lamp_bearer() -> Robot:
 
 
 @pytest.mark.parametrize(
-    ("light", "hider", "expected"),
+    ("light", "is_hidden", "expected"),
     [
         ((0.5, 0.0, 0.0225), False, 1.0),
         ((2.0, 0.0, 0.0225), False, (1.0 / 1.9525) ** 2),
@@ -198,10 +198,10 @@ def lamp_bearer() -> Robot:
         ((-0.5, 0.0, 0.0225), False, 0.0),
     ],
 )
-def test_light_falls_off_and_can_be_hidden(
+def test_light_decreases_with_distance_and_can_be_hidden(
     turtle: Robot,
     light: tuple[float, float, float],
-    hider: bool,  # noqa: FBT001 - a case
+    is_hidden: bool,  # noqa: FBT001 - a case
     expected: float,
 ) -> None:
     space = Space(
@@ -209,10 +209,10 @@ def test_light_falls_off_and_can_be_hidden(
     )
     assert LIGHT_SENSOR.name == "LightSensor"
     settings = replace(settings_of(light=light, drop_m=0.0), space=space)
-    newcomers = [Insertion(A, lamp_bearer(), (0.0, 0.0))]
-    if hider:
-        newcomers.append(Insertion(B, turtle, (0.25, 0.0), 0.5 * math.pi))
-    world = populated(settings, newcomers)
+    newborns = [Insertion(A, light_robot(), (0.0, 0.0))]
+    if is_hidden:
+        newborns.append(Insertion(B, turtle, (0.25, 0.0), 0.5 * math.pi))
+    world = populated(settings, newborns)
     reading = world.population.find(A).view.sensors.readings[0, 6]
     assert reading == pytest.approx(expected, abs=0.02)
     world.advance(SECOND)

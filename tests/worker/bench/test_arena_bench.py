@@ -1,4 +1,4 @@
-"""The thesis's benchmarks: the right robots, in the right places, told in a table."""
+"""The thesis's benchmarks: robots, places and the table of results."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ from worker.bench.spider import grid, spider
 ROBOTS = RobotSource(generate, analyze)
 
 
-def test_the_spider_is_the_thesis_s() -> None:
+def test_spider_has_mass_motors_and_height_of_the_thesis() -> None:
     """383 g, 8 servos, underside 2.25 cm below the core (facts, section 9)."""
     robot = spider()
     check_robot(robot, BUILT_IN)
@@ -32,14 +32,14 @@ def test_the_spider_is_the_thesis_s() -> None:
     assert robot.brain.count("input") == 10
 
 
-def test_the_grid_has_rows_of_five() -> None:
+def test_grid_has_rows_of_five() -> None:
     places = np.array(grid(12))
     assert places[4] == pytest.approx((1.6, 0.0))
     assert places[5] == pytest.approx((0.0, 0.4))
 
 
 @pytest.mark.parametrize("what", ["arena", "spider"])
-def test_a_benchmark_writes_a_row_per_repetition(
+def test_benchmark_writes_a_row_per_repetition(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], what: str
 ) -> None:
     out = tmp_path / "results.parquet"
@@ -51,14 +51,14 @@ def test_a_benchmark_writes_a_row_per_repetition(
     assert table["simulated_s"].to_pylist() == [1.0] * 6
     factor, wall = table["factor"].to_numpy(), table["wall_s"].to_numpy()
     assert factor == pytest.approx(1.0 / wall)
-    said = capsys.readouterr().out
-    assert said.count("x real time") == 3
-    assert ("thesis: factor = -0.26 +34.78 / p +20.41 / p^2" in said) is (
+    printed = capsys.readouterr().out
+    assert printed.count("x real time") == 3
+    assert ("thesis: factor = -0.26 +34.78 / p +20.41 / p^2" in printed) is (
         what == "arena"
     )
 
 
-def test_a_file_that_cannot_be_written_is_told_before_the_minutes(
+def test_unwritable_file_is_rejected_before_the_first_measurement(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = str(tmp_path / "nowhere" / "results.parquet")

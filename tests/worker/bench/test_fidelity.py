@@ -1,4 +1,4 @@
-"""The fidelity study's own arithmetic."""
+"""Arithmetic of the fidelity benchmark."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +21,7 @@ from worker.bench.fidelity import (
 )
 
 
-def test_spearman_is_scipy_s_ties_included() -> None:
+def test_spearman_equals_that_of_scipy_with_ties() -> None:
     rng = np.random.default_rng(3)
     for _ in range(20):
         first = rng.integers(0, 6, 25).astype(float)
@@ -31,7 +31,7 @@ def test_spearman_is_scipy_s_ties_included() -> None:
         )
 
 
-def test_each_third_gives_its_share() -> None:
+def test_each_third_is_sampled_equally() -> None:
     fitness = np.random.default_rng(4).permutation(30).astype(float)
     chosen = fitness[sample_thirds(fitness, 4)]
     assert (chosen[:4] < 10).all()
@@ -47,19 +47,19 @@ def test_winners_are_the_ten_fittest_in_order() -> None:
     assert winners(fitness) == list(range(19, 9, -1))
 
 
-def test_a_finer_world_lasts_as_long() -> None:
+def test_finer_simulation_has_the_same_duration() -> None:
     world = finer(Simulation(warmup_steps=600))
     assert world.timestep_s == pytest.approx(0.001)
     assert (world.brain_steps, world.pose_steps) == (125, 200)
     assert (world.window_steps, world.warmup_steps) == (12_000, 3000)
 
 
-def test_a_folder_without_a_run_is_told(tmp_path: Path) -> None:
+def test_folder_without_a_run_is_rejected(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="no run is there"):
         read_population(tmp_path)
 
 
-def test_the_same_world_agrees_and_a_wild_one_counts_nothing(turtle: Robot) -> None:
+def test_same_simulation_agrees_and_a_diverging_one_counts_zero(turtle: Robot) -> None:
     short = Simulation(window_steps=400)
     experiment = Experiment(name="test", simulation=short)
     same = compare([turtle], experiment, short)
@@ -69,7 +69,7 @@ def test_the_same_world_agrees_and_a_wild_one_counts_nothing(turtle: Robot) -> N
 
 
 def test_random_robots_agree_with_finer_steps(robot_of: Callable[[int], Robot]) -> None:
-    """A small sign of what ``revolve bench fidelity`` measures at length."""
+    """A small version of ``revolve bench fidelity``."""
     experiment = Experiment(name="test", simulation=Simulation(window_steps=1200))
     robots = [robot_of(seed) for seed in range(12)]
     found = compare(robots, experiment, finer(experiment.simulation))

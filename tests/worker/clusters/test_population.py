@@ -1,4 +1,4 @@
-"""Clusters overlook no contact, whatever falls onto whatever."""
+"""Merges and splits of clusters; no contact of robots is missed."""
 
 import sys
 from collections.abc import Callable
@@ -19,17 +19,17 @@ Robots = Callable[[int], Robot]
 def live(
     robot_of: Robots, *, radius_m: float, drop_m: float, lives: int, seed: int
 ) -> tuple[World, Oracle]:
-    """Return an arena in which for some seconds robots fell, lived and went.
+    """Return an arena after ``lives`` seconds of births and deaths.
 
-    Never more than 30 at a time; each second four come and the oldest go.
+    Four robots are born per second; the oldest beyond 30 are removed.
     """
     world = World(settings_of(drop_m=drop_m), threads=2)
     oracle = Oracle(world)
     rng = np.random.default_rng(seed)
     for second in range(lives):
-        newcomers = crowd(robot_of, 4, radius_m, seed=seed + second, first=4 * second)
+        newborns = crowd(robot_of, 4, radius_m, seed=seed + second, first=4 * second)
         gone = world.births[: max(0, len(world.births) + 4 - 30)]
-        world.apply(Changes(gone, newcomers))
+        world.apply(Changes(gone, newborns))
         seconds(world, 1.0)
         if rng.random() < 0.2:
             world.apply(Changes(removals=world.births[::5]))
@@ -38,10 +38,8 @@ def live(
 
 
 @pytest.mark.parametrize(("radius_m", "drop_m"), [(0.9, 0.25), (0.35, 0.6)])
-def test_no_contact_comes_late(
-    robot_of: Robots, radius_m: float, drop_m: float
-) -> None:
-    """Against a joint model of all, at every physics step."""
+def test_no_contact_is_missed(robot_of: Robots, radius_m: float, drop_m: float) -> None:
+    """Compared with one model of all robots, at every physics step."""
     world, oracle = live(robot_of, radius_m=radius_m, drop_m=drop_m, lives=6, seed=1)
     assert oracle.missed == []
     assert oracle.pair_steps > 200
@@ -50,8 +48,8 @@ def test_no_contact_comes_late(
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_no_contact_comes_late_in_long_lives(robot_of: Robots) -> None:
-    """Promise of the issue: over 10,000 pair-steps in contact and 200 merges."""
+def test_no_contact_is_missed_in_long_runs(robot_of: Robots) -> None:
+    """Over 10,000 pair-steps in contact and 200 merges."""
     pair_steps = merges = 0
     for radius_m, drop_m in ((1.4, 0.25), (0.9, 0.25), (0.5, 0.5), (0.35, 1.0)):
         world, oracle = live(
@@ -61,7 +59,7 @@ def test_no_contact_comes_late_in_long_lives(robot_of: Robots) -> None:
             f"\nradius {radius_m} m, drop {drop_m} m: {oracle.pair_steps} pair-steps "
             f"in contact, {len(oracle.missed)} missed, "
             f"{world.population.merges} merges, "
-            f"{world.population.splits} partings"
+            f"{world.population.splits} splits"
         )
         assert oracle.missed == []
         pair_steps += oracle.pair_steps
@@ -71,17 +69,17 @@ def test_no_contact_comes_late_in_long_lives(robot_of: Robots) -> None:
 
 
 @pytest.mark.slow
-def test_a_pile_of_thirty_stays_finite(robot_of: Robots) -> None:
+def test_pile_of_thirty_robots_stays_finite(robot_of: Robots) -> None:
     world = World(settings_of(drop_m=0.8), threads=2)
     rng = np.random.default_rng(3)
-    fallen: list[Casualty] = []
+    casualties: list[Casualty] = []
     for number in range(30):
         place = (float(rng.uniform(-0.05, 0.05)), float(rng.uniform(-0.05, 0.05)))
-        newcomer = Insertion(BirthId(0, number), robot_of(number), place)
-        world.apply(Changes(insertions=(newcomer,)))
-        fallen += seconds(world, 0.5).casualties
+        newborn = Insertion(BirthId(0, number), robot_of(number), place)
+        world.apply(Changes(insertions=(newborn,)))
+        casualties += seconds(world, 0.5).casualties
     advance = seconds(world, 2.0)
-    assert not fallen
+    assert not casualties
     assert not advance.casualties
     largest = max(len(cluster.members) for cluster in world.population.clusters)
     assert largest == 30
@@ -92,8 +90,8 @@ def test_a_pile_of_thirty_stays_finite(robot_of: Robots) -> None:
     world.close()
 
 
-def test_those_who_part_live_alone_again(turtle: Robot) -> None:
-    """Merged below 2 cm, together until beyond 6 cm, then each in its own home."""
+def test_separated_robots_are_split(turtle: Robot) -> None:
+    """Merged below 2 cm, split beyond 6 cm, then each in its own model."""
     near = [
         Insertion(BirthId(0, number), turtle, (0.3 * number, 0.0)) for number in (0, 1)
     ]
@@ -108,5 +106,5 @@ def test_those_who_part_live_alone_again(turtle: Robot) -> None:
         sizes.append(len(world.population.clusters))
     assert sizes[1] == 1
     assert sizes[-1] == 2
-    assert first.view is first.body.home.views[0]
+    assert first.view is first.body.solo.views[0]
     assert (world.population.merges, world.population.splits) == (1, 1)

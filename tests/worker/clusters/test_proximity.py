@@ -1,4 +1,4 @@
-"""Boxes and hulls spare the measuring of pairs; they never decide who meets."""
+"""Boxes and hulls only save measurements; they do not change the pairs."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ Robots = Callable[[int], Robot]
 
 
 def measured(world: World, scene: Scene, gap_m: float) -> Pairs:
-    """Return who is to meet below a gap, every pair that lives apart measured."""
+    """Return the pairs to merge, with every pair of different clusters measured."""
     population, settings = world.population, world.population.model_cache.settings
     steps = settings.arena.proximity_steps + 1
     moves = np.minimum(scene.speeds[0], FASTEST) * steps * 0.005
@@ -24,15 +24,17 @@ def measured(world: World, scene: Scene, gap_m: float) -> Pairs:
         for first, here in enumerate(births)
         for second, there in enumerate(births)
         if first < second
-        and population.cluster_of(here) is not population.cluster_of(there)
+        and population.cluster_of[here] is not population.cluster_of[there]
         and scene.distances([(first, second)])[0, 0]
         < moves[first] + moves[second] + gap_m
     ]
 
 
 @pytest.mark.parametrize("gap_m", [0.02, 0.1, 0.5])
-def test_nobody_is_spared_who_is_to_meet(robot_of: Robots, gap_m: float) -> None:
-    """In a falling crowd, by merge distances beyond those that it lives by."""
+def test_pairs_to_merge_equal_those_of_all_measurements(
+    robot_of: Robots, gap_m: float
+) -> None:
+    """For falling robots, also with distances greater than the arena's own."""
     world = populated(settings_of(drop_m=0.5), crowd(robot_of, 20, 1.2))
     proximity = Proximity(settings_of(merge_distance_m=gap_m))
     pairs = 0

@@ -1,4 +1,4 @@
-"""The sliding window, worked by hand."""
+"""The sliding window, with results computed by hand."""
 
 import pytest
 from msgspec.structs import replace
@@ -14,23 +14,23 @@ CLOCK = Simulation(
 """Samples every 0.1 s, a window of 0.8 s, a warm-up of 0.2 s."""
 
 
-def test_the_fall_and_the_warm_up_do_not_count() -> None:
+def test_window_excludes_fall_and_warm_up() -> None:
     window = Window(CLOCK, born=100)
     window.add(110, (9.0, 9.0, 9.0))
     assert not window.positions
     window.add(120, (0.0, 0.0, 0.0))
     window.add(130, (0.1, 0.0, 0.0))
-    judged = [window.has_fitness]
+    has_fitness = [window.has_fitness]
     window.add(140, (0.1, 0.1, 5.0))
-    judged.append(window.has_fitness)
-    assert judged == [False, True]
+    has_fitness.append(window.has_fitness)
+    assert has_fitness == [False, True]
     track = window.track()
     assert path_velocity(track) == pytest.approx(1.0)
     assert straight_velocity(track) == pytest.approx(2**0.5 / 2)
 
 
-def test_it_is_mature_after_warm_up_and_a_whole_window() -> None:
-    """200 + 800 ms: with the sample at age 1 s, not with the one before."""
+def test_window_is_mature_after_warm_up_and_window() -> None:
+    """200 + 800 ms: from the sample at age 1 s on."""
     window = Window(CLOCK, born=50)
     mature = []
     for step in range(50, 200, 10):
@@ -39,7 +39,7 @@ def test_it_is_mature_after_warm_up_and_a_whole_window() -> None:
     assert mature.index(True) == (20 + 80) // 10
 
 
-def test_old_samples_leave_so_that_velocities_are_the_latest() -> None:
+def test_window_drops_old_samples() -> None:
     """East at 1 m/s for 0.8 s, then back west: after 0.4 s of that s is 0."""
     window = Window(CLOCK, born=0)
     places = [0.1 * min(n, 16 - n) for n in range(17)]
@@ -54,7 +54,7 @@ def test_old_samples_leave_so_that_velocities_are_the_latest() -> None:
     assert len(window.positions) == 9
 
 
-def test_fitness_is_the_experiment_s_own_over_the_window() -> None:
+def test_fitness_of_the_window_uses_the_experiment_s_weights() -> None:
     window = Window(CLOCK, born=0)
     for number in range(9):
         window.add(20 + 10 * number, (0.01 * number, 0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Brains in motion: the formulas, and each robot's arithmetic its own."""
+"""Controllers: formulas, and independence of the robots of a batch."""
 
 import math
 from collections.abc import Callable
@@ -29,7 +29,7 @@ def test_widths_are_the_limits_of_the_experiment() -> None:
     assert WIDTH.states == 20
 
 
-def test_a_simple_neuron_scales_what_exceeds_its_bias() -> None:
+def test_simple_neuron_scales_the_input_above_its_bias() -> None:
     brain = Brain(
         (Neuron("input", INPUT, 0), Neuron("output", "Simple", 1, (0.25, 0.5))),
         (Connection(0, 1, 0.75),),
@@ -37,7 +37,7 @@ def test_a_simple_neuron_scales_what_exceeds_its_bias() -> None:
     assert outputs_of(brain, [2.0], 1) == [0.5 * (0.75 * 2.0 - 0.25)]
 
 
-def test_a_sigmoid_squeezes_what_exceeds_its_bias() -> None:
+def test_sigmoid_of_the_input_above_its_bias() -> None:
     brain = Brain(
         (Neuron("input", INPUT, 0), Neuron("output", "Sigmoid", 1, (0.25, 0.5))),
         (Connection(0, 1, 0.75),),
@@ -46,7 +46,7 @@ def test_a_sigmoid_squeezes_what_exceeds_its_bias() -> None:
     assert outputs_of(brain, [2.0], 1) == pytest.approx([expected], abs=1e-15)
 
 
-def test_an_oscillator_counts_phase_in_periods_and_ignores_inputs() -> None:
+def test_oscillator_has_phase_in_periods_and_ignores_inputs() -> None:
     brain = Brain(
         (Neuron("input", INPUT, 0), Neuron("output", "Oscillator", 1, (2.0, 0.3, 1.6))),
         (Connection(0, 1, 0.75), Connection(1, 1, 1.0)),
@@ -58,8 +58,8 @@ def test_an_oscillator_counts_phase_in_periods_and_ignores_inputs() -> None:
     assert outputs_of(brain, [9.0], 4) == pytest.approx(expected, abs=1e-14)
 
 
-def test_neurons_change_together_from_the_states_before() -> None:
-    """A chain input -> hidden -> output takes one tick a link."""
+def test_all_neurons_are_updated_from_the_previous_states() -> None:
+    """A signal takes one tick per connection: input, hidden, output."""
     brain = Brain(
         (
             Neuron("input", INPUT, 0),
@@ -71,7 +71,7 @@ def test_neurons_change_together_from_the_states_before() -> None:
     assert outputs_of(brain, [3.0], 3) == [0.0, 3.0, 3.0]
 
 
-def test_a_growing_state_stops_at_the_limit() -> None:
+def test_growing_state_stops_at_the_limit() -> None:
     brain = Brain(
         (
             Neuron("output", "Simple", 0, (-1.0, 1.0)),
@@ -90,13 +90,13 @@ def test_a_growing_state_stops_at_the_limit() -> None:
 
 
 @pytest.mark.parametrize("period", [0.0, 1e-300, 1e-9, -1.0])
-def test_a_tiny_period_stays_a_number(period: float) -> None:
+def test_tiny_period_gives_finite_outputs(period: float) -> None:
     brain = Brain((Neuron("output", "Oscillator", 0, (period, 1.0, 2.0)),))
     found = outputs_of(brain, [], 50)
     assert all(-0.5 <= value <= 1.5 for value in found)
 
 
-def test_more_neurons_than_the_limit_are_refused() -> None:
+def test_more_neurons_than_the_limit_are_rejected() -> None:
     brain = Brain(tuple(Neuron("hidden", "Simple", 0, (0.0, 1.0)) for _ in range(11)))
     with pytest.raises(InvalidRobot, match="hidden neurons must be <= 10, got 11"):
         pack(brain, WIDTH)
@@ -108,10 +108,10 @@ def networks(robot_of: Callable[[int], Robot]) -> list[Network]:
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 30, 100])
-def test_a_robot_thinks_the_same_in_any_company(
+def test_outputs_are_independent_of_the_batch(
     networks: list[Network], count: int
 ) -> None:
-    """To the last bit: alone, in batches, and wherever it stands in them."""
+    """To the last bit: alone, and in any row of any batch."""
     rng = np.random.default_rng(count)
     ticks = 96
     readings = rng.normal(0.0, 5.0, (ticks, 100, WIDTH.inputs))
@@ -129,7 +129,7 @@ def test_a_robot_thinks_the_same_in_any_company(
             assert alone[row].states.tobytes() == batch.states[row].tobytes()
 
 
-def test_states_can_be_carried_to_another_batch(networks: list[Network]) -> None:
+def test_states_can_be_moved_to_another_batch(networks: list[Network]) -> None:
     rng = np.random.default_rng(1)
     readings = rng.normal(0.0, 5.0, (20, 3, WIDTH.inputs))
     whole = Bank(networks[:3], WIDTH, TICK_S)

@@ -1,4 +1,4 @@
-"""Evaluations that last as long as their request says, judged over the same window."""
+"""Evaluations with a duration in the request; the window is the same."""
 
 import math
 from itertools import pairwise
@@ -36,21 +36,21 @@ def request(robot: Robot, steps: int = 0) -> bytes:
     )
 
 
-def judged(robot: Robot, steps: int = 0) -> Evaluation:
+def evaluated(robot: Robot, steps: int = 0) -> Evaluation:
     result = decode_answer(answer(request(robot, steps))).result
     assert isinstance(result, Evaluation)
     return result
 
 
-def test_no_steps_are_no_bytes_and_the_settings_warm_up(turtle: Robot) -> None:
+def test_zero_steps_use_the_warm_up_of_the_settings(turtle: Robot) -> None:
     assert len(request(turtle, steps=1)) == len(request(turtle)) + 2
     assert decode_request(request(turtle)).steps == 0
-    assert judged(turtle).simulated_s == pytest.approx(2.4)
-    assert judged(turtle) == judged(turtle, steps=480)
+    assert evaluated(turtle).simulated_s == pytest.approx(2.4)
+    assert evaluated(turtle) == evaluated(turtle, steps=480)
 
 
-def test_the_last_window_of_a_longer_life_is_judged(turtle: Robot) -> None:
-    found = judged(turtle, steps=1200)
+def test_longer_evaluation_is_judged_by_its_last_window(turtle: Robot) -> None:
+    found = evaluated(turtle, steps=1200)
     assert found.simulated_s == pytest.approx(6.0)
     # All 6 s as one window, of which the last 2 s are the last 11 of 31 samples.
     whole = replace(WORLD, warmup_steps=0, window_steps=1200)
@@ -59,13 +59,13 @@ def test_the_last_window_of_a_longer_life_is_judged(turtle: Robot) -> None:
     assert found.path_velocity == pytest.approx(sum(hops) / 2.0, rel=1e-12)
     net = math.dist(track[0][:2], track[-1][:2])
     assert found.straight_velocity == pytest.approx(net / 2.0, rel=1e-12)
-    assert found.path_velocity != judged(turtle).path_velocity
+    assert found.path_velocity != evaluated(turtle).path_velocity
 
 
-def test_a_duration_that_is_no_multiple_of_a_pose_is_fine(turtle: Robot) -> None:
-    assert judged(turtle, steps=401).simulated_s == pytest.approx(2.005)
+def test_duration_need_not_be_a_multiple_of_the_pose_interval(turtle: Robot) -> None:
+    assert evaluated(turtle, steps=401).simulated_s == pytest.approx(2.005)
 
 
-def test_less_than_the_window_is_refused(turtle: Robot) -> None:
+def test_duration_shorter_than_the_window_is_rejected(turtle: Robot) -> None:
     with pytest.raises(ExperimentError, match="400 steps, got 399"):
         answer(request(turtle, steps=399))

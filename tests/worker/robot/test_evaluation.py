@@ -1,4 +1,4 @@
-"""One robot, alone, from birth to a number."""
+"""Off-line evaluation of one robot."""
 
 import hashlib
 import subprocess
@@ -36,7 +36,7 @@ WORLD = Simulation()
 SETTINGS = EvaluationSettings(space=Space(), simulation=WORLD, fitness=Fitness())
 
 
-def test_an_evaluation_is_the_fitness_of_the_track(turtle: Robot) -> None:
+def test_evaluation_has_the_fitness_of_the_track(turtle: Robot) -> None:
     track = simulate(turtle, Space(), WORLD, FLAT)
     found = evaluate(turtle, SETTINGS)
     assert found.path_velocity == path_velocity(track) > 0
@@ -45,29 +45,29 @@ def test_an_evaluation_is_the_fitness_of_the_track(turtle: Robot) -> None:
     assert found.simulated_s == 12.0
 
 
-def test_a_track_has_both_ends_of_its_window(turtle: Robot) -> None:
+def test_track_includes_both_ends_of_its_window(turtle: Robot) -> None:
     track = simulate(turtle, Space(), WORLD, FLAT)
     assert track.core_position.shape == (61, 3)
     assert track.interval_s == 0.2
     assert track.core_position[0] == pytest.approx([0, 0, 0.0225], abs=1e-12)
 
 
-def test_the_window_begins_after_the_warm_up(turtle: Robot) -> None:
-    """Dropped robots fall before the window, and the window is as long."""
+def test_window_starts_after_the_warm_up(turtle: Robot) -> None:
+    """The warm-up does not shorten the window."""
     whole = simulate(turtle, Space(), replace(WORLD, window_steps=2400 + 600), FLAT)
     late = simulate(turtle, Space(), replace(WORLD, warmup_steps=600), FLAT)
     assert late.core_position.shape == (61, 3)
     assert late.core_position.tobytes() == whole.core_position[15:].tobytes()
 
 
-def test_clocks_need_not_divide_each_other(turtle: Robot) -> None:
-    """A pose in the middle of a tick changes nothing of the motion."""
+def test_sampling_interval_does_not_change_the_motion(turtle: Robot) -> None:
+    """Intervals need not divide each other."""
     coarse = simulate(turtle, Space(), replace(WORLD, pose_steps=2400), FLAT)
     fine = simulate(turtle, Space(), replace(WORLD, pose_steps=32), FLAT)
     assert coarse.core_position[-1].tobytes() == fine.core_position[-1].tobytes()
 
 
-def test_the_physics_are_stepped_as_often_as_the_window_says(
+def test_number_of_physics_steps_is_warm_up_plus_window(
     turtle: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     steps: list[int] = []
@@ -82,7 +82,7 @@ def test_the_physics_are_stepped_as_often_as_the_window_says(
     assert sum(steps) == 2407
 
 
-def test_a_robot_without_a_brain_stays_where_it_is() -> None:
+def test_robot_without_a_brain_stays_at_its_place() -> None:
     grey = (0.5, 0.5, 0.5)
     robot = Robot(
         (Part("Core", -1, -1, -1, 0, grey),),
@@ -95,14 +95,14 @@ def bits(track: Track) -> bytes:
     return track.core_position.tobytes()
 
 
-def test_the_same_robot_goes_the_same_way_again(robot_of: RobotOf) -> None:
+def test_simulation_is_repeatable(robot_of: RobotOf) -> None:
     for seed in range(5):
         robot = robot_of(seed)
         first = simulate(robot, Space(), WORLD, FLAT)
         assert bits(simulate(robot, Space(), WORLD, FLAT)) == bits(first)
 
 
-def test_threads_do_not_change_the_way(robot_of: RobotOf) -> None:
+def test_simulation_is_independent_of_threads(robot_of: RobotOf) -> None:
     robots = [robot_of(seed) for seed in range(8)]
     alone = [bits(simulate(robot, Space(), WORLD, FLAT)) for robot in robots]
     with ThreadPoolExecutor(4) as pool:
@@ -124,7 +124,7 @@ for line in sys.stdin:
 """
 
 
-def test_another_process_goes_the_same_way(robot_of: RobotOf) -> None:
+def test_simulation_is_equal_in_another_process(robot_of: RobotOf) -> None:
     robots = [robot_of(seed) for seed in range(4)]
     found = subprocess.run(
         [sys.executable, "-c", ELSEWHERE],
@@ -140,13 +140,13 @@ def test_another_process_goes_the_same_way(robot_of: RobotOf) -> None:
     ]
 
 
-def test_a_robot_that_explodes_is_a_result_with_reason_and_time(
+def test_divergence_is_reported_with_reason_and_time(
     robot_of: RobotOf,
     capfd: pytest.CaptureFixture[str],
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """And the engine writes neither to the screen nor to a file."""
+    """The engine writes neither to the terminal nor to a file."""
     monkeypatch.chdir(tmp_path)
     absurd = replace(
         WORLD, timestep_s=0.5, servo_armature=0.0, armature=0.0, servo_stiffness=1e9
@@ -157,7 +157,7 @@ def test_a_robot_that_explodes_is_a_result_with_reason_and_time(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_diverged_robot_does_not_harm_the_next(robot_of: RobotOf) -> None:
+def test_divergence_does_not_affect_the_next_simulation(robot_of: RobotOf) -> None:
     before = bits(simulate(robot_of(4), Space(), WORLD, FLAT))
     absurd = replace(WORLD, timestep_s=0.5, servo_armature=0.0, armature=0.0)
     with pytest.raises(SimulationDiverged):
@@ -166,26 +166,26 @@ def test_a_diverged_robot_does_not_harm_the_next(robot_of: RobotOf) -> None:
 
 
 @pytest.mark.parametrize(
-    ("memory", "told"),
+    ("memory", "message"),
     [
         (1 << 9, "cannot be built: .*out of memory"),
         (1 << 12, r"physics diverged by 0\.060 s: .*out of memory"),
     ],
 )
-def test_an_engine_that_gives_up_on_a_robot_is_a_result(
-    turtle: Robot, monkeypatch: pytest.MonkeyPatch, memory: int, told: str
+def test_engine_failure_is_reported_as_divergence(
+    turtle: Robot, monkeypatch: pytest.MonkeyPatch, memory: int, message: str
 ) -> None:
-    """Too many contacts for the memory that a robot has; it is told in a line."""
+    """Too many contacts for the engine's memory; the message has one line."""
     before = bits(simulate(turtle, Space(), WORLD, FLAT))
     with monkeypatch.context() as patch:
         patch.setattr("schema.mjcf.model.MEMORY_BYTES", memory)
-        with pytest.raises(SimulationDiverged, match=told) as caught:
+        with pytest.raises(SimulationDiverged, match=message) as caught:
             simulate(turtle, Space(), WORLD, FLAT)
     assert "\n" not in str(caught.value)
     assert bits(simulate(turtle, Space(), WORLD, FLAT)) == before
 
 
-def test_a_light_sensor_in_a_world_without_light_is_refused() -> None:
+def test_light_sensor_in_a_world_without_light_is_rejected() -> None:
     grey = (0.5, 0.5, 0.5)
     parts = (
         Part("Core", -1, -1, -1, 0, grey),
@@ -197,7 +197,7 @@ def test_a_light_sensor_in_a_world_without_light_is_refused() -> None:
         simulate(Robot(parts, Brain(inputs)), space, WORLD, FLAT)
 
 
-def test_a_brain_beyond_the_limits_is_refused(turtle: Robot) -> None:
+def test_brain_beyond_the_limits_is_rejected(turtle: Robot) -> None:
     with pytest.raises(InvalidRobot, match="input neurons must be <= 6, got 8"):
         simulate(turtle, Space(max_inputs=6), WORLD, FLAT)
 
@@ -206,25 +206,25 @@ def not_a_number(_track: Track, _fitness: Fitness) -> float:
     return float("nan")
 
 
-def undecided(_track: Track, _fitness: Fitness) -> float:
+def raises(_track: Track, _fitness: Fitness) -> float:
     raise ZeroDivisionError("by nothing")
 
 
 @pytest.mark.parametrize(
-    ("function", "told"),
+    ("function", "message"),
     [
         (not_a_number, "must return a finite number, got nan"),
-        (undecided, "raised ZeroDivisionError: by nothing"),
+        (raises, "raised ZeroDivisionError: by nothing"),
     ],
 )
-def test_a_fitness_function_that_cannot_judge_is_a_result(
+def test_undefined_fitness_is_a_result(
     turtle: Robot,
     monkeypatch: pytest.MonkeyPatch,
     function: FitnessFunction,
-    told: str,
+    message: str,
 ) -> None:
     monkeypatch.setattr(fitness, "fitness_function", lambda _fitness: function)
-    with pytest.raises(FitnessUndefined, match=told):
+    with pytest.raises(FitnessUndefined, match=message):
         evaluate(turtle, SETTINGS)
     request = encode_request(
         run="run",
@@ -233,9 +233,9 @@ def test_a_fitness_function_that_cannot_judge_is_a_result(
         settings=msgspec.json.encode(SETTINGS),
         robot=encode_robot(turtle),
     )
-    assert told in str(decode_answer(answer(request)).result)
+    assert message in str(decode_answer(answer(request)).result)
 
 
-def test_positions_are_those_of_the_core_not_of_the_mass(turtle: Robot) -> None:
+def test_track_has_the_positions_of_the_core(turtle: Robot) -> None:
     track = simulate(turtle, Space(), replace(WORLD, window_steps=40), FLAT)
     assert np.abs(track.core_position[0, :2]).max() == 0.0

@@ -1,4 +1,4 @@
-"""Noise: whose it is and when decides it, and nothing else does."""
+"""Noise depends on identity and tick only."""
 
 from collections.abc import Callable
 
@@ -64,15 +64,15 @@ def noise_of(
 
 
 def drawn(identity: Identity, ticks: int = 200) -> Floats:
-    """Return what is added to a robot's readings and outputs, (T, I + O)."""
+    """Return the noise on a robot's readings and outputs, (T, I + O)."""
     noise = noise_of(identity.birth, identity=identity)
-    silence = np.zeros((1, WIDTH.inputs)), np.zeros((1, WIDTH.outputs))
+    zeros = np.zeros((1, WIDTH.inputs)), np.zeros((1, WIDTH.outputs))
     return np.array(
         [
             np.hstack(
                 [
-                    noise.perturb_readings(tick, silence[0])[0],
-                    noise.perturb_outputs(tick, silence[1])[0],
+                    noise.perturb_readings(tick, zeros[0])[0],
+                    noise.perturb_outputs(tick, zeros[1])[0],
                 ]
             )
             for tick in range(ticks)
@@ -80,7 +80,7 @@ def drawn(identity: Identity, ticks: int = 200) -> Floats:
     )
 
 
-def test_noise_has_the_mean_and_the_deviation_that_are_set() -> None:
+def test_noise_has_mean_zero_and_the_configured_deviation() -> None:
     found = drawn(IDENTITY, 5000)
     for part, sd in ((found[:, :10], 0.3), (found[:, 10:], 0.05)):
         # 50000 draws: three standard errors.
@@ -94,13 +94,13 @@ def test_noise_has_the_mean_and_the_deviation_that_are_set() -> None:
 
 
 @pytest.mark.parametrize("other", OTHERS)
-def test_another_name_draws_something_else(other: Identity) -> None:
+def test_noise_of_different_identities_is_uncorrelated(other: Identity) -> None:
     ours, theirs = drawn(IDENTITY), drawn(other)
     assert abs(np.corrcoef(ours.ravel(), theirs.ravel())[0, 1]) < 0.05
     assert np.array_equal(drawn(IDENTITY), ours)
 
 
-def test_neither_company_nor_the_order_of_ticks_matters() -> None:
+def test_noise_is_independent_of_other_robots_and_order_of_ticks() -> None:
     births = [BirthId(2, 5), BirthId(0, 1), BirthId(2, 4)]
     readings = np.linspace(-1.0, 1.0, 3 * WIDTH.inputs).reshape(3, -1)
     population, own = noise_of(*births), [noise_of(birth) for birth in births]
@@ -116,17 +116,19 @@ def test_neither_company_nor_the_order_of_ticks_matters() -> None:
     )
 
 
-def test_one_kind_of_noise_is_the_same_without_the_other() -> None:
+def test_sensor_and_actuator_noise_are_independent() -> None:
     rows = np.ones((1, 10))
     both = noise_of(A)
-    deaf = noise_of(A, simulation=replace(LOUD, actuator_noise=0.0))
-    shaky = noise_of(A, simulation=replace(LOUD, sensor_noise=0.0))
+    sensors = noise_of(A, simulation=replace(LOUD, actuator_noise=0.0))
+    actuators = noise_of(A, simulation=replace(LOUD, sensor_noise=0.0))
     assert np.array_equal(
-        deaf.perturb_readings(3, rows), both.perturb_readings(3, rows)
+        sensors.perturb_readings(3, rows), both.perturb_readings(3, rows)
     )
-    assert np.array_equal(shaky.perturb_outputs(3, rows), both.perturb_outputs(3, rows))
-    assert deaf.perturb_outputs(3, rows) is rows
-    assert shaky.perturb_readings(3, rows) is rows
+    assert np.array_equal(
+        actuators.perturb_outputs(3, rows), both.perturb_outputs(3, rows)
+    )
+    assert sensors.perturb_outputs(3, rows) is rows
+    assert actuators.perturb_readings(3, rows) is rows
 
 
 # --- off-line ---------------------------------------------------------------------
@@ -136,23 +138,25 @@ def bits(track: Track) -> bytes:
     return track.core_position.tobytes()
 
 
-def test_an_evaluation_repeats_and_another_one_differs(robot_of: Robots) -> None:
+def test_evaluations_of_one_identity_are_equal_and_others_differ(
+    robot_of: Robots,
+) -> None:
     settings = EvaluationSettings(space=Space(), simulation=LOUD, fitness=Fitness())
     robot = robot_of(3)
     found = evaluate(robot, settings, IDENTITY)
     assert evaluate(robot, settings, IDENTITY) == found
     fitness = {evaluate(robot, settings, other).fitness for other in OTHERS}
     assert len(fitness | {found.fitness}) == 1 + len(OTHERS)
-    again, poses = alone(robot, settings, IDENTITY)
-    assert again == found
+    repeated, poses = alone(robot, settings, IDENTITY)
+    assert repeated == found
     assert set(poses["birth"].to_pylist()) == {5}
     other, moved = alone(robot, settings, OTHERS[-1])
     assert other != found
     assert moved["x"][-1] != poses["x"][-1]
 
 
-def test_without_noise_it_does_not_matter_who_asks(robot_of: Robots) -> None:
-    """And nothing is drawn: a generator would not start."""
+def test_without_noise_the_identity_has_no_effect(robot_of: Robots) -> None:
+    """No random number is drawn: the generator is disabled."""
     silent = replace(LOUD, sensor_noise=0.0, actuator_noise=0.0)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(np.random, "Philox", None)
@@ -163,20 +167,22 @@ def test_without_noise_it_does_not_matter_who_asks(robot_of: Robots) -> None:
     assert len(found) == 1
 
 
-def test_noise_of_sensors_moves_only_those_who_listen(turtle: Robot) -> None:
-    """The turtle's motors follow clocks; wired to its imu, they do not."""
+def test_sensor_noise_affects_only_robots_that_use_their_sensors(turtle: Robot) -> None:
+    """The turtle's motors follow oscillators; connected to its imu, they do not."""
     still = replace(LOUD, sensor_noise=0.0, actuator_noise=0.0)
-    deaf = replace(LOUD, actuator_noise=0.0)
+    sensor_noise = replace(LOUD, actuator_noise=0.0)
     plain = bits(simulate(turtle, Space(), still, FLAT))
-    assert bits(simulate(turtle, Space(), deaf, FLAT, identity=IDENTITY)) == plain
-    listening = wired(turtle, [(0, 0.1)])
-    assert bits(simulate(listening, Space(), deaf, FLAT, identity=IDENTITY)) != bits(
-        simulate(listening, Space(), still, FLAT)
+    assert (
+        bits(simulate(turtle, Space(), sensor_noise, FLAT, identity=IDENTITY)) == plain
     )
+    connected = wired(turtle, [(0, 0.1)])
+    assert bits(
+        simulate(connected, Space(), sensor_noise, FLAT, identity=IDENTITY)
+    ) != bits(simulate(connected, Space(), still, FLAT))
 
 
 def wired(turtle: Robot, edges: list[tuple[int, float]]) -> Robot:
-    """Return a turtle whose motors take 0.5 and what (input, weight) add."""
+    """Return a turtle whose outputs are 0.5 plus its (input, weight) edges."""
     inputs = turtle.brain.neurons[:8]
     motors = [Neuron("output", "Simple", part, (-0.5, 1.0)) for part in (1, 3)]
     wires = [
@@ -188,7 +194,7 @@ def wired(turtle: Robot, edges: list[tuple[int, float]]) -> Robot:
 
 
 def shares(robot: Robot, simulation: Simulation) -> Floats:
-    """Return where in its range each joint was told to go, (T, 2)."""
+    """Return each joint's target as a share of its range, (T, 2)."""
     found: list[Floats] = []
 
     def watch(data: mujoco.MjData) -> None:
@@ -200,7 +206,7 @@ def shares(robot: Robot, simulation: Simulation) -> Floats:
     return np.array(found)
 
 
-def test_motors_are_told_as_much_otherwise_as_is_set(turtle: Robot) -> None:
+def test_motor_targets_have_the_configured_deviation(turtle: Robot) -> None:
     world = Simulation(window_steps=8000, actuator_noise=0.05)
     found = shares(wired(turtle, []), world) - 0.5
     assert found.shape == (320, 2)
@@ -208,8 +214,8 @@ def test_motors_are_told_as_much_otherwise_as_is_set(turtle: Robot) -> None:
     assert abs(found.mean()) < 3 * 0.05 / np.sqrt(found.size)
 
 
-def test_networks_are_told_as_much_otherwise_as_is_set(turtle: Robot) -> None:
-    """Both pads of the turtle hang in the air: they read 0, and the noise."""
+def test_network_inputs_have_the_configured_deviation(turtle: Robot) -> None:
+    """Both pads of the turtle are in the air and read 0 plus noise."""
     world = Simulation(window_steps=8000, sensor_noise=0.2)
     found = shares(wired(turtle, [(6, 0.25), (7, 0.0)]), world) - 0.5
     assert np.allclose(found[:, 0], found[:, 1])
@@ -223,7 +229,7 @@ def test_outputs_are_clipped_after_the_noise(turtle: Robot) -> None:
     assert found.max() == pytest.approx(HIGHEST_OUTPUT, abs=1e-9)
 
 
-def test_the_loudest_noise_is_survived(robot_of: Robots) -> None:
+def test_extreme_noise_keeps_positions_finite(robot_of: Robots) -> None:
     loudest = replace(LOUD, sensor_noise=1e6, actuator_noise=1e6)
     for seed in range(4):
         track = simulate(robot_of(seed), Space(), loudest, FLAT, identity=IDENTITY)
@@ -233,8 +239,8 @@ def test_the_loudest_noise_is_survived(robot_of: Robots) -> None:
 # --- arenas -----------------------------------------------------------------------
 
 
-def test_a_robot_alone_moves_as_it_does_off_line(robot_of: Robots) -> None:
-    """Of one name, from step 0 on: two ways to the same noise, to the last bit."""
+def test_noise_of_a_robot_alone_equals_that_off_line(robot_of: Robots) -> None:
+    """With one identity, from step 0 on: equal to the last bit."""
     for seed in (3, 4):
         world = populated(NOISY, [Insertion(A, robot_of(seed), (0.0, 0.0))])
         world.advance(600 + 800)
@@ -249,8 +255,8 @@ def test_a_robot_alone_moves_as_it_does_off_line(robot_of: Robots) -> None:
         )
 
 
-def test_those_far_away_change_nothing(robot_of: Robots) -> None:
-    """Whoever lives, is born and dies there, before us and behind us by name."""
+def test_distant_births_and_deaths_do_not_change_the_noise(robot_of: Robots) -> None:
+    """Births with smaller and with greater numbers."""
     own = Insertion(BirthId(0, 5), robot_of(3), (0.0, 0.0))
     lonely, busy = populated(NOISY, [own]), populated(NOISY, [own])
     seconds(lonely, 3.0)
@@ -265,7 +271,7 @@ def test_those_far_away_change_nothing(robot_of: Robots) -> None:
     assert state_of(lonely, own.birth) == state_of(busy, own.birth)
 
 
-def test_a_newborn_feels_the_noise_of_its_name_at_once(turtle: Robot) -> None:
+def test_noise_starts_with_the_first_tick_of_a_newborn(turtle: Robot) -> None:
     held = [
         populated(settings, [Insertion(A, wired(turtle, []), (0.0, 0.0))])
         for settings in (NOISY, NOISY, replace(NOISY, origin=Origin(seed=8)))
@@ -276,21 +282,23 @@ def test_a_newborn_feels_the_noise_of_its_name_at_once(turtle: Robot) -> None:
 
 
 def lived(world: World, robot_of: Robots) -> list[bytes]:
-    """Return digests of a life with births and deaths, in which robots meet."""
+    """Return digests of a world with births, deaths and merges."""
     digests = [seconds(world, 1.0).digest]
     world.apply(Changes(world.births[:2], crowd(robot_of, 2, 0.3, seed=2, first=20)))
     return [*digests, seconds(world, 1.0).digest]
 
 
-def test_neither_threads_nor_advances_nor_restoring_matter(robot_of: Robots) -> None:
-    newcomers = crowd(robot_of, 8, 0.4)
-    plain = populated(NOISY, newcomers)
+def test_noise_is_independent_of_threads_advances_and_restores(
+    robot_of: Robots,
+) -> None:
+    newborns = crowd(robot_of, 8, 0.4)
+    plain = populated(NOISY, newborns)
     expected = lived(plain, robot_of)
     assert plain.population.merges > 0
-    threaded = populated(NOISY, newcomers, threads=2)
+    threaded = populated(NOISY, newborns, threads=2)
     assert lived(threaded, robot_of) == expected
     threaded.close()
-    pieces = populated(NOISY, newcomers)
+    pieces = populated(NOISY, newborns)
     for until in (1, 13, 77, 130, 199):
         pieces.advance(until)
         pieces = World.restore(NOISY, pieces.snapshot(), threads=2)
@@ -299,21 +307,21 @@ def test_neither_threads_nor_advances_nor_restoring_matter(robot_of: Robots) -> 
     pieces.close()
 
 
-def test_a_snapshot_is_of_one_run_only(turtle: Robot) -> None:
+def test_snapshot_of_another_run_is_rejected(turtle: Robot) -> None:
     world = populated(NOISY, [Insertion(A, turtle, (0.0, 0.0))])
     other: ArenaSettings = replace(NOISY, origin=replace(ORIGIN, seed=8))
     with pytest.raises(MalformedMessage, match="other settings"):
         World.restore(other, world.snapshot())
 
 
-def test_a_silent_arena_is_the_same_in_every_run(robot_of: Robots) -> None:
-    newcomers = crowd(robot_of, 3, 0.4)
+def test_arena_without_noise_is_equal_in_every_run(robot_of: Robots) -> None:
+    newborns = crowd(robot_of, 3, 0.4)
     worlds = [
-        populated(replace(SETTINGS, origin=origin), newcomers)
+        populated(replace(SETTINGS, origin=origin), newborns)
         for origin in (Origin(), ORIGIN)
     ]
     found = []
     for world in worlds:
         seconds(world, 1.0)
-        found.append([state_of(world, one.birth) for one in newcomers])
+        found.append([state_of(world, one.birth) for one in newborns])
     assert found[0] == found[1]

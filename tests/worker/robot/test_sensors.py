@@ -1,4 +1,4 @@
-"""What robots feel and how their motors obey, against the engine's own numbers."""
+"""Sensor readings and motor commands, compared with the engine's numbers."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -66,7 +66,7 @@ def ticks(
         yield tick
 
 
-def test_at_rest_the_accelerometer_reads_gravity_upward(turtle: Robot) -> None:
+def test_accelerometer_at_rest_reads_gravity_upward(turtle: Robot) -> None:
     model, data = alone(turtle)
     sensors = Sensors(turtle, BUILT_IN, model, data, width=10)
     assert sensors.start()[0, :6] == pytest.approx([0, 0, 9.81, 0, 0, 0])
@@ -75,7 +75,7 @@ def test_at_rest_the_accelerometer_reads_gravity_upward(turtle: Robot) -> None:
     assert sensors.readings[0, :6] == pytest.approx([0, 0, 9.81, 0, 0, 0], abs=1e-3)
 
 
-def test_at_rest_both_of_two_robots_read_gravity_upward(turtle: Robot) -> None:
+def test_two_robots_of_one_model_read_gravity_upward(turtle: Robot) -> None:
     model, data = two((turtle, HINGED))
     sensors = [
         Sensors(turtle, BUILT_IN, model, data, width=10, prefix="1:"),
@@ -87,7 +87,7 @@ def test_at_rest_both_of_two_robots_read_gravity_upward(turtle: Robot) -> None:
         assert each.readings[0, :6] == pytest.approx([0, 0, 9.81, 0, 0, 0], abs=0.01)
 
 
-def test_on_its_side_gravity_reads_along_the_side() -> None:
+def test_gravity_is_read_in_the_frame_of_the_core() -> None:
     """Turned a quarter about +x, the core's +y points up."""
     model, data = alone(HINGED, replace(WORLD, drop_m=1.0))
     data.qpos[3:7] = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
@@ -95,15 +95,15 @@ def test_on_its_side_gravity_reads_along_the_side() -> None:
     assert sensors.start()[0, :3] == pytest.approx([0, 9.81, 0], abs=1e-9)
 
 
-def test_a_falling_robot_reads_nothing() -> None:
+def test_accelerometer_of_a_falling_robot_reads_zero() -> None:
     model, data = alone(HINGED, replace(WORLD, drop_m=5.0))
     sensors = Sensors(HINGED, BUILT_IN, model, data, width=10)
     for _ in ticks(model, data, [sensors], 3):
         assert sensors.readings[0, :3] == pytest.approx([0, 0, 0], abs=1e-9)
 
 
-def test_acceleration_is_the_mean_of_what_an_ideal_sensor_feels() -> None:
-    """Pushed along +x at 2 m/s2 while turned by a half turn: -2 in its own frame."""
+def test_acceleration_is_the_mean_over_the_interval() -> None:
+    """Accelerated along +x by 2 m/s2 after half a turn: -2 in its own frame."""
     model, data = alone(HINGED, replace(WORLD, drop_m=5.0, gravity=0.0))
     data.qpos[3:7] = (0.0, 0.0, 0.0, 1.0)
     sensors = Sensors(HINGED, BUILT_IN, model, data, width=10)
@@ -112,7 +112,7 @@ def test_acceleration_is_the_mean_of_what_an_ideal_sensor_feels() -> None:
     assert sensors.read(TICK_S)[0, :3] == pytest.approx([-2.0, 0.0, 0.0])
 
 
-def test_the_gyroscope_reads_in_the_core_s_own_frame() -> None:
+def test_gyroscope_reads_in_the_frame_of_the_core() -> None:
     model, data = alone(HINGED, replace(WORLD, drop_m=5.0, gravity=0.0))
     data.qpos[3:7] = (math.cos(0.4), math.sin(0.4), 0.0, 0.0)
     data.qvel[3:6] = (0.1, -0.2, 0.3)
@@ -133,8 +133,8 @@ def _imu_in_a_brick() -> BodySpace:
     }
 
 
-def test_an_imu_may_sit_in_a_limb() -> None:
-    """It agrees with the engine's own gyroscope and velocimeter at that site."""
+def test_imu_in_a_limb_agrees_with_the_engine_s_sensors() -> None:
+    """Gyroscope and velocimeter at the imu's site."""
     space = _imu_in_a_brick()
     spec = robot_spec(HINGED, space, WORLD).spec
     set_options(spec, WORLD, FLAT, is_single=True)
@@ -161,8 +161,8 @@ def test_an_imu_may_sit_in_a_limb() -> None:
     assert found[3:6] == pytest.approx(data.sensor("w").data, abs=1e-9)
 
 
-def test_a_pad_feels_the_ground_and_nothing_else() -> None:
-    """A sensor that points downwards: the core stands on its two pads."""
+def test_touch_sensor_reads_contact_with_the_ground() -> None:
+    """The sensor points downwards; the core stands on its two pads."""
     robot = Robot(
         (
             Part("Core", -1, -1, -1, 0, GREY),
@@ -182,22 +182,22 @@ def test_a_pad_feels_the_ground_and_nothing_else() -> None:
         turn = np.array([math.cos(angle), 0.0, math.sin(angle), 0.0])
         mujoco.mju_mulQuat(tilt, turn, np.array([0.5, 0.0, 0.5, 0.0]) * math.sqrt(2))
         data.qpos[3:7] = tilt
-        felt = sensors.start()[0, 6:8].tolist()
+        found = sensors.start()[0, 6:8].tolist()
         heights = [data.geom(f"1/{name}").xpos[2] for name in ("left", "right")]
-        assert felt == [float(height == min(heights)) for height in heights]
+        assert found == [float(height == min(heights)) for height in heights]
 
 
-def test_readings_beyond_the_robot_s_own_stay_zero(turtle: Robot) -> None:
+def test_unused_readings_stay_zero(turtle: Robot) -> None:
     model, data = alone(turtle)
     sensors = Sensors(turtle, BUILT_IN, model, data, width=12)
     for _ in ticks(model, data, [sensors], 4):
         assert sensors.readings[0, 8:].tolist() == [0.0] * 4
 
 
-def test_the_servo_commands_what_is_left_of_the_way(
+def test_commanded_velocity_is_proportional_to_the_error(
     robot_of: Callable[[int], Robot],
 ) -> None:
-    """Velocity = 0.9 (target - angle); joint angles as the engine has them."""
+    """Velocity = 0.9 (target - angle), with the engine's joint angles."""
     robots = (robot_of(1), robot_of(2))
     model, data = two(robots)
     servos = [
@@ -222,8 +222,8 @@ def test_the_servo_commands_what_is_left_of_the_way(
 
 
 @pytest.mark.parametrize("turn", [0, 90])
-def test_the_commanded_velocity_is_reached_and_held(turn: int) -> None:
-    """Within 2 % before half of the tick is over, and without chatter."""
+def test_commanded_velocity_is_reached_and_held(turn: int) -> None:
+    """Within 2 % before half of the tick, without oscillation."""
     robot = Robot((HINGED.parts[0], Part("ActiveHinge", 0, 2, 0, turn, GREY)))
     model, data = alone(robot)
     for command in (1.2, -1.2, 0.6, -0.6):
@@ -236,8 +236,8 @@ def test_the_commanded_velocity_is_reached_and_held(turn: int) -> None:
         assert velocities == pytest.approx([command] * 10, rel=0.02)
 
 
-def test_a_joint_comes_to_its_target_in_about_a_second() -> None:
-    """Time constant 1 / 0.9 = 1.11 s, seen through ticks of 0.125 s."""
+def test_joint_approaches_its_target_in_about_a_second() -> None:
+    """Time constant 1 / 0.9 = 1.11 s, with ticks of 0.125 s."""
     model, data = alone(HINGED)
     servos = Servos(HINGED, BUILT_IN, model, data)
     start, target = 0.0, math.pi / 4 * 0.99998

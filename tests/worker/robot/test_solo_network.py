@@ -1,4 +1,4 @@
-"""A network alone thinks as it does in a bank, to the last bit."""
+"""A solo network equals a bank of one, to the last bit."""
 
 from collections.abc import Callable
 
@@ -32,7 +32,7 @@ def agree(brain: Brain, ticks: int, seed: int) -> np.ndarray[tuple[int], np.dtyp
     return solo.states
 
 
-def test_random_brains_think_the_same_alone(robot_of: Callable[[int], Robot]) -> None:
+def test_random_brains_equal_those_of_a_bank(robot_of: Callable[[int], Robot]) -> None:
     for seed in range(100):
         agree(robot_of(seed).brain, 96, seed)
 
@@ -50,7 +50,9 @@ def test_random_brains_think_the_same_alone(robot_of: Callable[[int], Robot]) ->
     ],
     ids=lambda neurons: "-".join(neuron.kind for neuron in neurons),
 )
-def test_every_mixture_of_kinds_thinks_the_same(neurons: tuple[Neuron, ...]) -> None:
+def test_every_mixture_of_neuron_types_equals_that_of_a_bank(
+    neurons: tuple[Neuron, ...],
+) -> None:
     edges = tuple(
         Connection(source, target, 0.3 + 0.2 * source - 0.4 * target)
         for source in range(len(neurons))
@@ -59,7 +61,7 @@ def test_every_mixture_of_kinds_thinks_the_same(neurons: tuple[Neuron, ...]) -> 
     agree(Brain(neurons, edges), 40, 1)
 
 
-def test_what_grows_stops_at_the_limit_here_too() -> None:
+def test_growing_state_stops_at_the_limit() -> None:
     wild = Neuron("hidden", "Oscillator", 0, (1e-300, 0.3, 1e99))
     brain = Brain((LINEAR, wild), (Connection(0, 0, 1e300), Connection(1, 0, 0.5)))
     assert np.abs(agree(brain, 30, 2)).max() == STATE_LIMIT

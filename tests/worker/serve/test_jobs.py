@@ -1,4 +1,4 @@
-"""The worker's work on bytes."""
+"""Evaluation requests and answers as bytes."""
 
 import pytest
 from msgspec.structs import replace
@@ -25,7 +25,7 @@ def request_for(robot: Robot, experiment: Experiment = EXPERIMENT) -> bytes:
     )
 
 
-def test_an_answer_carries_the_evaluation_and_whose_it_is(turtle: Robot) -> None:
+def test_answer_has_the_evaluation_and_the_request_s_number(turtle: Robot) -> None:
     settings = read_evaluation_settings(evaluation_settings(EXPERIMENT))
     found = decode_answer(answer(request_for(turtle)))
     assert (found.epoch, found.number) == (3, 17)
@@ -33,7 +33,7 @@ def test_an_answer_carries_the_evaluation_and_whose_it_is(turtle: Robot) -> None
     assert found.wall_s > 0
 
 
-def test_a_diverged_simulation_is_an_answer(turtle: Robot) -> None:
+def test_diverged_simulation_is_answered_with_the_reason(turtle: Robot) -> None:
     wild = replace(
         EXPERIMENT.simulation, timestep_s=0.5, servo_armature=0.0, servo_stiffness=1e9
     )
@@ -43,7 +43,7 @@ def test_a_diverged_simulation_is_an_answer(turtle: Robot) -> None:
     assert found.result.startswith("physics diverged by ")
 
 
-def test_what_is_no_request_is_refused(turtle: Robot) -> None:
+def test_invalid_requests_are_rejected(turtle: Robot) -> None:
     with pytest.raises(MalformedMessage):
         answer(b"no request")
     robot = Robot(turtle.parts)

@@ -1,4 +1,4 @@
-"""What a worker does with shards, in a world without physics."""
+"""Arena shards of a worker, in a world without physics."""
 
 from dataclasses import replace
 
@@ -37,7 +37,7 @@ def insertion(number: int, robot: Robot = CORE) -> Changes:
 
 
 class JobClient:
-    """A coordinator of one shard: knows what came of each advance."""
+    """Coordinator of one shard, with the history of its advances."""
 
     def __init__(self, run: str = "r", shard: int = 0) -> None:
         self.run, self.shard = run, shard
@@ -71,7 +71,7 @@ class JobClient:
         *,
         keep: bool = False,
     ) -> AdvanceAnswer:
-        """Ask, and remember what came of it."""
+        """Request an advance and record it."""
         request = self.request(steps, changes, rebuild, keep=keep)
         answer = decode_advance_answer(shards.answer(request))
         assert (answer.epoch, answer.number) == (1, 7)
@@ -88,7 +88,7 @@ class JobClient:
 
 
 def lived(shards: Shards) -> JobClient:
-    """Return an asker whose shard has had two robots for a while."""
+    """Return a client whose shard has had two advances with two robots."""
     requester = JobClient()
     requester.ask(shards, 100, insertion(0), EMPTY)
     requester.ask(shards, 100, insertion(1))
@@ -102,16 +102,15 @@ def following(
     return decode_advance_answer(shards.answer(request)).advance
 
 
-def test_goes_on_from_the_state_that_it_holds() -> None:
+def test_advance_continues_from_the_kept_state() -> None:
     shards = Shards(FakeWorld)
     FakeWorld.made = 0
     lived(shards)
     assert FakeWorld.made == 1
-    assert shards.held == [("r", 0)]
 
 
 @pytest.mark.parametrize("keep", [False, True])
-def test_another_worker_comes_to_the_same(keep: bool) -> None:  # noqa: FBT001 - a case
+def test_rebuilt_shard_advances_like_the_original(keep: bool) -> None:  # noqa: FBT001 - a case
     first = Shards(FakeWorld)
     requester = lived(first)
     requester.ask(first, 300, keep=keep)
@@ -122,7 +121,7 @@ def test_another_worker_comes_to_the_same(keep: bool) -> None:  # noqa: FBT001 -
     assert rebuilt == following(requester, first, None)
 
 
-def test_a_snapshot_without_history_is_enough() -> None:
+def test_shard_is_rebuilt_from_a_snapshot_without_history() -> None:
     first = Shards(FakeWorld)
     requester = lived(first)
     requester.ask(first, 300, keep=True)
@@ -133,37 +132,36 @@ def test_a_snapshot_without_history_is_enough() -> None:
     )
 
 
-def test_without_the_state_it_asks_for_it() -> None:
+def test_answer_asks_for_a_missing_state() -> None:
     requester = lived(Shards(FakeWorld))
     assert following(requester, Shards(FakeWorld), None) is None
 
 
-def test_a_state_that_went_on_is_not_the_one_to_start_from() -> None:
-    # Its answer was lost: the coordinator stands where the worker stood.
+def test_state_that_is_ahead_of_the_request_is_dropped() -> None:
+    # After a lost answer the coordinator is one advance behind the worker.
     shards = Shards(FakeWorld)
     requester = lived(shards)
     first = following(requester, shards, None)
     assert following(requester, shards, None) is None
-    assert shards.held == []
     assert following(requester, shards, requester.whole()) == first
 
 
-def test_other_digest_same_step_is_another_state() -> None:
+def test_state_with_another_digest_is_not_used() -> None:
     shards = Shards(FakeWorld)
     requester = lived(shards)
     requester.digest = bytes(32)
     assert following(requester, shards, None) is None
 
 
-def test_a_machine_that_computes_otherwise_is_found_out() -> None:
+def test_rebuild_on_a_machine_with_different_results_is_rejected() -> None:
     requester = lived(Shards(FakeWorld))
     odd = Shards(OddWorld)
-    with pytest.raises(StateDiffers, match=r"at step 100 .* computes otherwise"):
+    with pytest.raises(StateDiffers, match=r"at step 100 .* results differ"):
         odd.answer(requester.request(50, None, requester.whole()))
-    assert odd.held == []
+    assert following(requester, odd, None) is None
 
 
-def test_a_snapshot_of_another_state_is_found_out() -> None:
+def test_snapshot_with_another_digest_is_rejected() -> None:
     first = Shards(FakeWorld)
     requester = lived(first)
     requester.ask(first, 300, keep=True)
@@ -172,14 +170,14 @@ def test_a_snapshot_of_another_state_is_found_out() -> None:
         Shards(FakeWorld).answer(requester.request(50, None, requester.whole()))
 
 
-def test_a_history_that_ends_elsewhere_is_found_out() -> None:
+def test_history_that_ends_at_another_step_is_rejected() -> None:
     requester = lived(Shards(FakeWorld))
     rebuild = Rebuild(b"", tuple(requester.history[:1]))
     with pytest.raises(StateDiffers, match="rebuilt to step 100, must be 200"):
         Shards(FakeWorld).answer(requester.request(50, None, rebuild))
 
 
-def test_a_robot_that_breaks_the_rules_changes_nothing() -> None:
+def test_invalid_robot_leaves_the_shard_unchanged() -> None:
     shards = Shards(FakeWorld)
     requester = lived(shards)
     strange = Robot((Part("Wheelbarrow", -1, -1, -1, 0, ()),))
@@ -188,7 +186,7 @@ def test_a_robot_that_breaks_the_rules_changes_nothing() -> None:
     assert following(requester, shards, None) is not None
 
 
-def test_runs_and_shards_do_not_meet() -> None:
+def test_shards_of_different_runs_are_independent() -> None:
     shards = Shards(FakeWorld)
     clients = [JobClient("a", 0), JobClient("a", 1), JobClient("b", 0)]
     for requester in clients:
@@ -197,7 +195,7 @@ def test_runs_and_shards_do_not_meet() -> None:
         assert requester.ask(shards).advance is not None
 
 
-def test_the_one_that_rested_longest_goes_first() -> None:
+def test_least_recently_used_shard_is_dropped_first() -> None:
     shards = Shards(FakeWorld)
     clients = [JobClient(shard=number) for number in range(MOST_HELD + 1)]
     for requester in clients[:-1]:
@@ -206,10 +204,10 @@ def test_the_one_that_rested_longest_goes_first() -> None:
     clients[-1].ask(shards, rebuild=EMPTY)
     assert clients[0].ask(shards).advance is not None
     assert clients[1].ask(shards).advance is None
-    assert len(shards.held) == MOST_HELD
+    assert clients[2].ask(shards).advance is not None
 
 
-def test_those_who_watch_see_each_advance() -> None:
+def test_each_advance_is_published() -> None:
     seen: list[Live] = []
     requester = lived(Shards(FakeWorld, publish=seen.append))
     assert [(live.run, live.shard, live.advance.step) for live in seen] == [
@@ -220,16 +218,16 @@ def test_those_who_watch_see_each_advance() -> None:
     assert decode_live(encode_live(seen[1])) == seen[1]
 
 
-def test_other_bytes_are_refused() -> None:
+def test_malformed_request_is_rejected() -> None:
     with pytest.raises(MalformedMessage):
         Shards(FakeWorld).answer(b"\xff\xff")
 
 
-def test_what_was_elsewhere_is_done_again_as_nearly_as_it_goes() -> None:
-    """Who fell only here is not asked for, who fell only there does not stay."""
+def test_history_of_another_platform_is_approximated() -> None:
+    """Robots lost only here are ignored, robots lost only there are removed."""
     requester = lived(Shards(FakeWorld))
-    fallen = Changes(removals=(BirthId(0, 9),), insertions=insertion(2).insertions)
-    requester.history.append(PastAdvance(fallen, 300, b"\0" * 32))
+    changes = Changes(removals=(BirthId(0, 9),), insertions=insertion(2).insertions)
+    requester.history.append(PastAdvance(changes, 300, b"\0" * 32))
     requester.step, requester.digest = 300, b"\1" * 32
     with pytest.raises(KeyError):
         requester.ask(Shards(FakeWorld), 10, None, requester.whole())
@@ -237,5 +235,6 @@ def test_what_was_elsewhere_is_done_again_as_nearly_as_it_goes() -> None:
     gone = Changes(removals=(BirthId(0, 7),))
     advance = requester.ask(Shards(FakeWorld), 10, gone, rebuild).advance
     assert advance is not None
-    told = {one.birth for one in advance.judgements}
-    assert told | {one.birth for one in advance.casualties} == {BirthId(0, 0)}
+    births = {judgement.birth for judgement in advance.judgements}
+    births |= {casualty.birth for casualty in advance.casualties}
+    assert births == {BirthId(0, 0)}
