@@ -157,16 +157,16 @@ def test_the_last_population_is_kept_with_its_genomes(data: Path) -> None:
 def test_collecting_resumes_where_it_was_left(
     place: Path, parts: Parts, data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    integer_breaks = _files(data)
-    before = {name: (data / name).stat().st_mtime_ns for name in integer_breaks}
+    complete = _files(data)
+    before = {name: (data / name).stat().st_mtime_ns for name in complete}
     path_of(data, "runs", "scenario1-01").unlink()
     path_of(data, "final", "scenario3-00").write_bytes(b"PAR1")
     capsys.readouterr()
     assert campaign.collect(place, data, COMMIT, parts) == 0
     assert "2 repeats collected, 0 failed" in capsys.readouterr().out
-    assert _files(data) == integer_breaks
+    assert _files(data) == complete
     touched = {
-        name for name in integer_breaks if (data / name).stat().st_mtime_ns != before[name]
+        name for name in complete if (data / name).stat().st_mtime_ns != before[name]
     }
     assert {Path(name).stem for name in touched} == {"scenario1-01", "scenario3-00"}
 
@@ -181,7 +181,7 @@ def test_only_finished_runs_of_the_campaign_are_collected(
     fewer = Part("off-line", "some", parts[0].experiments, 1, BIRTHS, 3)
     assert campaign.collect(tmp_path, tmp_path / "data", COMMIT, (fewer,)) == 0
     assert {Path(name).stem for name in _files(tmp_path / "data")} == {"scenario1-00"}
-    assert "scenario2-1: is no run of the campaign" in capsys.readouterr().out
+    assert "scenario2-1: not a run of the campaign" in capsys.readouterr().out
     assert campaign.collect(tmp_path, tmp_path / "data", COMMIT, parts[:1]) == 1
     assert "scenario2-01: table evaluations: missing" in capsys.readouterr().out
 
@@ -231,17 +231,17 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "missing": (
         lambda data: path_of(data, "final", "scenario3-00").unlink(),
-        "final/scenario3-00.parquet: is missing",
+        "final/scenario3-00.parquet: missing",
     ),
-    "columns": (_no_rank, "final/scenario2-00.parquet: has other columns"),
+    "columns": (_no_rank, "final/scenario2-00.parquet: unexpected columns"),
     "exchanged": (
         _exchanged,
         "scenario2-00.parquet: must have rows of scenario2-00 only",
     ),
-    "platform": (_other_platform, "runs: of 2 platforms, must be of one"),
+    "platform": (_other_platform, "runs: must have one platform, got 2"),
     "stray": (
         lambda data: (data / "final" / "scenario2-07.parquet").write_bytes(b""),
-        "final/scenario2-07.parquet: is not expected",
+        "final/scenario2-07.parquet: unexpected file",
     ),
 }
 
@@ -296,11 +296,11 @@ def test_experiments_are_compared_by_what_is_kept(
 
 def test_courses_are_those_of_the_runs(place: Path, parts: Parts, data: Path) -> None:
     runs, _ = read_runs([place / "runs" / part.folder for part in parts])
-    integer_breaks = progression(concatenated(measure_runs(runs))["populations"])
+    complete = progression(concatenated(measure_runs(runs))["populations"])
     ours = progression(kept(data, "populations"))
-    is_kept = pc.is_in(integer_breaks["births"], pa.array([MARK, BIRTHS]))
-    assert ours == integer_breaks.filter(is_kept)
-    assert integer_breaks.num_rows > ours.num_rows > 40
+    is_kept = pc.is_in(complete["births"], pa.array([MARK, BIRTHS]))
+    assert ours == complete.filter(is_kept)
+    assert complete.num_rows > ours.num_rows > 40
 
 
 def test_committed_rows_are_whole() -> None:

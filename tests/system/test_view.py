@@ -225,7 +225,7 @@ def test_a_robot_of_an_arena_moves_again_as_recorded(
 ) -> None:
     words = ("view", str(quiet_hamlet), "--robot", "0:3", "--robot", "best")
     out = stage.run(*words, "--save", "again.rrd")
-    assert "0:3: moves again as recorded, to the last bit" in out
+    assert "0:3: moves as recorded, equal to the last bit" in out
     again = poses(stage.folder / "again.rrd", "/motion/0-3")
     table = read_table(quiet_hamlet, "poses").filter(pc.field("birth") == 3)
     # Brains tick more often than poses are recorded.
@@ -241,9 +241,9 @@ def test_a_robot_that_was_alone_moves_again_as_recorded(
         row["fitness"] or 0.0
         for row in read_table(undisturbed, "evaluations").to_pylist()
     )
-    (told,) = [line for line in out.splitlines() if line.startswith("best ever judged")]
-    assert told.endswith(f", fitness {best:.4f}")
-    assert "moves again as recorded, to the last bit" in out
+    (line,) = [one for one in out.splitlines() if one.startswith("best ever")]
+    assert line == f"best ever evaluated: {line.split()[3]} fitness {best:.4f}"
+    assert "moves as recorded, equal to the last bit" in out
     assert "DIFFERS" not in out
 
 
@@ -258,21 +258,24 @@ def test_a_record_that_is_not_what_happens_is_told(
     fitness = pc.add(table["fitness"], 1e-9)
     pq.write_table(table.set_column(index, table.schema.field(index), fitness), file)
     out = stage.run("view", str(folder), "--robot", "0:4", "--save", "a.rrd")
-    assert "0:4: DIFFERS from what was recorded: fitness" in out
+    assert "0:4: DIFFERS from the record: fitness" in out
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("view",), "name a run folder, or a coordinator"),
-        (("view", "nowhere"), "no run is there"),
+        (("view",), "give either a run folder or --connect"),
+        (("view", "nowhere"), "no run found"),
         (("view", "--connect", "tcp/127.0.0.1:1"), "no coordinator at"),
         (("view", "nowhere", "--serve", "9876"), "must be HOST:PORT"),
         (("view", "nowhere", "--follow", "7"), "must be ISLAND:BIRTH"),
-        (("view", "nowhere", "--save", "no/such/a.rrd"), "there is no folder no/such"),
+        (("view", "nowhere", "--save", "no/such/a.rrd"), "no such folder: no/such"),
         (("view", "nowhere", "--save", "a.txt"), "must end in .rrd"),
-        (("view", "nowhere", "--ancestry"), "of whom?"),
-        (("view", "--connect", "tcp/127.0.0.1:1", "--robot", "best"), "folder only"),
+        (("view", "nowhere", "--ancestry"), "needs --robot best"),
+        (
+            ("view", "--connect", "tcp/127.0.0.1:1", "--robot", "best"),
+            "a run folder only",
+        ),
     ],
 )
 def test_bad_words_are_told_in_one_line(

@@ -132,7 +132,7 @@ def robot_file(tmp_path: Path) -> Path:
 @pytest.mark.usefixtures("renderer")  # where nothing can draw, that is told
 def test_a_strip_longer_than_there_are_ticks_is_refused(robot_file: Path) -> None:
     words = ["robot render", str(robot_file), str(robot_file.with_suffix(".png"))]
-    said = r"--gait 49: must be <= 48, the ticks of the second half of its life"
+    said = r"--gait 49: must be <= 48, the number of ticks in the second half"
     with pytest.raises(NoPictures, match=said):
         main([*words, "--gait", "49"], simulate)
     # One less is what there is, and goes on to the simulation.
@@ -147,9 +147,9 @@ def test_a_log_is_told_at_the_beginning_what_is_drawn(
     out = robot_file.with_suffix(".gif")
     with pytest.raises(AssertionError, match="words come first"):
         main(["robot render", str(robot_file), str(out)], simulate)
-    assert capsys.readouterr().err == f"simulating and drawing: {out}\n"
+    assert capsys.readouterr().err == f"simulating and rendering {out}\n"
 
 
 def test_a_film_is_no_strip() -> None:
-    with pytest.raises(NoPictures, match=r"--gait is for a \.png"):
+    with pytest.raises(NoPictures, match=r"--gait needs a \.png"):
         main(["robot render", "a.yaml", "a.gif", "--gait", "5"], simulate)

@@ -13,10 +13,9 @@ import pytest
 
 from analysis.viewer.blueprint import layout
 from analysis.viewer.entities import PoseBatch, TimePoint
-from analysis.viewer.gallery import Gallery, spot_place
+from analysis.viewer.gallery import BoxModels, Gallery, spot_place
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.live import Sequel
-from analysis.viewer.looks import BoxModels
 from analysis.viewer.output import Output, Window, keep_serving
 from analysis.viewer.recording import ViewerError
 from analysis.viewer.scene import scene_of
@@ -155,7 +154,7 @@ def test_islands_of_a_mixed_archipelago_are_called_what_they_are() -> None:
     scene = scene_of(read_experiment("archipelago-mixed"))
     assert scene.islands == (0, 1, 2, 3, 4, 5)
     assert scene.arenas == {4, 5}
-    blueprint: Any = layout(scene.islands, extent_m=2.0, arenas=scene.arenas)
+    blueprint: Any = layout(scene)
     scenes, _ = blueprint.root_container.contents
     names = [view.name for view in scenes.contents]
     assert names == [*(f"Population of island {n}" for n in range(4)),
@@ -172,7 +171,7 @@ def test_an_output_is_a_window_unless_told_otherwise(tmp_path: Path) -> None:
 def test_a_file_that_no_viewer_would_open_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ViewerError, match=r"must end in \.rrd"):
         Output.of(tmp_path / "a.txt", None)
-    with pytest.raises(ViewerError, match="there is no folder"):
+    with pytest.raises(ViewerError, match="no such folder"):
         Output.of(tmp_path / "no" / "a.rrd", None)
 
 

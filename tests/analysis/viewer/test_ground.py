@@ -110,7 +110,7 @@ def test_a_recording_has_the_ground_and_its_arena_shows_it(tmp_path: Path) -> No
     # Island 0 is off-line: its robots hang side by side, with no ground below them.
     islands = (Islands(), Islands(arena=Arena()))
     scene = scene_of(Experiment(name="a", environment=environment, islands=islands))
-    plan = layout(scene.islands, extent_m=scene.extent_m, arenas=scene.arenas)
+    plan = layout(scene)
     with Recording("a", plan, file=tmp_path / "a.rrd") as recording:
         recording.add_scene(scene)
     found = {

@@ -6,7 +6,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.viewer.motion import best_evaluated, chosen
+from analysis.viewer.motion import best_evaluated, selected_robots
 from analysis.viewer.recording import ViewerError
 from schema.robot.ids import BirthId
 from schema.tables.files import parquet_path
@@ -33,7 +33,7 @@ def test_the_best_is_the_first_of_the_fittest_ever_judged(tmp_path: Path) -> Non
 
 def test_where_nobody_was_judged_there_is_no_best(tmp_path: Path) -> None:
     write(tmp_path)
-    with pytest.raises(ViewerError, match="nobody has been judged yet"):
+    with pytest.raises(ViewerError, match="no robot has been evaluated yet"):
         best_evaluated(tmp_path)
 
 
@@ -43,7 +43,7 @@ def test_ancestry_goes_back_by_first_parents_each_once(tmp_path: Path) -> None:
     a, b, c, d = ((0, number) for number in range(4))
     pq.write_table(births((a, []), (b, []), (c, [b, a]), (d, [c, a])), path)
     names = [BirthId(*each) for each in (d, c, a)]
-    found = chosen(tmp_path, names, has_ancestry=True)
+    found = selected_robots(tmp_path, names, has_ancestry=True)
     assert found == [BirthId(*each) for each in (d, c, b, a)]
-    with pytest.raises(ViewerError, match="0:9: nobody of that name"):
-        chosen(tmp_path, [BirthId(0, 9)], has_ancestry=False)
+    with pytest.raises(ViewerError, match="0:9: no robot of that name"):
+        selected_robots(tmp_path, [BirthId(0, 9)], has_ancestry=False)

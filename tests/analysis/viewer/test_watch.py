@@ -59,9 +59,9 @@ def test_how_far_it_is_and_where_the_recording_is_are_told(
     file = tmp_path / "my run.rrd"
     seen(file, WHOLE, news(2, (0, 2)), *end)
     told = capsys.readouterr()
-    saved = f"saved {file}; to look: rerun '{file}'"
+    saved = f"saved {file}; to view: rerun '{file}'"
     assert told.err.splitlines() == [
-        "watching e-run: 2 births so far",
+        "recording e-run: 2 births",
         *(["the run has ended"] if end else []),
         saved,
     ]
@@ -74,7 +74,7 @@ def test_that_nothing_was_saved_is_told(
 ) -> None:
     file = tmp_path / "a.rrd"
     seen(file)
-    why = f"stopped before a run was told of: no {file} is written\n"
+    why = f"stopped before a run was received; {file} not written\n"
     assert capsys.readouterr().err == why
     assert not file.exists()
 
@@ -87,9 +87,9 @@ def test_who_waits_for_a_run_is_told_so_once(
     times = iter([0.0, 0.0, 1.0, 2.5, 3.0, 16.0])
     clock = SimpleNamespace(monotonic=lambda: next(times))
     monkeypatch.setattr("analysis.viewer.watch.time", clock)
-    with pytest.raises(NetworkError, match="does not tell of a run"):
+    with pytest.raises(NetworkError, match="does not send a run"):
         seen(tmp_path / "a.rrd", *[news(number) for number in range(5)])
-    assert capsys.readouterr().err == "waiting to be told of a run\n"
+    assert capsys.readouterr().err == "waiting for the coordinator to send a run\n"
 
 
 def test_births_count_once_on_every_island() -> None:
