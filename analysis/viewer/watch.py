@@ -76,10 +76,10 @@ def _first(source: LiveSource, stop: threading.Event) -> tuple[News | None, list
     has_reported = False
     while not stop.is_set():
         now_s = time.monotonic()
-        told = source.receive(_POLL_S, now_s)
-        for index, each in enumerate(told):
+        messages = source.receive(_POLL_S, now_s)
+        for index, each in enumerate(messages):
             if isinstance(each, News) and each.is_whole:
-                return each, told[index + 1 :]
+                return each, messages[index + 1 :]
         if now_s > since_s + _PATIENCE_S:
             raise NetworkError("the coordinator does not send a run")
         if now_s > since_s + _SILENT_S and not has_reported:
@@ -107,9 +107,9 @@ class LiveView:
         """Number of births on all islands so far."""
         return sum(self._births.values())
 
-    def tell(self, told: list[Told]) -> None:
+    def tell(self, messages: list[Told]) -> None:
         """Record messages: births before poses of their robots."""
-        news = [each for each in told if isinstance(each, News)]
+        news = [each for each in messages if isinstance(each, News)]
         for one in news:
             # A birth carries the number of births on its island, so that duplicates
             # count once.
@@ -119,7 +119,7 @@ class LiveView:
             waiting, self._unknown = self._unknown, deque(maxlen=_MOST_UNKNOWN)
             for arena, poses in waiting:
                 self._move(arena, poses, has_all=False)
-        for each in told:
+        for each in messages:
             if isinstance(each, Live) and each.run == self._run:
                 try:
                     poses = read_columns("poses", each.advance.poses)

@@ -1,4 +1,4 @@
-"""The rows of docs/data: what the script keeps of a campaign, and what is there."""
+"""Tests of the rows of docs/data and the script that collects and checks them."""
 
 import re
 import shutil
@@ -154,7 +154,7 @@ def test_the_last_population_is_kept_with_its_genomes(data: Path) -> None:
         assert pc.mean(mine["fitness"]).as_py() == pytest.approx(mean)
 
 
-def test_collecting_resumes_where_it_was_left(
+def test_collecting_twice_writes_only_missing_rows(
     place: Path, parts: Parts, data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     complete = _files(data)
@@ -186,7 +186,7 @@ def test_only_finished_runs_of_the_campaign_are_collected(
     assert "scenario2-01: table evaluations: missing" in capsys.readouterr().out
 
 
-def test_a_lost_run_is_made_again(
+def test_a_lost_run_is_repeated(
     place: Path, parts: Parts, data: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "copy"
@@ -250,17 +250,17 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
 def test_damage_is_found(
     name: str, parts: Parts, data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    damage, said = DAMAGES[name]
+    damage, message = DAMAGES[name]
     damage(data)
     capsys.readouterr()
     assert check(data, parts) == 1
     lines = capsys.readouterr().out.splitlines()
     damaged = [line for line in lines if line.startswith("damaged: ")]
     assert len(damaged) == 1
-    assert said in damaged[0]
+    assert message in damaged[0]
 
 
-def test_repeats_that_are_not_there_yet_are_no_damage(
+def test_missing_repeats_are_no_damage(
     parts: Parts, data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for path in data.glob("*/scenario1-01.parquet"):
@@ -270,7 +270,7 @@ def test_repeats_that_are_not_there_yet_are_no_damage(
     assert "scenario1: 1 of 2 repeats, missing: 1\n" in capsys.readouterr().out
 
 
-def test_experiments_are_compared_by_what_is_kept(
+def test_kept_outcomes_give_the_same_comparison(
     place: Path, parts: Parts, data: Path
 ) -> None:
     runs, _ = read_runs([place / "runs" / part.folder for part in parts])
@@ -294,7 +294,9 @@ def test_experiments_are_compared_by_what_is_kept(
         assert early.values(one, "parts_change", MARK).tolist() == found
 
 
-def test_courses_are_those_of_the_runs(place: Path, parts: Parts, data: Path) -> None:
+def test_progression_of_kept_rows_equals_that_of_the_runs(
+    place: Path, parts: Parts, data: Path
+) -> None:
     runs, _ = read_runs([place / "runs" / part.folder for part in parts])
     complete = progression(concatenated(measure_runs(runs))["populations"])
     ours = progression(kept(data, "populations"))
@@ -303,11 +305,11 @@ def test_courses_are_those_of_the_runs(place: Path, parts: Parts, data: Path) ->
     assert complete.num_rows > ours.num_rows > 40
 
 
-def test_committed_rows_are_whole() -> None:
+def test_committed_rows_pass_the_check() -> None:
     assert check(DATA) == 0
 
 
-def test_code_of_the_page_runs() -> None:
+def test_code_of_the_readme_runs() -> None:
     page = (DATA / "README.md").read_text("utf-8")
     blocks = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     assert len(blocks) == 2

@@ -1,4 +1,4 @@
-"""Families of robots, and the figures that show them."""
+"""Tests of families of robots and the figures that show them."""
 
 from pathlib import Path
 
