@@ -264,7 +264,7 @@ def test_a_wrong_record_is_reported(stage: Stage, undisturbed: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("view",), "give either a run folder or --connect"),
         (("view", "nowhere"), "no run found"),

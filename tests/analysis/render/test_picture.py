@@ -109,7 +109,7 @@ def simulate(*_: object, **__: object) -> NoReturn:
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("--gait", "0"), "--gait: must be a whole number >= 1, got '0'"),
         (("--width", "-5"), "--width: must be a whole number >= 16, got '-5'"),
