@@ -1,4 +1,4 @@
-"""Tables into measures, figures and pictures to look at.
+"""Tables to measures, figures and pictures, and the viewer.
 
-Reads what a run left behind; never talks to one that decides.
+Reads run folders and messages of live runs; never influences a run.
 """

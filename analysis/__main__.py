@@ -10,22 +10,22 @@ from schema.errors import RevolveError
 from schema.flags import Flags, whole_number
 
 
-class MissingExtra(RevolveError):  # noqa: N818 - reads as what it says
+class MissingExtra(RevolveError):  # noqa: N818 - names what is missing
     """A library that only analysis needs is not installed."""
 
 
 def main(arguments: list[str]) -> int:
-    """Measure and draw what the tables of some runs allow.
+    """Run ``revolve analyze``, ``robot render`` or ``view``.
 
     Args:
         arguments: the command's name first.
 
     Returns:
-        0 if done, whatever was left out.
+        Exit code.
 
     Raises:
-        RunFolderError: no run.
-        MissingExtra: a library for measures or figures is not there.
+        RunFolderError: no run is found.
+        MissingExtra: a library is not installed.
     """
     if arguments[0] == "robot render":
         return _render(arguments)
@@ -46,32 +46,37 @@ def _flags() -> Flags:
         prog="revolve analyze",
         description="Measure runs, compare experiments, draw the thesis's figures, and "
         "write a report.",
-        epilog="for example: revolve analyze runs --out report; a benchmark's file "
-        "(revolve bench arena --out FILE) may be among the runs",
+        epilog="for example: revolve analyze runs --out report; files of benchmarks "
+        "(revolve bench arena --out FILE) may be given with the runs",
     )
-    flags.add_argument("runs", nargs="+", type=Path, help="folders of runs, or above")
     flags.add_argument(
-        "--out", type=Path, default=Path("report"), help="folder (default: report)"
+        "runs", nargs="+", type=Path, help="run folders, or folders that contain them"
+    )
+    flags.add_argument(
+        "--out",
+        type=Path,
+        default=Path("report"),
+        help="folder to write to (default: report)",
     )
     flags.add_argument(
         "--slots",
         choices=("parent", "own"),
         default="parent",
-        help="whose slot counts in the distance of bodies: its parent's as in the "
-        "thesis, or its own as in the published code",
+        help="slot that labels a part in the distance of bodies: its parent's, as in "
+        "the thesis (default), or its own, as in the published code",
     )
     flags.add_argument(
         "--processes",
         type=whole_number(),
         default=os.cpu_count() or 1,
         metavar="N",
-        help="runs measured at a time (default: the cores)",
+        help="number of runs measured in parallel (default: number of cores)",
     )
     return flags
 
 
 def _render(arguments: list[str]) -> int:
-    """Draw a robot, by the worker's simulation if it is to move."""
+    """Render a robot, with the worker's simulation."""
     simulate = _simulation()
     from analysis.render.command import main as render
 
@@ -79,16 +84,16 @@ def _render(arguments: list[str]) -> int:
 
 
 def _simulation() -> Callable[..., Any]:
-    """Return the worker's simulation, once what draws is settled.
+    """Return the worker's simulation, after choosing the renderer's backend.
 
     Raises:
-        MissingExtra: a library for pictures is not there.
-        NoPictures: nothing here can draw.
+        MissingExtra: a library for rendering is not installed.
+        NoPictures: this machine cannot render.
     """
     try:
         from analysis.render.picture import choose_engine
 
-        # Before anything loads the engine.
+        # Before MuJoCo is imported.
         choose_engine()
         from worker.robot.evaluation import simulate
     except ImportError as error:
@@ -99,7 +104,7 @@ def _simulation() -> Callable[..., Any]:
 
 
 def _view(arguments: list[str]) -> int:
-    """Show a run, by the worker's and the coordinator's word if robots are to move."""
+    """Show a run, with the simulations of the worker and the coordinator's journal."""
     try:
         from analysis.viewer.command import main as view
     except ImportError as error:

@@ -1,9 +1,8 @@
-"""How far a long command is, on standard error: bars, or lines in a log."""
+"""Progress of long commands on standard error: bars on a terminal, lines in a log."""
 
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import TracebackType
 from typing import Self
 
 from rich.console import Console
@@ -16,16 +15,16 @@ SPAN_S = 10.0
 
 
 @contextmanager
-def bars(what: str, *columns: str | ProgressColumn) -> Iterator[Progress]:
-    """Show bars while something is done; in a log say once what.
+def bars(title: str, *columns: str | ProgressColumn) -> Iterator[Progress]:
+    """Show progress bars on a terminal; print a title once in a log.
 
     Args:
-        what: is done.
-        columns: of the bars; rich's own if none are given.
+        title: text printed in a log.
+        columns: columns of the bars; rich's default if none are given.
     """
     console = Console(stderr=True)
     if not console.is_terminal:
-        _print(console, what)
+        print_line(console, title)
     with Progress(
         *columns, console=console, transient=True, disable=not console.is_terminal
     ) as progress:
@@ -33,48 +32,40 @@ def bars(what: str, *columns: str | ProgressColumn) -> Iterator[Progress]:
 
 
 class ProgressLine:
-    """What goes on until it ends by itself; use it in a ``with``.
+    """Progress of a task of unknown length; a context manager.
 
-    On a terminal a line that changes, in a log one every ``SPAN_S``.
+    A line that is updated on a terminal, a line every ``SPAN_S`` in a log.
+
+    Args:
+        console: console to print on; standard error by default.
     """
 
     def __init__(self, console: Console | None = None) -> None:
-        """Show nothing yet.
-
-        Args:
-            console: to show it on; standard error if not given.
-        """
         self._console = console or Console(stderr=True)
         self._line = Status("", console=self._console)
         self._next_s = -math.inf
 
     def __enter__(self) -> Self:
-        """Return itself; nothing is drawn before there is something to tell."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Take the line away."""
+    def __exit__(self, *_: object) -> None:
         self._line.stop()
 
-    def tell(self, how: str, now_s: float) -> None:
-        """Show how it goes.
+    def update(self, text: str, now_s: float) -> None:
+        """Show the progress.
 
         Args:
-            how: in words.
-            now_s: the time, of any clock that only goes forward [s].
+            text: the progress in words.
+            now_s: time of a monotonic clock [s].
         """
         if self._console.is_terminal:
             self._line.start()
-            self._line.update(Text(how))
+            self._line.update(Text(text))
         elif now_s >= self._next_s:
             self._next_s = now_s + SPAN_S
-            _print(self._console, how)
+            print_line(self._console, text)
 
 
-def _print(console: Console, line: str) -> None:
+def print_line(console: Console, line: str) -> None:
+    """Print a line without markup; a terminal wraps it, a file does not."""
     console.print(line, soft_wrap=True, markup=False, highlight=False)

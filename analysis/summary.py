@@ -1,4 +1,4 @@
-"""What ``revolve analyze`` says when it is done: populations, findings, left out."""
+"""Summary that ``revolve analyze`` prints: populations, findings, what was left out."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,39 +10,36 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from analysis.progress import print_line
+
 _FITNESS = ("fitness", "fitness_best")
 _BORDERS, _BORDER = 3, 1
-"""Characters that a column takes beside its cells, and the table beside those."""
+"""Characters of a column besides its cells, and of a table besides its columns."""
 _FOLDED = 12
-"""Characters that a column of words is not folded below."""
+"""Least width of a folded column of words."""
 
 
 def show(tables: dict[str, pa.Table], console: Console) -> None:
     """Print each run's last populations, the findings, and what was left out.
 
     Args:
-        tables: as ``analysis.measures.outputs`` names them.
-        console: to print on; however narrow, nothing is cut.
+        tables: by the names of ``analysis.measures.outputs``.
+        console: console to print on; nothing is cut off, however narrow it is.
     """
     populations = _last_populations(tables["populations"])
     if populations:
         heads = ("experiment", "run", "births", "size", "mean fitness", "best")
         _print_table(console, heads, populations, words={0, 1})
     else:
-        _print_line(console, "no population could be measured")
+        print_line(console, "no population could be measured")
     if findings := _findings(tables["findings"]):
         heads = ("figure", "finding of the thesis", "a", "b", "q", "verdict")
         _print_table(console, heads, findings, words={1, 5})
     for name, differs in _renamed(tables["runs"]).items():
-        _print_line(console, f"{name}: {differs}")
+        print_line(console, f"{name}: {differs}")
     for row in tables["left_out"].to_pylist():
-        whose = f"{row['folder']}: " if row["folder"] else ""
-        _print_line(console, f"left out: {whose}{row['what']}: {row['why']}")
-
-
-def _print_line(console: Console, line: str) -> None:
-    """Print a line as it is; a terminal wraps it, a file does not."""
-    console.print(line, soft_wrap=True, markup=False, highlight=False)
+        folder = f"{row['folder']}: " if row["folder"] else ""
+        print_line(console, f"left out: {folder}{row['what']}: {row['why']}")
 
 
 def _print_table(
@@ -51,12 +48,12 @@ def _print_table(
     rows: Sequence[Sequence[str]],
     words: set[int],
 ) -> None:
-    """Print rows as a table, or where it is too narrow for one each as a line.
+    """Print rows as a table, or as one line each if the console is too narrow.
 
     Args:
-        console: to print on.
-        heads: of the columns.
-        rows: cells.
+        console: console to print on.
+        heads: heads of the columns.
+        rows: cells of the rows.
         words: columns that may be folded; the others are numbers.
     """
     table = Table()
@@ -71,8 +68,8 @@ def _print_table(
         needed += longest + _BORDERS
     if needed > console.width:
         for row in rows:
-            told = (f"{head} {cell}" for head, cell in zip(heads, row, strict=True))
-            _print_line(console, ", ".join(told))
+            cells = (f"{head} {cell}" for head, cell in zip(heads, row, strict=True))
+            print_line(console, ", ".join(cells))
         return
     for row in rows:
         table.add_row(*map(Text, row))
@@ -98,7 +95,7 @@ def _last_populations(populations: pa.Table) -> list[tuple[str, ...]]:
 
 
 def _findings(findings: pa.Table) -> list[tuple[str, ...]]:
-    """Return figure, claim, means of a and b, q and verdict of what was compared."""
+    """Return figure, claim, means of a and b, q and verdict of tested findings."""
     compared = findings.filter(pc.field("runs_a").is_valid())
     return [
         (
@@ -112,6 +109,6 @@ def _findings(findings: pa.Table) -> list[tuple[str, ...]]:
 
 
 def _renamed(runs: pa.Table) -> dict[str, str]:
-    """Return experiments that another one shares a name with, and how they differ."""
+    """Return renamed experiments and their differing settings."""
     rows = runs.filter(pc.not_equal(runs["differs"], "")).to_pylist()
     return {row["experiment"]: row["differs"] for row in rows}

@@ -1,4 +1,4 @@
-"""Runs the campaign of docs/results.md, keeps its rows in docs/data, checks them.
+"""Runs the campaign of docs/results.md; collects its rows in docs/data; checks them.
 
     python docs/campaign.py run runs/results
     python docs/campaign.py collect runs/results
@@ -31,21 +31,21 @@ from docs.campaign_data import (
     check,
     parquet,
     path_of,
+    problems_of,
     replace,
     stem,
-    troubles_of,
 )
 from schema.errors import RevolveError, RunFolderError
 from schema.tables.files import read_table
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMIT = "commit"
-"""File of a campaign's folder: the commit of the code that began it."""
+"""File in a campaign's folder with the commit of the code that started it."""
 
 MARKS = (600,)
-"""Births at which outcomes are kept besides the last."""
+"""Births at which outcomes are kept, besides the last."""
 SPACING = 15
-"""Births between the populations that are kept: the brood of the thesis."""
+"""Births between the populations that are kept: the brood size of the thesis."""
 
 _PLATFORMS = (
     ("runs", "platform"),
@@ -53,15 +53,15 @@ _PLATFORMS = (
     ("drifts", "before"),
     ("drifts", "after"),
 )
-"""Where the tables of a run say which platform computed."""
+"""Columns that name the platforms of a run."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one of the three commands.
 
     Returns:
-        0 if done; 1 if something could not be collected or is damaged; else what
-        ``revolve`` returned.
+        0; 1 if a repeat could not be collected or a file is damaged; or the exit code
+        of ``revolve``.
     """
     options = _parser().parse_args(arguments)
     if options.command == "run":
@@ -75,35 +75,36 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(dest="command", required=True)
-    running = commands.add_parser("run", help="make or resume the campaign")
-    collecting = commands.add_parser("collect", help="keep rows of finished repeats")
-    checking = commands.add_parser(
-        "check", help="show what is kept and what is damaged"
-    )
+    running = commands.add_parser("run", help="start or resume the campaign")
+    collecting = commands.add_parser("collect", help="write rows of finished repeats")
+    checking = commands.add_parser("check", help="list kept, missing and damaged files")
     for command in (running, collecting):
-        command.add_argument("folder", type=Path, help="of the campaign")
+        command.add_argument("folder", type=Path, help="folder of the campaign")
     for command in (collecting, checking):
         command.add_argument(
-            "--data", type=Path, default=DATA, help="default: docs/data"
+            "--data",
+            type=Path,
+            default=DATA,
+            help="rows (default: docs/data)",
         )
     running.add_argument("--only", choices=[part.option for part in PARTS])
-    running.add_argument("--workers", type=int, help="default: one per core")
+    running.add_argument("--workers", type=int, help="processes (default: cores)")
     collecting.add_argument(
-        "--commit", help="of the code that made the runs, if FOLDER does not say"
+        "--commit", help="commit of the runs, if the folder does not name it"
     )
     return parser
 
 
 def run(folder: Path, parts: Sequence[Part], workers: int | None) -> int:
-    """Make or resume parts of the campaign with ``revolve run`` and ``revolve resume``.
+    """Start or resume parts of the campaign with ``revolve run`` or ``resume``.
 
     Args:
-        folder: of the campaign.
-        parts: one after the other.
-        workers: processes; None is one per core.
+        folder: folder of the campaign.
+        parts: parts of the campaign, run one after the other.
+        workers: number of processes; None is one per core.
 
     Returns:
-        0 if all runs are finished, else the code of the first command that failed.
+        0 if all runs are finished, else the exit code of the command that failed.
     """
     _note_commit(folder)
     for part in parts:
@@ -123,21 +124,21 @@ def run(folder: Path, parts: Sequence[Part], workers: int | None) -> int:
 
 
 def _revolve(words: Sequence[str]) -> int:
-    """Run the command of this clone to its end, and return its exit code."""
+    """Run the command of this clone, and return its exit code."""
     process = subprocess.Popen([sys.executable, "-m", "revolve", *words], cwd=ROOT)
     before = signal.signal(signal.SIGTERM, lambda *_: process.terminate())
     try:
         while True:
             try:
                 return process.wait()
-            except KeyboardInterrupt:  # the command was told, too, and ends by itself
+            except KeyboardInterrupt:  # the command received it, too, and ends
                 continue
     finally:
         signal.signal(signal.SIGTERM, before)
 
 
 def _note_commit(folder: Path) -> None:
-    """Write which commit begins a campaign; warn if another one resumes it."""
+    """Write the commit that starts a campaign; warn if another one resumes it."""
     git = shutil.which("git")
     if git is None or not (ROOT / ".git").exists():
         return
@@ -150,11 +151,11 @@ def _note_commit(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         replace(folder / COMMIT, f"{ours}\n".encode())
     elif ours and known not in {None, ours}:
-        print(f"{folder}: was begun at commit {known} and is resumed at {ours}")
+        print(f"{folder}: started at commit {known}, resumed at {ours}")
 
 
 def _commit_of(folder: Path) -> str | None:
-    """Return the commit that a campaign was begun at, None if it is unknown."""
+    """Return the commit that started a campaign; None if it is unknown."""
     try:
         return (folder / COMMIT).read_text(encoding="utf-8").strip() or None
     except FileNotFoundError:
@@ -170,10 +171,10 @@ def collect(
     """Write the rows of all finished repeats that are not kept yet.
 
     Args:
-        folder: of the campaign; nothing in it is written.
-        data: where rows are kept.
-        commit: of the code that made the runs; None takes what the folder says.
-        parts: of the campaign.
+        folder: folder of the campaign, which is only read.
+        data: folder of the rows.
+        commit: commit of the runs; None reads it from the folder.
+        parts: parts of the campaign.
 
     Returns:
         0, or 1 if a finished repeat could not be measured in full.
@@ -183,7 +184,7 @@ def collect(
     for part in parts:
         for one in _finished(folder / "runs" / part.folder, part):
             name = stem(one.experiment, one.number)
-            if not list(troubles_of(data, part, name)):
+            if not list(problems_of(data, part, name)):
                 continue
             begin = time.monotonic()
             try:
@@ -198,13 +199,13 @@ def collect(
             took_s = time.monotonic() - begin
             print(f"{name}: {size / 1000:.0f} kB, {took_s:.1f} s", flush=True)
             new += 1
-    said = "" if commit else "; commit unknown: name it with --commit"
-    print(f"{new} repeats collected, {failed} failed{said if new else ''}")
+    hint = "; commit unknown, set it with --commit" if new and not commit else ""
+    print(f"{new} repeats collected, {failed} failed{hint}")
     return 1 if failed else 0
 
 
 def _finished(root: Path, part: Part) -> list[Run]:
-    """Return the finished runs of a part of the campaign; name those of no part."""
+    """Return the finished runs of a part of the campaign; print unexpected runs."""
     try:
         runs, left_out = read_runs([root])
     except RevolveError as error:
@@ -217,7 +218,7 @@ def _finished(root: Path, part: Part) -> list[Run]:
         births = [island.births for island in one.islands]
         is_ours = one.experiment in part.names and one.number < part.repeats
         if not is_ours or one.seed != part.seed or births != [part.births]:
-            print(f"{one.folder}: is no run of the campaign")
+            print(f"{one.folder}: not a run of the campaign")
         elif one.is_finished:
             found.append(one)
     return found
@@ -249,7 +250,7 @@ def measured_rows(one: Run, commit: str | None) -> dict[str, pa.Table]:
 
 
 def _thinned(populations: pa.Table) -> pa.Table:
-    """Return every population after a multiple of ``SPACING`` births, and the last."""
+    """Return the populations at multiples of ``SPACING`` births, and the last one."""
     births = np.asarray(populations["births"], np.int64)
     return populations.filter(
         pa.array((births % SPACING == 0) | (births == births[-1]))
@@ -257,7 +258,7 @@ def _thinned(populations: pa.Table) -> pa.Table:
 
 
 def _final(robots: pa.Table, births: pa.Table) -> pa.Table:
-    """Return the last population: its robots with parents and genomes."""
+    """Return the robots of the last population with parents and genomes."""
     rows = robots.filter(robots["is_last"])
     born = births.take(pc.index_in(rows["birth"], births["birth"].combine_chunks()))
     parents = [
@@ -268,7 +269,7 @@ def _final(robots: pa.Table, births: pa.Table) -> pa.Table:
 
 
 def _details(one: Run, commit: str | None, births: int) -> pa.Table:
-    """Return what was run, on which platform, by which code."""
+    """Return the description of a run with its platforms and commit."""
     platforms: set[str] = set()
     for table, column in _PLATFORMS:
         platforms.update(read_table(one.folder, table)[column].to_pylist())
@@ -288,7 +289,7 @@ def _details(one: Run, commit: str | None, births: int) -> pa.Table:
 
 
 def _kept(table: pa.Table, name: str, one: Run) -> pa.Table:
-    """Return a table with the columns that are kept, NaN as null."""
+    """Return a table with the columns that are kept; NaN becomes null."""
     columns = {"experiment": one.experiment, "run": one.number}
     arrays = []
     for field in TABLES[name]:

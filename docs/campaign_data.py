@@ -1,6 +1,6 @@
-"""What is kept of the campaign in docs/data: tables, their files, how they are read.
+"""Tables of the campaign in docs/data: columns, files, reading and checks.
 
-A table is a folder, a repeat a file in it. Rows of a finished repeat never change.
+A table is a folder with one file per repeat. Rows of a finished repeat never change.
 """
 
 import os
@@ -18,20 +18,20 @@ from analysis.measures.population_table import Numbers
 
 DATA = Path(__file__).resolve().parent / "data"
 LEVEL = 19
-"""Of zstd: files are written once and stay in the history for good."""
+"""Compression level of zstd: files are written once and stay in the Git history."""
 
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """Part of the campaign: what one ``revolve run`` makes.
+    """Part of the campaign, made by one ``revolve run``.
 
     Attributes:
-        option: its name for ``--only``.
-        folder: its name below ``runs``.
+        option: value of ``--only``.
+        folder: folder below ``runs``.
         experiments: names of shipped experiments, or paths.
-        repeats: of each.
-        births: of each run.
-        seed: of all runs.
+        repeats: repeats of each experiment.
+        births: births of each run.
+        seed: seed of all runs.
     """
 
     option: str
@@ -57,14 +57,14 @@ PARTS = (
     Part("arena", "thesis-arena", ("scenario3",), repeats=10),
 )
 
-_WHOSE = [("experiment", pa.string()), ("run", pa.int32())]
+_NAMES = [("experiment", pa.string()), ("run", pa.int32())]
 
 
 def _of_analysis(table: str) -> pa.Schema:
-    """Return the columns of ``revolve analyze``, with the repeat for the folder."""
+    """Return the columns of ``revolve analyze``, but the repeat for the folder."""
     names = {"experiment", "folder"}
     fields = [(one.name, one.type) for one in schema(table) if one.name not in names]
-    return pa.schema([*_WHOSE, *fields])
+    return pa.schema([*_NAMES, *fields])
 
 
 _RUNS = {
@@ -86,12 +86,12 @@ _FINAL = {
 _MEASURES = ("outcomes", "populations", "extremities", "variability")
 TABLES = {
     **{name: _of_analysis(name) for name in _MEASURES},
-    "final": pa.schema([*_WHOSE, *_FINAL.items()]),
-    "runs": pa.schema([*_WHOSE, *_RUNS.items()]),
+    "final": pa.schema([*_NAMES, *_FINAL.items()]),
+    "runs": pa.schema([*_NAMES, *_RUNS.items()]),
 }
-"""Columns of the tables; each is a folder of ``docs/data``, a file per repeat.
+"""Columns of the tables, by the name of the folder in ``docs/data``.
 
-``runs`` is written last: where it is, the others are.
+``runs`` is written last: if it exists, the others exist.
 """
 
 _ONLY_OF_ARENAS = {"variability"}
@@ -99,7 +99,7 @@ _TO_THE_END = {"outcomes", "populations", "runs"}
 
 
 def parquet(table: pa.Table) -> bytes:
-    """Return a table as Parquet, small and with the same bytes every time."""
+    """Return a table as compressed Parquet; equal tables give equal bytes."""
     counts = {"birth", "births", "rank", "ancestors"}
     splits = {"fitness", "fitness_range", "population_range"}
     texts = [field.name for field in table.schema if pa.types.is_string(field.type)]
@@ -126,7 +126,7 @@ def parquet(table: pa.Table) -> bytes:
 
 
 def replace(path: Path, content: bytes) -> None:
-    """Write a file whole, or not at all."""
+    """Write a file atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_name(f"{path.name}.new")
     with new.open("wb") as file:
@@ -137,12 +137,12 @@ def replace(path: Path, content: bytes) -> None:
 
 
 def stem(experiment: str, number: int) -> str:
-    """Return the name of a repeat's files, without their ending."""
+    """Return the name of a repeat's files without the ending."""
     return f"{experiment}-{number:02}"
 
 
 def path_of(data: Path, table: str, name: str) -> Path:
-    """Return where the rows of a repeat are, by what ``stem`` returns."""
+    """Return the path of the rows of a repeat, named by ``stem``."""
     return data / table / f"{name}.parquet"
 
 
@@ -152,48 +152,48 @@ def tables_of(part: Part) -> list[str]:
     return [name for name in TABLES if is_arena or name not in _ONLY_OF_ARENAS]
 
 
-def troubles_of(data: Path, part: Part, name: str) -> Iterator[str]:
-    """Yield what is wrong with the files of a repeat."""
+def problems_of(data: Path, part: Part, name: str) -> Iterator[str]:
+    """Yield the problems of a repeat's files."""
     for table in tables_of(part):
         path = path_of(data, table, name)
         place = f"{table}/{path.name}"
         try:
             rows = read_rows(data, table, name)
         except FileNotFoundError:
-            yield f"{place}: is missing"
+            yield f"{place}: missing"
         except (pa.ArrowException, OSError, ValueError, MemoryError) as error:
             yield f"{place}: cannot be read: {error}"
         else:
-            if why := _mistake(rows, table, part, name):
+            if why := _problem(rows, table, part, name):
                 yield f"{place}: {why}"
 
 
-def _mistake(rows: pa.Table, table: str, part: Part, name: str) -> str:
-    """Return what is wrong with rows that can be read, empty if nothing is."""
+def _problem(rows: pa.Table, table: str, part: Part, name: str) -> str:
+    """Return the problem of readable rows, "" if there is none."""
     if rows.schema != TABLES[table]:
         found = ", ".join(f"{field.name} {field.type}" for field in rows.schema)
-        return f"has other columns than expected: {found}"
-    whose = set(zip(*(rows[key].to_pylist() for key, _ in _WHOSE), strict=True))
-    if {stem(*each) for each in whose} != {name}:
-        return f"must have rows of {name} only, and has of {sorted(whose)}"
+        return f"unexpected columns: {found}"
+    names = set(zip(*(rows[key].to_pylist() for key, _ in _NAMES), strict=True))
+    if {stem(*each) for each in names} != {name}:
+        return f"must have rows of {name} only, got {sorted(names)}"
     if table in _TO_THE_END and pc.max(rows["births"]).as_py() != part.births:
         return f"does not reach {part.births} births"
     if table == "runs" and (
         rows.num_rows != 1 or rows["state"][0].as_py() != "finished"
     ):
-        return "must be one finished run"
+        return "must have one row, of a finished run"
     return ""
 
 
 def read_rows(data: Path, table: str, name: str) -> pa.Table:
-    """Return the rows of a repeat; damaged pages raise.
+    """Return the rows of a repeat; raises an error for damaged pages.
 
     Measures that were added after the rows were written are null.
 
     Args:
-        data: where rows are kept.
+        data: folder of the rows.
         table: a key of ``TABLES``.
-        name: of the repeat, as ``stem`` returns it.
+        name: name of the repeat, as ``stem`` returns it.
     """
     content = path_of(data, table, name).read_bytes()
     with pq.ParquetFile(
@@ -210,32 +210,32 @@ def read_rows(data: Path, table: str, name: str) -> pa.Table:
 
 
 def _kept_repeats(data: Path, part: Part, experiment: str) -> list[int]:
-    """Return the repeats that have any file."""
+    """Return the repeats that have at least one file."""
     there = {path.stem for path in data.glob("*/*.parquet")}
     return [each for each in range(part.repeats) if stem(experiment, each) in there]
 
 
 def check(data: Path, parts: Sequence[Part] = PARTS) -> int:
-    """Print what is kept, what is missing and what is damaged.
+    """Print kept, missing and damaged files.
 
     Args:
-        data: where rows are kept.
-        parts: of the campaign.
+        data: folder of the rows.
+        parts: parts of the campaign.
 
     Returns:
-        0, or 1 if a file is damaged, missing of a repeat, or not expected, or if the
-        runs differ in platform or, of one experiment, in settings. Repeats that are
-        not there yet are no damage.
+        0, or 1 if a file is damaged or unexpected, if a repeat is incomplete, or if the
+        runs differ in platform or, within one experiment, in settings. Repeats without
+        any file are no error.
     """
-    troubles = []
+    problems = []
     details: list[dict[str, str]] = []
     expected: set[Path] = set()
     for part in parts:
         for experiment in part.names:
             kept = _kept_repeats(data, part, experiment)
             for name in (stem(experiment, number) for number in kept):
-                found = list(troubles_of(data, part, name))
-                troubles += found
+                found = list(problems_of(data, part, name))
+                problems += found
                 expected |= {path_of(data, table, name) for table in tables_of(part)}
                 if not found:
                     details += read_rows(data, "runs", name).to_pylist()
@@ -244,31 +244,31 @@ def check(data: Path, parts: Sequence[Part] = PARTS) -> int:
             print(f"{experiment}: {len(kept)} of {part.repeats} repeats{lack}")
     there = {path for table in data.glob("*/") for path in table.iterdir()}
     strays = sorted(there - expected)
-    troubles += [f"{path.relative_to(data)}: is not expected" for path in strays]
+    problems += [f"{path.relative_to(data)}: unexpected file" for path in strays]
     size = sum(path.stat().st_size for path in there)
     print(f"{len(there)} files, {size / 1e6:.1f} MB")
     for column in ("platform", "versions", "commit"):
         for value in sorted({str(row[column]) for row in details}):
             print(f"{column}: {value}")
-    troubles += _differences(details)
-    for trouble in troubles:
-        print(f"damaged: {trouble}")
-    return 1 if troubles else 0
+    problems += _differences(details)
+    for problem in problems:
+        print(f"damaged: {problem}")
+    return 1 if problems else 0
 
 
 def _differences(details: Sequence[dict[str, str]]) -> Iterator[str]:
-    """Yield in what runs differ that must not."""
+    """Yield differences that runs must not have."""
     platforms = {tag for row in details for tag in row["platform"].split()}
     if len(platforms) > 1:
-        yield f"runs: of {len(platforms)} platforms, must be of one"
+        yield f"runs: must have one platform, got {len(platforms)}"
     for experiment in sorted({row["experiment"] for row in details}):
         mine = [row for row in details if row["experiment"] == experiment]
         if len({row["document"] for row in mine}) > 1:
-            yield f"runs: those of {experiment} differ in their settings"
+            yield f"runs: settings of {experiment} differ"
 
 
 def _ranges(numbers: Sequence[int]) -> str:
-    """Return ascending numbers in words, such as ``0-3, 7``."""
+    """Return ascending numbers as text, such as ``0-3, 7``."""
     found: list[list[int]] = []
     for number in numbers:
         if found and found[-1][-1] == number - 1:
@@ -282,11 +282,11 @@ def _ranges(numbers: Sequence[int]) -> str:
 def kept(data: Path, table: str) -> pa.Table:
     """Return the rows of a table of all repeats, with the column ``folder``.
 
-    ``analysis.progression`` and the figures take them for those of ``revolve
-    analyze``; the name of the repeat stands for the folder of its run.
+    They have the form of the tables of ``revolve analyze``, which ``progression`` and
+    the figures read; ``folder`` is the name of the repeat.
 
     Args:
-        data: where rows are kept; all of it passes ``check``.
+        data: folder of the rows; its files pass ``check``.
         table: a key of ``TABLES``.
     """
     pieces = []
@@ -297,27 +297,22 @@ def kept(data: Path, table: str) -> pa.Table:
 
 
 class KeptOutcomes:
-    """Outcomes of the kept runs, as ``analysis.comparison`` takes them.
+    """Outcomes of the kept runs, for ``analysis.comparison``.
+
+    Args:
+        rows: rows of the table ``outcomes``, as ``kept`` returns them.
+        most: most births at which experiments are compared; None is no limit.
 
     Attributes:
-        experiments: those that have rows, by name.
+        experiments: experiments with rows, by name.
     """
 
     def __init__(self, rows: pa.Table, most: int | None = None) -> None:
-        """Take rows of the table ``outcomes``.
-
-        Args:
-            rows: as ``kept`` returns them.
-            most: births at which experiments are compared at most; None is no limit.
-        """
         self._rows = rows if most is None else rows.filter(pc.field("births") <= most)
         self.experiments: list[str] = sorted(set(self._rows["experiment"].to_pylist()))
 
     def births(self, *experiments: str) -> int:
-        """Return the greatest births that all runs of some experiments have rows at.
-
-        0 if there is no such number.
-        """
+        """Return the most births at which all runs have rows; 0 if there are none."""
         reached: dict[str, set[int]] = {}
         columns = ("experiment", "folder", "births")
         for experiment, folder, births in zip(

@@ -1,7 +1,7 @@
-"""What the thesis found, as data: which measure, of whom, in which direction.
+"""Findings of the thesis as data: measure, experiments and direction.
 
-A finding in words is made countable here; where the thesis leaves open how, the
-choice is ours and the words say what is counted. Source: Hupkes 2016, chapter 6.
+Each finding is expressed by a measure; where the thesis does not define one, the choice
+is our own and the text names it. Source: Hupkes 2016, chapter 6.
 """
 
 from dataclasses import dataclass
@@ -12,16 +12,16 @@ Direction = Literal[">", "<", "="]
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """One finding.
+    """A finding of the thesis.
 
     Attributes:
-        figure: of the thesis.
-        text: what is said.
-        measure: a column of ``outputs.OUTCOME``.
+        figure: figure of the thesis.
+        text: the finding in words.
+        measure: column of ``outputs.OUTCOME``.
         a: an experiment.
-        expected: how its runs lie to those of ``b``, or to ``reference``; "=" means
-            no large difference.
-        b: an experiment; None holds ``a`` against ``reference``.
+        expected: relation of its runs to those of ``b``, or to ``reference``; "="
+            means no large difference.
+        b: another experiment; None compares ``a`` with ``reference``.
         reference: a number.
     """
 
@@ -45,7 +45,7 @@ Pair = tuple[str, str]
 def _of(
     figure: str, text: str, measure: str, expected: Direction, *pairs: Pair
 ) -> list[Claim]:
-    """Return one claim about each pair of experiments; ``text`` names both."""
+    """Return one claim per pair of experiments, with both names in the text."""
     return [
         Claim(figure, text.format(a=a, b=b), measure, a, expected, b) for a, b in pairs
     ]
@@ -54,7 +54,7 @@ def _of(
 def _all(
     figure: str, text: str, measure: str, expected: Direction, reference: float = 0.0
 ) -> list[Claim]:
-    """Return one claim about each scenario, against a number."""
+    """Return one claim per scenario that compares it with a number."""
     return [
         Claim(figure, f"{a}: {text}", measure, a, expected, reference=reference)
         for a in _EVOLVED
@@ -103,4 +103,4 @@ CLAIMS: tuple[Claim, ...] = (
     *_of("6.16", "as many hidden neurons in {a} as in {b}", "hidden", "=",
          (_ONE, _DRIFT)),
 )  # fmt: skip
-"""In the order of the thesis's figures."""
+"""Findings in the order of the thesis's figures."""

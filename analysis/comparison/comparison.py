@@ -1,7 +1,7 @@
-"""Experiments held against each other, and the thesis's findings against ours.
+"""Comparison of experiments with each other, and with the findings of the thesis.
 
-The unit is the run. Founders are alike in runs of one seed and number, whatever the
-experiment; taking such runs for independent, as is done here, errs on the safe side.
+The unit is the run. Runs of different experiments with the same seed and number share
+their founders; treating them as independent, as is done here, is conservative.
 """
 
 import math
@@ -28,17 +28,17 @@ from analysis.measures.study import MeasuredRun, reach
 
 SURE = 0.05
 NEGLIGIBLE, LARGE = 0.147, 0.474
-"""Of Cliff's delta. Source: Romano et al., 2006, after Cohen's d."""
+"""Bounds of Cliff's delta. Source: Romano et al., 2006, after Cohen's d."""
 
 Row = dict[str, object]
 
 
 class RunOutcomes(Protocol):
-    """What is compared: outcomes of runs, wherever they come from."""
+    """Outcomes of the finished runs of experiments."""
 
     @property
     def experiments(self) -> list[str]:
-        """Those that have finished runs, by name."""
+        """Experiments with finished runs, by name."""
 
     def births(self, *experiments: str) -> int:
         """Return the greatest births that all runs of some experiments reach."""
@@ -48,10 +48,9 @@ class RunOutcomes(Protocol):
 
 
 class Outcomes:
-    """One number of each finished run for every measure, at any number of births."""
+    """Outcomes of finished runs, at any number of births; other runs are ignored."""
 
     def __init__(self, measured: Sequence[MeasuredRun]) -> None:
-        """Take finished runs as they are measured; others are left out."""
         self._runs: dict[str, list[MeasuredRun]] = {}
         for one in measured:
             if one.run.is_finished and reach(one):
@@ -85,33 +84,26 @@ class Outcomes:
         return known
 
     def table(self) -> pa.Table:
-        """Return the outcomes of all finished runs at what their experiment reaches."""
+        """Return the outcomes of all finished runs, at births that all reach."""
         rows: list[Row] = []
         for name in self.experiments:
             births = self.births(name)
             for one, found in zip(self._runs[name], self.at(name, births), strict=True):
-                numbers = {key: _known(value) for key, value in found.items()}
-                folder = str(one.run.folder)
-                rows.append(
-                    {
-                        **numbers,
-                        "births": births,
-                        "experiment": name,
-                        "folder": folder,
-                    }
-                )
+                numbers: Row = {key: _known(value) for key, value in found.items()}
+                names = {"experiment": name, "folder": str(one.run.folder)}
+                rows.append(numbers | names | {"births": births})
         return pa.Table.from_pylist(rows, schema("outcomes"))
 
 
 def comparison(outcomes: RunOutcomes) -> pa.Table:
-    """Return every measure of every pair of experiments.
+    """Return the comparison of every pair of experiments by every measure.
 
     Args:
-        outcomes: of finished runs.
+        outcomes: outcomes of finished runs.
 
     Returns:
-        One row per measure and pair that both have numbers of, with the columns of
-        ``outputs``.
+        One row per measure and pair for which both experiments have values, with the
+        columns of ``outputs``.
     """
     rows = []
     for a, b in combinations(outcomes.experiments, 2):
@@ -125,15 +117,15 @@ def comparison(outcomes: RunOutcomes) -> pa.Table:
 
 
 def findings(outcomes: RunOutcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
-    """Return what became of the thesis's findings.
+    """Return the test of each finding of the thesis.
 
     Args:
-        outcomes: of finished runs.
+        outcomes: outcomes of finished runs.
         claims: the findings.
 
     Returns:
-        One row per claim, in order, with the columns of ``outputs``; one
-        about experiments that have no finished run is undecided.
+        One row per claim, in order, with the columns of ``outputs``; claims about
+        experiments without finished runs are undecided.
     """
     rows = [_tested(outcomes, claim) for claim in claims]
     tested = [row for row in rows if row.get("p") is not None]
@@ -154,7 +146,7 @@ def findings(outcomes: RunOutcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Tabl
 
 
 def _tested(outcomes: RunOutcomes, claim: Claim) -> Row:
-    """Return the numbers of a claim, or why there are none."""
+    """Return the numbers of a claim, or the reason why it cannot be tested."""
     names = [name for name in (claim.a, claim.b) if name is not None]
     for name in names:
         if name not in outcomes.experiments:
@@ -215,12 +207,11 @@ def _corrected(rows: list[Row]) -> list[Row]:
 
 
 def verdict(expected: str, row: Mapping[str, object]) -> tuple[str, str]:
-    """Return whether a finding is reproduced, and the rule that decided.
+    """Return whether a finding is reproduced, and the rule of the verdict.
 
     Args:
-        expected: ">" and "<" say on which side a is; "=" that there is no large
-            difference.
-        row: ``effect``, ``q`` and, of two experiments, the effect's interval.
+        expected: ">" or "<" for the side of a, "=" for no large difference.
+        row: ``effect``, ``q`` and, for two experiments, the effect's interval.
     """
     effect, q = float(str(row["effect"])), float(str(row["q"]))
     low, high = (row.get(f"effect_{end}") for end in ("low", "high"))
@@ -231,11 +222,11 @@ def verdict(expected: str, row: Mapping[str, object]) -> tuple[str, str]:
     if q < SURE:
         if effect * sign > 0:
             return "reproduced", f"q < {SURE}, and the effect is as expected"
-        return "not reproduced", f"q < {SURE}, and the effect is the other way"
+        return "not reproduced", f"q < {SURE}, and the effect has the opposite sign"
     if ends is not None and max(sign * end for end in ends) < NEGLIGIBLE:
         why = f"at most negligible as expected: the interval ends below {NEGLIGIBLE}"
         return "not reproduced", why
-    return "undecided", f"q >= {SURE}: these runs do not tell"
+    return "undecided", f"q >= {SURE}: no significant difference"
 
 
 def _alike(effect: float, q: float, ends: tuple[float, float]) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""One number of each run for everything that experiments are compared by."""
+"""Outcomes of a run: one number per measure, by which experiments are compared."""
 
 import math
 from collections.abc import Mapping
@@ -11,19 +11,19 @@ from analysis.measures.outputs import BODY, POPULATION
 from analysis.measures.population_table import Booleans, Numbers
 
 FOUNDERS = 15
-"""Births that are founders in the thesis's experiments."""
+"""Number of founders in the thesis's experiments."""
 
 
 def outcome(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
-    """Return what a run had come to at a number of births.
+    """Return the outcomes of a run at a number of births.
 
     Args:
-        tables: of one run, as ``outputs`` names their columns.
-        births: on each island; the last population at or before counts.
+        tables: tables of one run, with the columns of ``outputs``.
+        births: births on each island; the last population at or before is used.
 
     Returns:
-        Numbers by the names of ``outputs.OUTCOME``; of several islands
-        their mean; NaN where there is none.
+        Numbers by the names of ``outputs.OUTCOME``, the mean over several islands;
+        NaN where a measure has no value.
     """
     populations = tables["populations"]
     islands = np.asarray(populations["island"], np.int64)
@@ -57,9 +57,9 @@ def _of_island(
 
 
 def _share(values: Numbers, counts: Numbers, middle: float, *, is_late: bool) -> float:
-    """Return the share of a change from first to last that came late, or early.
+    """Return the share of a change that happened after (or before) ``middle``.
 
-    NaN where fitness (late) did not rise or diversity (early) did not fall.
+    NaN if fitness (late) did not rise or diversity (early) did not fall.
     """
     known = ~np.isnan(values)
     values, counts = values[known], counts[known]
@@ -87,7 +87,7 @@ def _of_robots(
 def _changes(
     robots: pa.Table, last: dict[str, float], is_born: Booleans
 ) -> dict[str, float]:
-    """Return how far the last population is from robots that nobody begot."""
+    """Return the differences of the last population and robots without parents."""
     is_random = is_born & (_column(robots, "ancestors") == 0)
     return {
         f"{name}_change": last.get(name, math.nan)
@@ -116,7 +116,7 @@ def _of_arena(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
 
 
 def _correlation(first: Numbers, second: Numbers) -> float:
-    """Return Spearman's rank correlation; NaN where one of the two does not vary."""
+    """Return Spearman's rank correlation; NaN if one of the two is constant."""
     if len(first) < 2 or not np.ptp(first) or not np.ptp(second):  # noqa: PLR2004
         return math.nan
     return float(np.corrcoef(ranks(first), ranks(second))[0, 1])

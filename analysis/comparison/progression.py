@@ -46,7 +46,13 @@ def progression(populations: pa.Table) -> pa.Table:
         ).sort_by([(key, "ascending") for key in keys])
         measures = pa.repeat(pa.scalar(measure), named.num_rows)
         pieces.append(named.append_column("measure", measures))
-    return _with_intervals(pa.concat_tables(pieces)).cast(schema("progression"))
+    table = pa.concat_tables(pieces)
+    mean = np.asarray(table["mean"], np.float64)
+    deviation = np.asarray(table["sd"], np.float64)
+    half = half_interval(deviation, np.asarray(table["runs"], np.int64))
+    for name, ends in (("low", mean - half), ("high", mean + half)):
+        table = table.append_column(name, pa.array(ends, from_pandas=True))
+    return table.select(schema("progression").names).cast(schema("progression"))
 
 
 def _whole_runs(by_run: pa.Table, count: str) -> pa.Table:
@@ -57,13 +63,3 @@ def _whole_runs(by_run: pa.Table, count: str) -> pa.Table:
     most = np.zeros(len(runs), np.int64)
     np.maximum.at(most, runs, islands)
     return by_run.filter(pa.array(islands == most[runs]))
-
-
-def _with_intervals(table: pa.Table) -> pa.Table:
-    runs = np.asarray(table["runs"], np.int64)
-    mean = np.asarray(table["mean"], np.float64)
-    half = half_interval(np.asarray(table["sd"], np.float64), runs)
-    ends = {"low": mean - half, "high": mean + half}
-    for name, values in ends.items():
-        table = table.append_column(name, pa.array(values, from_pandas=True))
-    return table.select(schema("progression").names)

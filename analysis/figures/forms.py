@@ -1,6 +1,6 @@
 """Plots of the thesis: distributions over runs, and progress over births."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,15 +58,17 @@ def over_runs(tables: Tables, *panels: Panel) -> p9.ggplot:
     if not tables["outcomes"].num_rows:
         raise NothingToDraw("no finished run could be measured")
     runs = stacked(tables["outcomes"], panels)
-    if not runs.num_rows:
+    if runs.empty:
         raise NothingToDraw(f"no finished run has a value of {panels[0].measure}")
-    experiments = in_order(runs["experiment"].to_pylist())
-    figure = p9.ggplot(_frame(runs, panels), p9.aes("experiment", "value"))
-    violins = _violins(tables, panels, experiments)
-    for layer in (*violins, *_summaries(runs, panels)):
+    experiments = in_order(runs["experiment"])
+    figure = p9.ggplot(runs, p9.aes("experiment", "value"))
+    for layer in (*_violins(tables, panels, experiments), *_summaries(runs)):
         figure += layer
     figure = figure + scales(experiments) + p9.expand_limits(y=0)
-    figure += _unit_height(runs, panels)
+    # An invisible layer extends panels of zeros from 0 to 1.
+    flat = runs[runs.groupby("panel", observed=True)["value"].transform("max") == 0]
+    if not flat.empty:
+        figure += p9.geom_blank(data=flat.assign(value=1.0))
     figure += p9.geom_point(
         p9.aes(fill="experiment"),
         position=p9.position_jitter(width=0.06, height=0, random_state=1),
@@ -85,23 +87,6 @@ def over_runs(tables: Tables, *panels: Panel) -> p9.ggplot:
     figure += p9.scale_x_discrete(limits=experiments, labels=labels)
     look = theme_of_size(3.6) + p9.theme(legend_position="none")
     return figure + p9.labs(x="", y=panels[0].text) + look
-
-
-def _unit_height(runs: pa.Table, panels: Sequence[Panel]) -> list[Any]:
-    """Return an invisible layer that extends panels of zeros from 0 to 1."""
-    greatest = runs.group_by("panel").aggregate([("value", "max")])
-    flat = greatest.filter(pc.equal(greatest["value_max"], 0.0))["panel"]
-    empty = runs.filter(pc.is_in(runs["panel"], flat.combine_chunks()))
-    if not empty.num_rows:
-        return []
-    ones = pa.repeat(pa.scalar(1.0), empty.num_rows)
-    unseen = replace_column(empty, "value", ones)
-    return [p9.geom_blank(data=_frame(unseen, panels))]
-
-
-def replace_column(table: pa.Table, name: str, column: Any) -> pa.Table:  # noqa: ANN401 - untyped
-    """Return a table with another column in the place of one."""
-    return table.set_column(table.schema.get_field_index(name), name, column)
 
 
 def _births(outcomes: pa.Table, experiments: list[str]) -> dict[str, str]:
@@ -131,65 +116,55 @@ def _in_panels(count: int, experiments: list[str], births: dict[str, str]) -> li
     ]
 
 
-def stacked(table: pa.Table, panels: Sequence[Panel]) -> pa.Table:
-    """Return ``experiment``, ``panel`` (its text) and ``value``, one row per value."""
-    pieces = []
-    for panel in panels:
-        known = table.filter(table[panel.measure].is_valid())
-        pieces.append(
-            pa.table(
-                {
-                    "experiment": known["experiment"],
-                    "panel": pa.repeat(pa.scalar(panel.text), known.num_rows),
-                    "value": known[panel.measure].cast(pa.float64()),
-                }
-            )
-        )
-    return pa.concat_tables(pieces)
+def stacked(table: pa.Table, panels: Sequence[Panel]) -> Any:  # noqa: ANN401 - pandas
+    """Return the values of the panels' measures as a data frame.
 
+    Args:
+        table: with ``experiment`` and columns of measures; nulls are ignored.
+        panels: at least one of their measures is a column.
 
-def _frame(rows: pa.Table, panels: Sequence[Panel]) -> Any:  # noqa: ANN401 - pandas
-    """Return rows for plotnine, panels in their order."""
+    Returns:
+        ``experiment``, ``panel`` (its text; categories in order) and ``value``.
+    """
     texts = [panel.text for panel in panels]
-    index = pc.index_in(rows["panel"], pa.array(texts)).combine_chunks()
-    ordered = pa.DictionaryArray.from_arrays(index, texts)
-    return replace_column(rows, "panel", ordered).to_pandas()
+    pieces = []
+    for index, panel in enumerate(panels):
+        if panel.measure in table.column_names:
+            known = table.filter(table[panel.measure].is_valid())
+            places = pa.array(np.full(known.num_rows, index))
+            columns = {
+                "experiment": known["experiment"],
+                "panel": pa.DictionaryArray.from_arrays(places, texts),
+                "value": known[panel.measure].cast(pa.float64()),
+            }
+            pieces.append(pa.table(columns))
+    return pa.concat_tables(pieces).to_pandas()
 
 
-def _groups(rows: pa.Table) -> Iterator[pa.Table]:
-    """Yield the rows of each experiment and panel."""
-    keys = rows.select(["experiment", "panel"]).group_by(["experiment", "panel"])
-    for key in keys.aggregate([]).to_pylist():
-        is_here = pc.and_(
-            pc.equal(rows["experiment"], key["experiment"]),
-            pc.equal(rows["panel"], key["panel"]),
-        )
-        yield rows.filter(is_here)
+def _grouped(rows: Any) -> Any:  # noqa: ANN401 - pandas
+    """Return the values of each experiment and panel."""
+    groups = rows.groupby(["experiment", "panel"], observed=True, as_index=False)
+    return groups["value"]
 
 
 def _violins(
     tables: Tables, panels: Sequence[Panel], experiments: list[str]
 ) -> list[Any]:
     """Return a layer of the robots of last populations, if they have the measures."""
-    if "robots" not in tables:
+    robots = tables.get("robots")
+    if robots is None or not any(one.measure in robots.column_names for one in panels):
         return []
-    robots = tables["robots"].filter(pc.field("is_last"))
-    shown = [panel for panel in panels if panel.measure in robots.column_names]
-    if not shown:
-        return []
+    rows = stacked(robots.filter(pc.field("is_last")), panels)
+    rows = rows[rows["experiment"].isin(experiments)]
+    values = _grouped(rows)
     # A distribution of equal values has no shape.
-    varied = [
-        group
-        for group in _groups(stacked(robots, shown))
-        if np.ptp(np.asarray(group["value"])) > 0
-        and group["experiment"][0].as_py() in experiments
-    ]
-    if not varied:
+    varied = rows[values.transform("max") > values.transform("min")]
+    if varied.empty:
         return []
     return [
         p9.geom_violin(
             p9.aes(fill="experiment"),
-            data=_frame(pa.concat_tables(varied), panels),
+            data=varied,
             colour="none",
             alpha=0.3,
             scale="width",
@@ -198,17 +173,16 @@ def _violins(
     ]
 
 
-def _summaries(runs: pa.Table, panels: Sequence[Panel]) -> list[Any]:
+def _summaries(runs: Any) -> list[Any]:  # noqa: ANN401 - pandas
     """Return layers that summarise runs: boxes of many, medians of few."""
-    groups = list(_groups(runs))
-    many = [group for group in groups if group.num_rows >= BOX_RUNS]
-    few = [_median(group) for group in groups if group.num_rows < BOX_RUNS]
+    sizes = _grouped(runs).transform("size")
+    many, few = runs[sizes >= BOX_RUNS], runs[sizes < BOX_RUNS]
     layers = []
-    if many:
+    if not many.empty:
         layers.append(
             p9.geom_boxplot(
                 p9.aes(colour="experiment"),
-                data=_frame(pa.concat_tables(many), panels),
+                data=many,
                 width=0.3,
                 outlier_shape="",
                 size=0.7,
@@ -216,11 +190,11 @@ def _summaries(runs: pa.Table, panels: Sequence[Panel]) -> list[Any]:
                 show_legend=False,
             )
         )
-    if few:
+    if not few.empty:
         layers.append(
             p9.geom_errorbar(
                 p9.aes("experiment", ymin="value", ymax="value", colour="experiment"),
-                data=_frame(pa.concat_tables(few), panels),
+                data=_grouped(few).median(),
                 inherit_aes=False,
                 width=0.45,
                 size=1.1,
@@ -228,11 +202,6 @@ def _summaries(runs: pa.Table, panels: Sequence[Panel]) -> list[Any]:
             )
         )
     return layers
-
-
-def _median(group: pa.Table) -> pa.Table:
-    middle = float(np.median(np.asarray(group["value"])))
-    return group.slice(0, 1).set_column(2, "value", [[middle]])
 
 
 def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
@@ -253,8 +222,9 @@ def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
     sure = table.filter(pc.field("runs") >= BAND_RUNS)
     if sure.num_rows:
         ends = p9.aes(ymin="low", ymax="high", fill="experiment")
-        band = replace_column(sure, "low", pc.max_element_wise(sure["low"], 0.0))
-        figure += p9.geom_ribbon(ends, data=band.to_pandas(), alpha=0.18)
+        band = sure.to_pandas()
+        band["low"] = band["low"].clip(lower=0.0)
+        figure += p9.geom_ribbon(ends, data=band, alpha=0.18)
     figure += p9.geom_line(p9.aes(colour="experiment"), size=0.9)
     names = table["experiment"].to_pylist()
     figure = figure + scales(names, is_filled=sure.num_rows > 0) + theme_of_size(3.8)

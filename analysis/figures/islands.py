@@ -17,7 +17,7 @@ from analysis.figures.style import (
     theme_of_size,
 )
 
-_PAIRS = {"within islands": "within", "between islands": "between"}
+_PAIRS = {"within": "within islands", "between": "between islands"}
 _IN_A_ROW = 12
 _NO_ISLANDS = "no run has several islands"
 
@@ -34,19 +34,15 @@ def fitness_by_island(tables: Tables) -> p9.ggplot:
     several = tables["runs"].filter(pc.field("islands") > 1)["folder"]
     rows = tables["populations"]
     chosen = pc.is_in(rows["folder"], several.combine_chunks())
-    rows = rows.filter(chosen).filter(pc.field("fitness").is_valid())
-    if not rows.num_rows:
+    frame = rows.filter(chosen).filter(pc.field("fitness").is_valid()).to_pandas()
+    if frame.empty:
         raise NothingToDraw(_NO_ISLANDS)
-    lines = pc.binary_join_element_wise(
-        rows["folder"], rows["island"].cast(pa.string()), " "
-    )
-    islands = rows["island"].cast(pa.string())
-    shown = rows.select(["experiment", "births", "fitness"])
-    shown = shown.append_column("line", lines).append_column("island", islands)
-    names = sorted(set(islands.to_pylist()), key=int)
+    frame["island"] = frame["island"].astype(str)
+    frame["line"] = frame["folder"] + " " + frame["island"]
+    names = sorted(set(frame["island"]), key=int)
     hues = OTHERS * -(-len(names) // len(OTHERS))
     return (
-        p9.ggplot(shown.to_pandas(), p9.aes("births", "fitness"))
+        p9.ggplot(frame, p9.aes("births", "fitness"))
         + p9.geom_line(p9.aes(colour="island", group="line"), size=0.7, alpha=0.85)
         + p9.facet_wrap("experiment", labeller=label)
         + p9.scale_colour_manual(hues[: len(names)], limits=names)
@@ -70,18 +66,14 @@ def between(tables: Tables) -> p9.ggplot:
     rows = tables.get("between")
     if not rows:
         raise NothingToDraw(_NO_ISLANDS)
-    pieces = []
-    for text, name in _PAIRS.items():
-        known = rows.filter(rows[name].is_valid())
-        grouped = known.group_by(["experiment", "births"]).aggregate([(name, "mean")])
-        renamed = grouped.rename_columns(["experiment", "births", "distance"])
-        pairs = pa.repeat(pa.scalar(text), renamed.num_rows)
-        pieces.append(renamed.append_column("pairs", pairs))
-    shown = pa.concat_tables(pieces)
+    keys = ["experiment", "births"]
+    frame = rows.to_pandas().rename(columns=_PAIRS)
+    pairs = frame.melt(keys, list(_PAIRS.values()), "pairs", "distance")
+    means = pairs.dropna().groupby([*keys, "pairs"], as_index=False)["distance"].mean()
     return (
-        p9.ggplot(shown.to_pandas(), p9.aes("births", "distance"))
+        p9.ggplot(means, p9.aes("births", "distance"))
         + p9.geom_line(p9.aes(colour="experiment", linetype="pairs"), size=0.8)
-        + p9.scale_linetype_manual(["-", "--"], limits=list(_PAIRS))
+        + p9.scale_linetype_manual(["-", "--"], limits=list(_PAIRS.values()))
         + scales(rows["experiment"].to_pylist(), is_filled=False)
         + p9.expand_limits(y=0)
         + p9.labs(x="births on each island", y="mean tree edit distance", linetype="")
@@ -107,15 +99,16 @@ def migration_graph(tables: Tables) -> p9.ggplot:
         .group_by(["experiment", "island", "to"])
         .aggregate([("line", "count"), ("line", "mean")])
     )
-    places = [
-        row | _arrow(*(_spots(rows, row["experiment"])[row[end]] for end in
-                       ("island", "to")))
-        for row in edges.to_pylist()
-    ]  # fmt: skip
+    names = in_order(rows["experiment"].to_pylist())
+    spots = {name: _spots(rows, name) for name in names}
+    places = []
+    for row in edges.to_pylist():
+        known = spots[row["experiment"]]
+        places.append(row | _arrow(known[row["island"]], known[row["to"]]))
     islands = [
         {"experiment": name, "island": island, "x": x, "y": y}
-        for name in in_order(rows["experiment"].to_pylist())
-        for island, (x, y) in _spots(rows, name).items()
+        for name in names
+        for island, (x, y) in spots[name].items()
     ]
     nodes = pa.Table.from_pylist(islands).to_pandas()
     return (

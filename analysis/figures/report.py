@@ -154,19 +154,17 @@ def _findings(rows: Sequence[Mapping[str, object]]) -> str:
         verdict = str(row["verdict"])
         kind = verdict.split(maxsplit=1)[0]
         badge = f'<span class="v {kind}">{escape(verdict)}</span>'
-        runs = "–" if row["runs_a"] is None else f"{row['runs_a']}"
-        runs += "" if row["runs_b"] is None else f" / {row['runs_b']}"
-        lines.append(
-            [
-                _cell(row["figure"]),
-                _cell(row["claim"]),
-                _cell(row["expected"]),
-                _cell(runs),
-                *(_cell(row[name]) for name in numbers),
-                f"<td>{badge}</td>",
-                _cell(row["why"]),
-            ]
-        )
+        counted = [
+            str(row[key]) for key in ("runs_a", "runs_b") if row[key] is not None
+        ]
+        cells = [
+            row["figure"],
+            row["claim"],
+            row["expected"],
+            " / ".join(counted) or "–",
+        ]
+        cells += [row[name] for name in numbers]
+        lines.append([*map(_cell, cells), f"<td>{badge}</td>", _cell(row["why"])])
     heads = ("figure", "finding", "expected", "runs", "mean a", "mean b", "effect",
              "low", "high", "q", "verdict", "why")  # fmt: skip
     note = (

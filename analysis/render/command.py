@@ -1,4 +1,4 @@
-"""``revolve robot render``: pictures of the robot of a file."""
+"""``revolve robot render``: pictures of the robot in a file."""
 
 import argparse
 from collections.abc import Callable
@@ -27,21 +27,21 @@ PICTURE_ENDING = ".png"
 
 
 def main(arguments: list[str], simulate: Simulate) -> int:
-    """Draw a robot standing, or what it does; return the exit code.
+    """Render a robot in neutral pose or in motion; return the exit code.
 
     Args:
         arguments: the command's name, ``robot render``, first.
-        simulate: the worker's.
+        simulate: the worker's simulation.
 
     Returns:
-        0 if the picture is there.
+        0 if the picture was written.
 
     Raises:
-        NoPictures: nothing here can draw, an ending that is no picture's, or more
-            pictures than there are ticks to show.
-        InvalidRobot: a file that holds no robot.
-        SimulationDiverged: the physics did.
-        ExperimentError: no such experiment, or a sensor that it cannot feed.
+        NoPictures: this machine cannot render, the file name has another ending, or
+            ``--gait`` exceeds the number of ticks.
+        InvalidRobot: the file contains no robot.
+        SimulationDiverged: the physics diverged.
+        ExperimentError: no such experiment, or it does not support a sensor.
     """
     options = _parser().parse_args(arguments[1:])
     out: Path = options.out
@@ -50,7 +50,7 @@ def main(arguments: list[str], simulate: Simulate) -> int:
         allowed = f"{PICTURE_ENDING}, {FILM_ENDING}"
         raise NoPictures(f"{out}: must end in one of {allowed}, got {out.suffix!r}")
     if is_film and options.gait:
-        raise NoPictures(f"{out}: --gait is for a {PICTURE_ENDING}")
+        raise NoPictures(f"{out}: --gait needs a {PICTURE_ENDING} file")
     named = options.experiment
     settings = settings_of(read_experiment(named) if named else None)
     space, world = body_space(settings.space), settings.simulation
@@ -71,13 +71,13 @@ def main(arguments: list[str], simulate: Simulate) -> int:
 
 
 def _check_gait(gait: int | None, world: Simulation) -> None:
-    """Refuse more pictures than there are ticks to show."""
+    """Refuse more pictures than there are ticks."""
     ticks = -(-(world.warmup_steps + world.window_steps) // world.brain_steps)
     most = ticks - ticks // 2
     if gait is not None and gait > most:
         raise NoPictures(
-            f"--gait {gait}: must be <= {most}, the ticks of the second half of its "
-            "life, which is drawn"
+            f"--gait {gait}: must be <= {most}, the number of ticks in the second half "
+            "of the evaluation"
         )
 
 
@@ -88,17 +88,17 @@ def _draw_motion(
     out: Path,
     tick_s: float,
 ) -> None:
-    """Write a film of a whole life, or a strip of some of its ticks."""
+    """Write an animation of an evaluation, or a strip of some of its ticks."""
     poses: list[Floats] = []
     look_at = None
-    with bars(f"simulating and drawing: {out}") as bar:
+    with bars(f"simulating and rendering {out}") as bar:
         live(watch=lambda data: poses.append(data.qpos.copy()))
         if gait is not None:
-            # From the middle of the life on, when the first fall is over.
+            # From the middle on, when the first fall is over.
             poses = poses[len(poses) // 2 :][:gait]
-            # A camera that stands still: the robot is seen to go.
+            # A fixed camera, so that the robot moves in the pictures.
             look_at = np.mean([pose[:3] for pose in poses], axis=0)
-        shown = bar.track(poses, description="drawing")
+        shown = bar.track(poses, description="rendering")
         pictures = [renderer.picture(pose, look_at=look_at) for pose in shown]
     if gait is None:
         save_animation(pictures, out, tick_s)
@@ -109,19 +109,31 @@ def _draw_motion(
 def _parser() -> argparse.ArgumentParser:
     parser = Flags(
         prog="revolve robot render",
-        description="Draw a robot: standing, as a strip of consecutive pictures, or "
-        "(.gif) as a film of its life.",
+        description="Render a robot: in neutral pose, as a strip of consecutive "
+        "pictures (--gait), or as an animation of its evaluation (.gif).",
         epilog="example: revolve robot render best.yaml best.png --gait 10",
     )
-    parser.add_argument("file", type=Path, metavar="FILE")
-    parser.add_argument("out", type=Path, metavar="OUT.png|OUT.gif")
+    parser.add_argument("file", type=Path, metavar="FILE", help="robot file")
+    parser.add_argument(
+        "out", type=Path, metavar="OUT.png|OUT.gif", help="picture to write"
+    )
     parser.add_argument(
         "--gait",
         type=whole_number(1),
         metavar="N",
-        help="N pictures, one per tick of the brain from the middle of its life on, in "
-        "rows of five",
+        help="render N pictures, one per tick of the brain from the middle of the "
+        "evaluation on, in rows of five",
     )
-    parser.add_argument("--width", type=whole_number(16), default=640, metavar="PIXELS")
-    parser.add_argument("--experiment", metavar="NAME|FILE.toml")
+    parser.add_argument(
+        "--width",
+        type=whole_number(16),
+        default=640,
+        metavar="PIXELS",
+        help="width of a picture (default: 640)",
+    )
+    parser.add_argument(
+        "--experiment",
+        metavar="NAME|FILE.toml",
+        help="experiment that defines part types, simulation and environment",
+    )
     return parser

@@ -1,7 +1,7 @@
-"""Robots as pictures, without a screen.
+"""Off-screen rendering of robots.
 
-MuJoCo draws them off the screen, through EGL or, where that is missing, OSMesa: which
-of them is settled when MuJoCo is first imported, so ``choose_engine`` goes first.
+MuJoCo renders through EGL or, where that is missing, OSMesa. It chooses between them at
+its first import, so ``choose_engine`` must be called before.
 """
 
 import ctypes.util
@@ -9,7 +9,6 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Protocol, Self
 
 import numpy as np
@@ -37,12 +36,12 @@ _TILE_M = 0.1
 _GROUND = ("ground", "rough")
 
 
-class NoPictures(RevolveError):  # noqa: N818 - reads as what it says
-    """Nothing here can draw without a screen."""
+class NoPictures(RevolveError):  # noqa: N818 - names what is missing
+    """A picture cannot be rendered or written."""
 
 
 def choose_engine() -> str:
-    """Settle what draws, and return its name.
+    """Choose the backend of MuJoCo's renderer, and return its name.
 
     Raises:
         NoPictures: neither EGL nor OSMesa is installed.
@@ -60,10 +59,10 @@ def choose_engine() -> str:
 
 
 class RobotRenderer:
-    """One robot on a tiled floor, and a camera that looks at it.
+    """Renders one robot on a tiled floor; a context manager.
 
     Attributes:
-        model: MuJoCo's model of it; poses are its ``qpos``.
+        model: MuJoCo model of the robot; poses are its ``qpos``.
     """
 
     def __init__(
@@ -75,17 +74,17 @@ class RobotRenderer:
         *,
         size: tuple[int, int] = (640, 480),
     ) -> None:
-        """Set the robot up, at its neutral pose.
+        """Build the model, with the robot in neutral pose.
 
         Args:
-            robot: a checked robot.
+            robot: a valid robot.
             space: its part types.
-            simulation: the world's numbers.
-            environment: what it stands in.
+            simulation: settings of the simulation.
+            environment: ground and scenery.
             size: width and height of pictures [pixels].
 
         Raises:
-            NoPictures: what should draw does not work.
+            NoPictures: the backend does not work.
         """
         choose_engine()
         import mujoco  # noqa: PLC0415 - after its engine is chosen
@@ -99,41 +98,35 @@ class RobotRenderer:
         self._data = mujoco.MjData(self.model)
         try:
             self._renderer = mujoco.Renderer(self.model, size[1], size[0])
-        # Whatever the engine raises: it is another one on each machine.
+        # The type of the exception depends on the backend.
         except Exception as error:
             engine = os.environ.get(_SETTING, "OpenGL")
-            raise NoPictures(f"{engine} cannot draw here: {error}") from error
+            raise NoPictures(f"{engine} cannot render: {error}") from error
         mujoco.mj_forward(self.model, self._data)
         geoms = self.model.geom_bodyid > 0
         centres = self._data.geom_xpos[geoms]
         reaches = self.model.geom_rbound[geoms, np.newaxis]
         low, high = (centres - reaches).min(axis=0), (centres + reaches).max(axis=0)
-        # Of a sphere that holds the standing robot, in the frame of the core.
+        # Centre and radius of a sphere around the robot in neutral pose, in the frame
+        # of the core.
         self._middle = 0.5 * (low + high) - self._data.qpos[:3]
         away = np.linalg.norm(centres - 0.5 * (low + high), axis=1)
         self._radius = float((away + reaches[:, 0]).max())
 
     def __enter__(self) -> Self:
-        """Return itself."""
         return self
 
-    def __exit__(
-        self,
-        _kind: type[BaseException] | None,
-        _error: BaseException | None,
-        _trace: TracebackType | None,
-    ) -> None:
-        """Let go of the engine."""
+    def __exit__(self, *_: object) -> None:
         self._renderer.close()
 
     def picture(
         self, pose: Floats | None = None, *, look_at: Floats | None = None
     ) -> Picture:
-        """Return the robot in a pose.
+        """Return a picture of the robot in a pose.
 
         Args:
-            pose: (nq,) of the model; neutral, standing, if None.
-            look_at: (3,) point in the middle [m]; the robot's if None.
+            pose: (nq,) ``qpos`` of the model; the previous pose if None.
+            look_at: (3,) point that the camera looks at [m]; the robot if None.
         """
         if pose is not None:
             self._data.qpos[:] = pose
@@ -149,7 +142,7 @@ class RobotRenderer:
 
 
 def _furnish(width: int, height: int) -> Callable[[Any], None]:
-    """Return what adds floor, light and sky to a world."""
+    """Return a function that adds floor, light and sky to a model."""
 
     def add(spec: Any) -> None:  # noqa: ANN401 - the engine is imported late
         import mujoco  # noqa: PLC0415 - the same
@@ -160,7 +153,7 @@ def _furnish(width: int, height: int) -> Callable[[Any], None]:
         spec.visual.headlight.diffuse = (0.35, 0.35, 0.35)
         spec.visual.headlight.specular = (0.0, 0.0, 0.0)
         spec.visual.quality.shadowsize = 2048
-        # Robots are small: what is near must not be cut off, nor shadows be coarse.
+        # Robots are small: a near clipping plane and fine shadows.
         spec.stat.extent = 0.5
         spec.visual.map.znear = 0.01
         spec.visual.map.shadowclip = 1.0
@@ -205,11 +198,11 @@ def _furnish(width: int, height: int) -> Callable[[Any], None]:
 
 
 def gait_strip(pictures: Sequence[Picture], *, columns: int = 5) -> Picture:
-    """Return consecutive pictures side by side, row by row, white where none is left.
+    """Return pictures side by side in rows; the rest of the last row is white.
 
     Args:
-        pictures: all of one size; at least one.
-        columns: how many stand in a row at most.
+        pictures: pictures of one size; at least one.
+        columns: most pictures in a row.
     """
     height, width, _ = pictures[0].shape
     columns = min(columns, len(pictures))
@@ -224,24 +217,24 @@ def gait_strip(pictures: Sequence[Picture], *, columns: int = 5) -> Picture:
 
 
 def save_picture(picture: Picture, path: Path) -> None:
-    """Write a picture; the ending says how (.png).
+    """Write a picture in the format of the file's ending.
 
     Raises:
-        NoPictures: an ending that nobody knows, or a file that cannot be written.
+        NoPictures: the ending is unknown, or the file cannot be written.
     """
     _write(path, lambda: Image.fromarray(picture).save(path))
 
 
 def save_animation(pictures: Sequence[Picture], path: Path, interval_s: float) -> None:
-    """Write pictures as one that moves, over and over (.gif).
+    """Write pictures as an animation that repeats (.gif).
 
     Args:
-        pictures: all of one size; at least one.
-        path: ends in .gif.
-        interval_s: from one to the next [s]; a GIF counts hundredths.
+        pictures: pictures of one size; at least one.
+        path: path that ends in .gif.
+        interval_s: time between two pictures [s]; a GIF stores hundredths.
 
     Raises:
-        NoPictures: a file that cannot be written.
+        NoPictures: the file cannot be written.
     """
     frames = [Image.fromarray(picture) for picture in pictures]
     _write(
@@ -266,7 +259,7 @@ def _write(path: Path, save: Callable[[], None]) -> None:
 
 
 class Simulate(Protocol):
-    """What the worker has: a robot, alone, through its life."""
+    """The worker's simulation of one robot."""
 
     def __call__(
         self,
@@ -278,4 +271,4 @@ class Simulate(Protocol):
         identity: Identity = NOBODY,
         watch: Callable[[Any], None],
     ) -> Track:
-        """Return its track; ``watch`` is shown the engine's state at each tick."""
+        """Return the robot's track; each tick calls ``watch`` with ``MjData``."""

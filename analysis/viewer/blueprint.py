@@ -1,7 +1,6 @@
-"""How the viewer is laid out: arenas side by side, curves, log, ancestry, workers."""
+"""Layout of the viewer: arenas, curves, log, ancestry and workers."""
 
 from collections.abc import Sequence
-from collections.abc import Set as AbstractSet
 
 import rerun as rr
 import rerun.blueprint as rrb
@@ -9,6 +8,7 @@ import rerun.blueprint as rrb
 from analysis.viewer.entities import island_path, motion_path, robot_path
 from analysis.viewer.motion import LANES
 from analysis.viewer.recording import BIRTHS, SIMULATED
+from analysis.viewer.scene import Scene
 from schema.robot.ids import BirthId
 
 _SKY = (246, 247, 250)
@@ -16,37 +16,23 @@ _GRID = (205, 208, 216)
 
 
 def layout(
-    islands: Sequence[int],
-    *,
-    extent_m: float,
-    arenas: AbstractSet[int],
-    follow: tuple[int, BirthId] | None = None,
-    motions: Sequence[BirthId] = (),
+    scene: Scene, *, follow: BirthId | None = None, motions: Sequence[BirthId] = ()
 ) -> rrb.Blueprint:
     """Return the layout for a run.
 
     Args:
-        islands: their numbers.
-        extent_m: how far from its middle an arena or a gallery reaches [m].
-        arenas: those on which robots live together, in simulated time.
-        follow: island and name of the robot that the camera follows there.
-        motions: robots that are shown by themselves, moving.
+        scene: scene of the run.
+        follow: robot that the camera follows.
+        motions: re-simulated robots, which are shown in a view of their own.
     """
-    scenes = [
-        _scene(
-            each,
-            f"Arena {each}" if each in arenas else f"Population of island {each}",
-            extent_m,
-            follow,
-        )
-        for each in islands
-    ]
+    islands, arenas = scene.islands, scene.arenas
+    views = [_island_view(scene, each, follow) for each in islands]
     if motions and not arenas:
-        # Time alone is not the births' time: nothing else could be seen at once.
+        # Off-line motions have no births to show on the same timeline.
         return _framed(_motion(motions, is_online=False), SIMULATED)
     if motions:
-        scenes.insert(0, _motion(motions, is_online=True))
-    told = rrb.Vertical(
+        views.insert(0, _motion(motions, is_online=True))
+    panels = rrb.Vertical(
         _curves("Fitness", islands, "fitness"),
         _curves("Population", islands, "size"),
         rrb.Tabs(
@@ -57,14 +43,14 @@ def layout(
         ),
         row_shares=[3, 2, 4],
     )
-    whole = rrb.Horizontal(rrb.Grid(*scenes), told, column_shares=[5, 3])
-    # Off-line populations change by births alone.
+    root = rrb.Horizontal(rrb.Grid(*views), panels, column_shares=[5, 3])
+    # Off-line populations have no simulated time.
     is_timed = bool(motions) or arenas >= set(islands)
-    return _framed(whole, SIMULATED if is_timed else BIRTHS)
+    return _framed(root, SIMULATED if is_timed else BIRTHS)
 
 
 def _framed(root: rrb.Horizontal | rrb.Spatial3DView, timeline: str) -> rrb.Blueprint:
-    """Return a layout without panels that are not looked at."""
+    """Return a layout with collapsed side panels."""
     return rrb.Blueprint(
         root,
         rrb.BlueprintPanel(state="collapsed"),
@@ -75,7 +61,7 @@ def _framed(root: rrb.Horizontal | rrb.Spatial3DView, timeline: str) -> rrb.Blue
 
 
 def _curves(name: str, islands: Sequence[int], what: str) -> rrb.TimeSeriesView:
-    """Return the view of one curve of each island, from its beginning to its end."""
+    """Return the view of one curve per island, over the whole time."""
     all_of_it = rr.TimeRange(
         start=rr.TimeRangeBoundary.infinite(), end=rr.TimeRangeBoundary.infinite()
     )
@@ -87,30 +73,31 @@ def _curves(name: str, islands: Sequence[int], what: str) -> rrb.TimeSeriesView:
     )
 
 
-def _scene(
-    island: int, name: str, extent_m: float, follow: tuple[int, BirthId] | None
+def _island_view(
+    scene: Scene, island: int, follow: BirthId | None
 ) -> rrb.Spatial3DView:
-    """Return the view of one island: all of it, or one robot close by."""
+    """Return the view of one island, or a close view of one of its robots."""
     path = island_path(island)
-    followed = follow is not None and follow[0] == island
-    near = 0.6 if followed else 1.2 * extent_m
+    is_here = follow is not None and follow.island == island
+    tracked = robot_path(island, follow) if follow and is_here else None
+    is_arena = island in scene.arenas
     return rrb.Spatial3DView(
         origin=f"/{path}",
-        name=name,
+        name=f"Arena {island}" if is_arena else f"Population of island {island}",
         contents=[f"/{path}/{what}" for what in ("robots/**", "wall", "ground/**")],
         background=_SKY,
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.5, color=_GRID),
-        eye_controls=_eye(near, robot_path(*follow) if follow and followed else None),
+        eye_controls=_eye(0.6 if tracked else 1.2 * scene.extent_m, tracked),
     )
 
 
 def _motion(births: Sequence[BirthId], *, is_online: bool) -> rrb.Spatial3DView:
-    """Return the view of robots that do again what they did."""
+    """Return the view of re-simulated robots."""
     middle = len(births) // 2 // LANES * LANES + LANES // 2
     near = 0.9 if is_online else 0.9 + 0.7 * min(len(births), LANES)
     return rrb.Spatial3DView(
         origin="/motion",
-        name="Robots again",
+        name="Re-simulated robots",
         contents="/motion/**",
         background=_SKY,
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.1, color=_GRID),
@@ -119,7 +106,7 @@ def _motion(births: Sequence[BirthId], *, is_online: bool) -> rrb.Spatial3DView:
 
 
 def _eye(near: float, tracked: str | None) -> rrb.EyeControls3D:
-    """Return a camera that looks at the middle, or follows an entity."""
+    """Return a camera that looks at the origin, or follows an entity."""
     return rrb.EyeControls3D(
         kind=rrb.Eye3DKind.Orbital,
         position=(0.35 * near, -near, 0.8 * near),

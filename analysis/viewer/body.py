@@ -1,9 +1,9 @@
-"""A robot as boxes, and where they are in each of its recorded poses.
+"""Box models of robots, and the places of their boxes in recorded poses.
 
-A tree of segments is rebuilt from a body as ``schema.mjcf`` does, without an engine:
-at neutral pose all frames are parallel to the core's, and a joint turns all that
-hangs beyond it. Boxes of one segment share one attitude wherever right angles allow,
-for equal numbers take less room in a recording.
+The tree of segments is rebuilt from the body as in ``schema.mjcf``, without MuJoCo: at
+the neutral pose all frames are parallel to the core's, and a joint turns everything
+beyond it. Boxes of one segment share an attitude if they differ by right angles only,
+because equal numbers take less room in a recording.
 """
 
 from collections.abc import Iterable
@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from analysis.viewer.quaternions import product, quaternion, rotated
 from schema.parts import BodySpace, Box
 from schema.robot.frames import place_parts, shapes_of
 from schema.robot.results import Floats
@@ -22,24 +21,24 @@ from schema.robot.robot import Robot
 Float32s = npt.NDArray[np.float32]
 
 _PLATE_M = 0.002
-"""What is thinner only closes gaps between parts."""
+"""Thinner boxes only close gaps between parts [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class BoxModel:
-    """A body to draw: B boxes on S segments, the core's first.
+    """B boxes on S segments, the core's segment first.
 
     Attributes:
-        half_sizes: (B, 3) [m].
+        half_sizes: (B, 3) half sizes of the boxes [m].
         colours: (B, 3) red, green, blue, 0 to 255.
-        segments: (B,) which one a box is fixed to.
-        centres: (B, 3) in the segment's frame [m].
+        segments: (B,) segment that a box is fixed to.
+        centres: (B, 3) centres in the segment's frame [m].
         attitudes: (A, 4) unit quaternions x, y, z, w in the segments' frames.
-        attitude_of: (B,) a box's, an index.
-        carried_by: (A,) the segment of each attitude.
-        parents: (S,) whose child a segment is; -1 for the core's.
-        anchors: (S, 3) of the joint to it, in the parent's frame [m].
-        axes: (S, 3) of that joint; the angle is positive about it.
+        attitude_of: (B,) index of each box's attitude.
+        carried_by: (A,) segment of each attitude.
+        parents: (S,) parent of each segment; -1 for the core's.
+        anchors: (S, 3) anchor of the joint to the parent, in the parent's frame [m].
+        axes: (S, 3) axis of that joint, of positive angles.
     """
 
     half_sizes: Float32s
@@ -55,90 +54,87 @@ class BoxModel:
 
 
 def box_model(robot: Robot, space: BodySpace, *, is_plain: bool) -> BoxModel:
-    """Return a robot as boxes.
+    """Return the box model of a robot.
 
     Args:
-        robot: a checked body; its brain is not looked at.
+        robot: a valid robot; its brain is ignored.
         space: its part types.
-        is_plain: one box for what a part has on a segment, without thin plates.
+        is_plain: one box per part and segment, without thin plates.
     """
     builder = _Builder(robot, space, is_plain=is_plain)
     for index in range(len(robot.parts)):
         builder.add(index)
-    return builder.done()
+    return builder.model()
 
 
-def place(
-    box_model: BoxModel, roots: Floats, angles: Floats
-) -> tuple[Float32s, Float32s]:
-    """Return where a figure's boxes are.
+def place(model: BoxModel, roots: Floats, angles: Floats) -> tuple[Float32s, Float32s]:
+    """Return the places of a model's boxes.
 
     Args:
-        box_model: the body.
+        model: the body.
         roots: (T, 7) position x, y, z [m] and attitude w, x, y, z of the core.
-        angles: (T, J) of all joints, by ascending part [rad].
+        angles: (T, J) joint angles, by ascending part [rad].
 
     Returns:
         Centres (T, B, 3) [m] and attitudes (T, B, 4) x, y, z, w, world frame.
     """
     turns = [roots[:, [4, 5, 6, 3]]]
     places = [roots[:, :3]]
-    for joint, parent in enumerate(box_model.parents[1:]):
+    for joint, parent in enumerate(model.parents[1:]):
         half = 0.5 * angles[:, joint : joint + 1]
-        turn = np.hstack([np.sin(half) * box_model.axes[joint + 1], np.cos(half)])
-        offset = rotated(turns[parent], box_model.anchors[joint + 1])
+        turn = np.hstack([np.sin(half) * model.axes[joint + 1], np.cos(half)])
+        offset = rotated(turns[parent], model.anchors[joint + 1])
         places.append(places[parent] + offset)
         turns.append(product(turns[parent], turn))
     turned, placed = np.stack(turns, axis=1), np.stack(places, axis=1)
-    centres = placed[:, box_model.segments] + rotated(
-        turned[:, box_model.segments], box_model.centres
+    centres = placed[:, model.segments] + rotated(
+        turned[:, model.segments], model.centres
     )
-    attitudes = product(turned[:, box_model.carried_by], box_model.attitudes)
+    attitudes = product(turned[:, model.carried_by], model.attitudes)
     return (
         centres.astype(np.float32),
-        attitudes[:, box_model.attitude_of].astype(np.float32),
+        attitudes[:, model.attitude_of].astype(np.float32),
     )
 
 
-def place_rows(box_model: BoxModel, rows: pa.Table) -> tuple[Float32s, Float32s]:
-    """Return where a figure's boxes are, as ``place`` does, from rows of poses."""
+def place_rows(model: BoxModel, rows: pa.Table) -> tuple[Float32s, Float32s]:
+    """Return the places of a model's boxes, as ``place`` does, from rows of poses."""
     axes = ("x", "y", "z", "qw", "qx", "qy", "qz")
     roots = np.stack([rows[axis].to_numpy() for axis in axes], axis=1)
     angles = rows["angles"].combine_chunks().flatten().to_numpy()
     return place(
-        box_model,
+        model,
         roots.astype(np.float64),
         angles.astype(np.float64).reshape(len(roots), -1),
     )
 
 
 def neutral_pose(
-    box_model: BoxModel, spot: tuple[float, float]
+    model: BoxModel, spot: tuple[float, float]
 ) -> tuple[Float32s, Float32s]:
-    """Return where boxes are of a robot in neutral pose that touches the ground.
+    """Return the places of a model's boxes in neutral pose, standing on the ground.
 
     Args:
-        box_model: the body.
-        spot: of the core's centre in the ground plane, world frame [m].
+        model: the body.
+        spot: place of the core's centre in the ground plane, world frame [m].
 
     Returns:
         Centres (1, B, 3) and attitudes (1, B, 4), as ``place`` does.
     """
     root = np.array([[*spot, 0.0, 1.0, 0.0, 0.0, 0.0]])
-    centres, attitudes = place(
-        box_model, root, np.zeros((1, len(box_model.parents) - 1))
-    )
-    # Of a turned box the sum over its axes' heights reaches deepest.
+    centres, attitudes = place(model, root, np.zeros((1, len(model.parents) - 1)))
+    # The lowest corner of a turned box is below its centre by the sum of the heights
+    # of its half axes.
     axes = np.stack(
         [rotated(attitudes.astype(np.float64), axis) for axis in np.eye(3)], axis=-1
     )
-    reach = np.abs(axes[..., 2, :] * box_model.half_sizes).sum(axis=-1)
+    reach = np.abs(axes[..., 2, :] * model.half_sizes).sum(axis=-1)
     centres[..., 2] -= (centres[..., 2] - reach).min()
     return centres, attitudes
 
 
 class _Builder:
-    """Gathers the boxes and segments of one robot, part by part."""
+    """Collects the boxes and segments of one robot, part by part."""
 
     def __init__(self, robot: Robot, space: BodySpace, *, is_plain: bool) -> None:
         self.parts = robot.parts
@@ -183,7 +179,7 @@ class _Builder:
         self.rows.append((segment, number, centre, half, colour))
 
     def _attitude(self, segment: int, matrix: Floats) -> tuple[int, Floats]:
-        """Return a known attitude that differs by right angles, and by which."""
+        """Return an attitude that differs by right angles, and this rotation."""
         for number, (owner, known) in enumerate(self.attitudes):
             quotient = known.T @ matrix
             if owner == segment and np.abs(quotient).max(axis=0).min() > 1.0 - 1e-9:
@@ -191,7 +187,7 @@ class _Builder:
         self.attitudes.append((segment, matrix))
         return len(self.attitudes) - 1, np.eye(3)
 
-    def done(self) -> BoxModel:
+    def model(self) -> BoxModel:
         rows = sorted(self.rows, key=lambda row: row[:2])
         colours = np.array([row[4] for row in rows])
         origins = np.array(self.origins)
@@ -211,7 +207,7 @@ class _Builder:
 
 
 def _plain(boxes: Iterable[Box]) -> list[Box]:
-    """Return one box for those of a segment; plates only where nothing else is."""
+    """Return one box per segment that encloses its boxes; plates only if alone."""
     found: list[Box] = []
     for segment in (0, 1):
         own = [box for box in boxes if box.segment == segment]
@@ -228,3 +224,41 @@ def _plain(boxes: Iterable[Box]) -> list[Box]:
                 Box("all", tuple(size), tuple(middle), 0.0, segment, chosen[0].rotation)
             )
     return found
+
+
+def quaternion(matrix: Floats) -> Floats:
+    """Return the unit quaternion x, y, z, w of a rotation matrix.
+
+    Source: Bar-Itzhack 2000, New method for extracting the quaternion from a
+    rotation matrix: the greatest eigenvector of a symmetric matrix.
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix.tolist()
+    symmetric = [
+        [xx - yy - zz, yx + xy, zx + xz, zy - yz],
+        [yx + xy, yy - xx - zz, zy + yz, xz - zx],
+        [zx + xz, zy + yz, zz - xx - yy, yx - xy],
+        [zy - yz, xz - zx, yx - xy, xx + yy + zz],
+    ]
+    _, vectors = np.linalg.eigh(np.array(symmetric))
+    greatest: Floats = vectors[:, -1]
+    return greatest
+
+
+def product(first: Floats, second: Floats) -> Floats:
+    """Return the products of quaternions x, y, z, w, broadcast."""
+    vector, scalar = first[..., :3], first[..., 3:]
+    other, rest = second[..., :3], second[..., 3:]
+    return np.concatenate(
+        [
+            scalar * other + rest * vector + np.cross(vector, other),
+            scalar * rest - (vector * other).sum(axis=-1, keepdims=True),
+        ],
+        axis=-1,
+    )
+
+
+def rotated(turns: Floats, points: Floats) -> Floats:
+    """Return points rotated by quaternions x, y, z, w, broadcast."""
+    vector, scalar = turns[..., :3], turns[..., 3:]
+    across = 2.0 * np.cross(vector, points)
+    return points + scalar * across + np.cross(vector, across)

@@ -1,4 +1,4 @@
-"""What is told to a recording: moments, motion, kinship, and the names of entities."""
+"""Names of a recording's entities, and the data that is logged to them."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from schema.robot.ids import BirthId
 
 @dataclass(frozen=True, slots=True)
 class TimePoint:
-    """A moment: simulated time [s], None off-line, and births so far, if known."""
+    """Simulated time [s], None off-line, and births so far, if known."""
 
     sim_time_s: float | None = None
     births: int | None = None
@@ -19,7 +19,7 @@ class TimePoint:
 
 @dataclass(frozen=True, slots=True)
 class PoseBatch:
-    """T poses of one robot, at times (T,) [s] and after so many births (T,), if any."""
+    """T poses of one robot, their times (T,) [s] and births so far (T,), if known."""
 
     sim_time_s: npt.NDArray[np.float64]
     births: npt.NDArray[np.int64] | None
@@ -29,13 +29,18 @@ class PoseBatch:
 
 @dataclass(frozen=True, slots=True)
 class FamilyTree:
-    """One individual in the ancestry: column and row in the picture, and parents."""
+    """An individual in the ancestry graph: column, row (its rank) and parents."""
 
     birth: BirthId
     order: int
     rank: int
     parents: tuple[BirthId, ...]
     is_alive: bool
+
+
+def name_of(birth: BirthId) -> str:
+    """Return the name of an individual as ISLAND:BIRTH."""
+    return f"{birth.island}:{birth.number}"
 
 
 def island_path(island: int) -> str:
@@ -49,5 +54,5 @@ def robot_path(island: int, birth: BirthId) -> str:
 
 
 def motion_path(birth: BirthId) -> str:
-    """Return the entity of a robot that does again what it did."""
+    """Return the entity of a re-simulated robot."""
     return f"motion/{birth.island}-{birth.number}"

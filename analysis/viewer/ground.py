@@ -1,4 +1,4 @@
-"""What rises above the plane of an arena, as triangles to draw."""
+"""Rough ground and scenery as triangle meshes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +13,9 @@ from schema.robot.results import Floats
 
 _EARTH = (0.78, 0.76, 0.72, 1.0)
 _AROUND, _ACROSS = 24, 14
-"""Faces of round shapes: about their axis, and from pole to pole."""
+"""Faces of round shapes around their axis, and points from pole to pole."""
 _LID: Floats = np.array([(0.0, -1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 1.0)])
-"""Distances from the axis and heights of what is straight."""
+"""Outline of boxes and cylinders: distances from the axis, and heights."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Surface:
 
     @property
     def normals(self) -> Float32s:
-        """Which way each triangle faces, (T, 3) of length 1; 0 if it is a line."""
+        """Unit normal of each triangle, (T, 3); 0 if the triangle has no area."""
         first, second, third = self.corners.transpose(1, 0, 2)
         normals: Float32s = np.cross(second - first, third - first)
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -42,16 +42,16 @@ class Surface:
 
 
 def surfaces(environment: Environment, simulation: Simulation) -> tuple[Surface, ...]:
-    """Return rough ground and scenery.
+    """Return the surfaces of rough ground and scenery.
 
     Raises:
-        ExperimentError: scenery that is none.
+        ExperimentError: the scenery is invalid.
     """
     found = []
     if environment.roughness_m:
         found.append(_rough(environment))
     if environment.scenery:
-        # The engine is loaded for scenery only: nothing else here needs it.
+        # Imports MuJoCo, which only scenery needs.
         from schema.experiment.scenery import solids  # noqa: PLC0415
 
         for solid in solids(environment.scenery, simulation):
@@ -72,12 +72,11 @@ def _rough(environment: Environment) -> Surface:
 def _solid(shape: str, size: Sequence[float]) -> Floats:
     """Return the triangles of a shape in its own frame, (T, 3, 3) [m].
 
-    All shapes are outlines that are turned about z, and stretched: a box is one of
-    four faces.
+    All shapes are stretched solids of revolution about z; a box has four faces.
 
     Args:
-        shape: as ``schema.experiment.scenery.Solid`` has it.
-        size: likewise.
+        shape: as in ``schema.experiment.scenery.Solid``.
+        size: as in ``schema.experiment.scenery.Solid``.
     """
     a, b, c = size
     angles = np.linspace(-0.5 * pi, 0.5 * pi, _ACROSS)
@@ -89,7 +88,7 @@ def _solid(shape: str, size: Sequence[float]) -> Floats:
     elif shape == "cylinder":
         outline, stretch = _LID, (a, a, b)
     elif shape == "capsule":
-        # Half of an even number of points is above, half below.
+        # Half of the points, whose number is even, is above, half below.
         outline[:, 1] += b / a * np.sign(outline[:, 1])
     elif shape == "ellipsoid":
         stretch = (a, b, c)
@@ -98,11 +97,11 @@ def _solid(shape: str, size: Sequence[float]) -> Floats:
 
 
 def _turned(outline: Floats, faces: int) -> Floats:
-    """Return the triangles of an outline, from below, that is turned about z.
+    """Return the triangles of a solid of revolution about z.
 
     Args:
-        outline: (K, 2) distances from the axis, and heights.
-        faces: about the axis, the first centred on x.
+        outline: (K, 2) distances from the axis and heights, from below.
+        faces: number of faces around the axis, the first centred on x.
     """
     reach, height = outline.T[:, :, None]
     angles = 2.0 * pi * (np.arange(faces + 1) - 0.5) / faces
@@ -111,10 +110,10 @@ def _turned(outline: Floats, faces: int) -> Floats:
 
 
 def _triangles(nodes: Floats) -> Floats:
-    """Return two triangles for each mesh of a net, (2 (K - 1) (L - 1), 3, 3).
+    """Return two triangles per cell of a grid, (2 (K - 1) (L - 1), 3, 3).
 
     Args:
-        nodes: (K, L, 3) of the net; seen from outside, columns go right, rows up.
+        nodes: (K, L, 3) nodes; seen from outside, columns go right and rows up.
     """
     here, right = nodes[:-1, :-1], nodes[:-1, 1:]
     above, across = nodes[1:, :-1], nodes[1:, 1:]

@@ -1,4 +1,4 @@
-"""The ancestry as a picture: the newest births in a row, each at its rank."""
+"""Ancestry graph: the newest births from left to right, at the height of their rank."""
 
 from collections import OrderedDict
 from dataclasses import dataclass
@@ -9,9 +9,9 @@ from schema.robot.ids import BirthId
 from schema.wire.updates import Birth, Death, Level
 
 _MOST = 150
-"""Births that are shown; more are neither seen nor drawn in time."""
+"""Births that are shown; more cannot be distinguished or drawn in time."""
 _EVERY = 10
-"""A graph is told whole, so only every so many births."""
+"""Births between two drawings: Rerun needs the whole graph each time."""
 
 
 @dataclass(slots=True)
@@ -22,10 +22,9 @@ class _Entry:
 
 
 class Lineage:
-    """Who descends from whom, as far as it is shown."""
+    """Ancestry of the newest births, with those that are alive."""
 
     def __init__(self, recording: Recording) -> None:
-        """Know nobody yet."""
         self._recording = recording
         self._entries: OrderedDict[BirthId, _Entry] = OrderedDict()
         self._known: set[BirthId] = set()
@@ -47,11 +46,12 @@ class Lineage:
         return True
 
     def remove(self, gone: Death) -> None:
-        """Note that somebody does not live any more."""
-        self._die(gone.birth)
+        """Mark a robot as dead."""
+        if gone.birth in self._entries:
+            self._entries[gone.birth].is_alive = False
 
     def keep(self, level: Level) -> None:
-        """Note that of an island's births only those of a level live."""
+        """Mark all robots of an island as dead that are not in its population."""
         members = set(level.members)
         for birth, entry in self._entries.items():
             is_here = birth.island == level.island
@@ -59,7 +59,7 @@ class Lineage:
                 entry.is_alive = birth in members
 
     def draw(self) -> None:
-        """Draw what is new."""
+        """Draw the graph if there are new births."""
         if not self._undrawn:
             return
         self._undrawn = 0
@@ -77,7 +77,3 @@ class Lineage:
             ],
             self._latest,
         )
-
-    def _die(self, birth: BirthId) -> None:
-        if birth in self._entries:
-            self._entries[birth].is_alive = False

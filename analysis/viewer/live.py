@@ -1,7 +1,7 @@
-"""What comes over the network from a run that is watched.
+"""Receives the messages of a live run from the network.
 
-The network's threads only put aside; what is not fetched in time is dropped, oldest
-first, so that a slow viewer needs no more memory and holds nobody up.
+The network's threads only queue messages. If the queue is full the oldest messages are
+dropped, so that a slow viewer neither needs more memory nor blocks the run.
 """
 
 import threading
@@ -27,19 +27,18 @@ from schema.wire.arena_codec import Live, decode_live
 from schema.wire.updates import Update, decode_update
 
 _MOST = 2000
-"""Messages that wait at most."""
+"""Most messages in the queue."""
 _ASK_AGAIN_S = 3.0
 
 
 class Sequel:
-    """Tells from the numbers of news whether some were lost.
+    """Detects lost messages by their sequence numbers.
 
     Attributes:
-        is_behind: all there is should be asked for.
+        is_behind: the complete state must be requested.
     """
 
     def __init__(self) -> None:
-        """Know of nothing: all is to be asked for."""
         self.is_behind = True
         self._run = ""
         self._last = (0, 0)
@@ -63,29 +62,29 @@ class Sequel:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """The coordinator is gone."""
+    """Event: the coordinator has left the network."""
 
 
 Told = Update | Live | Ended
 
 
 class LiveSource:
-    """A viewer's end of the network; use it in a ``with``.
+    """A viewer's connection to the network; a context manager.
 
     Attributes:
-        malformed: messages that did not decode; they were dropped.
+        malformed: number of messages that could not be decoded and were dropped.
     """
 
     def __init__(self, connect: str, fleet: str, tls: Tls | None) -> None:
-        """Prepare, open nothing.
+        """Check the address; ``__enter__`` connects.
 
         Args:
             connect: address of the hub.
             fleet: name of the fleet.
-            tls: files, for a ``tls/`` address.
+            tls: certificate files, for a ``tls/`` address.
 
         Raises:
-            NetworkError: a name or an address that is none.
+            NetworkError: the name or the address is invalid.
         """
         self.malformed = 0
         self._fleet = check_name(fleet, "fleet")
@@ -98,10 +97,10 @@ class LiveSource:
         self._asked_s = -_ASK_AGAIN_S
 
     def __enter__(self) -> Self:
-        """Open the session and listen.
+        """Open the session and subscribe.
 
         Raises:
-            NetworkError: no hub is there.
+            NetworkError: no hub answers.
         """
         zenoh.init_log_from_env_or("error")
         with ExitStack() as opened:
@@ -130,11 +129,11 @@ class LiveSource:
         self._has_news.set()
 
     def receive(self, timeout_s: float, now_s: float) -> list[Told]:
-        """Return what came, in order; ask for all there is where some was lost.
+        """Return the messages received, in order; request lost ones again.
 
         Args:
-            timeout_s: how long to wait when nothing is there [s].
-            now_s: the time, of any clock that only goes forward [s].
+            timeout_s: time to wait for a message [s].
+            now_s: time of a monotonic clock [s].
         """
         self._has_news.wait(timeout_s)
         self._has_news.clear()
@@ -179,7 +178,7 @@ class LiveSource:
         return None if self._coordinators else Ended()
 
     def _ask(self) -> None:
-        """Ask all coordinators; no thread of this process waits for it."""
+        """Request the complete state from all coordinators, without waiting."""
         for member in self._coordinators.values():
             self._session.get(
                 member.state,

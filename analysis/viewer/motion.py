@@ -1,4 +1,4 @@
-"""Robots that are shown by themselves, in full motion: who, and how."""
+"""Selection and display of re-simulated robots."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.viewer.body import BoxModel, place_rows
-from analysis.viewer.entities import PoseBatch, TimePoint, motion_path
+from analysis.viewer.entities import PoseBatch, TimePoint, motion_path, name_of
 from analysis.viewer.recording import Recording, ViewerError
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
@@ -17,30 +17,32 @@ from schema.wire.updates import individual
 
 LANE_M = 0.8
 LANES = 4
-"""Robots that moved alone are shown side by side, so far apart [m], so many a row."""
+"""Robots that were simulated alone are shown side by side: distance [m], and robots
+per row."""
 
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """How a robot moved, and a line that tells whether it is what was recorded."""
+    """Motion of a re-simulated robot, and a line of text that compares it."""
 
     birth: BirthId
     poses: pa.Table
     verdict: str
 
 
-def chosen(
+def selected_robots(
     folder: Path, wanted: Iterable[BirthId], *, has_ancestry: bool
 ) -> list[BirthId]:
     """Return the robots of ``--robot``, each once, in their order.
 
     Args:
-        folder: of the run.
-        wanted: who.
-        has_ancestry: with each its first parent, and so on, back to a founder.
+        folder: the run folder.
+        wanted: robots named by the user.
+        has_ancestry: add the first parent of each robot, its first parent, and so on,
+            back to a founder.
 
     Raises:
-        ViewerError: nobody of that name was born.
+        ViewerError: no robot of that name was born.
     """
     births = read_table(folder, "births").select(["island", "birth", "parents"])
     parents = {
@@ -51,7 +53,7 @@ def chosen(
     for birth in wanted:
         if birth not in parents:
             name = name_of(birth)
-            raise ViewerError(f"--robot {name}: nobody of that name was born")
+            raise ViewerError(f"--robot {name}: no robot of that name was born")
         found[birth] = None
         last = birth
         while has_ancestry and parents[last]:
@@ -62,18 +64,18 @@ def chosen(
 
 
 def best_evaluated(folder: Path) -> tuple[BirthId, float]:
-    """Return the fittest of all that a run ever judged, the first of equals.
+    """Return the fittest robot that a run ever evaluated, the first of equal ones.
 
-    It may have died since: the best of the last population is another, then.
+    The robot may be dead, and is then fitter than the best of the last population.
 
     Args:
-        folder: of the run.
+        folder: the run folder.
 
     Returns:
-        Who, and its fitness [m/s].
+        The robot and its fitness [m/s].
 
     Raises:
-        ViewerError: nobody was judged.
+        ViewerError: no robot was evaluated.
     """
     alone = read_table(folder, "evaluations")
     together = read_table(folder, "fitness")
@@ -81,34 +83,29 @@ def best_evaluated(folder: Path) -> tuple[BirthId, float]:
     found = [(pc.max(rows["fitness"]).as_py(), rows) for rows in judged]
     known = [(best, rows) for best, rows in found if best is not None]
     if not known:
-        raise ViewerError(f"{folder}: nobody has been judged yet")
+        raise ViewerError(f"{folder}: no robot has been evaluated yet")
     best, rows = max(known, key=lambda one: one[0])
     (row,) = rows.filter(pc.equal(rows["fitness"], best)).slice(0, 1).to_pylist()
     return individual(row), best
 
 
 def show_motion(
-    recording: Recording, motion: Motion, box_model: BoxModel, lane: int | None
+    recording: Recording, motion: Motion, model: BoxModel, lane: int | None
 ) -> None:
-    """Show how a robot moved.
+    """Show the motion of a robot.
 
     Args:
-        recording: to fill.
-        motion: of the robot.
-        box_model: its body.
-        lane: which lane it is shown in, from 0; where it was if None.
+        recording: recording to log to.
+        motion: motion of the robot.
+        model: model of the robot.
+        lane: lane that it is shown in, from 0; None shows it at its recorded place.
     """
     path = motion_path(motion.birth)
     times = motion.poses["sim_time_s"].to_numpy()
-    centres, attitudes = place_rows(box_model, motion.poses)
+    centres, attitudes = place_rows(model, motion.poses)
     if lane is not None:
         row, column = divmod(lane, LANES)
         centres[..., :2] += LANE_M * np.array([column, row], dtype=np.float32)
-    recording.born(path, box_model, TimePoint(float(times[0])))
+    recording.born(path, model, TimePoint(float(times[0])))
     recording.moved(path, PoseBatch(times, None, centres, attitudes))
-    recording.said(motion.verdict, TimePoint(float(times[0])), "INFO")
-
-
-def name_of(birth: BirthId) -> str:
-    """Return how an individual is called: ISLAND:BIRTH."""
-    return f"{birth.island}:{birth.number}"
+    recording.log_line(motion.verdict, TimePoint(float(times[0])), "INFO")

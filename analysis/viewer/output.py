@@ -1,4 +1,4 @@
-"""Where a recording goes: a file, viewers that come, or a window that is opened."""
+"""Destinations of a recording: a file, a server for viewers, or a window."""
 
 import contextlib
 import shlex
@@ -20,12 +20,12 @@ _POLL_S = 0.2
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """Where a recording is to go.
+    """Destinations of a recording.
 
     Attributes:
-        file: to write, or None.
-        serve: host and port for viewers to come to, or None.
-        has_window: a viewer's window is to be opened.
+        file: file to write, or None.
+        serve: host and port to serve viewers at, or None.
+        has_window: open a viewer's window.
     """
 
     file: Path | None
@@ -34,16 +34,16 @@ class Output:
 
     @classmethod
     def of(cls, save: Path | None, serve: str | None) -> "Output":
-        """Return what two flags ask for; a window if neither is given.
+        """Return the destinations of two flags; a window if neither is given.
 
         Raises:
-            ViewerError: an address that is none or in use; a folder that is not
-                there, or a file that no viewer would take for a recording.
+            ViewerError: the address is invalid or in use, the folder does not exist,
+                or the file does not end in .rrd.
         """
         if save is not None and save.suffix != _ENDING:
             raise ViewerError(f"--save {save}: must end in {_ENDING}")
         if save is not None and not save.absolute().parent.is_dir():
-            raise ViewerError(f"--save {save}: there is no folder {save.parent}")
+            raise ViewerError(f"--save {save}: no such folder: {save.parent}")
         if serve is not None:
             return cls(save, _address(serve), has_window=False)
         if save is not None:
@@ -52,27 +52,27 @@ class Output:
 
     @property
     def url(self) -> str:
-        """Return where viewers connect to; empty if nobody can."""
+        """Address that viewers connect to; empty without a server."""
         if self.serve is None:
             return ""
         return f"rerun+http://{self.serve[0]}:{self.serve[1]}/proxy"
 
 
 class Window:
-    """A viewer's window, if one was asked for; it outlives this process."""
+    """A viewer's window, if requested; it stays open after this process ends."""
 
     def __init__(self, output: Output) -> None:
-        """Open it, or say where viewers may connect to.
+        """Open the window, or print the address that viewers connect to.
 
         Raises:
-            ViewerError: there is no screen, most likely.
+            ViewerError: the window cannot be opened, probably for lack of a screen.
         """
         self._process: subprocess.Popen[bytes] | None = None
         if not output.has_window:
             if output.url:
-                tell_user(f"serving; to look: rerun --connect {output.url}")
+                tell_user(f"serving; to view: rerun --connect {output.url}")
             return
-        # Its own server, which nothing here needs, stays on this machine.
+        # The viewer's own server, which is not used, listens on this machine only.
         command = [sys.executable, "-m", "rerun", "--bind", HOST, "--connect"]
         self._process = subprocess.Popen(  # noqa: S603 - our own interpreter
             [*command, output.url],
@@ -85,16 +85,16 @@ class Window:
 
     @property
     def was_closed(self) -> bool:
-        """A window was opened and has been closed.
+        """Whether a window was opened and has been closed.
 
         Raises:
-            ViewerError: it never opened, which a slow machine may tell late.
+            ViewerError: the window could not be opened; a slow machine reports it late.
         """
         ended = None if self._process is None else self._process.poll()
         if ended is not None and ended > 0:
             raise ViewerError(
-                "the viewer cannot open a window: without a screen use --save FILE, or "
-                "--serve and look from another machine"
+                "the viewer cannot open a window; without a screen use --save FILE, or "
+                "--serve and a viewer on another machine"
             )
         return ended is not None
 
@@ -102,15 +102,15 @@ class Window:
 def keep_serving(
     output: Output, window: Window, recording: Recording, stop: threading.Event
 ) -> None:
-    """Keep serving what is complete, for as long as somebody may look at it."""
+    """Keep serving a complete recording until the user stops or closes the viewer."""
     recording.flush()
     if output.file is not None:
         command = shlex.join(["rerun", str(output.file)])
-        tell_user(f"saved {output.file}; to look: {command}")
+        tell_user(f"saved {output.file}; to view: {command}")
     if output.serve is None:
         return
     if not (output.has_window or stop.is_set()):
-        tell_user("all is there; Ctrl-C ends")
+        tell_user("recording complete; press Ctrl-C to stop")
     while not (stop.is_set() or window.was_closed):
         stop.wait(_POLL_S)
 

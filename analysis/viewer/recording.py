@@ -1,13 +1,12 @@
-"""What goes into a Rerun recording, and how: the one file that logs.
+"""A Rerun recording; the only module that logs to it.
 
-A robot is one entity with its boxes as instances; geometry comes with the birth,
-poses as batches of columns, a ``Clear`` at the death. Times are whole nanoseconds.
-All of it is logged from one thread, for the current time is a thread's own.
+A robot is one entity with its boxes as instances. Geometry is logged at the birth,
+poses as batches of columns, and a ``Clear`` at the death. Times are integer
+nanoseconds. Rerun keeps the current time per thread, so one thread logs everything.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -15,11 +14,16 @@ import numpy.typing as npt
 import rerun as rr
 
 from analysis.viewer.body import BoxModel, Float32s
-from analysis.viewer.entities import FamilyTree, PoseBatch, TimePoint, island_path
+from analysis.viewer.entities import (
+    FamilyTree,
+    PoseBatch,
+    TimePoint,
+    island_path,
+    name_of,
+)
 from analysis.viewer.ground import Surface
 from analysis.viewer.scene import Scene
 from schema.errors import RevolveError
-from schema.robot.ids import BirthId
 
 APPLICATION = "revolve"
 SIMULATED = "sim_time"
@@ -33,7 +37,7 @@ _HUES = (
     (0, 114, 178), (230, 159, 0), (0, 158, 115), (204, 121, 167),
     (213, 94, 0), (86, 180, 233), (240, 228, 66), (150, 150, 150),
 )  # fmt: skip
-"""Of islands side by side. Source: Okabe and Ito, 2008."""
+"""Colours of islands. Source: Okabe and Ito, 2008."""
 _MEMORY = "512MiB"
 
 
@@ -42,7 +46,7 @@ class ViewerError(RevolveError):
 
 
 class Recording:
-    """An open recording, to a file or a server or both; use it in a ``with``."""
+    """An open recording to a file, a server or both; a context manager."""
 
     def __init__(
         self,
@@ -52,16 +56,17 @@ class Recording:
         file: Path | None = None,
         serve: tuple[str, int] | None = None,
     ) -> None:
-        """Open it.
+        """Open the recording.
 
         Args:
-            name: of the recording; only letters, digits and ``_-.`` of it count.
-            blueprint: how it is to be shown.
-            file: to write to.
-            serve: host and port for viewers to come to; it never waits for them.
+            name: name of the recording; other characters than letters, digits, ``_``
+                and ``-`` are replaced.
+            blueprint: layout of the viewer.
+            file: file to write.
+            serve: host and port to serve viewers at; logging never waits for them.
 
         Raises:
-            ViewerError: the file cannot be written, or nothing served there.
+            ViewerError: the file cannot be written, or the port cannot be served.
         """
         kept = "".join(c if c.isalnum() or c in "_-" else "-" for c in name)
         self._stream = rr.RecordingStream(APPLICATION, recording_id=kept)
@@ -77,34 +82,28 @@ class Recording:
         try:
             self._stream.set_sinks(*sinks, default_blueprint=blueprint)
         except RuntimeError as error:
-            raise ViewerError(f"nothing can be recorded: {error}") from None
+            raise ViewerError(f"cannot open the recording: {error}") from None
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Write what waits, and the file's end."""
+    def __exit__(self, *_: object) -> None:
         self._stream.flush()
         self._stream.disconnect()
 
     def flush(self) -> None:
-        """Bring what was logged to the file."""
+        """Write buffered data to the file."""
         self._stream.flush()
 
     # --- arenas and robots --------------------------------------------------
 
     def add_scene(self, scene: Scene) -> None:
-        """Tell of all islands of a run, before anything happens there."""
+        """Log the islands of a run, before any robot."""
         is_alone = len(scene.islands) == 1
         grounds = zip(scene.islands, scene.walls, scene.surfaces, strict=True)
         for island, walls, surfaces in grounds:
             self._island(island, walls, is_alone=is_alone)
-            # Off-line populations hang side by side: no ground is below them.
+            # Off-line populations are shown on a grid, without ground.
             if island in scene.arenas:
                 self.ground(island_path(island), surfaces)
 
@@ -115,12 +114,12 @@ class Recording:
         *,
         is_alone: bool,
     ) -> None:
-        """Tell which way is up on an island, and what stands around it.
+        """Log the axes, walls and styles of the curves of an island.
 
         Args:
-            island: its number.
-            walls: centre, attitude (7,) and half sizes (3,) of each.
-            is_alone: there is no other one whose curves stand beside its.
+            island: number of the island.
+            walls: centre and attitude (7,), and half sizes (3,) of each wall.
+            is_alone: the run has no other island.
         """
         path = island_path(island)
         self.upright(path)
@@ -148,11 +147,11 @@ class Recording:
             )
 
     def ground(self, path: str, surfaces: Sequence[Surface]) -> None:
-        """Show what rises above a plane.
+        """Log ground and scenery.
 
         Args:
-            path: of the entity that it belongs to.
-            surfaces: of all of it.
+            path: entity that it belongs to.
+            surfaces: surfaces above the plane.
         """
         for number, surface in enumerate(surfaces):
             mesh = rr.Mesh3D(
@@ -162,16 +161,16 @@ class Recording:
             )
             self._stream.log(f"{path}/ground/{number}", mesh, static=True)
 
-    def born(self, path: str, box_model: BoxModel, when: TimePoint) -> None:
-        """Give a robot its boxes, from a moment on."""
+    def born(self, path: str, model: BoxModel, when: TimePoint) -> None:
+        """Log the boxes of a robot, from a time on."""
         self._at(when)
         boxes = rr.Boxes3D.from_fields(
-            half_sizes=box_model.half_sizes, colors=box_model.colours, fill_mode="solid"
+            half_sizes=model.half_sizes, colors=model.colours, fill_mode="solid"
         )
         self._stream.log(path, boxes)
 
     def moved(self, path: str, moves: PoseBatch) -> None:
-        """Add poses of a robot, all at once."""
+        """Log poses of a robot in one batch."""
         rows, count, _ = moves.centres.shape
         index = [rr.TimeColumn(SIMULATED, duration=_nanoseconds(moves.sim_time_s))]
         if moves.births is not None:
@@ -180,19 +179,15 @@ class Recording:
             centers=moves.centres.reshape(-1, 3),
             quaternions=moves.attitudes.reshape(-1, 4),
         )
-        self._stream.send_columns(
-            path,
-            index,
-            columns.partition([count] * rows),
-        )
+        self._stream.send_columns(path, index, columns.partition([count] * rows))
 
     def stands(self, path: str, centres: Float32s, attitudes: Float32s) -> None:
-        """Put a robot where it stays, at the moment of what was logged before."""
+        """Log the place of a robot that does not move, at the time logged last."""
         boxes = rr.Boxes3D.from_fields(centers=centres[0], quaternions=attitudes[0])
         self._stream.log(path, boxes)
 
     def died(self, path: str, when: TimePoint) -> None:
-        """Let a robot vanish."""
+        """Remove a robot from the view."""
         self._at(when)
         self._stream.log(path, rr.Clear(recursive=True))
 
@@ -201,13 +196,13 @@ class Recording:
     def level(
         self, island: int, when: TimePoint, size: int, fitness: Sequence[float]
     ) -> None:
-        """Add to an island's curves.
+        """Log size and fitness of an island's population.
 
         Args:
-            island: its number.
-            when: the moment.
-            size: how many live.
-            fitness: mean and best, or nothing if nobody was judged.
+            island: number of the island.
+            when: time of the population.
+            size: number of living robots.
+            fitness: mean and best; empty if no robot was evaluated.
         """
         self._at(when)
         path = island_path(island)
@@ -216,29 +211,29 @@ class Recording:
             self._stream.log(f"{path}/fitness", rr.Scalars(list(fitness)))
 
     def upright(self, path: str) -> None:
-        """Tell that z is up there."""
+        """Log that z is up for an entity."""
         self._stream.log(path, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
-    def said(self, text: str, when: TimePoint, level: str) -> None:
-        """Add a line to the log; "INFO" of what goes on, "WARN" of ends."""
+    def log_line(self, text: str, when: TimePoint, level: str) -> None:
+        """Add a line of level "INFO" or "WARN" to the log."""
         self._at(when)
         self._stream.log("log", rr.TextLog(text, level=level))
 
-    def ancestry(self, relatives: Iterable[FamilyTree], when: TimePoint) -> None:
-        """Draw who descends from whom, anew."""
+    def ancestry(self, entries: Sequence[FamilyTree], when: TimePoint) -> None:
+        """Log the whole ancestry graph."""
         self._at(when)
-        entries = list(relatives)
         shown = {each.birth for each in entries}
+        names = [name_of(each.birth) for each in entries]
         nodes = rr.GraphNodes(
-            [_name(each.birth) for each in entries],
+            names,
             positions=[(30.0 * each.order, 90.0 * each.rank) for each in entries],
             colors=[_ALIVE if each.is_alive else _DEAD for each in entries],
-            labels=[_name(each.birth) for each in entries],
+            labels=names,
             radii=[13.0 if each.is_alive else 8.0 for each in entries],
             show_labels=False,
         )
         edges = [
-            (_name(parent), _name(each.birth))
+            (name_of(parent), name_of(each.birth))
             for each in entries
             for parent in each.parents
             if parent in shown
@@ -247,12 +242,12 @@ class Recording:
         self._stream.log("ancestry", nodes, arrows)
 
     def process_pool(self, text: str) -> None:
-        """Tell who works, as Markdown."""
+        """Log the workers, as Markdown."""
         document = rr.TextDocument(text, media_type="text/markdown")
         self._stream.log("workers", document, static=True)
 
     def _at(self, when: TimePoint) -> None:
-        """Set the moment of what is logged next."""
+        """Set the time of the next data."""
         self._stream.reset_time()
         if when.sim_time_s is not None:
             time = np.timedelta64(round(when.sim_time_s * 1e9), "ns")
@@ -263,7 +258,3 @@ class Recording:
 
 def _nanoseconds(times_s: npt.NDArray[np.float64]) -> npt.NDArray[np.timedelta64]:
     return np.round(times_s * 1e9).astype("timedelta64[ns]")
-
-
-def _name(birth: BirthId) -> str:
-    return f"{birth.island}:{birth.number}"

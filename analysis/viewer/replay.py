@@ -1,4 +1,4 @@
-"""What the tables of a run tell, in the form in which it is told live."""
+"""Reads the tables of a run, in the form of the messages of a live run."""
 
 import json
 from collections.abc import Iterator
@@ -14,6 +14,7 @@ from schema.errors import RunFolderError
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Origin
+from schema.robot.ids import BirthId
 from schema.tables.files import FINISHED, campaign, read_table
 from schema.wire.updates import (
     Update,
@@ -24,7 +25,7 @@ from schema.wire.updates import (
 )
 
 CHUNK_S = 20.0
-"""Simulated time that is read and shown at once [s]."""
+"""Simulated time of the poses that are read and shown at once [s]."""
 
 _DETAILS = "run.json"
 _BORN = ("island", "birth", "parents", "rank", "body", "sim_time_s")
@@ -32,17 +33,17 @@ _BORN = ("island", "birth", "parents", "rank", "body", "sim_time_s")
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Simulated time from which poses are shown, and until when [s]."""
+    """Interval of simulated time whose poses are shown [s]."""
 
     start_s: float
     end_s: float
 
 
 def read_news(folder: Path) -> Update:
-    """Return all that a run's tables tell, but for poses.
+    """Return the contents of a run's tables, except poses.
 
     Raises:
-        RunFolderError: no run is there, or a table cannot be read.
+        RunFolderError: the folder has no run, or a table cannot be read.
     """
     details = _details(folder)
     counts: dict[int, int] = {}
@@ -51,7 +52,7 @@ def read_news(folder: Path) -> Update:
         counts[row["island"]] = counts.get(row["island"], 0) + 1
         births.append(read_birth(row, counts[row["island"]]))
     if not births:
-        raise RunFolderError(f"{folder}: nobody has been born yet")
+        raise RunFolderError(f"{folder}: no robot has been born yet")
     population = read_table(folder, "population").to_pylist()
     return Update(
         run=str(folder),
@@ -71,24 +72,24 @@ def read_experiment(folder: Path) -> Experiment:
     """Return the experiment of a run.
 
     Raises:
-        RunFolderError: no run is there.
-        ExperimentError: its document is of another version.
+        RunFolderError: the folder has no run.
+        ExperimentError: its document has another version.
     """
     return experiment_from_text(_details(folder)["document"])
 
 
 def read_origin(folder: Path) -> Origin:
-    """Return what the noise of a run was drawn by, on its island 0.
+    """Return seed and number of a run, which determine its noise, for island 0.
 
     Raises:
-        RunFolderError: no run is there.
+        RunFolderError: the folder has no run.
     """
     details = _details(folder)
     return Origin(seed=details["seed"], run=details["run"])
 
 
 def last_time(folder: Path) -> float:
-    """Return the newest simulated time of a run that its tables know of [s]."""
+    """Return the last simulated time in the tables of a run [s]."""
     times = [
         pc.max(read_table(folder, table)["sim_time_s"]).as_py() or 0.0
         for table in ("births", "fitness", "deaths")
@@ -97,33 +98,49 @@ def last_time(folder: Path) -> float:
 
 
 def read_poses(folder: Path, span: Span) -> Iterator[tuple[int, pa.Table]]:
-    """Return the poses of a span, arena by arena and bit by bit.
+    """Yield the poses of a span, in pieces of ``CHUNK_S``.
 
     Args:
         folder: the run folder.
-        span: which simulated time.
+        span: interval of simulated time.
 
-    Returns:
-        Numbers of islands, and their rows by time.
+    Yields:
+        Number of an island, and its rows by time.
 
     Raises:
         RunFolderError: the table cannot be read.
     """
     poses = _within(folder, span)
     times = poses["sim_time_s"].to_numpy()
-    bits = np.floor((times - span.start_s) / CHUNK_S).astype(np.int64)
-    for bit in np.unique(bits).tolist():
-        now = poses.filter(pa.array(bits == bit))
+    chunks = np.floor((times - span.start_s) / CHUNK_S).astype(np.int64)
+    for chunk in np.unique(chunks).tolist():
+        now = poses.filter(pa.array(chunks == chunk))
         for island in sorted(pc.unique(now["island"]).to_pylist()):
             rows = now.filter(pc.equal(now["island"], island))
             yield island, rows.sort_by("sim_time_s")
 
 
+def rows_by_robot(poses: pa.Table) -> Iterator[tuple[BirthId, pa.Table]]:
+    """Yield each robot's rows of poses in their order, robots ascending."""
+    born = poses["island"]
+    if "birth_island" in poses.column_names:
+        born = pc.coalesce(poses["birth_island"], born)
+    islands, numbers = born.to_numpy(), poses["birth"].to_numpy()
+    order = np.lexsort((numbers, islands))
+    poses = poses.take(order)
+    islands, numbers = islands[order], numbers[order]
+    is_new = (np.diff(islands) != 0) | (np.diff(numbers) != 0)
+    starts = [0, *(np.flatnonzero(is_new) + 1).tolist()] if len(order) else []
+    for start, end in zip(starts, [*starts[1:], len(order)], strict=True):
+        birth = BirthId(int(islands[start]), int(numbers[start]))
+        yield birth, poses.slice(start, end - start)
+
+
 def _details(folder: Path) -> dict[str, Any]:
-    """Return what a run folder says of its run.
+    """Return the description of a run.
 
     Raises:
-        RunFolderError: no run is there.
+        RunFolderError: the folder has no run.
     """
     try:
         details: dict[str, Any] = json.loads((folder / _DETAILS).read_text("utf-8"))
@@ -133,7 +150,7 @@ def _details(folder: Path) -> dict[str, Any]:
         why = f"{_DETAILS}: {error.strerror}"
     except (ValueError, KeyError, TypeError) as error:
         why = f"{_DETAILS}: {error}"
-    raise RunFolderError(f"{folder}: no run is there: {why}")
+    raise RunFolderError(f"{folder}: no run found: {why}")
 
 
 def _within(folder: Path, span: Span) -> pa.Table:

@@ -1,6 +1,6 @@
-"""Full motion of chosen robots, by simulating them again and comparing.
+"""Full motion of selected robots: simulates them again and compares the results.
 
-Whoever simulates is handed in: rooms do not know each other.
+The simulators are passed in, because rooms do not import each other.
 """
 
 from collections.abc import Callable, Iterator
@@ -12,7 +12,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from msgspec.structs import replace
 
-from analysis.viewer.motion import Motion, name_of
+from analysis.viewer.entities import name_of
+from analysis.viewer.motion import Motion
 from analysis.viewer.recording import ViewerError
 from analysis.viewer.replay import read_origin
 from schema.agent.platform_tag import platform_tag
@@ -37,34 +38,29 @@ _COMPARED = ("fitness", "path_velocity", "straight_velocity", "simulated_s")
 
 
 class ReplayedStep(Protocol):
-    """A step of an arena that is done again; see ``worker.arena.replay``."""
-
-    @property
-    def step(self) -> int:
-        """Reached."""
+    """One advance of a replayed arena; see ``worker.arena.replay``."""
 
     @property
     def is_equal(self) -> bool:
-        """Its state is what it was."""
+        """Whether its state equals the recorded one."""
 
     @property
     def samples(self) -> pa.Table:
-        """The poses that were recorded."""
+        """Poses at the recorded times."""
 
     @property
     def motion(self) -> pa.Table:
-        """Poses of those in question, at every tick."""
+        """Poses of the selected robots, at every tick."""
 
 
 @dataclass(frozen=True, slots=True)
 class Simulators:
-    """What does it again.
+    """Functions that simulate robots again.
 
     Attributes:
-        alone: a robot, its settings and which evaluation it is to that evaluation
-            and poses.
-        history: run folder, island and time to settings and past of its arena.
-        together: settings, past and robots to scenes.
+        alone: evaluates a robot; returns the evaluation and poses.
+        history: reads the settings and the past of an arena before a time [s].
+        together: replays an arena; yields its advances.
     """
 
     alone: Callable[[Robot, EvaluationSettings, Identity], tuple[Evaluation, pa.Table]]
@@ -79,17 +75,17 @@ def resimulate(
     simulators: Simulators,
     report: Callable[[float], None],
 ) -> list[Motion]:
-    """Return how robots moved.
+    """Return the motions of robots, in their order.
 
     Args:
-        folder: of the run.
-        experiment: the run's.
-        births: who.
-        simulators: do it.
-        report: is told how far it is, 0 to 1.
+        folder: the run folder.
+        experiment: experiment of the run.
+        births: the robots.
+        simulators: functions that simulate.
+        report: called with the progress, 0 to 1.
 
     Raises:
-        ViewerError: nothing is recorded of a robot.
+        ViewerError: no evaluation or pose of a robot is recorded.
         RevolveError: the journal cannot be read, or a robot cannot be simulated.
     """
     arenas = [
@@ -108,12 +104,12 @@ def resimulate(
 def _alone(
     folder: Path, experiment: Experiment, birth: BirthId, simulators: Simulators
 ) -> Motion:
-    """Return the motion of a robot that was judged alone."""
+    """Return the motion of a robot that was evaluated alone."""
     own = island_experiment(experiment, birth.island)
     settings = read_evaluation_settings(evaluation_settings(own))
     rows = _rows_of(folder, "evaluations", birth).to_pylist()
     if not rows:
-        raise ViewerError(f"robot {name_of(birth)}: no evaluation of it is recorded")
+        raise ViewerError(f"robot {name_of(birth)}: no evaluation is recorded")
     recorded = rows[0]
     if recorded["simulated_s"] is not None:
         steps = round(recorded["simulated_s"] / settings.simulation.timestep_s)
@@ -137,7 +133,7 @@ def _together(
     simulators: Simulators,
     report: Callable[[float], None],
 ) -> list[Motion]:
-    """Return the motion of robots in the arenas that they were born in."""
+    """Return the motions of robots in the arenas that they were born in."""
     motions: list[Motion] = []
     for island in sorted({birth.island for birth in births}):
         recorded = {
@@ -147,7 +143,7 @@ def _together(
         }
         for birth, rows in recorded.items():
             if not rows.num_rows:
-                raise ViewerError(f"robot {name_of(birth)}: no pose of it is recorded")
+                raise ViewerError(f"robot {name_of(birth)}: no pose is recorded")
         motions += _in_arena(folder, island, recorded, simulators, report)
     return motions
 
@@ -165,72 +161,61 @@ def _in_arena(
     settings, past = simulators.history(folder, island, start_s)
     samples, motion = [], []
     is_equal = True
-    scenes = simulators.together(settings, past, frozenset(recorded))
-    for number, scene in enumerate(scenes, start=1):
+    steps = simulators.together(settings, past, frozenset(recorded))
+    for number, step in enumerate(steps, start=1):
         report(number / len(past.history))
-        is_equal = is_equal and scene.is_equal
-        samples.append(scene.samples)
-        motion.append(scene.motion)
-        times = scene.samples["sim_time_s"]
+        is_equal = is_equal and step.is_equal
+        samples.append(step.samples)
+        motion.append(step.motion)
+        times = step.samples["sim_time_s"]
         if len(times) and pc.max(times).as_py() >= end_s:
             break
-    again, frames = pa.concat_tables(samples), pa.concat_tables(motion)
-    platforms = read_table(folder, "runs")["platform"].to_pylist()
-    return [
-        Motion(
-            birth,
-            _only(frames, birth),
-            _verdict(
-                birth,
-                _differences(rows, _only(again, birth), is_equal=is_equal),
-                platforms[0] if platforms else "",
-            ),
-        )
-        for birth, rows in recorded.items()
-    ]
+    replayed, frames = pa.concat_tables(samples), pa.concat_tables(motion)
+    platform = next(iter(read_table(folder, "runs")["platform"].to_pylist()), "")
+    motions = []
+    for birth, rows in recorded.items():
+        differing = _differences(rows, _only(replayed, birth), is_equal=is_equal)
+        verdict = _verdict(birth, differing, platform)
+        motions.append(Motion(birth, _only(frames, birth), verdict))
+    return motions
 
 
-def _differences(recorded: pa.Table, again: pa.Table, *, is_equal: bool) -> list[str]:
-    """Return where a track is not what was recorded."""
-    columns = [name for name in again.column_names if name in _TRACK]
+def _differences(
+    recorded: pa.Table, replayed: pa.Table, *, is_equal: bool
+) -> list[str]:
+    """Return the differences between a recorded and a re-simulated track."""
+    columns = [name for name in replayed.column_names if name in _TRACK]
     first = recorded.select(columns).combine_chunks()
-    second = again.select(columns).combine_chunks()
+    second = replayed.select(columns).combine_chunks()
     if not first.equals(second):
         return [f"{first.num_rows} poses recorded, {second.num_rows} now differ"]
     if is_equal:
         return []
-    # Versions may note an arena's state otherwise and yet move it alike.
-    return ["no pose, but the arena's state, which other versions write otherwise"]
+    # Other versions may encode the state differently and move robots equally.
+    return ["the arena's state, but no pose; other versions may encode it differently"]
 
 
 def _rows_of(folder: Path, table: str, birth: BirthId) -> pa.Table:
     """Return the rows of a robot on the island where it was born."""
-    rows = read_table(folder, table)
-    is_it = pc.and_(
-        pc.equal(rows["island"], birth.island), pc.equal(rows["birth"], birth.number)
-    )
+    rows = _only(read_table(folder, table), birth)
     if "birth_island" in rows.column_names:
-        is_it = pc.and_(is_it, pc.is_null(rows["birth_island"]))
-    return rows.filter(is_it)
+        rows = rows.filter(pc.is_null(rows["birth_island"]))
+    return rows
 
 
 def _only(poses: pa.Table, birth: BirthId) -> pa.Table:
-    """Return a robot's rows of poses as a worker tells of them."""
-    is_it = pc.and_(
-        pc.equal(poses["island"], birth.island), pc.equal(poses["birth"], birth.number)
-    )
-    return poses.filter(is_it)
+    """Return the rows with a robot's island and number of birth."""
+    is_island = pc.field("island") == birth.island
+    return poses.filter(is_island & (pc.field("birth") == birth.number))
 
 
 def _verdict(birth: BirthId, differing: list[str], platform: str) -> str:
-    """Return whether a robot does again what it did."""
+    """Return a line of text that says whether a robot moves as recorded."""
     if not differing:
-        return f"{name_of(birth)}: moves again as recorded, to the last bit"
+        return f"{name_of(birth)}: moves as recorded, equal to the last bit"
     here = platform_tag()
-    where = (
-        "on this very platform"
-        if platform == here
-        else f"recorded on {platform or 'an unknown platform'}, this is {here}"
-    )
+    where = f"same platform, {here}"
+    if platform != here:
+        where = f"recorded on {platform or 'an unknown platform'}, this is {here}"
     what = "; ".join(differing)
-    return f"{name_of(birth)}: DIFFERS from what was recorded: {what} ({where})"
+    return f"{name_of(birth)}: DIFFERS from the record: {what} ({where})"

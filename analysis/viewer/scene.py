@@ -1,4 +1,4 @@
-"""What a viewer needs to know of an experiment before anything happens in it."""
+"""The scene of a run: islands, arenas, walls and ground of an experiment."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -19,15 +19,15 @@ _GALLERY_M = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Where a run takes place.
+    """The islands of a run, as a viewer shows them.
 
     Attributes:
-        islands: their numbers.
-        arenas: those on which robots live together, in simulated time.
-        extent_m: how far from its middle an arena or a gallery reaches [m].
+        islands: numbers of the islands.
+        arenas: islands on which robots live together, in simulated time.
+        extent_m: half width of the largest arena or population grid [m].
         space: the part types.
-        walls: of each island: place and attitude (7,) and half sizes (3,) of each.
-        surfaces: of each island: of what rises above its plane.
+        walls: walls of each island: place and attitude (7,) and half sizes (3,).
+        surfaces: surfaces above the plane of each island.
     """
 
     islands: tuple[int, ...]
@@ -38,9 +38,9 @@ class Scene:
     surfaces: tuple[tuple[Surface, ...], ...]
 
     def below(self, births: Iterable[BirthId]) -> tuple[Surface, ...]:
-        """Return the ground below robots, if they are shown where they were.
+        """Return the ground below robots, if they are shown at their recorded places.
 
-        So are those of one arena, and one robot that was alone.
+        This applies to robots of one arena, and to a single off-line robot.
         """
         islands = [birth.island for birth in births]
         is_one_place = len(set(islands)) == 1
@@ -50,11 +50,10 @@ class Scene:
 
 
 def scene_of(experiment: Experiment) -> Scene:
-    """Return where an experiment takes place.
+    """Return the scene of an experiment.
 
     Raises:
-        ExperimentError: a part type of a plug-in that is not here, or scenery that
-            is none.
+        ExperimentError: a plug-in with part types is missing, or scenery is invalid.
     """
     islands = tuple(range(island_count(experiment)))
     settings = [of_island(experiment, each) for each in islands]
@@ -71,12 +70,12 @@ def scene_of(experiment: Experiment) -> Scene:
 
 
 def _reach(arena: Arena) -> float:
-    """Return how far from its middle an arena is looked at [m]."""
+    """Return the half width of an arena's view [m]."""
     return _MARGIN * max(0.5 * arena.wall_diameter_m, arena.birth_radius_m)
 
 
 def _ring_wall(arena: Arena) -> tuple[tuple[Float32s, Float32s], ...]:
-    """Return the walls of an arena, as ``schema.mjcf.model`` puts them."""
+    """Return the walls of an arena, as ``schema.mjcf.world`` builds them."""
     if not arena.wall_diameter_m:
         return ()
     half, height = 0.5 * arena.wall_thickness_m, 0.5 * arena.wall_height_m
@@ -86,7 +85,7 @@ def _ring_wall(arena: Arena) -> tuple[tuple[Float32s, Float32s], ...]:
     walls = []
     for index in range(arena.wall_segments):
         angle = 2.0 * pi * index / arena.wall_segments
-        turn = (0.0, 0.0, sin(0.5 * angle), cos(0.5 * angle))
-        place = (centre * cos(angle), centre * sin(angle), height, *turn)
+        attitude = (0.0, 0.0, sin(0.5 * angle), cos(0.5 * angle))
+        place = (centre * cos(angle), centre * sin(angle), height, *attitude)
         walls.append((np.array(place, dtype=np.float32), size))
     return tuple(walls)

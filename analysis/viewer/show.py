@@ -1,7 +1,7 @@
-"""Puts what is told of a run, live or from its tables, into a recording.
+"""Records a run, from live messages or from its tables.
 
-Who lives where is kept here, so that a robot's boxes come with its first pose, and
-go with its death; whatever is told twice is shown once.
+``Show`` keeps the robots that are shown, so that a robot's boxes appear with its first
+pose and disappear at its death. Data that arrives twice is recorded once.
 """
 
 from dataclasses import dataclass, field
@@ -11,38 +11,40 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from analysis.viewer.body import Float32s, place_rows
-from analysis.viewer.entities import PoseBatch, TimePoint, robot_path
-from analysis.viewer.gallery import Gallery
+from analysis.viewer.entities import PoseBatch, TimePoint, name_of, robot_path
+from analysis.viewer.gallery import BoxModels, Gallery
 from analysis.viewer.lineage import Lineage
-from analysis.viewer.looks import BoxModels, rows_by_robot
 from analysis.viewer.recording import Recording
+from analysis.viewer.replay import rows_by_robot
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
 from schema.wire.codec import decode_body
 from schema.wire.updates import Birth, Death, Level, Migrant, Update, WorkerInfo
 
 _REPEAT_S = 10.0
-"""A server forgets its oldest; a robot's boxes are told again every so often [s]."""
+"""Interval at which a robot's boxes are logged again: a server drops its oldest data
+[s]."""
 _PER_M, _PER_TURN = 2048.0, 1024.0
-"""Half a millimetre and a tenth of a degree are not seen: a third less to store."""
+"""Resolution of places and attitudes, 0.5 mm and 0.1 degrees: saves a third of the
+size."""
 _BLINK_S = 0.1
-"""Who is not told of any more vanishes so long after the last pose [s]."""
+"""A robot without further poses is removed this long after the last one [s]."""
 
 
 @dataclass(slots=True)
 class _Clock:
-    """When births happened on one island: times [s], ascending."""
+    """Times of the births on one island [s], ascending."""
 
     times_s: list[float] = field(default_factory=list)
     births: list[int] = field(default_factory=list)
 
     def births_at(self, times_s: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
-        """Return how many had been born at some times."""
+        """Return the numbers of births up to some times."""
         after = np.searchsorted(self.times_s, times_s, side="right")
         return np.array([0, *self.births], dtype=np.int64)[after]
 
     def when(self, births: int) -> TimePoint:
-        """Return the moment of a birth by its number on the island, from 1."""
+        """Return the time of a birth by its number on the island, from 1."""
         index = int(np.searchsorted(self.births, births))
         if index < len(self.births) and self.births[index] == births:
             return TimePoint(self.times_s[index], births)
@@ -53,7 +55,11 @@ class _Clock:
 class _ShownRobot:
     """A robot that is shown in an arena.
 
-    ``drawn_s`` is when its boxes were told last, ``seen_s`` its last pose's time.
+    Attributes:
+        path: its entity.
+        drawn_s: time at which its boxes were logged last [s].
+        seen_s: time of its last pose [s].
+        is_gone: its boxes were removed.
     """
 
     path: str
@@ -63,15 +69,14 @@ class _ShownRobot:
 
 
 class Show:
-    """One run in one recording."""
+    """One run in one recording.
+
+    Args:
+        recording: recording to log to.
+        space: the part types.
+    """
 
     def __init__(self, recording: Recording, space: BodySpace) -> None:
-        """Show nothing yet.
-
-        Args:
-            recording: to fill.
-            space: the part types.
-        """
         self._recording = recording
         self._lineage = Lineage(recording)
         self._gallery = Gallery(recording)
@@ -84,7 +89,7 @@ class Show:
         self._workers: tuple[WorkerInfo, ...] | None = None
 
     def tell(self, news: Update) -> None:
-        """Show what is new in some news."""
+        """Record everything new in a message."""
         for each in _in_order(news):
             match each:
                 case Birth():
@@ -102,23 +107,23 @@ class Show:
 
     def move(
         self, arena: int, poses: pa.Table, *, has_all: bool = True
-    ) -> list[BirthId]:
-        """Show robots' poses in an arena.
+    ) -> pa.Table | None:
+        """Record poses of the robots in an arena.
 
         Args:
-            arena: the number of its island.
-            poses: rows of the poses table, by time; ``record`` is not looked at.
-            has_all: of all who live there; who is not among them is gone.
+            arena: number of its island.
+            poses: rows of the poses table, by time; ``record`` is ignored.
+            has_all: remove robots that have no row.
 
         Returns:
-            Whose poses were left out, for their births have not been told.
+            Poses of robots whose births are not known yet; None if there are none.
         """
-        unknown: list[BirthId] = []
+        unknown: list[pa.Table] = []
         shown: set[BirthId] = set()
         for birth, rows in rows_by_robot(poses):
             shown.add(birth)
             if birth not in self._models:
-                unknown.append(birth)
+                unknown.append(rows)
                 continue
             times = rows["sim_time_s"].to_numpy()
             path = self._settle(arena, birth, times)
@@ -129,21 +134,21 @@ class Show:
             )
             self._recording.moved(path, moves)
         if has_all:
-            self._take_away(arena, shown)
-        return unknown
+            self._remove_absent(arena, shown)
+        return pa.concat_tables(unknown) if unknown else None
 
     def _clock(self, island: int) -> _Clock:
         return self._clocks.setdefault(island, _Clock())
 
     def _at(self, island: int, time_s: float) -> TimePoint:
-        """Return a moment of an arena, with its births until then."""
+        """Return a time of an arena, with its births so far."""
         births = self._clock(island).births_at(np.array([time_s]))
         return TimePoint(time_s, int(births[0]))
 
     def _settle(
         self, arena: int, birth: BirthId, times_s: npt.NDArray[np.float64]
     ) -> str:
-        """See to it that a robot has its boxes in an arena; return its path."""
+        """Log a robot's boxes in an arena if needed; return its path."""
         key, path = (arena, birth), robot_path(arena, birth)
         first_s, last_s = float(times_s[0]), float(times_s[-1])
         robot = self._shown.get(key)
@@ -155,8 +160,8 @@ class Show:
         self._shown[key].seen_s = last_s
         return path
 
-    def _take_away(self, arena: int, shown: set[BirthId]) -> None:
-        """Take the boxes of those away who died, or are not in the arena any more."""
+    def _remove_absent(self, arena: int, shown: set[BirthId]) -> None:
+        """Remove the boxes of robots that died or have left the arena."""
         here = [key for key in self._shown if key[0] == arena]
         for key in here:
             if key in self._gone:
@@ -170,11 +175,11 @@ class Show:
                 del self._shown[key]
 
     def _leave(self, gone: Death) -> None:
-        """Take a robot's boxes away, once."""
+        """Remove a robot's boxes, once."""
         robot = self._shown.get((gone.island, gone.birth))
         if robot is not None and not robot.is_gone:
             robot.is_gone = True
-            # As many births as its last pose has: who is born then counts already.
+            # A robot that is born at the same time counts as born before the death.
             when = self._at(gone.island, gone.sim_time_s)
             self._recording.died(robot.path, when)
 
@@ -187,10 +192,9 @@ class Show:
         if one.sim_time_s is not None:
             clock.times_s.append(one.sim_time_s)
             clock.births.append(one.births)
-        whose = " and ".join(f"{each.island}:{each.number}" for each in one.parents)
-        text = f"{one.birth.island}:{one.birth.number} is born"
-        when = TimePoint(one.sim_time_s, one.births)
-        self._recording.said(f"{text} to {whose}" if whose else text, when, "INFO")
+        parents = " and ".join(map(name_of, one.parents))
+        text = f"{name_of(one.birth)} is born{' to ' if parents else ''}{parents}"
+        self._recording.log_line(text, TimePoint(one.sim_time_s, one.births), "INFO")
 
     def _departed(self, gone: Death) -> None:
         if (gone.island, gone.birth) in self._gone:
@@ -198,8 +202,8 @@ class Show:
         self._gone[gone.island, gone.birth] = gone
         self._leave(gone)
         self._lineage.remove(gone)
-        text = f"{gone.birth.island}:{gone.birth.number} is gone: {gone.reason}"
-        self._recording.said(text, TimePoint(gone.sim_time_s, gone.births), "WARN")
+        text = f"{name_of(gone.birth)} is gone: {gone.reason}"
+        self._recording.log_line(text, TimePoint(gone.sim_time_s, gone.births), "WARN")
 
     def _level(self, level: Level) -> None:
         if (level.island, level.births) in self._levels:
@@ -217,21 +221,21 @@ class Show:
         if key in self._moves:
             return
         self._moves.add(key)
-        name = f"{migrant.birth.island}:{migrant.birth.number}"
-        text = f"{name} goes from island {migrant.island} to {migrant.to}"
+        name = name_of(migrant.birth)
+        text = f"{name} migrates from island {migrant.island} to {migrant.to}"
         when = TimePoint(migrant.sim_time_s, migrant.births)
-        self._recording.said(text, when, "INFO")
+        self._recording.log_line(text, when, "INFO")
 
 
 def _coarse(numbers: Float32s, grains: float) -> Float32s:
-    """Return numbers of which so many fit into 1; they take less room in a file."""
+    """Return numbers rounded to ``1 / grains``, which take less room in a file."""
     return (np.round(numbers * grains) / grains).astype(np.float32)
 
 
 def _in_order(news: Update) -> list[Birth | Level | Death]:
-    """Return births and levels as they came, by births on their island, then deaths.
+    """Return births and populations by births on their island, then deaths.
 
-    Who is born at the instant of a death counts as born by then.
+    A birth at the time of a death comes before the death.
     """
     births = [((one.births, 0), one) for one in news.births]
     levels = [((level.births, 1), level) for level in news.levels]
@@ -241,7 +245,7 @@ def _in_order(news: Update) -> list[Birth | Level | Death]:
 
 
 def _process_pool(workers: tuple[WorkerInfo, ...]) -> str:
-    """Return a table of who works, as Markdown."""
+    """Return a table of the workers, as Markdown."""
     lines = ["| worker | platform | arenas |", "|---|---|---|"]
     for man in workers:
         arenas = ", ".join(map(str, man.shards)) or "-"

@@ -1,4 +1,4 @@
-"""Random and hand-made bodies for the tests of the analysis."""
+"""Builders of bodies for the tests of the analysis."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""A made-up campaign: run folders as large as the thesis's, without any robot."""
+"""A synthetic campaign: run folders as large as the thesis's, without simulation."""
 
 import json
 from pathlib import Path
@@ -90,13 +90,13 @@ def _levels(rng: np.random.Generator, experiment: str, births: int) -> Levels:
     found = [(FOUNDERS, living)]
     for count in range(FOUNDERS + brood, births + 1, brood):
         newborn = np.arange(count - brood, count)
-        everybody = np.concatenate([living, newborn])
-        keep = min(len(everybody), size)
-        chosen = rng.permutation(len(everybody))[:keep]
+        candidates = np.concatenate([living, newborn])
+        keep = min(len(candidates), size)
+        chosen = rng.permutation(len(candidates))[:keep]
         if brood == 1:  # the newborn lives, as the dearest case
-            chosen[0] = len(everybody) - 1
+            chosen[0] = len(candidates) - 1
             chosen = np.unique(chosen)
-        living = np.sort(everybody[chosen])
+        living = np.sort(candidates[chosen])
         found.append((count, living))
     return found
 
@@ -130,7 +130,7 @@ def _births(
 
 
 def _samples(rng: np.random.Generator, levels: Levels) -> Columns:
-    """Return three samples of everybody between two births."""
+    """Return three samples of each robot between two births."""
     rows = [
         (count, living, count * _BIRTH_S + sample * _SAMPLE_S)
         for count, living in levels

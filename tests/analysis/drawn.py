@@ -1,4 +1,4 @@
-"""Tables of measures by hand, and what a figure of them shows."""
+"""Builders of tables of measures, and the data of a figure's layers."""
 
 from typing import Any
 
@@ -11,12 +11,12 @@ Row = dict[str, Any]
 
 
 def table(name: str, rows: list[Row]) -> pa.Table:
-    """Return a table of measures; what rows do not say is null."""
+    """Return a table of measures; missing columns are null."""
     return pa.Table.from_pylist(rows, schema(name))
 
 
 def layers(figure: p9.ggplot) -> dict[str, Row]:
-    """Return the columns that each layer shows, by its form."""
+    """Return the data of each layer, by the name of its geom."""
     return {
         type(layer.geom).__name__: (
             figure.data if layer._data is None else layer._data

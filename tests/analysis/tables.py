@@ -1,4 +1,4 @@
-"""Small tables of a run, written down by hand."""
+"""Builders of small tables of a run."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ CORE: Body = [part(0, -1, -1, "Core")]
 
 
 def table(name: str, rows: list[dict[str, Any]]) -> pa.Table:
-    """Return rows of a table; what they do not say is 0, empty or null."""
+    """Return rows of a table; missing columns are 0, empty or null."""
     made = TABLES[name]
     filled = []
     for record, row in enumerate(rows):
@@ -56,7 +56,7 @@ def births(*rows: tuple[Name, list[Name]], **columns: list[Any]) -> pa.Table:
 def population(
     *levels: tuple[int, int, dict[Name, float | None]], is_online: bool = False
 ) -> pa.Table:
-    """Return who is alive: (island, births, fitness by name)."""
+    """Return recorded populations: (island, births, fitness by birth id)."""
     rows = [
         {
             "island": island,

@@ -1,4 +1,4 @@
-"""What is said at the end of an analysis, on screens of any width."""
+"""Tests of the summary of an analysis, on consoles of any width."""
 
 import io
 from typing import Any
@@ -26,7 +26,7 @@ ROWS: dict[str, list[dict[str, Any]]] = {
 }  # fmt: skip
 
 
-def told(rows: dict[str, list[dict[str, Any]]], width: int) -> str:
+def output(rows: dict[str, list[dict[str, Any]]], width: int) -> str:
     tables = {
         name: pa.Table.from_pylist(rows.get(name, []), schema(name)) for name in ROWS
     }
@@ -36,8 +36,8 @@ def told(rows: dict[str, list[dict[str, Any]]], width: int) -> str:
 
 
 @pytest.mark.parametrize("width", [10, 40, 60, 70, 80, 120])
-def test_nothing_is_cut_however_narrow_the_screen(width: int) -> None:
-    text = told(ROWS, width)
+def test_nothing_is_cut_off_on_a_narrow_console(width: int) -> None:
+    text = output(ROWS, width)
     assert "…" not in text
     for number in ("1500", "15", "0.1234", "0.5678", "6.14", "-0.369", "0.5", "0.701"):
         assert number in text.replace("│", " ").replace(",", " ").split()
@@ -46,15 +46,15 @@ def test_nothing_is_cut_however_narrow_the_screen(width: int) -> None:
         assert cell in words
 
 
-def test_names_are_whole_where_they_are_folded() -> None:
-    lines = told({"populations": ROWS["populations"]}, 80).splitlines()
+def test_folded_names_are_complete() -> None:
+    lines = output({"populations": ROWS["populations"]}, 80).splitlines()
     cells = [line.split("│")[1:3] for line in lines if line.startswith("│")]
     assert "".join(name.strip() for name, _ in cells) == NAME
     assert "".join(run.strip() for _, run in cells).replace(" ", "") == f"{NAME}-123"
 
 
-def test_where_there_is_no_population_it_is_said() -> None:
-    text = told({"left_out": ROWS["left_out"]}, 80)
+def test_a_run_without_populations_is_reported() -> None:
+    text = output({"left_out": ROWS["left_out"]}, 80)
     assert text == (
         "no population could be measured\nleft out: runs/x: run: broken [red] & gone\n"
     )

@@ -14,9 +14,10 @@ import pytest
 
 from analysis.viewer.blueprint import layout
 from analysis.viewer.recording import Recording
+from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
 from analysis.viewer.watch import LiveView
-from schema.experiment.document import Space, body_space
+from schema.experiment.document import Arena, Experiment
 from schema.experiment.file import read_experiment
 from schema.experiment.identity import NOBODY
 from schema.experiment.settings import EvaluationSettings
@@ -103,10 +104,9 @@ def test_an_arena_of_thirty_costs_the_viewer_a_fifth_of_a_core_at_most(
     told, tables = crowd()
     messages = [message(poses) for poses in tables]
     file = tmp_path / "watched.rrd"
-    space = body_space(Space())
-    blueprint = layout((0,), extent_m=2.6, arenas={0})
-    with Recording("watched", blueprint, file=file) as recording:
-        view = LiveView(Show(recording, space), "run")
+    scene = scene_of(Experiment(name="watched", arena=Arena()))
+    with Recording("watched", layout(scene), file=file) as recording:
+        view = LiveView(Show(recording, scene.space), "run")
         view.tell([told])
         began = time.process_time()
         for data in messages:

@@ -1,4 +1,4 @@
-"""The rows of docs/data: what the script keeps of a campaign, and what is there."""
+"""Tests of the rows of docs/data and the script that collects and checks them."""
 
 import re
 import shutil
@@ -154,19 +154,19 @@ def test_the_last_population_is_kept_with_its_genomes(data: Path) -> None:
         assert pc.mean(mine["fitness"]).as_py() == pytest.approx(mean)
 
 
-def test_collecting_resumes_where_it_was_left(
+def test_collecting_twice_writes_only_missing_rows(
     place: Path, parts: Parts, data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    files = _files(data)
-    before = {name: (data / name).stat().st_mtime_ns for name in files}
+    complete = _files(data)
+    before = {name: (data / name).stat().st_mtime_ns for name in complete}
     path_of(data, "runs", "scenario1-01").unlink()
     path_of(data, "final", "scenario3-00").write_bytes(b"PAR1")
     capsys.readouterr()
     assert campaign.collect(place, data, COMMIT, parts) == 0
     assert "2 repeats collected, 0 failed" in capsys.readouterr().out
-    assert _files(data) == files
+    assert _files(data) == complete
     touched = {
-        name for name in files if (data / name).stat().st_mtime_ns != before[name]
+        name for name in complete if (data / name).stat().st_mtime_ns != before[name]
     }
     assert {Path(name).stem for name in touched} == {"scenario1-01", "scenario3-00"}
 
@@ -181,12 +181,12 @@ def test_only_finished_runs_of_the_campaign_are_collected(
     fewer = Part("off-line", "some", parts[0].experiments, 1, BIRTHS, 3)
     assert campaign.collect(tmp_path, tmp_path / "data", COMMIT, (fewer,)) == 0
     assert {Path(name).stem for name in _files(tmp_path / "data")} == {"scenario1-00"}
-    assert "scenario2-1: is no run of the campaign" in capsys.readouterr().out
+    assert "scenario2-1: not a run of the campaign" in capsys.readouterr().out
     assert campaign.collect(tmp_path, tmp_path / "data", COMMIT, parts[:1]) == 1
     assert "scenario2-01: table evaluations: missing" in capsys.readouterr().out
 
 
-def test_a_lost_run_is_made_again(
+def test_a_lost_run_is_repeated(
     place: Path, parts: Parts, data: Path, tmp_path: Path
 ) -> None:
     folder = tmp_path / "copy"
@@ -231,17 +231,17 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "missing": (
         lambda data: path_of(data, "final", "scenario3-00").unlink(),
-        "final/scenario3-00.parquet: is missing",
+        "final/scenario3-00.parquet: missing",
     ),
-    "columns": (_no_rank, "final/scenario2-00.parquet: has other columns"),
+    "columns": (_no_rank, "final/scenario2-00.parquet: unexpected columns"),
     "exchanged": (
         _exchanged,
         "scenario2-00.parquet: must have rows of scenario2-00 only",
     ),
-    "platform": (_other_platform, "runs: of 2 platforms, must be of one"),
+    "platform": (_other_platform, "runs: must have one platform, got 2"),
     "stray": (
         lambda data: (data / "final" / "scenario2-07.parquet").write_bytes(b""),
-        "final/scenario2-07.parquet: is not expected",
+        "final/scenario2-07.parquet: unexpected file",
     ),
 }
 
@@ -250,17 +250,17 @@ DAMAGES: dict[str, tuple[Callable[[Path], object], str]] = {
 def test_damage_is_found(
     name: str, parts: Parts, data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    damage, said = DAMAGES[name]
+    damage, message = DAMAGES[name]
     damage(data)
     capsys.readouterr()
     assert check(data, parts) == 1
     lines = capsys.readouterr().out.splitlines()
     damaged = [line for line in lines if line.startswith("damaged: ")]
     assert len(damaged) == 1
-    assert said in damaged[0]
+    assert message in damaged[0]
 
 
-def test_repeats_that_are_not_there_yet_are_no_damage(
+def test_missing_repeats_are_no_damage(
     parts: Parts, data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for path in data.glob("*/scenario1-01.parquet"):
@@ -270,7 +270,7 @@ def test_repeats_that_are_not_there_yet_are_no_damage(
     assert "scenario1: 1 of 2 repeats, missing: 1\n" in capsys.readouterr().out
 
 
-def test_experiments_are_compared_by_what_is_kept(
+def test_kept_outcomes_give_the_same_comparison(
     place: Path, parts: Parts, data: Path
 ) -> None:
     runs, _ = read_runs([place / "runs" / part.folder for part in parts])
@@ -294,30 +294,22 @@ def test_experiments_are_compared_by_what_is_kept(
         assert early.values(one, "parts_change", MARK).tolist() == found
 
 
-def test_courses_are_those_of_the_runs(place: Path, parts: Parts, data: Path) -> None:
+def test_progression_of_kept_rows_equals_that_of_the_runs(
+    place: Path, parts: Parts, data: Path
+) -> None:
     runs, _ = read_runs([place / "runs" / part.folder for part in parts])
-    courses = progression(concatenated(measure_runs(runs))["populations"])
+    complete = progression(concatenated(measure_runs(runs))["populations"])
     ours = progression(kept(data, "populations"))
-    is_kept = pc.is_in(courses["births"], pa.array([MARK, BIRTHS]))
-    assert ours == courses.filter(is_kept)
-    assert courses.num_rows > ours.num_rows > 40
+    is_kept = pc.is_in(complete["births"], pa.array([MARK, BIRTHS]))
+    assert ours == complete.filter(is_kept)
+    assert complete.num_rows > ours.num_rows > 40
 
 
-def test_measures_newer_than_the_rows_are_null(data: Path, parts: Parts) -> None:
-    for table in ("outcomes", "populations"):
-        rows = read_rows(data, table, "scenario2-00").drop_columns(["rank"])
-        path_of(data, table, "scenario2-00").write_bytes(parquet(rows))
-        found = read_rows(data, table, "scenario2-00")
-        assert found.schema == TABLES[table]
-        assert found["rank"].null_count == found.num_rows > 0
-    assert check(data, parts) == 0
-
-
-def test_committed_rows_are_whole() -> None:
+def test_committed_rows_pass_the_check() -> None:
     assert check(DATA) == 0
 
 
-def test_code_of_the_page_runs() -> None:
+def test_code_of_the_readme_runs() -> None:
     page = (DATA / "README.md").read_text("utf-8")
     blocks = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     assert len(blocks) == 2

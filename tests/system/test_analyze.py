@@ -1,4 +1,4 @@
-"""``revolve analyze`` as a user starts it, on runs that were really made."""
+"""Tests of ``revolve analyze`` on real runs."""
 
 import json
 import shutil
@@ -35,17 +35,17 @@ def analysed(once: Any, undisturbed: Path, calm: Path) -> tuple[Path, str]:  # n
         details.write_text(json.dumps({**entries, "document": json.dumps(document)}))
         (stage.folder / "runs" / "d").mkdir()
         (stage.folder / "runs" / "d" / "run.json").write_text("{")
-        told = stage.run("analyze", "runs", "--out", "report")
-        (stage.folder / "told").write_text(told)
+        output = stage.run("analyze", "runs", "--out", "report")
+        (stage.folder / "output").write_text(output)
 
     folder: Path = once("analysed", make)
-    return folder / "report", (folder / "told").read_text()
+    return folder / "report", (folder / "output").read_text()
 
 
-def test_runs_are_measured_and_what_is_left_out_is_named(
+def test_runs_are_measured_and_left_out_runs_are_reported(
     analysed: tuple[Path, str],
 ) -> None:
-    report, told = analysed
+    report, output = analysed
     measures = {path.stem: pq.read_table(path) for path in report.glob("*/*.parquet")}
     assert set(measures) == set(OUTPUTS) - {"between", "migrants"}
     for name, table in measures.items():
@@ -65,20 +65,22 @@ def test_runs_are_measured_and_what_is_left_out_is_named(
         ("runs/d", "run.json: ca"),
         ("runs/c", "the same run"),
     ]
-    assert "left out: runs/d: run: run.json" in told
+    assert "left out: runs/d: run: run.json" in output
 
 
-def test_experiments_of_one_name_are_told_apart(analysed: tuple[Path, str]) -> None:
-    report, told = analysed
+def test_experiments_of_the_same_name_get_distinct_names(
+    analysed: tuple[Path, str],
+) -> None:
+    report, output = analysed
     differs = "vetting.tolerance_m: 0.001 instead of 1e-06"
-    assert f"scenario1~2: {differs}" in told
+    assert f"scenario1~2: {differs}" in output
     assert differs in (report / "report.html").read_text("utf-8")
 
 
-def test_figures_and_report_are_written_and_what_is_left_out_has_a_reason(
+def test_figures_are_written_or_left_out_with_a_reason(
     analysed: tuple[Path, str],
 ) -> None:
-    report, told = analysed
+    report, output = analysed
     page = (report / "report.html").read_text("utf-8")
     drawn = {path.stem for path in (report / "figures").glob("*.png")}
     assert drawn == {path.stem for path in (report / "figures").glob("*.pdf")}
@@ -88,14 +90,14 @@ def test_figures_and_report_are_written_and_what_is_left_out_has_a_reason(
     why = {row["what"]: row["why"] for row in table if not row["folder"]}
     assert "revolve bench arena" in why["figure 6.1"]
     assert why["figure 6.19"] == "no robot of scenario2 was judged"
-    assert "left out: figure B: no run has several islands" in told
+    assert "left out: figure B: no run has several islands" in output
     everything = {f"figure-{one.number}" for one in FIGURES}
     assert everything == (everything & drawn) | {
         name.replace(" ", "-") for name in why if name.replace(" ", "-") in everything
     }
 
 
-def test_three_readers_read_the_same(analysed: tuple[Path, str]) -> None:
+def test_three_libraries_read_the_same_tables(analysed: tuple[Path, str]) -> None:
     report, _ = analysed
     for path in sorted(report.glob("measures/*.parquet")):
         arrow = pq.read_table(path)
@@ -106,25 +108,23 @@ def test_three_readers_read_the_same(analysed: tuple[Path, str]) -> None:
         assert rows == [tuple(row.values()) for row in arrow.to_pylist()]
 
 
-def test_no_run_is_one_line(stage: Stage) -> None:
-    told = stage.run("analyze", "nowhere", code=2)
-    assert told == "revolve: nowhere: no such folder\n"
+def test_a_missing_folder_is_reported_in_one_line(stage: Stage) -> None:
+    output = stage.run("analyze", "nowhere", code=2)
+    assert output == "revolve: nowhere: no such folder\n"
 
 
-def test_a_file_is_no_place_for_a_report(stage: Stage, undisturbed: Path) -> None:
+def test_a_file_as_output_folder_is_refused(stage: Stage, undisturbed: Path) -> None:
     (stage.folder / "file").write_text("mine")
-    told = stage.run("analyze", str(undisturbed), "--out", "file", code=2)
-    assert told == "revolve: file: cannot be written: Not a directory\n"
+    output = stage.run("analyze", str(undisturbed), "--out", "file", code=2)
+    assert output == "revolve: file: cannot be written: Not a directory\n"
     assert (stage.folder / "file").read_text() == "mine"
 
 
-def test_a_single_run_that_is_broken_in_part_is_measured_as_far_as_it_goes(
-    stage: Stage, undisturbed: Path
-) -> None:
+def test_a_damaged_run_is_measured_in_part(stage: Stage, undisturbed: Path) -> None:
     shutil.copytree(undisturbed, stage.folder / "run")
     (evaluations,) = (stage.folder / "run").glob("tables/*/*/evaluations.parquet")
     evaluations.write_bytes(b"")
-    told = stage.run("analyze", "run", "--out", "report")
-    assert "left out: run: table evaluations: " in told
+    output = stage.run("analyze", "run", "--out", "report")
+    assert "left out: run: table evaluations: " in output
     robots = pq.read_table(stage.folder / "report" / "measures" / "robots.parquet")
     assert robots.num_rows == 0

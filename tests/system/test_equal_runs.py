@@ -102,7 +102,7 @@ def test_noise_is_the_same_whoever_draws_it(stage: Stage) -> None:
     assert again
     robots = ("--robot", "best", "--robot", f"0:{min(again)}")
     out = stage.run("view", "one", *robots, "--save", "a.rrd")
-    assert out.count("moves again as recorded, to the last bit") == 2
+    assert out.count("moves as recorded, equal to the last bit") == 2
     assert "DIFFERS" not in out
 
 

@@ -1,4 +1,4 @@
-"""A recording holds what the tables hold, and nobody who watches changes a run."""
+"""Tests of ``revolve view``: recordings equal the tables, viewers affect no run."""
 
 import signal
 import subprocess
@@ -29,7 +29,7 @@ CENTRES, QUATERNIONS = "Boxes3D:centers", "Boxes3D:quaternions"
 
 
 def batches(file: Path, path: str) -> Iterator[tuple[pa.RecordBatch, bool]]:
-    """Return what an entity was told, and whether for all time."""
+    """Return the data of an entity, and whether it is static."""
     for chunk in RrdReader(file).stream().filter(content=path):
         yield chunk.to_record_batch(), chunk.is_static
 
@@ -139,7 +139,7 @@ def test_a_replay_has_each_pose_of_each_robot(
             assert apart.min() < 1e-3
 
 
-def test_who_died_is_cleared_then_and_nobody_stays_for_ever(
+def test_dead_robots_are_cleared_at_their_death(
     replayed: Path, quiet_hamlet: Path
 ) -> None:
     deaths = {
@@ -159,9 +159,9 @@ def test_who_died_is_cleared_then_and_nobody_stays_for_ever(
         assert not any(is_static for _, is_static in batches(replayed, path))
 
 
-def test_boxes_are_told_of_with_the_first_pose(replayed: Path) -> None:
+def test_boxes_are_logged_with_the_first_pose(replayed: Path) -> None:
     for path in sorted(each for each in paths(replayed) if "/robots/" in each):
-        told = [
+        times = [
             time.value
             for batch, _ in batches(replayed, path)
             if "Boxes3D:half_sizes" in batch.schema.names
@@ -170,14 +170,18 @@ def test_boxes_are_told_of_with_the_first_pose(replayed: Path) -> None:
             )
             if row.is_valid
         ]
-        assert min(told) == min(poses(replayed, path))
+        assert min(times) == min(poses(replayed, path))
 
 
-def test_a_replays_curves_are_the_tables(replayed: Path, quiet_hamlet: Path) -> None:
+def test_curves_of_a_replay_equal_the_tables(
+    replayed: Path, quiet_hamlet: Path
+) -> None:
     check_curves(replayed, quiet_hamlet)
 
 
-def test_the_log_tells_each_birth_and_death(replayed: Path, quiet_hamlet: Path) -> None:
+def test_the_log_contains_each_birth_and_death(
+    replayed: Path, quiet_hamlet: Path
+) -> None:
     lines = [
         line.as_py()[0]
         for batch, _ in batches(replayed, "/log")
@@ -189,7 +193,7 @@ def test_the_log_tells_each_birth_and_death(replayed: Path, quiet_hamlet: Path) 
     assert sum("is gone" in line for line in lines) == deaths
 
 
-def test_who_watches_changes_nothing_and_is_told_all(
+def test_viewers_receive_everything_and_do_not_change_the_run(
     hamlet_stage: Stage, quiet_hamlet: Path, fleet_of: Fleet, until: Until
 ) -> None:
     """One viewer sees all of a run; one is killed, one frozen while it lives."""
@@ -200,7 +204,7 @@ def test_who_watches_changes_nothing_and_is_told_all(
         words = ("view", "--connect", fleet.address, "--save", f"{name}.rrd")
         viewers[name] = stage.start(*words)
         file = stage.folder / f"{name}.rrd"
-        until(file.exists, f"the viewer {name} has been told of the run")
+        until(file.exists, f"the viewer {name} has received the run")
     fleet.join("w", "worker")
     fleet.begin(1)
     fleet.wait_for(0.4 * (quiet_hamlet / NAME).stat().st_size)
@@ -220,19 +224,19 @@ def test_who_watches_changes_nothing_and_is_told_all(
     assert 0.9 * table.num_rows <= shown <= table.num_rows
 
 
-def test_a_robot_of_an_arena_moves_again_as_recorded(
+def test_a_resimulated_robot_of_an_arena_moves_as_recorded(
     stage: Stage, quiet_hamlet: Path
 ) -> None:
     words = ("view", str(quiet_hamlet), "--robot", "0:3", "--robot", "best")
     out = stage.run(*words, "--save", "again.rrd")
-    assert "0:3: moves again as recorded, to the last bit" in out
+    assert "0:3: moves as recorded, equal to the last bit" in out
     again = poses(stage.folder / "again.rrd", "/motion/0-3")
     table = read_table(quiet_hamlet, "poses").filter(pc.field("birth") == 3)
     # Brains tick more often than poses are recorded.
     assert len(again) > 1.5 * table.num_rows
 
 
-def test_a_robot_that_was_alone_moves_again_as_recorded(
+def test_a_resimulated_off_line_robot_moves_as_recorded(
     stage: Stage, undisturbed: Path
 ) -> None:
     words = ("view", str(undisturbed), "--robot", "best", "--ancestry")
@@ -241,15 +245,13 @@ def test_a_robot_that_was_alone_moves_again_as_recorded(
         row["fitness"] or 0.0
         for row in read_table(undisturbed, "evaluations").to_pylist()
     )
-    (told,) = [line for line in out.splitlines() if line.startswith("best ever judged")]
-    assert told.endswith(f", fitness {best:.4f}")
-    assert "moves again as recorded, to the last bit" in out
+    (line,) = [one for one in out.splitlines() if one.startswith("best ever")]
+    assert line == f"best ever evaluated: {line.split()[3]} fitness {best:.4f}"
+    assert "moves as recorded, equal to the last bit" in out
     assert "DIFFERS" not in out
 
 
-def test_a_record_that_is_not_what_happens_is_told(
-    stage: Stage, undisturbed: Path
-) -> None:
+def test_a_wrong_record_is_reported(stage: Stage, undisturbed: Path) -> None:
     folder = stage.folder / "forged"
     subprocess.run(["cp", "-r", str(undisturbed), str(folder)], check=True)
     (file,) = folder.glob("tables/*/*/evaluations.parquet")
@@ -258,26 +260,29 @@ def test_a_record_that_is_not_what_happens_is_told(
     fitness = pc.add(table["fitness"], 1e-9)
     pq.write_table(table.set_column(index, table.schema.field(index), fitness), file)
     out = stage.run("view", str(folder), "--robot", "0:4", "--save", "a.rrd")
-    assert "0:4: DIFFERS from what was recorded: fitness" in out
+    assert "0:4: DIFFERS from the record: fitness" in out
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
-        (("view",), "name a run folder, or a coordinator"),
-        (("view", "nowhere"), "no run is there"),
+        (("view",), "give either a run folder or --connect"),
+        (("view", "nowhere"), "no run found"),
         (("view", "--connect", "tcp/127.0.0.1:1"), "no coordinator at"),
         (("view", "nowhere", "--serve", "9876"), "must be HOST:PORT"),
         (("view", "nowhere", "--follow", "7"), "must be ISLAND:BIRTH"),
-        (("view", "nowhere", "--save", "no/such/a.rrd"), "there is no folder no/such"),
+        (("view", "nowhere", "--save", "no/such/a.rrd"), "no such folder: no/such"),
         (("view", "nowhere", "--save", "a.txt"), "must end in .rrd"),
-        (("view", "nowhere", "--ancestry"), "of whom?"),
-        (("view", "--connect", "tcp/127.0.0.1:1", "--robot", "best"), "folder only"),
+        (("view", "nowhere", "--ancestry"), "needs --robot best"),
+        (
+            ("view", "--connect", "tcp/127.0.0.1:1", "--robot", "best"),
+            "a run folder only",
+        ),
     ],
 )
-def test_bad_words_are_told_in_one_line(
-    stage: Stage, words: tuple[str, ...], said: str
+def test_invalid_flags_are_reported_in_one_line(
+    stage: Stage, words: tuple[str, ...], message: str
 ) -> None:
     out = stage.run(*words, code=2)
-    assert said in out
+    assert message in out
     assert out.count("\n") == 1

@@ -1,4 +1,4 @@
-"""What a viewer shows, live and again, looked at without a screen.
+"""Tests of the pictures that a viewer shows, live and in a replay, without a screen.
 
 Needs a Vulkan driver (Debian: mesa-vulkan-drivers) and is skipped without one.
 """
@@ -131,7 +131,7 @@ def test_a_live_view_shows_robots_where_they_are(
     served = f"127.0.0.1:{free_port()}"
     words = ("--serve", served, "--save", "live.rrd")
     hamlet_stage.start("view", "--connect", fleet.address, *words)
-    until((hamlet_stage.folder / "live.rrd").exists, "the viewer has been told")
+    until((hamlet_stage.folder / "live.rrd").exists, "the viewer has received the run")
     fleet.join("w", "worker")
     fleet.begin(1)
     fleet.finish()
@@ -139,6 +139,6 @@ def test_a_live_view_shows_robots_where_they_are(
     check_robots(picture, fleet.folder)
 
 
-def test_a_picture_of_something_else_is_noticed(quiet_hamlet: Path) -> None:
+def test_a_wrong_picture_fails_the_check(quiet_hamlet: Path) -> None:
     with pytest.raises(AssertionError):
         check_robots(np.full((900, 1200, 3), 246.0), quiet_hamlet)

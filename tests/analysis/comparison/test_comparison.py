@@ -1,4 +1,4 @@
-"""Experiments against each other, and findings, of runs with known numbers."""
+"""Tests of comparisons and findings, of runs with known numbers."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -80,7 +80,7 @@ def test_outcomes_by_hand() -> None:
     assert math.isnan(found["touched"])
 
 
-def test_several_islands_count_with_their_mean() -> None:
+def test_outcome_of_several_islands_is_their_mean() -> None:
     levels = [
         {"island": 0, "births": 15, "fitness": 0.1},
         {"island": 1, "births": 15, "fitness": 0.5},
@@ -107,7 +107,7 @@ def test_every_measure_of_every_pair_is_compared_once() -> None:
     assert first["difference_low"] < 3 < first["difference_high"]
 
 
-def test_experiments_meet_where_all_their_runs_have_been() -> None:
+def test_experiments_are_compared_at_births_that_all_runs_reach() -> None:
     short = [
         measured("a", 0, tables([{"births": 30, "fitness": 0.2}])),
         measured("a", 1, tables([{"births": 60, "fitness": 0.4}])),
@@ -123,7 +123,7 @@ def test_experiments_meet_where_all_their_runs_have_been() -> None:
     assert (row["births"], row["runs_a"], row["mean_b"]) == (30, 1, 0.1)
 
 
-def test_who_has_not_finished_is_not_compared() -> None:
+def test_unfinished_runs_are_not_compared() -> None:
     made = tables([{"births": 30, "fitness": 0.2}])
     outcomes = Outcomes([measured("a", 0, made, "running"), *runs("b", [1, 2])])
     assert outcomes.experiments == ["b"]
@@ -135,12 +135,12 @@ HIGH = [11.0, 12, 13, 14, 15, 16, 17, 18, 19, 20]
 LOW = [1.0, 2, 3, 4, 5, 6, 7, 8, 9, 10]
 
 
-def test_findings_are_reproduced_or_not_or_undecided() -> None:
+def test_findings_are_reproduced_not_reproduced_or_undecided() -> None:
     claims = [
         Claim("1", "reproduced", "fitness", "high", ">", "low"),
-        Claim("2", "the other way", "fitness", "high", "<", "low"),
-        Claim("3", "two alike runs do not tell", "fitness", "low", ">", "few"),
-        Claim("4", "nobody ran it", "fitness", "low", ">", "ghost"),
+        Claim("2", "the opposite", "fitness", "high", "<", "low"),
+        Claim("3", "two equal runs are undecided", "fitness", "low", ">", "few"),
+        Claim("4", "without runs", "fitness", "low", ">", "ghost"),
         Claim("5", "far from alike", "fitness", "high", "=", "low"),
         Claim("6", "alike", "fitness", "many", "=", "more"),
         Claim("7", "above a reference", "fitness", "low", ">", reference=0.5),
@@ -196,7 +196,7 @@ def test_the_rules_of_verdicts(
     assert verdict(expected, row)[0] == decided
 
 
-def test_claims_are_about_what_is_measured() -> None:
+def test_claims_name_existing_measures() -> None:
     assert {claim.measure for claim in CLAIMS} <= set(OUTCOME)
     figures = [tuple(map(int, claim.figure.split("."))) for claim in CLAIMS]
     assert figures == sorted(figures)

@@ -1,4 +1,4 @@
-"""Statistics against scipy, and by hand where few runs can be counted out."""
+"""Tests of statistics against SciPy, and against enumeration for few runs."""
 
 import math
 from itertools import combinations
@@ -38,8 +38,8 @@ def test_cliffs_delta_by_hand() -> None:
     assert cliffs_delta(numbers(5, 6), numbers(1, 2, 3)) == 1
 
 
-def test_few_runs_cannot_be_sure() -> None:
-    # All three above all three: one of 20 ways to deal, and as many the other way.
+def test_few_runs_have_a_large_p() -> None:
+    # All three above all three: one of 20 ways, and one with the opposite sign.
     assert rank_sum_p(numbers(4, 5, 6), numbers(1, 2, 3)) == pytest.approx(2 / 20)
     assert rank_sum_p(numbers(1, 2, 3), numbers(4, 5, 6)) == pytest.approx(2 / 20)
     assert rank_sum_p(numbers(1, 1), numbers(1, 1)) == 1
@@ -54,7 +54,7 @@ def test_rank_sum_without_ties_equals_scipy() -> None:
 
 
 @given(samples, samples)
-def test_rank_sum_with_ties_is_counted_out(a: list[int], b: list[int]) -> None:
+def test_rank_sum_with_ties_equals_enumeration(a: list[int], b: list[int]) -> None:
     both = numbers(*a, *b)
     places = ranks(both)
     found = places[: len(a)].sum()
@@ -117,7 +117,7 @@ def test_difference_of_means_equals_scipy() -> None:
     assert (low + 0.5, high + 0.5) == pytest.approx((alone.low, alone.high), rel=1e-5)
 
 
-def test_no_spread_can_be_told_from_one_run() -> None:
+def test_one_run_has_no_interval() -> None:
     difference, low, high = mean_difference(numbers(3), numbers(1, 2))
     assert difference == 1.5
     assert math.isnan(low)
@@ -125,7 +125,7 @@ def test_no_spread_can_be_told_from_one_run() -> None:
 
 
 @pytest.mark.parametrize("delta", [-1.0, -0.6, 0.0, 0.3, 1.0])
-def test_the_interval_of_delta_ends_where_the_score_does(delta: float) -> None:
+def test_interval_of_delta_ends_at_the_score_bounds(delta: float) -> None:
     first, second = 10, 5
     theta = (delta + 1) / 2
 
@@ -145,7 +145,7 @@ def test_the_interval_of_delta_ends_where_the_score_does(delta: float) -> None:
 
 
 @pytest.mark.slow
-def test_the_interval_holds_what_it_promises() -> None:
+def test_interval_of_delta_has_the_stated_coverage() -> None:
     # Normal runs, one experiment half a deviation above: delta is known.
     rng = np.random.default_rng(7)
     truth = 2 * stats.norm.cdf(0.5 / math.sqrt(2)) - 1

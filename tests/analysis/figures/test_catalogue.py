@@ -168,4 +168,4 @@ def test_an_experiment_has_the_same_colour_in_every_figure() -> None:
 
 def test_null_values_have_no_rows() -> None:
     rows = table("outcomes", [*outcomes("a", 0.1), {"experiment": "b"}])
-    assert stacked(rows, [FITNESS])["value"].to_pylist() == [0.1]
+    assert stacked(rows, [FITNESS])["value"].tolist() == [0.1]

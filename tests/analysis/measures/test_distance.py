@@ -1,4 +1,4 @@
-"""Tree edit distance: by hand, against an older implementation, as a metric."""
+"""Tests of tree edit distance: known values, another implementation, a metric."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ CHAIN = [*BRICK, part(2, 1, 2, "Hinge", own=0)]
         # The brick between core and hinge goes; the hinge moves from slot 2 to 1.
         (CHAIN, [*CORE, part(1, 0, 1, "Hinge")], 2),
         (CHAIN, [*CORE, part(1, 0, 2, "Hinge")], 1),
-        # Nobody crosses over: one of the two is taken off and put on again.
+        # Children are ordered: one of the two is deleted and inserted again.
         (
             [*CORE, part(1, 0, 0, "FixedBrick"), part(2, 0, 1, "ActiveHinge")],
             [*CORE, part(1, 0, 0, "ActiveHinge"), part(2, 0, 1, "FixedBrick")],
@@ -52,14 +52,14 @@ def test_distances_by_hand(first: Body, second: Body, expected: int) -> None:
     assert distance(second, first) == expected
 
 
-def test_the_published_code_s_rule_looks_at_a_part_s_own_slot() -> None:
+def test_own_slot_rule_compares_the_slot_of_the_part() -> None:
     turned = [*CORE, part(1, 0, 0, "FixedBrick", own=1)]
     moved = [*CORE, part(1, 0, 3, "FixedBrick", own=0)]
     assert [distance(BRICK, turned, rule) for rule in ("parent", "own")] == [0, 1]
     assert [distance(BRICK, moved, rule) for rule in ("parent", "own")] == [1, 0]
 
 
-def test_equal_trees_are_one_tree() -> None:
+def test_equal_trees_are_stored_once() -> None:
     other_numbers = [{**row, "rot": 90, "params": [1.0], "gene": 5} for row in CHAIN]
     trees = encode(column([CHAIN, BRICK, other_numbers]))
     assert trees.tree_of.tolist() == [0, 1, 0]
@@ -128,7 +128,7 @@ def as_labelled(body: Body, slots: SlotRule) -> list[tuple[object, ...]]:
 
 @settings(max_examples=200)
 @given(three_bodies(), st.sampled_from(["parent", "own"]))
-def test_it_is_a_metric(bodies: list[Body], slots: SlotRule) -> None:
+def test_distance_is_a_metric(bodies: list[Body], slots: SlotRule) -> None:
     trees = encode(column(bodies), slots)
     a, b, c = trees.tree_of
     first, second = np.array([a, b, a, c, a, b]), np.array([b, a, c, a, a, c])
@@ -152,12 +152,12 @@ def test_it_is_a_metric(bodies: list[Body], slots: SlotRule) -> None:
         [*BRICK, part(2, 0, 1, "Hinge"), part(3, 1, 1, "Hinge")],
     ],
 )
-def test_a_broken_tree_is_told_with_its_row(body: Body) -> None:
+def test_an_invalid_tree_is_reported_with_its_row(body: Body) -> None:
     with pytest.raises(InvalidRobot, match="body of birth row 1"):
         encode(column([CHAIN, body]))
 
 
-def test_no_bodies_are_no_trees() -> None:
+def test_no_bodies_give_no_trees() -> None:
     trees = encode(column([]))
-    nobody = np.zeros(0, np.int64)
-    assert tree_distances(trees, nobody, nobody).tolist() == []
+    empty = np.zeros(0, np.int64)
+    assert tree_distances(trees, empty, empty).tolist() == []

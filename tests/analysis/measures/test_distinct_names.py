@@ -1,4 +1,4 @@
-"""Experiments that have one name and other settings."""
+"""Tests of experiments of the same name with different settings."""
 
 import json
 from collections.abc import Mapping
@@ -43,39 +43,39 @@ def runs(*documents: Mapping[str, Any], name: str = "scenario1") -> list[Run]:
     ]
 
 
-def told(*documents: Mapping[str, Any]) -> list[tuple[str, str]]:
+def named(*documents: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
         (run.experiment, run.differs) for run in with_distinct_names(runs(*documents))
     ]
 
 
 def test_equal_settings_stay_one_experiment() -> None:
-    assert told(SCENARIO, SCENARIO) == [("scenario1", "")] * 2
+    assert named(SCENARIO, SCENARIO) == [("scenario1", "")] * 2
 
 
-def test_births_are_no_setting() -> None:
+def test_different_births_are_the_same_experiment() -> None:
     experiment = Experiment("e", islands=(Islands(births=20), Islands(births=30)))
     more = Experiment("e", islands=(Islands(births=50), Islands()))
     both = [json.loads(experiment_text(each)) for each in (experiment, more)]
-    assert told(SCENARIO, changed(births=99)) == [("scenario1", "")] * 2
-    assert told(*both) == [("scenario1", "")] * 2
+    assert named(SCENARIO, changed(births=99)) == [("scenario1", "")] * 2
+    assert named(*both) == [("scenario1", "")] * 2
 
 
-def test_most_runs_keep_the_name_and_the_others_say_what_is_different() -> None:
+def test_most_runs_keep_the_name_and_others_list_their_differences() -> None:
     other = changed(selection={"population": 30, "parents": "random"})
     differs = (
         "selection.population: 30 instead of 15, "
         'selection.parents: "random" instead of "tournament"'
     )
     second, plain = ("scenario1~2", differs), ("scenario1", "")
-    found = told(other, SCENARIO, SCENARIO, other, SCENARIO)
+    found = named(other, SCENARIO, SCENARIO, other, SCENARIO)
     assert found == [second, plain, plain, second, plain]
 
 
-def test_of_as_many_the_first_keeps_the_name_and_each_kind_is_one_experiment() -> None:
+def test_the_first_of_equally_many_settings_keeps_the_name() -> None:
     names = [
         name
-        for name, _ in told(
+        for name, _ in named(
             changed(simulation={"friction": 0.5}),
             SCENARIO,
             changed(simulation={"friction": 0.7}),
@@ -105,29 +105,29 @@ def test_of_as_many_the_first_keeps_the_name_and_each_kind_is_one_experiment() -
         ),
     ],
 )
-def test_what_is_different_is_told(document: dict[str, Any], differs: str) -> None:
-    assert told(SCENARIO, document) == [("scenario1", ""), ("scenario1~2", differs)]
+def test_differences_are_listed(document: dict[str, Any], differs: str) -> None:
+    assert named(SCENARIO, document) == [("scenario1", ""), ("scenario1~2", differs)]
 
 
-def test_an_older_document_has_today_s_defaults_where_it_knows_nothing() -> None:
+def test_missing_keys_of_an_older_document_have_current_defaults() -> None:
     older = {key: value for key, value in SCENARIO.items() if key != "environment"}
     older["simulation"] = {**SCENARIO["simulation"]}
     del older["simulation"]["sensor_noise"]
-    assert told(SCENARIO, older) == [("scenario1", "")] * 2
+    assert named(SCENARIO, older) == [("scenario1", "")] * 2
 
 
-def test_documents_that_are_not_ours_are_compared_as_they_stand() -> None:
+def test_invalid_documents_are_compared_unchanged() -> None:
     strange = {"births": 3, "fitness": "fast", "islands": [{"births": 4, "a": 1}]}
-    assert told(strange, {**strange, "births": 5}) == [("scenario1", "")] * 2
-    assert told(strange, {**strange, "fitness": "slow"})[1] == (
+    assert named(strange, {**strange, "births": 5}) == [("scenario1", "")] * 2
+    assert named(strange, {**strange, "fitness": "slow"})[1] == (
         "scenario1~2",
         'fitness: "slow" instead of "fast"',
     )
     further = {**strange, "islands": [{"births": 4, "a": 2}]}
-    assert told(strange, further)[1][1] == "islands.0.a: 2 instead of 1"
+    assert named(strange, further)[1][1] == "islands.0.a: 2 instead of 1"
 
 
-def test_names_are_told_apart_each_for_itself() -> None:
+def test_each_name_is_numbered_separately() -> None:
     some = [*runs(SCENARIO), *runs(changed(births=5), name="mine")]
     some += runs(json.loads(experiment_text(Experiment("mine"))), name="mine")
     assert [run.experiment for run in with_distinct_names(some)] == [
@@ -140,7 +140,7 @@ def test_names_are_told_apart_each_for_itself() -> None:
     assert with_distinct_names(some)[-1].experiment == "mine~2"
 
 
-def test_a_name_that_an_experiment_has_is_given_to_no_other() -> None:
+def test_a_taken_name_is_not_used_again() -> None:
     taken = runs(SCENARIO, name="scenario1~2")
     others = [changed(simulation={"friction": each}) for each in (0.5, 0.7)]
     names = [
@@ -149,7 +149,7 @@ def test_a_name_that_an_experiment_has_is_given_to_no_other() -> None:
     assert names == ["scenario1", "scenario1~3", "scenario1~4", "scenario1~2"]
 
 
-def test_figures_say_which_is_meant() -> None:
+def test_figures_label_renamed_experiments() -> None:
     assert label("scenario1~2") == "scenario 1 ~2"
     assert two_line_label("no-selection~2") == "no selection\n~2"
     names = ["scenario1~2", "scenario1", "scenario2"]

@@ -1,4 +1,4 @@
-"""Runs that are broken, unfinished, doubled or of another version."""
+"""Tests of damaged, unfinished and duplicate runs, and runs of other versions."""
 
 import json
 import shutil
@@ -95,7 +95,7 @@ def test_runs_are_found_below_in_order(made: Maker, tmp_path: Path) -> None:
     assert not left_out
 
 
-def test_where_no_run_is_is_said(tmp_path: Path) -> None:
+def test_a_folder_without_runs_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="no run in or below this folder"):
         read_runs([tmp_path])
     with pytest.raises(RunFolderError, match="nowhere: no such folder"):
@@ -105,7 +105,7 @@ def test_where_no_run_is_is_said(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text", ["", "[]", "{}", '{"name": 1}', '{"document": "{}", "name": "e"}', "\x00"]
 )
-def test_a_broken_description_is_named_and_the_others_are_read(
+def test_an_unreadable_description_is_reported_and_others_are_read(
     made: Maker, tmp_path: Path, text: str
 ) -> None:
     made("whole")
@@ -117,13 +117,13 @@ def test_a_broken_description_is_named_and_the_others_are_read(
     assert one.why.startswith("run.json: ")
 
 
-def test_where_no_run_can_be_read_is_said(tmp_path: Path) -> None:
+def test_no_readable_run_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text("{}")
     with pytest.raises(RunFolderError, match=r"no run can be read: .*: run.json: "):
         read_runs([tmp_path])
 
 
-def test_a_finished_run_tells_what_it_is_without_its_description(made: Maker) -> None:
+def test_a_finished_run_is_read_without_its_description(made: Maker) -> None:
     folder = made("x")
     document = json.dumps({"births": 3, "arena": None})
     row = {"name": "e", "run": 4, "seed": 9, "document": document, "state": "finished"}
@@ -147,7 +147,7 @@ def test_a_run_in_two_folders_counts_once(made: Maker, tmp_path: Path) -> None:
     assert all(one.why.endswith("b") for one in left_out)
 
 
-def test_a_finished_run_without_tables_is_named(made: Maker, tmp_path: Path) -> None:
+def test_a_finished_run_without_tables_is_reported(made: Maker, tmp_path: Path) -> None:
     made("whole")
     shutil.rmtree(made("gone", seed=2) / "tables")
     runs, left_out = read_runs([tmp_path])
@@ -158,9 +158,7 @@ def test_a_finished_run_without_tables_is_named(made: Maker, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("name", ["births", "population", "evaluations"])
-def test_a_table_that_a_finished_run_must_have_is_missed(
-    made: Maker, name: str
-) -> None:
+def test_a_missing_table_of_a_finished_run_is_reported(made: Maker, name: str) -> None:
     folder = made("x")
     parquet_path(folder, "e", 0, name).unlink()
     measured = measure_run(found_in(folder), "parent")
@@ -169,7 +167,7 @@ def test_a_table_that_a_finished_run_must_have_is_missed(
     assert whys(measured)["measure robots"] == f"needs table {name}"
 
 
-def test_an_arena_s_tables_are_missed_too(made: Maker) -> None:
+def test_a_missing_table_of_an_arena_is_reported(made: Maker) -> None:
     folder = made("x")
     document = {"births": 3, "arena": {"record_touches": True}}
     details = {"name": "e", "run": 0, "seed": 1, "document": json.dumps(document)}
@@ -178,9 +176,7 @@ def test_an_arena_s_tables_are_missed_too(made: Maker) -> None:
     assert missing == {"table fitness", "table deaths", "table touches"}
 
 
-def test_a_copy_whose_tables_are_gone_does_not_count(
-    made: Maker, tmp_path: Path
-) -> None:
+def test_a_copy_without_tables_is_not_used(made: Maker, tmp_path: Path) -> None:
     for name in ("a", "b", "c"):
         made(name)
     shutil.rmtree(tmp_path / "a" / "tables")
@@ -189,9 +185,7 @@ def test_a_copy_whose_tables_are_gone_does_not_count(
     assert [run.folder.name for run in runs] == ["c"]
 
 
-def test_of_a_run_in_two_folders_the_one_that_can_be_read_counts(
-    made: Maker, tmp_path: Path
-) -> None:
+def test_the_readable_copy_of_a_run_is_used(made: Maker, tmp_path: Path) -> None:
     for name in ("a", "b", "c"):
         made(name)
     for name, damaged in (("a", "population"), ("c", "births")):
@@ -205,7 +199,7 @@ def test_of_a_run_in_two_folders_the_one_that_can_be_read_counts(
     ]
 
 
-def test_of_an_unfinished_run_in_two_folders_the_longer_counts(
+def test_the_longer_copy_of_an_unfinished_run_is_used(
     made: Maker, tmp_path: Path
 ) -> None:
     for name in ("a", "b"):
@@ -216,7 +210,7 @@ def test_of_an_unfinished_run_in_two_folders_the_longer_counts(
     assert [run.folder.name for run in runs] == ["b"]
 
 
-def test_a_damaged_table_is_named_and_the_others_are_measured(made: Maker) -> None:
+def test_a_damaged_table_is_reported_and_others_are_measured(made: Maker) -> None:
     folder = made("x")
     path = parquet_path(folder, "e", 0, "evaluations")
     path.write_bytes(path.read_bytes()[:-20])
@@ -228,7 +222,7 @@ def test_a_damaged_table_is_named_and_the_others_are_measured(made: Maker) -> No
     assert "robots" not in measured.tables
 
 
-def test_another_version_s_table_is_named_not_guessed_at(made: Maker) -> None:
+def test_a_table_of_another_version_is_reported_and_skipped(made: Maker) -> None:
     folder = made("x")
     path = parquet_path(folder, "e", 0, "population")
     old = ROWS["population"].replace_schema_metadata({"revolve.schema_version": "1"})
@@ -242,7 +236,7 @@ def test_another_version_s_table_is_named_not_guessed_at(made: Maker) -> None:
     assert whys(measured)["measures"] == "no population is recorded"
 
 
-def test_another_version_s_segment_is_named(made: Maker) -> None:
+def test_a_segment_of_another_version_is_reported(made: Maker) -> None:
     folder = made("x", state="running")
     path = segment_path(folder, "births", 0)
     rows = ROWS["births"].rename_columns(
@@ -255,7 +249,7 @@ def test_another_version_s_segment_is_named(made: Maker) -> None:
     assert "2 populations skipped" in whys(measured)["populations"]
 
 
-def test_columns_that_an_older_run_lacks_are_filled(made: Maker) -> None:
+def test_missing_columns_of_an_older_run_are_filled(made: Maker) -> None:
     folder = made("x")
     for name, column in (("population", "birth_island"), ("evaluations", "trial")):
         path = parquet_path(folder, "e", 0, name)
@@ -266,9 +260,7 @@ def test_columns_that_an_older_run_lacks_are_filled(made: Maker) -> None:
 
 
 @pytest.mark.parametrize("kept", np.linspace(0.3, 0.99, 6).tolist())
-def test_what_a_kill_cut_off_is_missing_and_nothing_else(
-    made: Maker, kept: float
-) -> None:
+def test_a_truncated_segment_loses_only_its_last_rows(made: Maker, kept: float) -> None:
     folder = made("x", state="running")
     path = segment_path(folder, "births", 0)
     data = path.read_bytes()
@@ -284,7 +276,7 @@ def test_what_a_kill_cut_off_is_missing_and_nothing_else(
     assert why.startswith("1 population" if known == 2 else "2 population")
 
 
-def test_an_empty_run_is_named(made: Maker) -> None:
+def test_a_run_without_tables_is_reported(made: Maker) -> None:
     folder = made("x", state="running")
     shutil.rmtree(folder / "segments")
     measured = measure_run(found_in(folder), "parent")
@@ -311,7 +303,7 @@ def test_islands_have_their_own_settings(made: Maker) -> None:
     assert {"between", "migrants", "variability"} <= set(measured.tables)
 
 
-def test_immigrants_keep_the_name_they_were_born_with(made: Maker) -> None:
+def test_immigrants_keep_their_birth_id(made: Maker) -> None:
     folder = made("x")
     rows: list[dict[str, object]] = [
         {"island": 1, "births": 3, "birth_island": 0, "birth": 2, "fitness": 1.0},
@@ -325,7 +317,9 @@ def test_immigrants_keep_the_name_they_were_born_with(made: Maker) -> None:
 
 
 @pytest.mark.slow
-def test_processes_measure_as_one_does(made: Maker, tmp_path: Path) -> None:
+def test_several_processes_give_the_same_measures_as_one(
+    made: Maker, tmp_path: Path
+) -> None:
     for number in range(4):
         made(f"run-{number}", seed=number)
     runs, _ = read_runs([tmp_path])

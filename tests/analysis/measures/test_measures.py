@@ -1,4 +1,4 @@
-"""Every measure of hand-worked tables with a known answer."""
+"""Tests of all measures, with small tables and known results."""
 
 import math
 from typing import Any
@@ -34,7 +34,7 @@ def column(tables: dict[str, pa.Table], name: str) -> list[Any]:
     return values
 
 
-def test_fitness_is_that_of_the_judged_off_line() -> None:
+def test_failed_evaluations_count_as_zero_fitness_off_line() -> None:
     tables = run(
         births=FAMILY,
         population=population(
@@ -50,7 +50,7 @@ def test_fitness_is_that_of_the_judged_off_line() -> None:
     assert column(tables, "fitness_best") == [0.3, 0.5]
 
 
-def test_in_an_arena_who_is_not_mature_does_not_count() -> None:
+def test_immature_robots_of_an_arena_are_not_judged() -> None:
     living = population(
         (0, 1, {A: None}), (0, 4, {A: 0.2, B: None, D: 0.4}), is_online=True
     )
@@ -63,7 +63,7 @@ def test_in_an_arena_who_is_not_mature_does_not_count() -> None:
     assert column(tables, "rank") == [None, 1.5]
 
 
-def test_unique_ancestors_are_counted_once_each() -> None:
+def test_each_ancestor_is_counted_once() -> None:
     assert ancestors(parents_of(FAMILY)) == [0, 0, 0b11, 0b111, 0b1111]
     tables = run(
         births=FAMILY,
@@ -78,7 +78,7 @@ def test_unique_ancestors_are_counted_once_each() -> None:
     assert column(tables, "ancestors_per_robot") == [0, 1, 2]
 
 
-def test_a_parent_on_another_island_may_stand_behind_its_child() -> None:
+def test_a_parents_row_may_come_after_its_childs() -> None:
     # Island 0 is recorded first; its G descends from F and H of island 1.
     f, g, h = (1, 0), (0, 0), (1, 1)
     born = births((g, [h]), (f, []), (h, [f]))
@@ -89,12 +89,12 @@ def test_a_parent_on_another_island_may_stand_behind_its_child() -> None:
     assert column(tables, "foreign") == [1, 0]
 
 
-def test_nobody_descends_from_itself() -> None:
+def test_an_individual_that_is_its_own_ancestor_is_refused() -> None:
     with pytest.raises(RunFolderError, match="row 0 descends from itself"):
         ancestors(parents_of(births((A, [B]), (B, [A]))))
 
 
-def test_ancestors_of_the_immature_do_not_count() -> None:
+def test_ancestors_of_immature_robots_do_not_count() -> None:
     tables = run(
         births=FAMILY, population=population((0, 5, {C: 0.1, E: None}), is_online=True)
     )
@@ -102,7 +102,7 @@ def test_ancestors_of_the_immature_do_not_count() -> None:
     assert column(tables, "ancestors_per_robot") == [2]
 
 
-def test_a_parent_that_is_not_there_is_told_and_the_rest_is_measured() -> None:
+def test_a_missing_parent_is_reported_and_other_measures_remain() -> None:
     tables = run(
         births=births((A, []), (C, [A, B])), population=population((0, 2, {A: 1, C: 2}))
     )
@@ -123,7 +123,7 @@ def test_diversity_is_the_mean_over_pairs() -> None:
     # Core to brick 1, core to hinge 1, brick to hinge 1, core to far 2, brick to far
     # 1 + 2 (type and slot differ, one more part), hinge to far the same.
     bodies = births((A, []), (B, []), (C, []), (D, []), body=[CORE, BRICK, HINGE, FAR])
-    who = population_table(
+    recorded_populations = population_table(
         population(
             (0, 2, {A: 0.1}),
             (0, 3, {A: 0.1, B: None, C: 0.1}),
@@ -132,14 +132,14 @@ def test_diversity_is_the_mean_over_pairs() -> None:
         ),
         bodies,
     )
-    found = diversity(who, encode(bodies["body"]))
+    found = diversity(recorded_populations, encode(bodies["body"]))
     assert math.isnan(found[0])
     assert found[1:].tolist() == pytest.approx([1.0, (1 + 1 + 1 + 2 + 3 + 3) / 6])
 
 
-def test_retention_is_the_share_that_still_lives() -> None:
+def test_retention_is_the_share_that_is_still_alive() -> None:
     born = births(*((name, []) for name in (A, B, C, D, E)))
-    who = population_table(
+    recorded_populations = population_table(
         population(
             (0, 10, {A: 1, B: 1, C: 1, D: 1}),
             # Nothing was recorded at 130 + 5: skipped, and so are the last.
@@ -151,11 +151,11 @@ def test_retention_is_the_share_that_still_lives() -> None:
         ),
         born,
     )
-    found = retention(who)
+    found = retention(recorded_populations)
     assert found.tolist() == pytest.approx(
         [0.5, math.nan, 1 / 3, math.nan, math.nan], nan_ok=True
     )
-    assert retention(who, step=5)[0] == 0.25
+    assert retention(recorded_populations, step=5)[0] == 0.25
 
 
 def test_variability_by_hand() -> None:
@@ -219,7 +219,7 @@ def test_sizes_by_hand() -> None:
     assert column(tables, "without_touch") == [0.5]
 
 
-def test_robots_have_the_fitness_that_they_were_last_judged_by() -> None:
+def test_robots_have_their_last_fitness() -> None:
     evaluations = [
         {"birth": 0, "trial": 0, "status": "ok", "fitness": 0.1},
         {"birth": 1, "trial": 0, "status": "failed", "fitness": None},
@@ -238,7 +238,7 @@ def test_robots_have_the_fitness_that_they_were_last_judged_by() -> None:
     assert found["ancestors"].to_pylist() == [0, 0, 2]
 
 
-def test_robots_of_an_arena_count_once_they_were_mature() -> None:
+def test_robots_of_an_arena_count_if_they_were_ever_mature() -> None:
     samples = [
         {"birth": 0, "sim_time_s": 20.0, "fitness": 0.2, "is_mature": True},
         {"birth": 0, "sim_time_s": 15.0, "fitness": 0.1, "is_mature": True},
@@ -345,7 +345,7 @@ def test_migrants_and_their_descendants() -> None:
     assert [row["birth_island"] for row in found] == [0, 1]
 
 
-def test_one_island_has_no_foreigners() -> None:
+def test_foreign_share_of_one_island_is_null() -> None:
     tables = run(births=FAMILY, population=population((0, 2, {A: 1, B: 1})))
     assert column(tables, "foreign") == [None]
 
@@ -353,7 +353,7 @@ def test_one_island_has_no_foreigners() -> None:
 def test_distances_between_islands() -> None:
     bodies = [CORE, BRICK, FAR, HINGE, CORE, CORE]
     born = births((A, []), (B, []), (F, []), (C, []), (G, []), (H, []), body=bodies)
-    who = population_table(
+    recorded_populations = population_table(
         population(
             (0, 2, {A: 1, B: 1}),
             (1, 1, {F: 1}),
@@ -362,7 +362,9 @@ def test_distances_between_islands() -> None:
         ),
         born,
     )
-    found = mean_distances(who, encode(born["body"]), step=2).to_pylist()
+    found = mean_distances(
+        recorded_populations, encode(born["body"]), step=2
+    ).to_pylist()
     # At 2: core and brick here, far there: (2 + 3) / 2; within only here: 1.
     assert found[0] == {"births": 2, "islands": 2, "within": 1.0, "between": 2.5}
     # At 4: brick and hinge; far and core: 3, 1, 3, 1; within: 1 and 2.
@@ -396,7 +398,7 @@ def test_progression_of_two_runs_and_of_another_experiment() -> None:
     assert found[1]["low"] is None
 
 
-def test_progression_of_islands_is_where_all_of_them_are_recorded() -> None:
+def test_progression_of_islands_has_births_at_which_all_are_recorded() -> None:
     rows = [(0, 15, 0.2), (1, 15, 0.4), (1, 16, 0.9), (0, 30, 0.4), (1, 30, 0.8)]
     names = ["island", "births", "fitness"]
     made = pa.table(dict(zip(names, map(list, zip(*rows, strict=True)), strict=True)))
@@ -410,14 +412,16 @@ def test_progression_of_islands_is_where_all_of_them_are_recorded() -> None:
     assert [row["mean"] for row in found] == pytest.approx([0.3, 0.6])
 
 
-def test_a_population_with_somebody_unknown_is_left_out() -> None:
+def test_a_population_with_an_unknown_member_is_left_out() -> None:
     born = births((A, []), (B, []))
-    who = population_table(population((0, 1, {A: 1}), (0, 3, {B: 1, C: 2})), born)
-    assert who.births.tolist() == [1]
-    assert who.incomplete == 1
+    recorded_populations = population_table(
+        population((0, 1, {A: 1}), (0, 3, {B: 1, C: 2})), born
+    )
+    assert recorded_populations.births.tolist() == [1]
+    assert recorded_populations.incomplete == 1
 
 
-def test_nothing_born_is_nothing_measured() -> None:
+def test_a_run_without_births_has_no_measures() -> None:
     tables = run(births=births(), population=population())
     found, problems = measure(
         RunTables(tables),

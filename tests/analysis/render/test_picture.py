@@ -1,4 +1,4 @@
-"""Pictures: what is drawn where, and files that open again."""
+"""Tests of rendered pictures and their files."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -52,7 +52,9 @@ def mostly(picture: np.ndarray, channel: int) -> np.ndarray:
     return np.argwhere(picture[..., channel].astype(int) > 2 * others + 20)
 
 
-def test_parts_show_their_colours_where_they_are(renderer: RobotRenderer) -> None:
+def test_parts_are_rendered_at_their_places_in_their_colours(
+    renderer: RobotRenderer,
+) -> None:
     picture = renderer.picture()
     assert picture.shape == (120, 160, 3)
     red, blue = mostly(picture, 0), mostly(picture, 2)
@@ -67,7 +69,7 @@ def test_parts_show_their_colours_where_they_are(renderer: RobotRenderer) -> Non
     assert (seen.max(axis=0) < (117, 157)).all()
 
 
-def test_a_pose_moves_the_robot_in_a_picture_that_stands_still(
+def test_a_pose_moves_the_robot_before_a_fixed_camera(
     renderer: RobotRenderer,
 ) -> None:
     pose = np.array([0.0, 0.0, 0.0225, 1.0, 0.0, 0.0, 0.0])
@@ -102,24 +104,24 @@ def test_files_open_again(tmp_path: Path) -> None:
 
 
 def simulate(*_: object, **__: object) -> NoReturn:
-    """Fail: what is wrong with the words is told before anything is done."""
+    """Fail: flags are checked before the simulation."""
     raise AssertionError("words come first")
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [
         (("--gait", "0"), "--gait: must be a whole number >= 1, got '0'"),
         (("--width", "-5"), "--width: must be a whole number >= 16, got '-5'"),
     ],
 )
-def test_words_that_cannot_be_are_refused(
-    words: tuple[str, str], said: str, capsys: pytest.CaptureFixture[str]
+def test_invalid_flags_are_refused(
+    words: tuple[str, str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as end:
         main(["robot render", "a.yaml", "a.png", *words], simulate)
     assert end.value.code == 2
-    assert said in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 @pytest.fixture
@@ -129,11 +131,11 @@ def robot_file(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.usefixtures("renderer")  # where nothing can draw, that is told
-def test_a_strip_longer_than_there_are_ticks_is_refused(robot_file: Path) -> None:
+@pytest.mark.usefixtures("renderer")  # skips where nothing can render
+def test_a_strip_longer_than_the_evaluation_is_refused(robot_file: Path) -> None:
     words = ["robot render", str(robot_file), str(robot_file.with_suffix(".png"))]
-    said = r"--gait 49: must be <= 48, the ticks of the second half of its life"
-    with pytest.raises(NoPictures, match=said):
+    message = r"--gait 49: must be <= 48, the number of ticks in the second half"
+    with pytest.raises(NoPictures, match=message):
         main([*words, "--gait", "49"], simulate)
     # One less is what there is, and goes on to the simulation.
     with pytest.raises(AssertionError, match="words come first"):
@@ -141,15 +143,15 @@ def test_a_strip_longer_than_there_are_ticks_is_refused(robot_file: Path) -> Non
 
 
 @pytest.mark.usefixtures("renderer")
-def test_a_log_is_told_at_the_beginning_what_is_drawn(
+def test_a_log_names_the_picture_that_is_rendered(
     robot_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = robot_file.with_suffix(".gif")
     with pytest.raises(AssertionError, match="words come first"):
         main(["robot render", str(robot_file), str(out)], simulate)
-    assert capsys.readouterr().err == f"simulating and drawing: {out}\n"
+    assert capsys.readouterr().err == f"simulating and rendering {out}\n"
 
 
-def test_a_film_is_no_strip() -> None:
-    with pytest.raises(NoPictures, match=r"--gait is for a \.png"):
+def test_a_strip_as_gif_is_refused() -> None:
+    with pytest.raises(NoPictures, match=r"--gait needs a \.png"):
         main(["robot render", "a.yaml", "a.gif", "--gait", "5"], simulate)

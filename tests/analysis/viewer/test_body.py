@@ -1,4 +1,4 @@
-"""Boxes are where the engine has them, in every pose."""
+"""Tests of box models: MuJoCo has the same boxes in every pose."""
 
 import itertools
 
@@ -81,13 +81,13 @@ def _apart(first: Floats, second: Floats) -> float:
     return float(distances.min(axis=1).max())
 
 
-def test_a_plain_figure_has_a_box_for_each_part_and_segment() -> None:
+def test_a_plain_model_has_one_box_per_part_and_segment() -> None:
     drawn = box_model(ROBOT, BUILT_IN, is_plain=True)
     assert len(drawn.half_sizes) == len(ROBOT.parts) + 3
     assert len(drawn.parents) == 4
 
 
-def test_a_plain_figure_fills_the_room_of_the_whole_one() -> None:
+def test_a_plain_model_covers_the_same_space() -> None:
     root, angles = np.array([[0.0, 0, 0, 1, 0, 0, 0]]), np.zeros((1, 3))
     plain = box_model(ROBOT, BUILT_IN, is_plain=True)
     whole = box_model(ROBOT, BUILT_IN, is_plain=False)
@@ -96,13 +96,13 @@ def test_a_plain_figure_fills_the_room_of_the_whole_one() -> None:
         assert np.linalg.norm(far[0] - centre, axis=1).min() < 0.02
 
 
-def test_few_attitudes_serve_all_boxes() -> None:
+def test_boxes_share_few_attitudes() -> None:
     drawn = box_model(ROBOT, BUILT_IN, is_plain=False)
     # Four segments, and the tilts beyond the bar.
     assert len(np.unique(drawn.attitude_of)) <= 6
 
 
-def test_colours_are_the_parts() -> None:
+def test_boxes_have_the_colours_of_their_parts() -> None:
     drawn = box_model(ROBOT, BUILT_IN, is_plain=True)
     assert {tuple(colour) for colour in drawn.colours.tolist()} == {
         (51, 102, 153),

@@ -1,4 +1,4 @@
-"""What a viewer makes of what it is told, without network and screen."""
+"""Tests of the viewer without network and screen."""
 
 import os
 import threading
@@ -13,10 +13,9 @@ from msgspec.structs import replace
 
 from analysis.viewer.blueprint import layout
 from analysis.viewer.entities import PoseBatch, TimePoint
-from analysis.viewer.gallery import Gallery, spot_place
+from analysis.viewer.gallery import BoxModels, Gallery, spot_place
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.live import Sequel
-from analysis.viewer.looks import BoxModels
 from analysis.viewer.output import Output, Window, keep_serving
 from analysis.viewer.recording import ViewerError
 from analysis.viewer.scene import scene_of
@@ -36,20 +35,20 @@ WHOLE = Update("run", 1, 4, is_whole=True, experiment="e")
 
 
 class Recorded:
-    """Takes down what a recording is told."""
+    """Records the calls of a recording's methods."""
 
     def __init__(self) -> None:
-        self.told: list[tuple[object, ...]] = []
+        self.calls: list[tuple[object, ...]] = []
 
     def __getattr__(self, name: str) -> object:
-        return lambda *words: self.told.append((name, *words))
+        return lambda *words: self.calls.append((name, *words))
 
 
 def _news(sequence: int, run: str = "run", epoch: int = 1) -> Update:
     return Update(run, epoch, sequence, is_whole=False, experiment="e")
 
 
-def test_news_that_follow_are_shown_and_nothing_is_asked() -> None:
+def test_consecutive_messages_need_no_complete_state() -> None:
     sequel = Sequel()
     assert sequel.is_behind
     assert sequel.take(WHOLE)
@@ -59,7 +58,7 @@ def test_news_that_follow_are_shown_and_nothing_is_asked() -> None:
 
 
 @pytest.mark.parametrize("late", [_news(6), _news(1, epoch=2)])
-def test_a_gap_has_all_asked_anew_until_it_comes(late: Update) -> None:
+def test_after_a_gap_the_complete_state_is_needed(late: Update) -> None:
     sequel = Sequel()
     sequel.take(WHOLE)
     assert sequel.take(late)
@@ -70,7 +69,7 @@ def test_a_gap_has_all_asked_anew_until_it_comes(late: Update) -> None:
     assert not sequel.is_behind
 
 
-def test_another_run_is_not_shown() -> None:
+def test_messages_of_another_run_are_ignored() -> None:
     sequel = Sequel()
     sequel.take(WHOLE)
     assert not sequel.take(_news(5, run="other"))
@@ -78,14 +77,14 @@ def test_another_run_is_not_shown() -> None:
     assert not sequel.is_behind
 
 
-def test_news_that_come_twice_are_no_gap() -> None:
+def test_duplicate_messages_are_no_gap() -> None:
     sequel = Sequel()
     sequel.take(WHOLE)
     sequel.take(_news(3))
     assert not sequel.is_behind
 
 
-def test_a_ring_wall_stands_where_the_engine_has_it() -> None:
+def test_a_ring_wall_is_where_mujoco_has_it() -> None:
     arena = Arena(wall_diameter_m=3.0, wall_segments=5)
     spec = mujoco.MjSpec()
     add_ring_wall(spec, arena, Simulation())
@@ -98,7 +97,7 @@ def test_a_ring_wall_stands_where_the_engine_has_it() -> None:
         assert half == pytest.approx(model.geom_size[geom], abs=1e-6)
 
 
-def test_who_lives_keeps_a_spot_and_who_dies_frees_it() -> None:
+def test_living_robots_keep_their_spot_and_dead_robots_free_it() -> None:
     recorded, models = Recorded(), BoxModels(BUILT_IN)
     gallery = Gallery(recorded)  # type: ignore[arg-type]
     names = [BirthId(0, number) for number in range(4)]
@@ -106,31 +105,31 @@ def test_who_lives_keeps_a_spot_and_who_dies_frees_it() -> None:
         models.add(name, CORE)
     gallery.show(Level(0, 3, 3, 3, 0.0, 0.0, tuple(names[:3])), models)
     gallery.show(Level(0, 4, 3, 3, 0.0, 0.0, (names[0], names[2], names[3])), models)
-    kinds = [told[0] for told in recorded.told]
+    kinds = [calls[0] for calls in recorded.calls]
     assert kinds == ["born", "stands"] * 3 + ["died", "born", "stands"]
-    assert recorded.told[6][1] == "islands/0/robots/0-1"
-    centres = recorded.told[8][2]
+    assert recorded.calls[6][1] == "islands/0/robots/0-1"
+    centres = recorded.calls[8][2]
     assert isinstance(centres, np.ndarray)
     assert centres[0, 0, :2] == pytest.approx(spot_place(1))
 
 
-def test_the_lineage_is_drawn_every_ten_births_and_knows_the_living() -> None:
+def test_ancestry_is_drawn_every_ten_births_with_living_robots_marked() -> None:
     recorded = Recorded()
     lineage = Lineage(recorded)  # type: ignore[arg-type]
     for number in range(12):
         one = Birth(BirthId(0, number), (), 1, number + 1, None, None)
         assert lineage.add(one)
         assert not lineage.add(one)
-    assert len(recorded.told) == 1
+    assert len(recorded.calls) == 1
     lineage.keep(Level(0, 11, 2, 2, 0.0, 0.0, (BirthId(0, 3), BirthId(0, 10))))
     lineage.draw()
-    _, relatives, _ = recorded.told[1]
-    assert isinstance(relatives, list)
+    _, entries, _ = recorded.calls[1]
+    assert isinstance(entries, list)
     # The last one was born since.
-    assert [each.birth.number for each in relatives if each.is_alive] == [3, 10, 11]
+    assert [each.birth.number for each in entries if each.is_alive] == [3, 10, 11]
 
 
-def test_who_dies_vanishes_with_as_many_births_as_its_last_pose_has() -> None:
+def test_a_death_has_as_many_births_as_the_last_pose() -> None:
     recorded: Any = Recorded()
     show = Show(recorded, BUILT_IN)
     first, second = (Birth(BirthId(0, n), (), 1, n + 1, 10.0 * n, encode_body(CORE))
@@ -144,40 +143,40 @@ def test_who_dies_vanishes_with_as_many_births_as_its_last_pose_has() -> None:
         for n in range(2)
     ]  # fmt: skip
     show.move(0, pa.Table.from_pylist(rows, TABLES["poses"]))
-    (moves,) = [told[2] for told in recorded.told if told[0] == "moved"]
+    (moves,) = [calls[2] for calls in recorded.calls if calls[0] == "moved"]
     assert isinstance(moves, PoseBatch)
     assert moves.births is not None
     assert moves.births.tolist() == [1, 2]
-    (gone,) = [told[2] for told in recorded.told if told[0] == "died"]
+    (gone,) = [calls[2] for calls in recorded.calls if calls[0] == "died"]
     assert gone == TimePoint(10.0, 2)
 
 
-def test_islands_of_a_mixed_archipelago_are_called_what_they_are() -> None:
+def test_views_of_a_mixed_archipelago_name_arenas_and_populations() -> None:
     scene = scene_of(read_experiment("archipelago-mixed"))
     assert scene.islands == (0, 1, 2, 3, 4, 5)
     assert scene.arenas == {4, 5}
-    blueprint: Any = layout(scene.islands, extent_m=2.0, arenas=scene.arenas)
+    blueprint: Any = layout(scene)
     scenes, _ = blueprint.root_container.contents
     names = [view.name for view in scenes.contents]
     assert names == [*(f"Population of island {n}" for n in range(4)),
                      "Arena 4", "Arena 5"]  # fmt: skip
 
 
-def test_an_output_is_a_window_unless_told_otherwise(tmp_path: Path) -> None:
+def test_an_output_is_a_window_by_default(tmp_path: Path) -> None:
     file = tmp_path / "a.rrd"
     assert Output.of(None, None).has_window
     assert Output.of(file, None) == Output(file, None, has_window=False)
     assert Output.of(None, "127.0.0.1:0").url == "rerun+http://127.0.0.1:0/proxy"
 
 
-def test_a_file_that_no_viewer_would_open_is_refused(tmp_path: Path) -> None:
+def test_a_file_with_another_ending_or_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ViewerError, match=r"must end in \.rrd"):
         Output.of(tmp_path / "a.txt", None)
-    with pytest.raises(ViewerError, match="there is no folder"):
+    with pytest.raises(ViewerError, match="no such folder"):
         Output.of(tmp_path / "no" / "a.rrd", None)
 
 
-def test_a_window_that_fails_late_is_told_of(
+def test_a_window_that_fails_late_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     program = tmp_path / "python"
@@ -196,6 +195,6 @@ def test_a_window_that_fails_late_is_told_of(
 
 
 @pytest.mark.parametrize("text", ["9876", "127.0.0.1:", "127.0.0.1:99999", ":x"])
-def test_an_address_that_is_none_is_refused(text: str) -> None:
+def test_an_invalid_address_is_refused(text: str) -> None:
     with pytest.raises(ViewerError, match="must be HOST:PORT"):
         Output.of(None, text)

@@ -1,4 +1,4 @@
-"""What is drawn of ground and scenery is where the engine has it."""
+"""Tests of the surfaces of ground and scenery."""
 
 import math
 from pathlib import Path
@@ -50,7 +50,7 @@ def volume(surface: Surface) -> float:
         ),
     ],
 )
-def test_a_shape_is_as_large_as_it_says_and_faces_outward(
+def test_a_shape_has_its_size_and_faces_outward(
     geom: str, half_sizes: tuple[float, float, float], expected: float
 ) -> None:
     drawn = solid(geom)
@@ -64,7 +64,7 @@ def test_a_shape_is_as_large_as_it_says_and_faces_outward(
     assert set(np.round(lengths, 5).tolist()) <= {0.0, 1.0}
 
 
-def test_scenery_is_drawn_where_it_stands_and_in_its_colour() -> None:
+def test_scenery_has_its_place_and_colour() -> None:
     """A bar of 2 m by 0.2 m, turned by 30 degrees, about (1, 2, 3)."""
     drawn = solid(
         'type="box" size="1 0.1 0.1" pos="1 2 3" euler="0 0 30" rgba="0 0.5 1 1"'
@@ -87,8 +87,8 @@ def test_rough_ground_is_drawn_node_by_node() -> None:
         assert z == pytest.approx(0.1 * shares[row, column], abs=1e-7)
 
 
-def test_ground_is_below_those_who_are_shown_where_they_were() -> None:
-    """All of an arena; of those who were alone one: two would stand side by side."""
+def test_ground_is_below_robots_at_their_recorded_places() -> None:
+    """Robots of one arena, and a single off-line robot, have ground below them."""
     rough = Environment(roughness_m=0.1, patch_m=0.5, extent_m=1.0)
     islands = (Islands(environment=rough), Islands(environment=rough, arena=Arena()))
     scene = scene_of(Experiment(name="a", islands=islands))
@@ -99,7 +99,7 @@ def test_ground_is_below_those_who_are_shown_where_they_were() -> None:
     assert surfaces(FLAT, WORLD) == ()
 
 
-def test_a_recording_has_the_ground_and_its_arena_shows_it(tmp_path: Path) -> None:
+def test_an_arena_shows_its_recorded_ground(tmp_path: Path) -> None:
     geom = '<geom type="box" size="0.1 0.1 0.1"/>'
     environment = Environment(
         roughness_m=0.1,
@@ -110,7 +110,7 @@ def test_a_recording_has_the_ground_and_its_arena_shows_it(tmp_path: Path) -> No
     # Island 0 is off-line: its robots hang side by side, with no ground below them.
     islands = (Islands(), Islands(arena=Arena()))
     scene = scene_of(Experiment(name="a", environment=environment, islands=islands))
-    plan = layout(scene.islands, extent_m=scene.extent_m, arenas=scene.arenas)
+    plan = layout(scene)
     with Recording("a", plan, file=tmp_path / "a.rrd") as recording:
         recording.add_scene(scene)
     found = {

@@ -1,4 +1,4 @@
-"""Who the best is that a viewer is asked for."""
+"""Tests of the selection of robots to re-simulate."""
 
 from pathlib import Path
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 import pyarrow.parquet as pq
 import pytest
 
-from analysis.viewer.motion import best_evaluated, chosen
+from analysis.viewer.motion import best_evaluated, selected_robots
 from analysis.viewer.recording import ViewerError
 from schema.robot.ids import BirthId
 from schema.tables.files import parquet_path
@@ -20,7 +20,7 @@ def write(folder: Path, **rows: list[dict[str, Any]]) -> None:
         pq.write_table(table(name, rows.get(name, [])), path)
 
 
-def test_the_best_is_the_first_of_the_fittest_ever_judged(tmp_path: Path) -> None:
+def test_the_best_is_the_first_of_the_fittest_ever_evaluated(tmp_path: Path) -> None:
     fitness = (0.1, 0.5, None, 0.5, 0.3)
     judged = [{"birth": n, "fitness": value} for n, value in enumerate(fitness)]
     young = {"birth": 7, "fitness": 0.9, "is_mature": False}
@@ -31,19 +31,19 @@ def test_the_best_is_the_first_of_the_fittest_ever_judged(tmp_path: Path) -> Non
     assert best_evaluated(tmp_path) == (BirthId(1, 8), 0.8)
 
 
-def test_where_nobody_was_judged_there_is_no_best(tmp_path: Path) -> None:
+def test_without_evaluations_there_is_no_best(tmp_path: Path) -> None:
     write(tmp_path)
-    with pytest.raises(ViewerError, match="nobody has been judged yet"):
+    with pytest.raises(ViewerError, match="no robot has been evaluated yet"):
         best_evaluated(tmp_path)
 
 
-def test_ancestry_goes_back_by_first_parents_each_once(tmp_path: Path) -> None:
+def test_ancestry_follows_first_parents_each_once(tmp_path: Path) -> None:
     path = parquet_path(tmp_path, "e", 0, "births")
     path.parent.mkdir(parents=True)
     a, b, c, d = ((0, number) for number in range(4))
     pq.write_table(births((a, []), (b, []), (c, [b, a]), (d, [c, a])), path)
     names = [BirthId(*each) for each in (d, c, a)]
-    found = chosen(tmp_path, names, has_ancestry=True)
+    found = selected_robots(tmp_path, names, has_ancestry=True)
     assert found == [BirthId(*each) for each in (d, c, b, a)]
-    with pytest.raises(ViewerError, match="0:9: nobody of that name"):
-        chosen(tmp_path, [BirthId(0, 9)], has_ancestry=False)
+    with pytest.raises(ViewerError, match="0:9: no robot of that name"):
+        selected_robots(tmp_path, [BirthId(0, 9)], has_ancestry=False)

@@ -1,4 +1,4 @@
-"""Watching a run: how far it is, and where the recording went."""
+"""Tests of recording a live run: progress and messages."""
 
 import threading
 from pathlib import Path
@@ -34,52 +34,52 @@ WHOLE = replace(
 
 
 class Source:
-    """Tells what it is given, bit by bit; then somebody stops the viewer, or not."""
+    """Returns messages one by one, then stops the viewer."""
 
-    def __init__(self, stop: threading.Event, *told: Told) -> None:
-        self._told = list(told)
+    def __init__(self, stop: threading.Event, *messages: Told) -> None:
+        self._messages = list(messages)
         self._stop = stop
 
     def receive(self, *_: float) -> list[Told]:
-        if not self._told:
+        if not self._messages:
             self._stop.set()
-        return [self._told.pop(0)] if self._told else []
+        return [self._messages.pop(0)] if self._messages else []
 
 
-def seen(file: Path, *told: Told) -> None:
+def seen(file: Path, *messages: Told) -> None:
     stop = threading.Event()
-    source: Any = Source(stop, *told)
+    source: Any = Source(stop, *messages)
     watch(source, Output(file, None, has_window=False), None, stop)
 
 
 @pytest.mark.parametrize("end", [(), (Ended(),)])
-def test_how_far_it_is_and_where_the_recording_is_are_told(
+def test_progress_and_file_are_printed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], end: tuple[Ended, ...]
 ) -> None:
     file = tmp_path / "my run.rrd"
     seen(file, WHOLE, news(2, (0, 2)), *end)
-    told = capsys.readouterr()
-    saved = f"saved {file}; to look: rerun '{file}'"
-    assert told.err.splitlines() == [
-        "watching e-run: 2 births so far",
+    messages = capsys.readouterr()
+    saved = f"saved {file}; to view: rerun '{file}'"
+    assert messages.err.splitlines() == [
+        "recording e-run: 2 births",
         *(["the run has ended"] if end else []),
         saved,
     ]
-    assert not told.out
+    assert not messages.out
     assert file.stat().st_size > 0
 
 
-def test_that_nothing_was_saved_is_told(
+def test_a_stop_before_the_first_message_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "a.rrd"
     seen(file)
-    why = f"stopped before a run was told of: no {file} is written\n"
+    why = f"stopped before a run was received; {file} not written\n"
     assert capsys.readouterr().err == why
     assert not file.exists()
 
 
-def test_who_waits_for_a_run_is_told_so_once(
+def test_waiting_for_a_run_is_reported_once(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
@@ -87,9 +87,9 @@ def test_who_waits_for_a_run_is_told_so_once(
     times = iter([0.0, 0.0, 1.0, 2.5, 3.0, 16.0])
     clock = SimpleNamespace(monotonic=lambda: next(times))
     monkeypatch.setattr("analysis.viewer.watch.time", clock)
-    with pytest.raises(NetworkError, match="does not tell of a run"):
+    with pytest.raises(NetworkError, match="does not send a run"):
         seen(tmp_path / "a.rrd", *[news(number) for number in range(5)])
-    assert capsys.readouterr().err == "waiting to be told of a run\n"
+    assert capsys.readouterr().err == "waiting for the coordinator to send a run\n"
 
 
 def test_births_count_once_on_every_island() -> None:
