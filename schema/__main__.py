@@ -18,13 +18,13 @@ def main(argv: list[str] | None = None) -> int:
     """Run ``revolve robot ...`` and return its exit code.
 
     Args:
-        argv: the words after ``revolve``; those of the process by default.
+        argv: arguments after ``revolve``; those of the process by default.
 
     Returns:
         0 if done.
 
     Raises:
-        RevolveError: a file that holds no robot, or cannot be read or written.
+        RevolveError: a file does not hold a robot, or cannot be read or written.
     """
     words = ["robot", *sys.argv[1:]] if argv is None else argv
     options = _parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
@@ -44,16 +44,16 @@ def main(argv: list[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = Flags(
         prog="revolve robot",
-        description="Check, convert or show a robot file. Read are .yaml, .yml, .pb, "
-        ".xml (MJCF), and RoboGen's .txt and .json; written are .yaml, .yml, .pb, .xml "
-        "and .urdf.",
+        description="Check, convert or show a robot file. It reads .yaml, .yml, "
+        ".pb, .xml (MJCF), and RoboGen's .txt and .json; it writes .yaml, .yml, .pb, "
+        ".xml and .urdf.",
         epilog="example: revolve robot convert spider.yaml spider.pb",
     )
     commands = parser.add_subparsers(dest="command", required=True)
     for name, what in (
-        ("check", "tell whether a file holds a well-formed robot"),
-        ("convert", "write a robot in another form (.urdf: its body only)"),
-        ("show", "show a robot's body and brain as a tree"),
+        ("check", "check that a file holds a well-formed robot"),
+        ("convert", "convert a robot file to another format (.urdf: the body only)"),
+        ("show", "show the body and brain of a robot as a tree"),
     ):
         command = commands.add_parser(name, help=what, description=what)
         command.add_argument("file", type=Path, metavar="FILE")
@@ -62,8 +62,8 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--experiment",
             metavar="NAME|FILE.toml",
-            help="take this experiment's part types, and world where a form holds one, "
-            "not all built-in ones and the thesis's world",
+            help="use the part types and the world of this experiment (default: all "
+            "built-in part types and the default world)",
         )
     return parser
 
@@ -78,7 +78,7 @@ def _summary(robot: Robot) -> str:
 
 
 def _show(robot: Robot, space: BodySpace, title: str) -> None:
-    """Print a robot: its parts as a tree, each with its neurons and their inputs."""
+    """Print the parts of a robot as a tree, each with its neurons and their inputs."""
     from rich.console import Console
     from rich.text import Text
     from rich.tree import Tree
@@ -90,7 +90,7 @@ def _show(robot: Robot, space: BodySpace, title: str) -> None:
         if index:
             label = (
                 f"slot {part.parent_slot}: {label}, by its slot {part.slot}, "
-                f"turned {part.orientation}°"
+                f"orientation {part.orientation}°"
             )
         own = space[part.kind].own_parameters
         for parameter, value in zip(own, part.parameters, strict=False):

@@ -25,8 +25,6 @@ from schema.wire.arena import BrainChange
 from schema.wire.arena_messages import (
     advance_from_message,
     advance_to_message,
-    birth_from_message,
-    birth_to_message,
     read_brain_change,
     write_brain_change,
 )
@@ -37,7 +35,13 @@ from schema.wire.codec import (
     report_from_message,
     write_report,
 )
-from schema.wire.messages import finite, genome_from_message, genome_to_message
+from schema.wire.messages import (
+    birth_from_message,
+    birth_to_message,
+    finite,
+    genome_from_message,
+    genome_to_message,
+)
 
 
 def encode_entry(event: JournalledEvent) -> bytes:

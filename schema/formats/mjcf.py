@@ -1,9 +1,9 @@
-"""MJCF files that hold a whole robot: body, brain and the world it is judged in.
+"""MJCF files that hold a whole robot: body, brain and evaluation settings.
 
-The body is plain MJCF, for MuJoCo's own viewer and other tools. What MJCF has no
-words for rides along as custom text: the robot in its Protobuf form, and the
-settings of an evaluation. MJCF rounds its numbers, so what is read back is that
-text, bit for bit; a body that was edited by hand no longer fits it, and is refused.
+The body is plain MJCF, for MuJoCo's viewer and other tools. Two custom texts hold the
+robot in Protobuf form and the settings of an evaluation. Reading takes the robot from
+the text, bit for bit, because MJCF rounds numbers. A file whose body was edited by
+hand differs from its text and is refused.
 """
 
 import base64
@@ -26,17 +26,17 @@ SETTINGS = "revolve_settings"
 """Names of the two custom texts."""
 
 _DIGITS = 1e-4
-"""Relative difference that MJCF's rounding cannot make."""
+"""Relative difference that is greater than MJCF's rounding."""
 _LENGTH_M = 1e-6
 _COMPARED = ("body_mass", "geom_size", "geom_pos", "geom_quat", "jnt_range")
 
 
 def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
-    """Return the text of a robot alone on its ground, brain and settings inside.
+    """Return the MJCF text of a robot on its ground, with brain and settings.
 
     Args:
         robot: the robot.
-        settings: the world that it is to be judged in, and how.
+        settings: of its evaluation.
 
     Raises:
         InvalidRobot: the robot is not well formed in the settings' body space.
@@ -56,15 +56,15 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
 
 
 def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
-    """Return the robot and the settings that a text holds.
+    """Return the robot and the settings of an MJCF text.
 
     Args:
         text: of an MJCF file.
         where: its name, for messages.
 
     Raises:
-        InvalidRobot: no MJCF, or none that holds a robot and its settings; or its
-            body is another than the robot's.
+        InvalidRobot: not MJCF; no robot or settings in it; a body that differs from
+            the robot's.
     """
     try:
         spec = mujoco.MjSpec.from_string(text)
@@ -112,7 +112,7 @@ def _bytes(held: dict[str, str], name: str) -> bytes:
 
 
 def _check_body(found: mujoco.MjModel, built: mujoco.MjModel, where: str) -> None:
-    """Raise if a file's body is not, but for rounding, the robot's."""
+    """Raise if the body of a file differs from the robot's by more than rounding."""
     counts = ("nbody", "ngeom", "njnt", "nu")
     differing = [n for n in counts if getattr(found, n) != getattr(built, n)]
     if not differing:

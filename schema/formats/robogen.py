@@ -1,8 +1,8 @@
-"""RoboGen's robots: its part tree and network, made into ours.
+"""Conversion of RoboGen's part tree and network into a robot.
 
-RoboGen counts slots and quarter turns by frames of its own, and keeps bricks level
-and tilting bars flat whatever their file says. Here each part gets the slot and the
-orientation that bring it into the same place.
+RoboGen has its own frames for slots and quarter turns, and it levels bricks and
+tilting bars whatever the file says. Each part gets the slot and the orientation that
+give it the same pose.
 Source: RoboGen's published sources of 2018, planar bodies as it builds them.
 """
 
@@ -17,7 +17,7 @@ from schema.robot.brain import INPUT, Brain, Connection, Layer, Neuron
 from schema.robot.robot import Part, Robot, check_robot, part_type
 
 Ending = tuple[str, int]
-"""A neuron's name in RoboGen: part and number among that part's neurons."""
+"""RoboGen's name of a neuron: part, and number among the part's neurons."""
 
 KINDS: Mapping[str, str] = {
     "CoreComponent": "Core",
@@ -29,7 +29,7 @@ KINDS: Mapping[str, str] = {
     "TouchSensor": "TouchSensor",
     "LightSensor": "LightSensor",
 }
-"""RoboGen's part types that have a counterpart; without IMU: it feeds nobody."""
+"""Our part types by RoboGen's; a core without IMU has unconnected inputs."""
 
 _NEURONS = {
     "simple": "Simple",
@@ -39,24 +39,24 @@ _NEURONS = {
 }
 
 _BAR_NUMBERS = 3
-"""Length, alpha, beta; no other part has numbers."""
+"""Length, alpha, beta; no other part type has parameters in RoboGen."""
 
 _ROOT_TURNS = (2, 0, 3, 3)
-"""By RoboGen's slot of a square part: quarter turns that its children inherit."""
+"""Quarter turns that children inherit, by RoboGen's slot of a square part."""
 _GREY = (0.5, 0.5, 0.5)
 
 
 @dataclass(slots=True)
 class RobogenPart:
-    """A part as RoboGen's files have it.
+    """Part of a RoboGen file.
 
     Attributes:
-        name: unique in its file.
-        kind: our name of its type.
+        name: unique in the file.
+        kind: our name of the part type.
         orientation: quarter turns, 0..3.
-        parameters: as written: length [m], alpha and beta [degrees].
+        parameters: as in the file: length [m], alpha and beta [degrees].
         where: file and line or path, for messages.
-        children: by RoboGen's slot; those that are not square count from slot 1.
+        children: by RoboGen's slot; parts that are not square number them from 1.
     """
 
     name: str
@@ -69,13 +69,13 @@ class RobogenPart:
 
 @dataclass(slots=True)
 class RobogenRobot:
-    """A robot as RoboGen's files have it.
+    """Robot of a RoboGen file.
 
     Attributes:
         root: the core.
-        hidden: name of each hidden neuron's part, with its number there.
-        kinds: type and parameters of neurons that are not said to be as usual.
-        weights: (source, target, weight).
+        hidden: names of the hidden neurons.
+        kinds: types and parameters of neurons that differ from ``USUAL``.
+        weights: (source, target, weight) of each connection.
     """
 
     root: RobogenPart
@@ -85,24 +85,24 @@ class RobogenRobot:
 
 
 USUAL: tuple[str, tuple[float, ...]] = ("Sigmoid", (0.0, 1.0))
-"""A neuron that nothing is said of: bias 0, gain 1."""
+"""Default type and parameters of a neuron: bias 0, gain 1."""
 
 
 def checked_part(
     name: str, kind: str, turns: int, values: tuple[float, ...], where: str
 ) -> RobogenPart:
-    """Return a part of a file, still without children.
+    """Return a part without children, after checking its fields.
 
     Args:
-        name: unique in its file.
+        name: unique in the file.
         kind: RoboGen's type.
         turns: quarter turns.
-        values: parameters as written.
+        values: parameters as in the file.
         where: file and line or path, for messages.
 
     Raises:
-        InvalidRobot: a type that has no counterpart, another number of turns or
-            parameters than there can be.
+        InvalidRobot: an unknown type, turns outside 0..3, or a wrong number of
+            parameters.
     """
     if kind not in KINDS:
         allowed = ", ".join(KINDS)
@@ -117,10 +117,10 @@ def checked_part(
 
 
 def neuron_kind(name: str, where: str) -> str:
-    """Return our type of a neuron.
+    """Return our type of a neuron, given RoboGen's.
 
     Raises:
-        InvalidRobot: none of ours.
+        InvalidRobot: an unknown type.
     """
     if name.lower() not in _NEURONS:
         allowed = ", ".join(_NEURONS)
@@ -129,16 +129,16 @@ def neuron_kind(name: str, where: str) -> str:
 
 
 def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
-    """Return a RoboGen robot as ours.
+    """Return the robot of a RoboGen file.
 
     Args:
-        theirs: as read from a file.
-        space: its part types; ``schema.robogen_parts`` has RoboGen's dimensions.
+        theirs: as read from the file.
+        space: the part types; ``schema.robogen_parts`` has RoboGen's dimensions.
         where: the file's name, for messages.
 
     Raises:
-        InvalidRobot: a slot that a part does not have, a number that a part type
-            does not allow, a neuron or its part that is not there.
+        InvalidRobot: a slot that a part does not have, a parameter out of range, an
+            unknown neuron or part.
     """
     body = _Body()
     body.add(theirs.root, (-1, -1, -1), 0, 0)
@@ -149,7 +149,7 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
             raise InvalidRobot(f"{where}: no neuron {number} on part {name!r}")
     connections = []
     for source, target, weight in theirs.weights:
-        # RoboGen takes connections to an oscillator off: it does not listen.
+        # RoboGen ignores connections to oscillators.
         if neurons[index[target]].kind != "Oscillator":
             connections.append(Connection(index[source], index[target], weight))
     robot = Robot(tuple(body.parts), Brain(tuple(neurons), tuple(connections)))
@@ -162,7 +162,7 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
 
 @dataclass(slots=True)
 class _Body:
-    """Our parts so far, and RoboGen's names of them."""
+    """Our parts so far, and their names in RoboGen."""
 
     parts: list[Part] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
@@ -170,13 +170,13 @@ class _Body:
     def add(
         self, part: RobogenPart, place: tuple[int, int, int], turn: int, turns: int
     ) -> None:
-        """Add a part and all that it carries.
+        """Add a part and its subtree.
 
         Args:
-            part: RoboGen's.
+            part: of RoboGen.
             place: index of its parent, slot there, own slot.
-            turn: our orientation of it [degrees].
-            turns: quarter turns from the core to it, as RoboGen counts them.
+            turn: its orientation [degrees].
+            turns: sum of RoboGen's quarter turns from the core to the part.
         """
         own = len(self.parts)
         self.names.append(part.name)
@@ -188,24 +188,24 @@ class _Body:
             if not 0 <= slot < BUILT_IN[part.kind].arity:
                 raise InvalidRobot(f"{child.where}: {part.kind} has no slot {slot}")
             by_slot[our_slot(part.kind, slot)] = slot, child
-        for place_there in sorted(by_slot):
-            slot, child = by_slot[place_there]
+        for parent_slot in sorted(by_slot):
+            slot, child = by_slot[parent_slot]
             inherited = turns + (_ROOT_TURNS[slot] if is_square else 0)
             quarter, child_turns = _levelled(child, inherited)
             child_turn = our_orientation(part.kind, slot, child.kind, quarter)
-            sits = (own, place_there, our_slot(child.kind, 0))
-            self.add(child, sits, child_turn, child_turns)
+            place = (own, parent_slot, our_slot(child.kind, 0))
+            self.add(child, place, child_turn, child_turns)
 
 
 def _levelled(part: RobogenPart, inherited: int) -> tuple[int, int]:
-    """Return the quarter turns that RoboGen gives a part, and those to its children."""
+    """Return RoboGen's quarter turns of a part, and those that children inherit."""
     to_root = (part.orientation + inherited) % 4
     upright = {"FixedBrick": 0, "ParametricBarJoint": 1}.get(part.kind, to_root)
     return (part.orientation + upright - to_root) % 4, upright
 
 
 def _parameters(part: RobogenPart) -> tuple[float, ...]:
-    """Return a part's own parameters in our units."""
+    """Return the parameters of a part in our units."""
     if part.kind != "ParametricBarJoint":
         return ()
     length_m, alpha, beta = part.parameters
@@ -215,7 +215,7 @@ def _parameters(part: RobogenPart) -> tuple[float, ...]:
 def _neurons(
     theirs: RobogenRobot, body: _Body, space: BodySpace
 ) -> tuple[list[Neuron], dict[Ending, int]]:
-    """Return our neurons in their order, and where RoboGen's names lead."""
+    """Return our neurons in order, and their indices by RoboGen's names."""
     neurons: list[Neuron] = []
     index: dict[Ending, int] = {}
 

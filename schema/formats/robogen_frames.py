@@ -1,4 +1,4 @@
-"""How RoboGen's slots and quarter turns become ours.
+"""Conversion of RoboGen's slots and quarter turns into ours.
 
 Source: RoboGen's published sources of 2018.
 """
@@ -12,7 +12,7 @@ from schema.robot.frames import attach
 from schema.robot.robot import ORIENTATIONS
 
 SQUARE = ("Core", "FixedBrick")
-"""Parts whose slots RoboGen counts left, right, front, back."""
+"""Parts whose slots RoboGen numbers left, right, front, back."""
 
 _OUR_SLOTS = (3, 2, 0, 1)
 _X: Vector = (1.0, 0.0, 0.0)
@@ -21,21 +21,21 @@ _Z: Vector = (0.0, 0.0, 1.0)
 
 
 def our_slot(kind: str, slot: int) -> int:
-    """Return our number of a slot that RoboGen numbers."""
+    """Return our number of a slot, given RoboGen's."""
     return _OUR_SLOTS[slot] if kind in SQUARE else slot
 
 
 @lru_cache(maxsize=256)
 def our_orientation(parent: str, slot: int, child: str, quarter: int) -> int:
-    """Return the orientation [degrees] that turns a part as RoboGen does.
+    """Return the orientation [degrees] that matches RoboGen's quarter turns.
 
     Args:
         parent: our type of the parent.
         slot: RoboGen's slot of it.
-        child: our type of the child, which sits by its first slot.
+        child: our type of the child, attached by its first slot.
         quarter: RoboGen's quarter turns.
     """
-    # It turns the child about its own normal, ours turns the tangent: opposite.
+    # RoboGen turns the child about its own normal, we turn the tangent: opposite.
     turn = (-90 * quarter) % 360
     wanted, _ = attach(_their_slot(parent, slot), _their_slot(child, 0), turn)
     parent_slot = _OUR_SLOTS[slot] if parent in SQUARE else slot
@@ -47,11 +47,11 @@ def our_orientation(parent: str, slot: int, child: str, quarter: int) -> int:
         rotation, _ = attach(*ours, orientation)
         if np.allclose(rotation, wanted, atol=1e-9):
             return orientation
-    raise AssertionError("quarter turns about one normal reach each other")
+    raise AssertionError("one of four quarter turns must match")
 
 
 def _their_slot(kind: str, slot: int) -> Slot:
-    """Return RoboGen's normal and tangent of a slot, untilted, at the origin."""
+    """Return RoboGen's slot at the origin, without tilt."""
     if kind in SQUARE:
         normal = ((-1.0, 0.0, 0.0), _X, (0.0, -1.0, 0.0), _Y)[slot]
         return Slot((0.0, 0.0, 0.0), normal, (_Y, _Y, _Z, _Z)[slot])
@@ -59,7 +59,7 @@ def _their_slot(kind: str, slot: int) -> Slot:
 
 
 def _our_slot(kind: str, slot: int) -> Slot:
-    """Return our normal and tangent of a slot, untilted."""
+    """Return our slot, without tilt."""
     part_type = BUILT_IN[kind]
     values = tuple(parameter.default for parameter in part_type.parameters)
     return part_type.shape(values).slots[slot]

@@ -1,4 +1,4 @@
-"""RoboGen's JSON, as its evolution writes robots.
+"""Reader of RoboGen's JSON, the form in which its evolution writes robots.
 
 Source: RoboGen's published sources of 2018.
 """
@@ -20,13 +20,14 @@ from schema.robot.brain import LAYERS
 from schema.robot.robot import Robot
 
 T = TypeVar("T", str, int, float)
+K = TypeVar("K")
 
 _KEYS: dict[str, tuple[tuple[str, float], ...]] = {
     "Simple": (("bias", 0.0), ("gain", 1.0)),
     "Sigmoid": (("bias", 0.0), ("gain", 1.0)),
     "Oscillator": (("period", 0.0), ("phaseOffset", 0.0), ("gain", 1.0)),
 }
-"""Keys of our parameters, and what a missing one stands for."""
+"""Keys of our parameters, and their defaults."""
 
 
 def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
@@ -38,7 +39,7 @@ def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
         space: part types that the robot may use.
 
     Raises:
-        InvalidRobot: no such JSON; with file and line, or path in the document.
+        InvalidRobot: not such JSON; the message names file and line, or the path.
     """
     try:
         document = json.loads(text, parse_constant=_refuse)
@@ -62,8 +63,8 @@ def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
         if layer != "input":
             kind = neuron_kind(_get(neuron, "type", str, at), f"{at}.type")
             values = [
-                _get(neuron, key, float, at) if key in neuron else usual
-                for key, usual in _KEYS[kind]
+                _get(neuron, key, float, at) if key in neuron else default
+                for key, default in _KEYS[kind]
             ]
             theirs.kinds[end] = (kind, tuple(values))
     for at, edge in _items(document, ("brain", "connection"), where):
@@ -76,7 +77,7 @@ def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
 
 
 def _body(document: object, where: str) -> RobogenPart:
-    """Return a document's tree of parts."""
+    """Return the tree of parts of a document."""
     parts: dict[str, RobogenPart] = {}
     roots: list[RobogenPart] = []
     for at, entry in _items(document, ("body", "part"), where):
@@ -95,7 +96,7 @@ def _body(document: object, where: str) -> RobogenPart:
         raise InvalidRobot(
             f"{where}: body.part: exactly one must be the root, got {len(roots)}"
         )
-    carried = {roots[0].name}
+    attached = {roots[0].name}
     for at, entry in _items(document, ("body", "connection"), where):
         child = _known(parts, _get(entry, "dest", str, at), f"{at}.dest")
         parent = _known(parts, _get(entry, "src", str, at), f"{at}.src")
@@ -104,24 +105,24 @@ def _body(document: object, where: str) -> RobogenPart:
             raise InvalidRobot(
                 f"{at}.destSlot: must be 0: parts attach by their slot 0"
             )
-        if child.name in carried:
+        if child.name in attached:
             raise InvalidRobot(
                 f"{at}.dest: {child.name!r} is already attached to a part"
             )
         if slot in parent.children or (slot == 0 and parent is not roots[0]):
             raise InvalidRobot(f"{at}.srcSlot: slot {slot} is taken")
-        carried.add(child.name)
+        attached.add(child.name)
         parent.children[slot] = child
-    if loose := [name for name in parts if name not in carried]:
+    if separate := [name for name in parts if name not in attached]:
         raise InvalidRobot(
-            f"{where}: body.part: {loose[0]!r} is not attached to any part"
+            f"{where}: body.part: {separate[0]!r} is not attached to any part"
         )
     _check_connected(roots[0], len(parts), where)
     return roots[0]
 
 
 def _check_connected(root: RobogenPart, count: int, where: str) -> None:
-    """Raise if some parts carry each other in a ring, apart from the core."""
+    """Raise if some parts form a ring that is not connected to the core."""
     waiting, reached = [root], 0
     while waiting:
         reached += 1
@@ -136,7 +137,7 @@ def _check_connected(root: RobogenPart, count: int, where: str) -> None:
 def _items(
     document: object, path: tuple[str, ...], where: str
 ) -> list[tuple[str, dict[str, Any]]]:
-    """Return (where, entry) of a list in a document; a missing one is empty."""
+    """Return (path, entry) of a list in a document; a missing list is empty."""
     value = document
     for key in path:
         if not isinstance(value, dict):
@@ -154,7 +155,7 @@ def _items(
 
 
 def _get(entry: dict[str, Any], key: str, kind: type[T], at: str) -> T:
-    """Return an entry's value of a type; whole numbers pass for floats."""
+    """Return the value of a key, of a type; integers are accepted as floats."""
     value = entry.get(key)
     if kind is float and isinstance(value, int):
         value = float(value)
@@ -165,13 +166,11 @@ def _get(entry: dict[str, Any], key: str, kind: type[T], at: str) -> T:
     return value
 
 
-Known = TypeVar("Known")
-
-
-def _known(things: dict[str, Known], name: str, at: str) -> Known:
-    if name not in things:
+def _known(named: dict[str, K], name: str, at: str) -> K:
+    """Return the value of a name that must exist."""
+    if name not in named:
         raise InvalidRobot(f"{at}: unknown name {name!r}")
-    return things[name]
+    return named[name]
 
 
 def _refuse(name: str) -> NoReturn:

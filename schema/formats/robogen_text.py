@@ -1,8 +1,8 @@
-"""RoboGen's indented text.
+"""Reader of RoboGen's indented text.
 
-It has four sections, each ended by an empty line: parts, one a line, indented
-by tabs below what carries them; hidden neurons; weights; neuron parameters. All but
-the first may be missing.
+The text has four sections, separated by empty lines: parts, one per line, indented
+by tabs below their parents; hidden neurons; weights; neuron parameters. Only the
+first is required.
 Source: RoboGen's published sources of 2018.
 """
 
@@ -43,7 +43,7 @@ def robot_from_robogen_text(text: str, where: str, space: BodySpace) -> Robot:
         space: part types that the robot may use.
 
     Raises:
-        InvalidRobot: no such text; with file, line and what is allowed.
+        InvalidRobot: not such a text; the message names file, line and what is allowed.
     """
     sections = _sections(text, where)
     root = _body(next(sections), where)
@@ -54,7 +54,7 @@ def robot_from_robogen_text(text: str, where: str, space: BodySpace) -> Robot:
         if part not in numbers:
             raise InvalidRobot(f"{line}: no part {part!r}")
         theirs.hidden.append((part, numbers[part]))
-        # Said again below if it has parameters of its own.
+        # The last section overrides it.
         theirs.kinds[theirs.hidden[-1]] = (neuron_kind(kind, line), (0.0, 1.0))
         numbers[part] += 1
     for line, words in next(sections, []):
@@ -70,7 +70,7 @@ def robot_from_robogen_text(text: str, where: str, space: BodySpace) -> Robot:
 
 
 def _sections(text: str, where: str) -> Iterator[list[tuple[str, list[str]]]]:
-    """Yield (file and line, words) of all lines, section by section, the first raw."""
+    """Yield sections as lists of (file and line, words); the first is not split."""
     section: list[tuple[str, list[str]]] = []
     is_body = True
     for number, line in enumerate(text.splitlines(), start=1):
@@ -83,7 +83,7 @@ def _sections(text: str, where: str) -> Iterator[list[tuple[str, list[str]]]]:
 
 
 def _body(lines: list[tuple[str, list[str]]], where: str) -> RobogenPart:
-    """Return the tree of a text's first section."""
+    """Return the tree of parts of the first section."""
     if not lines:
         raise InvalidRobot(f"{where}:1: must be the core, got an empty line")
     path: list[RobogenPart] = []
@@ -114,8 +114,8 @@ def _body(lines: list[tuple[str, list[str]]], where: str) -> RobogenPart:
 
 
 def _graft(parent: RobogenPart, slot: int, child: RobogenPart) -> None:
-    """Put a part on another, by the slot number of a text."""
-    # Slot 0 of all but the core is where they sit themselves: not counted.
+    """Attach a part to its parent by the slot number in the text."""
+    # Slot 0 of all parts but the core attaches them to their parent: not numbered.
     own = slot + (parent.kind != "Core")
     if own in parent.children:
         raise InvalidRobot(f"{child.where}: slot {slot} of {parent.name!r} is taken")
@@ -123,14 +123,13 @@ def _graft(parent: RobogenPart, slot: int, child: RobogenPart) -> None:
     if own >= count:
         free = count - (parent.kind != "Core")
         raise InvalidRobot(
-            f"{child.where}: {parent.name!r} has {free} slots to put parts on, "
-            f"got slot {slot}"
+            f"{child.where}: {parent.name!r} has {free} free slots, got slot {slot}"
         )
     parent.children[own] = child
 
 
 def _counts(root: RobogenPart) -> dict[str, int]:
-    """Return how many neurons each part has from its sensors and motors."""
+    """Return the number of input and output neurons of each part by name."""
     counts: dict[str, int] = {}
     waiting = [root]
     while waiting:
@@ -152,7 +151,7 @@ def _read_parameters(theirs: RobogenRobot, words: list[str], line: str) -> None:
     wanted = 3 if kind == "Oscillator" else 1
     if len(values) != wanted:
         raise InvalidRobot(f"{line}: {name} takes {wanted} numbers, got {len(values)}")
-    # Their text has no gain but an oscillator's.
+    # Only oscillators have a gain in the text.
     gain = () if kind == "Oscillator" else (1.0,)
     theirs.kinds[part, _count(number, line)] = (kind, (*values, *gain))
 

@@ -1,7 +1,7 @@
-"""A robot's body as URDF, for other tools.
+"""Writer of a robot's body as URDF, for other tools.
 
-Links are the robot's rigid segments, named as its bodies in MuJoCo are; joints are
-revolute. URDF has no words for brains and servos: they stay behind.
+Links are the rigid segments of the robot, with the names of its MuJoCo bodies; joints
+are revolute. URDF has no elements for brains and servos, which are left out.
 """
 
 import math
@@ -17,16 +17,16 @@ from schema.robot.results import Floats
 from schema.robot.robot import Robot, check_robot
 
 _FREE = (0.0, 1e6)
-"""Effort [N m] and velocity [rad/s] of a hinge without a motor: URDF wants both."""
+"""Effort [N m] and velocity [rad/s] of a hinge without a motor; URDF needs both."""
 
 
 def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str:
-    """Return the text of a robot's body; lengths in m, masses in kg, angles in rad.
+    """Return the URDF text of a robot's body, in m, kg and rad.
 
     Args:
         robot: the robot.
         space: its part types.
-        simulation: damping of the joints.
+        simulation: gives the damping of the joints.
 
     Raises:
         InvalidRobot: the robot is not well formed in this body space.
@@ -46,7 +46,7 @@ def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str
 
 
 def _link(model: mujoco.MjModel, body: int) -> ET.Element:
-    """Return a body's mass and boxes."""
+    """Return the link of a body: its mass and boxes."""
     link = ET.Element("link", name=model.body(body).name)
     inertial = ET.SubElement(link, "inertial")
     inertial.append(_origin(model.body_ipos[body], model.body_iquat[body]))
@@ -71,7 +71,7 @@ def _link(model: mujoco.MjModel, body: int) -> ET.Element:
 def _joint(
     model: mujoco.MjModel, joint: int, effort: float, velocity: float
 ) -> ET.Element:
-    """Return a hinge between a body and its parent."""
+    """Return the hinge between a body and its parent."""
     body = int(model.jnt_bodyid[joint])
     parent = model.body(int(model.body_parentid[body])).name
     made = ET.Element("joint", name=model.joint(joint).name, type="revolute")
@@ -96,12 +96,12 @@ def _origin(position: Floats, quaternion: Floats) -> ET.Element:
     if abs(m[2, 0]) < 1.0 - 1e-12:
         roll, yaw = math.atan2(m[2, 1], m[2, 2]), math.atan2(m[1, 0], m[0, 0])
     else:
-        # Upright: roll and yaw turn about the same axis, one of them is enough.
+        # Gimbal lock: roll and yaw turn about the same axis.
         roll, yaw = 0.0, math.atan2(-m[0, 1], m[1, 1])
     angles = np.array((roll, pitch, yaw))
     return ET.Element("origin", xyz=_numbers(position), rpy=_numbers(angles))
 
 
 def _numbers(values: Floats) -> str:
-    """Return numbers as they are read back bit for bit."""
+    """Return numbers as text with all digits."""
     return " ".join(repr(float(value)) for value in values)

@@ -1,4 +1,4 @@
-"""Robots as YAML, the form for people.
+"""Robots as YAML, the form for people: writer and reader.
 
 ::
 
@@ -20,10 +20,10 @@
       connections:
       - {source: part-0-in-2, target: leg-out-0, weight: 0.25}
 
-A parameter that is not written has its default, an orientation or gene is 0, an id
-is ``part-<index>`` and for neurons ``<part>-in-k``, ``<part>-out-k`` or
-``<part>-hidden-k``. Input neurons are there because sensors are: they are only
-named, never written. Floats are written so that they are read back bit for bit.
+Defaults of omitted keys: a parameter its default, an orientation or gene 0, an id
+``part-<index>``, and for neurons ``<part>-in-k``, ``<part>-out-k`` or
+``<part>-hidden-k``. Input neurons follow from the sensors: connections name them, but
+they are not written. Floats are written with all digits and read back bit for bit.
 """
 
 import re
@@ -52,7 +52,7 @@ _INDEXED = re.compile(r"(?:body\.parts|brain\.(?:neurons|connections))\[\d+\](\.
 
 
 def robot_to_yaml(robot: Robot, space: BodySpace) -> str:
-    """Return the text of a robot.
+    """Return the YAML text of a robot.
 
     Raises:
         InvalidRobot: the robot is not well formed in this body space.
@@ -112,15 +112,15 @@ def _named(
 
 
 class Reader:
-    """One reading of one document.
+    """Reader of one document.
 
-    It remembers the line of all that it has read, so that a rule that is checked
-    on the finished robot can still say where it was broken.
+    It keeps the line of everything that it reads, so that errors of checks on the
+    complete robot name a line, too.
 
     Attributes:
-        space: the part types that a robot may use.
-        parts: those that were read.
-        part_index: their indices by their names, in their order.
+        space: the allowed part types.
+        parts: the parts read so far.
+        part_index: their indices by name, in their order.
     """
 
     top_keys: tuple[str, ...] = ("revolve_robot", "body", "brain")
@@ -130,11 +130,11 @@ class Reader:
     )  # fmt: skip
 
     def __init__(self, space: BodySpace, file: str) -> None:
-        """Have read nothing yet.
+        """Initialise for a document.
 
         Args:
-            space: the part types that a robot may use.
-            file: the document's name, for messages.
+            space: the allowed part types.
+            file: name of the document, for messages.
         """
         self.space = space
         self._file = file
@@ -146,7 +146,7 @@ class Reader:
         """Return the robot of a document.
 
         Raises:
-            InvalidRobot: what is wrong, with file, line and field.
+            InvalidRobot: the document is wrong; the message names file, line and field.
         """
         document.refuse_others(*self.top_keys)
         if document.has("revolve_robot"):
@@ -163,7 +163,7 @@ class Reader:
         return robot
 
     def _place(self, message: str) -> str:
-        """Return ``file:line`` of what a message of ``check_robot`` is about."""
+        """Return ``file:line`` of the field that a message of ``check_robot`` names."""
         found = _INDEXED.search(message)
         at = found.group() if found else ""
         line = self._lines.get(at) or self._lines.get(at.rpartition(".")[0])
@@ -199,11 +199,11 @@ class Reader:
         return table.word("type", self.space)
 
     def own_slot(self, table: Table) -> int:
-        """Return the slot with which a part sits on its parent."""
+        """Return the slot by which a part is attached to its parent."""
         return table.integer("slot")
 
     def orientation(self, table: Table) -> int:
-        """Return how far a part is turned about the axis of its slot [degrees]."""
+        """Return the orientation of a part about the axis of its slot [degrees]."""
         return table.integer("orientation", 0)
 
     def weight(self, table: Table) -> float:
@@ -211,7 +211,7 @@ class Reader:
         return table.number("weight")
 
     def inputs(self) -> dict[str, Neuron]:
-        """Return the input neurons that sensors are, by their names, in order."""
+        """Return the input neurons of the sensors by name, in order."""
         return {
             f"{name}-in-{offset}": Neuron("input", INPUT, index)
             for name, index in self.part_index.items()
@@ -219,7 +219,7 @@ class Reader:
         }
 
     def brain(self, table: Table | None) -> Brain:
-        """Return the brain, after the body; None is one that is not written."""
+        """Return the brain, after the body was read; None is an omitted brain."""
         names = self.inputs()
         if table is None:
             return Brain(tuple(names.values()))
@@ -251,7 +251,7 @@ class Reader:
     def connections(
         self, tables: list[Table], names: list[str]
     ) -> tuple[Connection, ...]:
-        """Return edges between neurons, given the names of all of them."""
+        """Return the connections, given the names of all neurons."""
         index = {name: number for number, name in enumerate(names)}
         edges = []
         for number, table in enumerate(tables):
@@ -263,13 +263,13 @@ class Reader:
 
 
 def _lines(table: Table, name: str) -> dict[str, int]:
-    """Return the lines of a mapping, its keys, and those of its ``params``."""
+    """Return the lines of a mapping, of its keys and of its ``params``."""
     inner = table.table("params").lines(name) if table.has("params") else {}
     return inner | table.lines(name)
 
 
 def _values(table: Table, parameters: tuple[Parameter, ...]) -> tuple[float, ...]:
-    """Return the values of ``params``, in the order of the parameters."""
+    """Return the values of ``params`` in the order of the parameters."""
     if not table.has("params"):
         return tuple(parameter.default for parameter in parameters)
     params = table.table("params")

@@ -1,8 +1,8 @@
-"""Robots in the YAML form of Revolve itself, read.
+"""Reader of the YAML form of Revolve (2016).
 
-It differs from ours in what goes without saying: a part sits on its parent with slot
-0, every output has a neuron, of type Simple unless ``params`` says otherwise, and
-hidden neurons are a mapping by their names. Edges go from ``src`` to ``dst``.
+It differs from ours in its defaults: a part is attached by its slot 0, every output
+has a neuron, of type Simple unless ``params`` gives another, and hidden neurons are a
+mapping by name. Connections go from ``src`` to ``dst``.
 
 Source: the conversion of the published code (revolve/convert), and its examples.
 """
@@ -13,12 +13,12 @@ from schema.robot.brain import NEURON_TYPES, Brain, Layer, Neuron
 
 _KINDS = {"CoreComponent": "Core"}
 _OTHER_NAMES = {"phase_offset": ("phaseOffset",), "amplitude": ("gain",)}
-"""Older names of an oscillator's parameters, as published robots have them."""
+"""Older names of the parameters of oscillators in published robots."""
 _ABOUT = ("id", "layer", "type", "part_id")
 
 
 def is_of_revolve(document: Table) -> bool:
-    """Return whether a document has what only Revolve's own form has."""
+    """Return whether a document has keys that only the form of 2016 has."""
     if document.has("revolve_robot"):
         return False
     has_brain = not document.is_empty("brain")
@@ -26,33 +26,33 @@ def is_of_revolve(document: Table) -> bool:
 
 
 class RevolveReader(Reader):
-    """One reading of one document in Revolve's form; labels and numbers are left."""
+    """Reader of one document in the form of 2016; it ignores labels and numbers."""
 
     top_keys = ("id", "body", "brain")
     edge_keys = ("src", "dst")
     part_keys = ("id", "type", "orientation", "label", "params", "children")
 
     def kind(self, table: Table) -> str:
-        """Return the type of a part, by the name that it has here."""
+        """Return the type of a part by its name of 2016."""
         return table.word("type", self.space, _KINDS)
 
     def own_slot(self, table: Table) -> int:
-        """Return the slot with which a part sits on its parent; 0 unless written."""
+        """Return the slot by which a part is attached to its parent; 0 by default."""
         return table.integer("slot", 0)
 
     def orientation(self, table: Table) -> int:
-        """Return how far a part is turned; Revolve itself writes 90.0."""
+        """Return the orientation of a part; the form of 2016 writes 90.0."""
         degrees = table.number("orientation", 0.0)
         if not degrees.is_integer():
             table.refuse("orientation", f"must be a whole number, got {degrees}")
         return int(degrees)
 
     def weight(self, table: Table) -> float:
-        """Return the weight of a connection; 0 unless written."""
+        """Return the weight of a connection; 0 by default."""
         return table.number("weight", 0.0)
 
     def brain(self, table: Table | None) -> Brain:
-        """Return the brain: all outputs, and the hidden neurons that are written."""
+        """Return the brain: all outputs, and the hidden neurons of the document."""
         neurons = self.inputs()
         outputs = {
             f"{name}-out-{offset}": index
@@ -66,20 +66,20 @@ class RevolveReader(Reader):
         written, params = _tables(table, "neurons"), _tables(table, "params")
         for name in params:
             if name not in {**neurons, **outputs, **written}:
-                table.table("params").refuse(name, "no such neuron")
+                table.table("params").refuse(name, "unknown neuron")
         for name, part in outputs.items():
-            said = params.get(name) or written.get(name)
-            neurons[name] = _neuron("output", part, said)
+            entry = params.get(name) or written.get(name)
+            neurons[name] = _neuron("output", part, entry)
         hidden = [name for name in written if name not in neurons]
         owner = {name: self._owner(written[name]) for name in hidden}
         for name in sorted(hidden, key=owner.__getitem__):
-            said = params.get(name) or written[name]
-            neurons[name] = _neuron("hidden", owner[name], said)
+            entry = params.get(name) or written[name]
+            neurons[name] = _neuron("hidden", owner[name], entry)
         edges = [] if table.is_empty("connections") else table.tables("connections")
         return Brain(tuple(neurons.values()), self.connections(edges, list(neurons)))
 
     def _owner(self, table: Table) -> int:
-        """Return the part of a hidden neuron: the core unless written."""
+        """Return the part of a hidden neuron; the core by default."""
         if table.has("layer"):
             table.word("layer", ("hidden",))
         if table.is_empty("part_id"):
@@ -88,7 +88,7 @@ class RevolveReader(Reader):
 
 
 def _tables(table: Table, key: str) -> dict[str, Table]:
-    """Return what stands at the keys of a mapping that may be missing or empty."""
+    """Return the mappings in a mapping that may be missing or empty, by key."""
     if table.is_empty(key):
         return {}
     inner = table.table(key)
@@ -96,7 +96,7 @@ def _tables(table: Table, key: str) -> dict[str, Table]:
 
 
 def _neuron(layer: Layer, part: int, table: Table | None) -> Neuron:
-    """Return a neuron of what is said of it, of type Simple unless that says so."""
+    """Return the neuron of a mapping; its type is Simple by default."""
     if table is None:
         defaults = (parameter.default for parameter in NEURON_TYPES["Simple"])
         return Neuron(layer, "Simple", part, tuple(defaults))

@@ -1,8 +1,8 @@
-"""YAML mappings that know where they stand, so that errors can say it.
+"""YAML mappings with line numbers for error messages.
 
-Scalars are taken as they are asked for: ``1e-5`` is a number where a number
-belongs, though YAML 1.1 calls it a text. Aliases are refused: what is written once
-is meant once, and a document cannot hold itself.
+A scalar is converted to the type that the caller requests: ``1e-5`` is read as a
+number where a number is expected, although it is a text in YAML 1.1. Aliases are
+refused, so that no document contains itself.
 """
 
 import math
@@ -19,7 +19,7 @@ _SLOT = re.compile("0|[1-9][0-9]{0,3}")
 
 
 class _Loader(yaml.SafeLoader):
-    """A loader that refuses aliases."""
+    """Loader that refuses aliases."""
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
@@ -31,18 +31,18 @@ class _Loader(yaml.SafeLoader):
 
 
 class Table:
-    """A mapping of a document.
+    """Mapping in a document.
 
     Attributes:
-        line: where it starts, from 1.
-        keys: its keys as they are written, in their order.
+        line: number of its first line, from 1.
+        keys: as written, in their order.
     """
 
     def __init__(self, node: yaml.Node | None, path: str, file: str) -> None:
         """Read the keys of a node.
 
         Raises:
-            InvalidRobot: not a mapping, a key that is no scalar, or one twice.
+            InvalidRobot: not a mapping, a key that is not a scalar, a duplicate key.
         """
         self._path = path
         self._file = file
@@ -61,20 +61,20 @@ class Table:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Return its keys as they are written, in their order."""
+        """Return the keys as written, in their order."""
         return tuple(self._values)
 
     def lines(self, name: str) -> dict[str, int]:
-        """Return the mapping's line, called so, and its keys', called ``name.key``."""
+        """Return the lines of the mapping (``name``) and its keys (``name.key``)."""
         keys = {f"{name}.{key}": line for key, line in self._key_lines.items()}
         return {name: self.line, **keys}
 
     def has(self, key: str) -> bool:
-        """Return whether it has a key."""
+        """Return whether the mapping has a key."""
         return key in self._values
 
     def is_empty(self, key: str) -> bool:
-        """Return whether nothing stands at a key, or the key is not there."""
+        """Return whether a key is missing or has no value."""
         node = self._values.get(key)
         return node is None or not node.value
 
@@ -83,10 +83,10 @@ class Table:
         self._fail(self._at(key), message, self._key_lines.get(key, self.line))
 
     def refuse_others(self, *allowed: str) -> None:
-        """Raise for a key that is not allowed, naming the nearest that is.
+        """Raise unless all keys are allowed; the message names the nearest key.
 
         Raises:
-            InvalidRobot: such a key.
+            InvalidRobot: a key that is not allowed.
         """
         for key in self._values:
             if key not in allowed:
@@ -99,12 +99,12 @@ class Table:
         """Return the mapping of a key.
 
         Raises:
-            InvalidRobot: no such key, or no mapping there.
+            InvalidRobot: no such key, or not a mapping.
         """
         return Table(self._node(key), self._at(key), self._file)
 
     def tables(self, key: str) -> list["Table"]:
-        """Return the mappings of a key that holds a list; none without the key.
+        """Return the list of mappings of a key; empty if the key is missing.
 
         Raises:
             InvalidRobot: not a list of mappings.
@@ -123,7 +123,7 @@ class Table:
         """Return the text of a key.
 
         Raises:
-            InvalidRobot: no such key and no default, or no text there.
+            InvalidRobot: no such key and no default, or not a text.
         """
         if default is not None and key not in self._values:
             return default
@@ -138,15 +138,15 @@ class Table:
         allowed: Iterable[str],
         also: Mapping[str, str] = MappingProxyType({}),
     ) -> str:
-        """Return the text of a key that must be one of some words.
+        """Return the text of a key, one of some words.
 
         Args:
-            key: where it stands.
+            key: of the mapping.
             allowed: the words.
-            also: other words that mean some of them.
+            also: synonyms, as a mapping to words of ``allowed``.
 
         Raises:
-            InvalidRobot: no such key, or another word; the nearest is named.
+            InvalidRobot: no such key, or another word; the message names the nearest.
         """
         words = list(allowed)
         word = also.get(self.text(key), self.text(key))
@@ -159,7 +159,7 @@ class Table:
         """Return the whole number of a key.
 
         Raises:
-            InvalidRobot: no such key and no default, or no whole number there.
+            InvalidRobot: no such key and no default, or not a whole number.
         """
         if default is not None and key not in self._values:
             return default
@@ -173,7 +173,7 @@ class Table:
         """Return the finite number of a key.
 
         Raises:
-            InvalidRobot: no such key and no default, or no finite number there.
+            InvalidRobot: no such key and no default, or not a finite number.
         """
         if default is not None and key not in self._values:
             return default
@@ -187,7 +187,7 @@ class Table:
         return value
 
     def key_as_slot(self, key: str) -> int:
-        """Return a key as the number of a slot.
+        """Return a key as a slot number.
 
         Raises:
             InvalidRobot: not a plain number such as 0 or 12.
@@ -210,14 +210,14 @@ class Table:
 
 
 def compose(text: str, file: str) -> Table:
-    """Return the outermost mapping of a document.
+    """Return the top-level mapping of a document.
 
     Args:
         text: the document.
         file: its name, for messages.
 
     Raises:
-        InvalidRobot: not YAML, not one mapping, or nested without end.
+        InvalidRobot: not YAML, not a mapping, or nested too deeply.
     """
     try:
         node = yaml.compose(text, Loader=_Loader)
@@ -238,7 +238,7 @@ def _line(node: yaml.Node | None) -> int:
 
 
 def _shown(node: yaml.Node | None) -> str:
-    """Return what a node is, short enough for a message."""
+    """Return a short description of a node for a message."""
     if isinstance(node, yaml.ScalarNode):
         return repr(str(node.value)[:40]) if node.value else "nothing"
     if node is None:

@@ -1,8 +1,21 @@
-"""Arrow tables of a run: what each column holds, its unit, whether it repeats.
+"""Schemas of the Arrow tables of a run, with the meaning of each column.
 
-Every field carries ``unit`` and ``repeatable`` in its metadata. Repeatable columns
-are equal, row by row, in two runs of the same experiment and seed; the others tell
-of machines and clocks. Every row starts with ``record``, its number in its table.
+Every field has ``unit`` and ``repeatable`` in its metadata. Repeatable columns are
+equal, row by row, in two runs of the same experiment and seed; the others depend on
+machines and clocks.
+
+Columns of several tables:
+
+- ``record``: number of the row in its table.
+- ``island``: number of the island where the event of the row happened.
+- ``birth_island``, ``birth``: id of an individual, the island and the number of its
+  birth. ``birth_island`` is null if it equals ``island``, so that the id is
+  ``coalesce(birth_island, island), birth``.
+- ``births``: number of individuals born on the island so far.
+- ``sim_time_s``: simulated time of an arena [s].
+- ``path_velocity``, ``straight_velocity``: length of the path of the core, and
+  distance between its ends, per second of the fitness window [m/s].
+- ``fitness``: higher is better.
 """
 
 from typing import Any
@@ -15,7 +28,7 @@ from schema.robot.genome import Genome, walk
 from schema.robot.robot import Robot
 
 VERSION = 2
-"""Of all tables; goes up when a column changes its name, type or meaning."""
+"""Version of all schemas; rises when a column changes its name, type or meaning."""
 
 Row = dict[str, Any]
 
@@ -29,7 +42,7 @@ def _column(
     is_nullable: bool = False,
     absent: int | None = None,
 ) -> pa.Field:
-    """Return a column; ``absent`` stands for it in rows older than the column."""
+    """Return a column; ``absent`` is its value in rows that are older than it."""
     metadata = {"unit": unit, "repeatable": "true" if is_repeatable else "false"}
     if absent is not None:
         metadata["absent"] = str(absent)
@@ -37,9 +50,15 @@ def _column(
 
 
 def _table(name: str, *columns: pa.Field, is_repeatable: bool = True) -> pa.Schema:
+    """Return a schema; ``is_repeatable`` false holds for all of its columns."""
     metadata = {"revolve.schema": name, "revolve.schema_version": str(VERSION)}
-    record = _column("record", pa.int64(), is_repeatable=is_repeatable)
-    return pa.schema([record, *columns], metadata=metadata)
+    fields = [_column("record", pa.int64()), *columns]
+    if not is_repeatable:
+        fields = [
+            field.with_metadata(field.metadata | {b"repeatable": b"false"})
+            for field in fields
+        ]
+    return pa.schema(fields, metadata=metadata)
 
 
 def _inner(name: str, kind: pa.DataType) -> pa.Field:
@@ -47,7 +66,7 @@ def _inner(name: str, kind: pa.DataType) -> pa.Field:
 
 
 PARENT = pa.struct([_inner("island", pa.int32()), _inner("birth", pa.int64())])
-"""A parent's name; the first of two is the one that was copied."""
+"""Id of a parent; of two, the first is the one whose copy was changed."""
 
 PART = pa.struct(
     [
@@ -61,14 +80,9 @@ PART = pa.struct(
         _inner("gene", pa.uint64()),
     ]
 )
-"""A part of a body, in the order and with the meaning of ``schema.robot.Part``."""
+"""Part of a body; the fields are those of ``schema.robot.robot.Part``."""
 
 _BIRTH_ISLAND = _column("birth_island", pa.int32(), is_nullable=True)
-"""Where an immigrant was born; null of those who live where they were born.
-
-``island`` is where something happened. An individual's name is its island of birth
-and its ``birth`` there: ``coalesce(birth_island, island), birth``.
-"""
 
 BIRTHS = _table(
     "births",
@@ -92,9 +106,16 @@ BIRTHS = _table(
     _column("x", pa.float64(), "m", is_nullable=True),
     _column("y", pa.float64(), "m", is_nullable=True),
 )
-"""One row per individual born; founders have no parents.
+"""One row per individual born.
 
-When and where it was born is null off-line, its generation on-line.
+- ``parents``: ids of the parents; empty for founders.
+- ``generation``: number of the brood; null on-line.
+- ``rank``: 1 for founders, otherwise one more than the greatest rank of the parents.
+- ``attempts``: matings that this birth took.
+- ``genome``, ``body``: Protobuf bytes of the genome; the parts, core first.
+- ``parts``, ``joints``, ``motors``, ``extremities``, ``inputs``, ``outputs``,
+  ``hidden``, ``connections``: counts, see ``sizes``.
+- ``sim_time_s``, ``x``, ``y``: time and place of birth, world frame; null off-line.
 """
 
 EVALUATIONS = _table(
@@ -113,9 +134,13 @@ EVALUATIONS = _table(
     _column("worker", pa.string(), is_repeatable=False),
     _column("platform", pa.string(), is_repeatable=False),
 )
-"""One row per evaluation finished; status is "ok", or "failed" with a reason.
+"""One row per finished evaluation.
 
-Trial 0 is the one at birth; where robots are judged anew, more rows have a greater.
+- ``trial``: number of the evaluation of this robot; 0 is the one at birth, others are
+  re-evaluations.
+- ``status``, ``reason``: "ok", or "failed" with a reason; then the numbers are null.
+- ``simulated_s``: simulated time, warm-up included [s].
+- ``wall_s``, ``worker``, ``platform``: duration by the clock, and where it ran.
 """
 
 POPULATION = _table(
@@ -128,8 +153,8 @@ POPULATION = _table(
 )
 """One row per individual alive when ``births`` individuals had been born.
 
-On-line there is a set of rows at each birth, the newborn's included; fitness is
-null of those who are not mature.
+On-line there is a set of rows at each birth, with a row for the new robot. ``fitness``
+is null if the evaluation failed or the robot is not mature.
 """
 
 FITNESS = _table(
@@ -145,7 +170,11 @@ FITNESS = _table(
     _column("fitness", pa.float64()),
     _column("is_mature", pa.bool_()),
 )
-"""One row per living robot and sample of an arena, mature or not."""
+"""One row per living robot and sample of an arena, mature or not.
+
+``age_s`` is the time since birth [s]; ``is_mature`` is whether the robot has lived
+its warm-up and a whole fitness window.
+"""
 
 _COORDINATE = pa.float32()
 
@@ -159,10 +188,11 @@ POSES = _table(
     *(_column(f"q{axis}", _COORDINATE) for axis in "wxyz"),
     _column("angles", pa.list_(_inner("item", _COORDINATE)), "rad"),
 )
-"""One row per living robot and pose of an arena: enough to draw it.
+"""One row per living robot and recorded pose of an arena.
 
-Position and attitude (unit quaternion) of the core, world frame, and the angle of
-every joint, driven or not, by ascending part.
+- ``x``, ``y``, ``z``: centre of the core, world frame [m].
+- ``qw``, ``qx``, ``qy``, ``qz``: attitude of the core as a unit quaternion.
+- ``angles``: angle of every joint, driven or not, by ascending part [rad].
 """
 
 DEATHS = _table(
@@ -178,12 +208,14 @@ DEATHS = _table(
     _column("y", pa.float64(), "m"),
     _column("z", pa.float64(), "m", is_nullable=True),
 )
-"""One row per robot that left an arena, and where its core was.
+"""One row per robot that left an arena.
 
-Reason is "selection" (less fit than the survivors' rule asks), "cull" (an arena
-full of the mature made room), "diverged" (its physics did; ``detail`` says how),
-"removed" (by an operator), "migrated" (it was moved to another island) or
-"replaced" (it made room for an immigrant); z is null if it had not lived yet.
+- ``reason``: "selection" (below the share of the mean fitness), "cull" (removed from
+  an arena full of mature robots), "diverged" (its simulation diverged; ``detail`` says
+  how), "removed" (by an operator), "migrated" (moved to another island) or "replaced"
+  (made room for an immigrant).
+- ``x``, ``y``, ``z``: centre of its core, world frame [m]; ``z`` is null if the robot
+  left before its first step.
 """
 
 TOUCHES = _table(
@@ -197,7 +229,12 @@ TOUCHES = _table(
     _column("over_s", pa.float64(), "s"),
     _column("duration_s", pa.float64(), "s"),
 )
-"""One row per pair that touched: for how long of the time ``over_s`` that ended."""
+"""One row per pair of robots that touched during an interval of an arena.
+
+- ``other_island``, ``other_birth``: id of the second robot.
+- ``over_s``: length of the interval, which ends at ``sim_time_s`` [s].
+- ``duration_s``: time in contact during the interval [s].
+"""
 
 MIGRATIONS = _table(
     "migrations",
@@ -210,54 +247,50 @@ MIGRATIONS = _table(
     _column("birth", pa.int64()),
     _column("fitness", pa.float64(), is_nullable=True),
 )
-"""One row per migrant that was sent, when ``births`` had been born on its island.
+"""One row per migrant sent.
 
-Fitness is what it was judged there, null if that failed; when is null off-line.
+- ``island``, ``to``: numbers of the islands that it left and reached.
+- ``epoch``: number of the migration epoch.
+- ``fitness``: on the island that it left; null if its evaluation failed.
+- ``sim_time_s``: null off-line.
 """
 
 AUDITS = _table(
     "audits",
-    *(
-        _column(name, kind, unit, is_repeatable=False, is_nullable=is_nullable)
-        for name, kind, unit, is_nullable in (
-            ("island", pa.int32(), "", False),
-            ("birth", pa.int64(), "", False),
-            ("trial", pa.int32(), "", False),
-            ("agrees", pa.bool_(), "", False),
-            ("worker", pa.string(), "", False),
-            ("platform", pa.string(), "", False),
-            ("reason", pa.string(), "", False),
-            ("fitness", pa.float64(), "", True),
-            ("path_velocity", pa.float64(), "m/s", True),
-            ("straight_velocity", pa.float64(), "m/s", True),
-            ("simulated_s", pa.float64(), "s", True),
-        )
-    ),
+    _column("island", pa.int32()),
+    _column("birth", pa.int64()),
+    _column("trial", pa.int32()),
+    _column("agrees", pa.bool_()),
+    _column("worker", pa.string()),
+    _column("platform", pa.string()),
+    _column("reason", pa.string()),
+    _column("fitness", pa.float64(), is_nullable=True),
+    _column("path_velocity", pa.float64(), "m/s", is_nullable=True),
+    _column("straight_velocity", pa.float64(), "m/s", is_nullable=True),
+    _column("simulated_s", pa.float64(), "s", is_nullable=True),
     is_repeatable=False,
 )
-"""Two rows per evaluation that two workers did: what each of them came to.
+"""Two rows per evaluation that two workers did, one for the answer of each.
 
-Which evaluations are audited is a flag, so nothing here repeats.
+``agrees`` is whether both answers are equal; ``trial`` and the numbers are as in
+``evaluations``, and ``reason`` is that of a failure. A flag selects the evaluations
+to audit, so no column is repeatable.
 """
 
 DRIFTS = _table(
     "drifts",
-    *(
-        _column(name, kind, is_repeatable=False)
-        for name, kind in (
-            ("island", pa.int32()),
-            ("step", pa.int64()),
-            ("before", pa.string()),
-            ("after", pa.string()),
-            ("worker", pa.string()),
-        )
-    ),
+    _column("island", pa.int32()),
+    _column("step", pa.int64()),
+    _column("before", pa.string()),
+    _column("after", pa.string()),
+    _column("worker", pa.string()),
     is_repeatable=False,
 )
-"""One row per arena that a worker of another platform went on with.
+"""One row per arena that moved to a worker of another platform.
 
-``step`` is the first that it reached; ``before`` and ``after`` are platforms. From
-there on the run is another one than on a single platform: this is allowed by a flag.
+``step`` is the first physics step that the new worker reached; ``before`` and
+``after`` are the platforms. From there on, the run differs from one on a single
+platform. A flag allows it.
 """
 
 _INSTANT = pa.timestamp("ms", tz="UTC")
@@ -275,10 +308,16 @@ RUNS = _table(
     _column("start", _INSTANT, is_repeatable=False),
     _column("end", _INSTANT, is_repeatable=False, is_nullable=True),
 )
-"""One row: what was run; ``document`` (the experiment) and ``versions`` are JSON.
+"""One row, which describes the run.
 
-No column may be called ``experiment``: that is a folder name of a finished run,
-which readers of a campaign turn into a column.
+- ``name``, ``run``, ``seed``: name of the experiment, number of the repeat, seed.
+- ``document``, ``versions``: the experiment, and versions of libraries, as JSON.
+- ``state``: of the run.
+- ``platform``, ``cpu_flags``: of the coordinator.
+- ``start``, ``end``: times by the clock.
+
+No column may be named ``experiment``: a folder of finished runs has that name, and
+readers of a campaign make a column of it.
 """
 
 TABLES: dict[str, pa.Schema] = {
@@ -298,11 +337,11 @@ TABLES: dict[str, pa.Schema] = {
 
 
 def read_columns(table: str, columns: bytes) -> pa.Table:
-    """Return rows that came as columns.
+    """Return the rows of an Arrow stream.
 
     Args:
-        table: whose they are.
-        columns: Arrow IPC stream of all columns but ``record``; no bytes, no rows.
+        table: name of their table.
+        columns: Arrow IPC stream of all columns but ``record``; empty for no rows.
 
     Raises:
         MalformedMessage: not such a stream, or columns of other names or types.
@@ -320,7 +359,7 @@ def read_columns(table: str, columns: bytes) -> pa.Table:
             )
         found.validate(full=True)
     except (pa.ArrowException, OSError) as error:
-        raise MalformedMessage(f"{table}: no Arrow stream: {error}") from None
+        raise MalformedMessage(f"{table}: not an Arrow stream: {error}") from None
     return found
 
 
@@ -329,27 +368,27 @@ def _described(schema: pa.Schema) -> str:
 
 
 def is_earlier(found: pa.Schema, schema: pa.Schema) -> bool:
-    """Return whether rows are of a table, or of it before it got its newest columns.
+    """Return whether a schema is that of a table, now or before it got new columns.
 
     Args:
-        found: what the rows are, with metadata.
-        schema: of the table, now.
+        found: schema of stored rows, with metadata.
+        schema: present schema of the table.
     """
     known = [field for field in schema if field.name in found.names]
-    lacking = [field for field in schema if field.name not in found.names]
+    missing = [field for field in schema if field.name not in found.names]
     return found.equals(pa.schema(known, schema.metadata), check_metadata=True) and all(
-        field.nullable or b"absent" in field.metadata for field in lacking
+        field.nullable or b"absent" in field.metadata for field in missing
     )
 
 
 def completed(rows: pa.Table, schema: pa.Schema) -> pa.Table:
-    """Return rows with the columns that their table got since they were written.
+    """Return rows with the columns added that they lack.
 
     Raises:
-        ValueError: they are none of the table.
+        ValueError: the rows are not of the table.
     """
-    lacking = [field for field in schema if field.name not in rows.column_names]
-    for field in lacking:
+    missing = [field for field in schema if field.name not in rows.column_names]
+    for field in missing:
         absent = field.metadata.get(b"absent")
         value = pa.scalar(absent and int(absent), field.type)
         rows = rows.append_column(field, pa.repeat(value, rows.num_rows))
@@ -358,7 +397,7 @@ def completed(rows: pa.Table, schema: pa.Schema) -> pa.Table:
 
 
 def repeatable(schema: pa.Schema) -> list[str]:
-    """Return the names of the columns that two equal runs have in common."""
+    """Return the names of the repeatable columns."""
     return [field.name for field in schema if field.metadata[b"repeatable"] == b"true"]
 
 
@@ -384,19 +423,19 @@ def sizes(robot: Robot, genome: Genome, space: BodySpace) -> dict[str, int]:
 
     Args:
         robot: the phenotype.
-        genome: what it developed from.
+        genome: of the phenotype.
         space: its part types.
 
     Returns:
         ``parts``, ``joints`` (driven or not), ``motors`` (driven), ``extremities``
         (parts without children; a lone core counts 1), ``inputs``, ``outputs``,
-        ``hidden``, and ``connections`` of the genome, unresolvable ones included.
+        ``hidden``, and ``connections`` of the genome, including unresolved ones.
 
     Source: thesis section 6.3; facts of the original, section 8.
     """
     kinds = [space[part.kind] for part in robot.parts]
     layers = [neuron.layer for neuron in robot.brain.neurons]
-    # The core's parent, -1, is among them.
+    # Includes -1, the parent of the core.
     parents = {part.parent for part in robot.parts}
     return {
         "parts": len(robot.parts),

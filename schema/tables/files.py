@@ -1,10 +1,10 @@
-"""Where the tables of a run lie, and how they are read.
+"""Paths and reading of the tables of a run.
 
-While a run lives, a table is a row of Arrow stream segments, one per incarnation
-of its coordinator: ``segments/births-000.arrows``. A finished run has Parquet
-instead: ``tables/experiment=NAME/run=N/births.parquet``. The names of the folders
-carry columns (hive partitioning), so that one call reads a campaign; in DuckDB
-``read_parquet('runs/**/births.parquet', hive_partitioning = true)``, and so on.
+While a run is active, a table consists of Arrow stream segments, one per start of
+its coordinator: ``segments/births-000.arrows``. A finished run has Parquet instead:
+``tables/experiment=NAME/run=N/births.parquet``. The folder names hold columns (hive
+partitioning), so that one call reads a campaign, such as DuckDB's
+``read_parquet('runs/**/births.parquet', hive_partitioning = true)``.
 """
 
 import contextlib
@@ -25,11 +25,11 @@ FINISHED = "tables"
 
 
 def parquet_path(folder: Path, experiment: str, run: int, table: str) -> Path:
-    """Return where a table of a finished run lies.
+    """Return the path of a table of a finished run.
 
     Args:
         folder: the run folder.
-        experiment: its name; whatever no path may hold is percent-encoded.
+        experiment: its name, which is percent-encoded.
         run: number of the repeat.
         table: its name.
     """
@@ -38,7 +38,7 @@ def parquet_path(folder: Path, experiment: str, run: int, table: str) -> Path:
 
 
 def segment_path(folder: Path, table: str, number: int) -> Path:
-    """Return where a segment of a table lies."""
+    """Return the path of a segment of a table."""
     return folder / SEGMENTS / f"{table}-{number:03d}.arrows"
 
 
@@ -48,18 +48,8 @@ def segments_of(folder: Path, table: str) -> list[tuple[int, Path]]:
     return sorted((int(path.stem.removeprefix(f"{table}-")), path) for path in found)
 
 
-def read_segment(path: Path, schema: pa.Schema) -> list[pa.RecordBatch]:
-    """Return the complete batches of a segment; what a kill cut off is left out.
-
-    Raises:
-        RunFolderError: the segment is of another version of its table, or the disk
-            fails.
-    """
-    return [batch for _, batch in _batches(path, schema)]
-
-
 def batch_ends(path: Path, schema: pa.Schema) -> list[tuple[int, range]]:
-    """Return where each complete batch of a segment ends, and its rows' numbers.
+    """Return the end of each complete batch of a segment, and its record numbers.
 
     Raises:
         RunFolderError: the segment is of another version of its table, or the disk
@@ -69,24 +59,24 @@ def batch_ends(path: Path, schema: pa.Schema) -> list[tuple[int, range]]:
 
 
 def _numbers(batch: pa.RecordBatch) -> range:
-    """Return the numbers of a batch's rows; they ascend one by one."""
+    """Return the record numbers of a batch; they are consecutive."""
     first = batch["record"][0].as_py() if batch.num_rows else 0
     return range(first, first + batch.num_rows)
 
 
 def _batches(path: Path, schema: pa.Schema) -> Iterator[tuple[int, pa.RecordBatch]]:
-    """Yield where each complete batch of a segment ends, and it; one at a time."""
+    """Yield the end of each complete batch of a segment, and the batch."""
     try:
         source = pa.OSFile(str(path))
     except OSError as error:
         raise RunFolderError(f"{path}: cannot be read: {error.strerror}") from None
     with source, contextlib.suppress(pa.ArrowInvalid, OSError, MemoryError):
-        # A cut or damaged tail raises one of these: batches before it are whole.
+        # A truncated or damaged tail raises one of these; the batches before are whole.
         reader = pa.ipc.open_stream(source)
         if not is_earlier(reader.schema, schema):
             raise RunFolderError(
                 f"{path}: was written by another version of Revolve: finish the run "
-                "with that one"
+                "with that version"
             )
         for batch in reader:
             yield source.tell(), _whole(batch, schema)
@@ -102,11 +92,10 @@ def _whole(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
 
 
 def stored_batches(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
-    """Yield the rows that stand in a table's segments, without a gap.
+    """Yield the rows of a table's segments up to the first gap.
 
-    Every row carries its number, so a row that is missing is noticed. Rows behind a
-    gap are left out: a replay of the journal writes them again. No more than one
-    batch is in memory.
+    Record numbers show gaps. A replay of the journal writes the rows behind a gap
+    again. Only one batch is in memory at a time.
 
     Args:
         folder: the run folder.
@@ -121,7 +110,7 @@ def stored_batches(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
 
 
 def batches_by_island(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
-    """Yield the same rows in the order of their islands, with their numbers in it.
+    """Yield these rows sorted by island, with new record numbers.
 
     Raises:
         RunFolderError: a segment of another version.
@@ -144,7 +133,7 @@ def batches_by_island(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
 
 
 def stored_rows(folder: Path, table: str) -> tuple[int, list[tuple[int, Path]]]:
-    """Return how many rows ``stored_batches`` yields, and segments it does not use.
+    """Return the number of rows before the first gap, and the unused segments.
 
     Raises:
         RunFolderError: a segment of another version.
@@ -159,10 +148,10 @@ def stored_rows(folder: Path, table: str) -> tuple[int, list[tuple[int, Path]]]:
 
 
 def _chain(folder: Path, table: str) -> Iterator[tuple[int, pa.RecordBatch | None]]:
-    """Yield index of the segment and batch; no batch where there is a gap.
+    """Yield (index of the segment, batch); the batch is None at a gap.
 
-    Rows that stand there twice come once: a coordinator that was frozen while another
-    took the run over may end what it was writing. Both are the journal's, so equal.
+    Duplicate rows are yielded once: a coordinator that was suspended while another
+    took over the run may finish a write. Both copies are equal.
     """
     rows = 0
     for index, (_, path) in enumerate(segments_of(folder, table)):
@@ -177,7 +166,7 @@ def _chain(folder: Path, table: str) -> Iterator[tuple[int, pa.RecordBatch | Non
 
 
 def has_rows(folder: Path, table: str) -> bool:
-    """Return whether a run has begun to write a table, or has it finished."""
+    """Return whether a run has any file of a table."""
     finished = (folder / FINISHED).glob(f"*/*/{table}.parquet")
     return any(finished) or bool(segments_of(folder, table))
 
@@ -185,8 +174,7 @@ def has_rows(folder: Path, table: str) -> bool:
 def read_table(folder: Path, table: str) -> pa.Table:
     """Return all rows of a table of a run, finished or not, island by island.
 
-    While a run lives, rows of several islands come as their answers do; those of
-    one island come in an order that repeats.
+    Rows of each island are in a repeatable order.
 
     Args:
         folder: the run folder.
@@ -211,16 +199,16 @@ def campaign(root: Path, table: str) -> pa.dataset.Dataset:
     """Return one table of all finished runs below a folder.
 
     Args:
-        root: a run folder, or any folder above some.
+        root: a run folder, or a folder above several.
         table: its name, a key of ``TABLES``.
 
     Returns:
         A dataset with the table's columns, ``experiment`` and ``run``.
 
     Raises:
-        RunFolderError: no finished run is there.
+        RunFolderError: no finished run.
     """
     files = sorted(root.glob(f"**/{FINISHED}/*/*/{table}.parquet"))
     if not files:
-        raise RunFolderError(f"{root}: no finished run is there or below")
+        raise RunFolderError(f"{root}: no finished run in this folder or below")
     return pa.dataset.dataset([str(file) for file in files], partitioning="hive")

@@ -1,8 +1,8 @@
-"""What the holder of an arena shard and whoever decides over it tell each other.
+"""Changes and advances of arena shards, exchanged by coordinator and worker.
 
-Time in an arena is counted in physics steps since it began. The worker that holds
-a shard advances it to a step it is given; an advance is a pure function of the
-shard's state, the changes made first and the step to reach.
+Time in an arena is counted in physics steps from its start. The worker that holds a
+shard advances it to a given step. An advance is a pure function of the state of the
+shard, the changes and the step.
 """
 
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ from schema.robot.robot import Robot
 
 @dataclass(frozen=True, slots=True)
 class Insertion:
-    """A robot to be put into the arena.
+    """Insertion of a robot into the arena.
 
     Attributes:
-        birth: who it is.
-        robot: what it is.
-        place: where the core's centre goes in the ground plane, world frame [m].
-        heading: turn about z [rad].
+        birth: id of the robot.
+        robot: body and brain.
+        place: centre of the core in the ground plane, world frame [m].
+        heading: rotation about z [rad].
     """
 
     birth: BirthId
@@ -32,7 +32,7 @@ class Insertion:
 
 @dataclass(frozen=True, slots=True)
 class BrainChange:
-    """An operator replaces a living robot's brain; its states begin anew."""
+    """Replacement of a living robot's brain; neuron states are reset."""
 
     birth: BirthId
     brain: Brain
@@ -40,7 +40,7 @@ class BrainChange:
 
 @dataclass(frozen=True, slots=True)
 class Changes:
-    """What is done to an arena before it advances: removals, insertions, brains."""
+    """Changes of an arena before an advance: removals, insertions, brains."""
 
     removals: tuple[BirthId, ...] = ()
     insertions: tuple[Insertion, ...] = ()
@@ -49,15 +49,15 @@ class Changes:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """How a living robot does at the end of an advance.
+    """Fitness of a living robot at the end of an advance.
 
     Attributes:
-        birth: who.
-        age_s: since insertion [s].
+        birth: id of the robot.
+        age_s: simulated time since insertion [s].
         path_velocity, straight_velocity: over the sliding window [m/s].
-        fitness: of the window; 0 before a quarter of it has been lived.
-        is_mature: it has lived its warm-up and a whole window.
-        place: core's centre, world frame [m].
+        fitness: of the window; 0 before a quarter of the window.
+        is_mature: its age is at least the warm-up and a whole window.
+        place: centre of the core, world frame [m].
     """
 
     birth: BirthId
@@ -71,7 +71,7 @@ class Judgement:
 
 @dataclass(frozen=True, slots=True)
 class Casualty:
-    """A robot whose physics diverged: it is gone, with the reason."""
+    """Removal of a robot whose simulation diverged, with the reason."""
 
     birth: BirthId
     step: int
@@ -81,7 +81,7 @@ class Casualty:
 
 @dataclass(frozen=True, slots=True)
 class Touch:
-    """Two robots touched each other during an advance, for so long [s]."""
+    """Contact of two robots during an advance, and its total duration [s]."""
 
     first: BirthId
     second: BirthId
@@ -90,14 +90,14 @@ class Touch:
 
 @dataclass(frozen=True, slots=True)
 class Advance:
-    """What an advance came to.
+    """Result of an advance.
 
     Attributes:
-        step: reached.
-        digest: SHA-256 of the state there, which is that of a snapshot of it.
+        step: at its end.
+        digest: SHA-256 of the state at that step, as of a snapshot of it.
         judgements: of all living robots, by birth.
-        casualties: in the order in which they fell.
-        touches: by pair; empty unless the experiment asks for them.
+        casualties: in the order in which they diverged.
+        touches: by pair; empty unless the experiment records them.
         poses: Arrow IPC stream of samples (schema.tables.columns.POSES without record).
     """
 

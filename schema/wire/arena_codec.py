@@ -1,4 +1,4 @@
-"""Bytes of what goes to the holder of an arena shard, and of what comes back."""
+"""Protobuf bytes of requests to advance arena shards, and of their answers."""
 
 from dataclasses import dataclass
 
@@ -7,21 +7,19 @@ from schema.robot.ids import BirthId
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import Advance, Changes
 from schema.wire.arena_messages import (
-    DIGEST_BYTES,
     advance_from_message,
     advance_to_message,
-    birth_from_message,
-    birth_to_message,
     changes_from_message,
     changes_to_message,
+    checked_digest,
 )
 from schema.wire.codec import decoded
-from schema.wire.messages import finite
+from schema.wire.messages import birth_from_message, birth_to_message, finite
 
 
 @dataclass(frozen=True, slots=True)
 class PastAdvance:
-    """An advance to be done again: the changes before it, and what it came to."""
+    """Past advance to repeat: its changes, last step, and digest of the result."""
 
     changes: Changes
     until: int
@@ -30,13 +28,13 @@ class PastAdvance:
 
 @dataclass(frozen=True, slots=True)
 class Rebuild:
-    """Where a shard's state comes from when its holder is lost.
+    """Data to rebuild the state of a shard.
 
     Attributes:
-        snapshot: of the shard; empty for an arena in which nothing has happened.
-        history: the advances since, oldest first.
-        living: who must be there at the end, if all this happened on another
-            platform: what comes of it here need not be the same.
+        snapshot: of the shard; empty for an arena before its first advance.
+        history: advances since the snapshot, oldest first.
+        living: robots that must live at the end, if the advances ran on another
+            platform, where results may differ.
     """
 
     snapshot: bytes
@@ -46,20 +44,20 @@ class Rebuild:
 
 @dataclass(frozen=True, slots=True)
 class AdvanceRequest:
-    """A request to advance a shard; its answer depends on nothing else.
+    """Request to advance a shard; its answer depends on nothing else.
 
     Attributes:
-        run: name of the run that it belongs to.
-        epoch: incarnation of the run's coordinator.
+        run: name of the run.
+        epoch: incarnation of the coordinator of the run.
         number: of the job, unique within the epoch.
         settings: JSON of ``ArenaSettings``.
-        shard: number of the island whose arena it is.
-        from_step: where the shard must stand.
-        from_digest: of its state there; empty if nothing has happened yet.
-        changes: what is done first.
-        until: the step to reach.
-        wants_snapshot: the answer is to hold the state that was reached.
-        rebuild: how to come to the state to start from, None for a worker that
+        shard: number of the arena's island.
+        from_step: step at which the advance starts.
+        from_digest: of the state at that step; empty before the first advance.
+        changes: made before the advance.
+        until: step at which the advance ends.
+        wants_snapshot: the answer must hold the state at the end.
+        rebuild: data to rebuild the state at the start; None for a worker that
             holds it.
     """
 
@@ -78,14 +76,14 @@ class AdvanceRequest:
 
 @dataclass(frozen=True, slots=True)
 class AdvanceAnswer:
-    """The answer to such a request.
+    """Answer to a request to advance a shard.
 
     Attributes:
         epoch, number: of the request.
-        wall_s: how long it took [s]; never decides anything.
-        advance: what it came to; None where the worker does not hold the state to
-            start from and was not told how to rebuild it.
-        snapshot: the state that was reached; empty if it was not wanted.
+        wall_s: duration by the clock [s]; information only.
+        advance: the result; None if the worker has neither the state at the start
+            nor data to rebuild it.
+        snapshot: state at the end; empty if not wanted.
     """
 
     epoch: int
@@ -97,12 +95,12 @@ class AdvanceAnswer:
 
 @dataclass(frozen=True, slots=True)
 class Live:
-    """What is published after each advance, best effort, for those who watch.
+    """Message to viewers after each advance, published best effort.
 
     Attributes:
         run: name of the run.
-        shard: number of the island whose arena it is.
-        advance: what it came to, poses included.
+        shard: number of the arena's island.
+        advance: the result, poses included.
     """
 
     run: str
@@ -113,7 +111,7 @@ class Live:
 def encode_advance_request(request: AdvanceRequest, plugins: str = "") -> bytes:
     """Return the bytes of a request.
 
-    ``plugins`` is what ``plugin_source.plugins_of`` says of its settings.
+    ``plugins`` is the result of ``plugin_source.plugins_of`` for its settings.
     """
     message = pb.AdvanceRequest(
         run=request.run,
@@ -148,7 +146,7 @@ def decode_advance_request(data: bytes) -> AdvanceRequest:
 
     Raises:
         MalformedMessage: not a request's bytes, a robot or a brain that breaks its
-            rules, a digest that is none, an advance that goes back, a number that
+            rules, a digest of wrong length, an end before the start, a number that
             is not finite.
     """
     return decoded(data, pb.AdvanceRequest(), _request)
@@ -173,21 +171,21 @@ def decode_advance_answer(data: bytes) -> AdvanceAnswer:
     """Return the answer of some bytes.
 
     Raises:
-        MalformedMessage: not an answer's bytes, no result in it, a digest that is
-            none, a number that is not finite.
+        MalformedMessage: not an answer's bytes, no result, a digest of wrong length,
+            a number that is not finite.
     """
     return decoded(data, pb.AdvanceAnswer(), _answer)
 
 
 def encode_live(live: Live) -> bytes:
-    """Return the bytes of what is published after an advance."""
+    """Return the bytes of a message to viewers."""
     message = pb.Live(run=live.run, shard=live.shard)
     message.advance.CopyFrom(advance_to_message(live.advance))
     return message.SerializeToString(deterministic=True)
 
 
 def decode_live(data: bytes) -> Live:
-    """Return what was published after an advance.
+    """Return the message to viewers of some bytes.
 
     Raises:
         MalformedMessage: other bytes, or an advance that breaks its rules.
@@ -211,7 +209,7 @@ def _request(message: pb.AdvanceRequest) -> AdvanceRequest:
         living if message.is_drift else None,
     )
     if not message.is_rebuild and rebuild != Rebuild(b"", ()):
-        raise MalformedMessage("advance: a state to rebuild, and no word to do so")
+        raise MalformedMessage("advance: snapshot and history need is_rebuild")
     return AdvanceRequest(
         run=message.run,
         epoch=message.epoch,
@@ -219,7 +217,7 @@ def _request(message: pb.AdvanceRequest) -> AdvanceRequest:
         settings=message.settings,
         shard=message.shard,
         from_step=message.from_step,
-        from_digest=_digest(message.from_digest) if message.from_digest else b"",
+        from_digest=checked_digest(message.from_digest) if message.from_digest else b"",
         changes=changes_from_message(message.changes),
         until=message.until,
         wants_snapshot=message.wants_snapshot,
@@ -229,13 +227,13 @@ def _request(message: pb.AdvanceRequest) -> AdvanceRequest:
 
 def _past(message: pb.PastAdvance) -> PastAdvance:
     changes = changes_from_message(message.changes)
-    return PastAdvance(changes, message.until, _digest(message.digest))
+    return PastAdvance(changes, message.until, checked_digest(message.digest))
 
 
 def _answer(message: pb.AdvanceAnswer) -> AdvanceAnswer:
     result = message.WhichOneof("result")
     if result is None or (result == "needs_state" and not message.needs_state):
-        raise MalformedMessage("answer: holds no advance, and needs no state")
+        raise MalformedMessage("answer: must hold an advance or need a state")
     return AdvanceAnswer(
         epoch=message.epoch,
         number=message.number,
@@ -245,9 +243,3 @@ def _answer(message: pb.AdvanceAnswer) -> AdvanceAnswer:
         ),
         snapshot=message.snapshot,
     )
-
-
-def _digest(data: bytes) -> bytes:
-    if len(data) != DIGEST_BYTES:
-        raise MalformedMessage(f"digest: must be {DIGEST_BYTES} bytes, got {len(data)}")
-    return data

@@ -1,10 +1,9 @@
-"""Changes and advances of arenas as Protobuf messages, and back.
+"""Conversion of changes and advances of arenas to Protobuf messages and back.
 
-``schema.wire.arena_codec`` makes bytes of them.
+``schema.wire.arena_codec`` encodes the messages.
 """
 
 from schema.errors import MalformedMessage
-from schema.robot.ids import BirthId
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import (
     Advance,
@@ -17,6 +16,8 @@ from schema.wire.arena import (
 )
 from schema.wire.codec import vector_from_message, vector_to_message
 from schema.wire.messages import (
+    birth_from_message,
+    birth_to_message,
     finite,
     read_brain,
     robot_from_message,
@@ -24,7 +25,7 @@ from schema.wire.messages import (
     write_brain,
 )
 
-DIGEST_BYTES = 32
+_DIGEST_BYTES = 32
 
 
 def changes_to_message(changes: Changes) -> pb.Changes:
@@ -58,7 +59,7 @@ def changes_from_message(message: pb.Changes) -> Changes:
 
 
 def write_brain_change(change: BrainChange, message: pb.BrainChange) -> None:
-    """Put a change of a brain into a message."""
+    """Fill a message with a change of a brain."""
     message.birth.CopyFrom(birth_to_message(change.birth))
     write_brain(change.brain, message)
 
@@ -66,7 +67,7 @@ def write_brain_change(change: BrainChange, message: pb.BrainChange) -> None:
 def read_brain_change(message: pb.BrainChange) -> BrainChange:
     """Return the change of a brain of a message.
 
-    Whether the brain fits its robot is for whoever has the robot.
+    The caller checks that the brain fits the robot.
 
     Raises:
         InvalidRobot: a brain that breaks its rules.
@@ -109,15 +110,11 @@ def advance_from_message(message: pb.Advance) -> Advance:
     """Return the advance of a message.
 
     Raises:
-        MalformedMessage: a digest that is none, a number that is not finite.
+        MalformedMessage: a digest of wrong length, a number that is not finite.
     """
-    if len(message.digest) != DIGEST_BYTES:
-        raise MalformedMessage(
-            f"advance.digest: must be {DIGEST_BYTES} bytes, got {len(message.digest)}"
-        )
     return Advance(
         step=message.step,
-        digest=message.digest,
+        digest=checked_digest(message.digest),
         judgements=tuple(map(_judgement, message.judgements)),
         casualties=tuple(map(_casualty, message.casualties)),
         touches=tuple(map(_touch, message.touches)),
@@ -125,14 +122,17 @@ def advance_from_message(message: pb.Advance) -> Advance:
     )
 
 
-def birth_to_message(birth: BirthId) -> pb.BirthName:
-    """Return an individual's name as a message."""
-    return pb.BirthName(island=birth.island, number=birth.number)
+def checked_digest(data: bytes) -> bytes:
+    """Return a digest.
 
-
-def birth_from_message(message: pb.BirthName) -> BirthId:
-    """Return the name of a message."""
-    return BirthId(message.island, message.number)
+    Raises:
+        MalformedMessage: a wrong length.
+    """
+    if len(data) != _DIGEST_BYTES:
+        raise MalformedMessage(
+            f"digest: must be {_DIGEST_BYTES} bytes, got {len(data)}"
+        )
+    return data
 
 
 def _insertion(message: pb.Insertion) -> Insertion:

@@ -1,6 +1,6 @@
-"""Robots and genomes as Protobuf messages, and back.
+"""Conversion of robots and genomes to Protobuf messages and back.
 
-``schema.wire.codec`` makes bytes of them.
+``schema.wire.codec`` encodes the messages.
 """
 
 import math
@@ -49,7 +49,7 @@ def robot_from_message(message: pb.Robot) -> Robot:
     """Return the robot of a message.
 
     Raises:
-        InvalidRobot: no tree of parts, or a brain that breaks its rules.
+        InvalidRobot: parts that are not a tree, or a brain that breaks its rules.
         MalformedMessage: an unknown layer.
     """
     parts = body_from_message(message)
@@ -57,10 +57,10 @@ def robot_from_message(message: pb.Robot) -> Robot:
 
 
 def body_from_message(message: pb.Robot) -> tuple[Part, ...]:
-    """Return the body of a message; whatever brain it holds is not looked at.
+    """Return the body of a message; its brain is not read.
 
     Raises:
-        InvalidRobot: no tree of parts.
+        InvalidRobot: parts that are not a tree.
     """
     parts = tuple(map(_part_from_message, message.parts))
     check_tree(parts)
@@ -68,7 +68,7 @@ def body_from_message(message: pb.Robot) -> tuple[Part, ...]:
 
 
 def write_brain(brain: Brain, message: pb.Robot | pb.BrainChange) -> None:
-    """Put a brain into a message that has neurons and connections."""
+    """Add a brain to a message that has neurons and connections."""
     add_neuron = message.neurons.add
     for neuron in brain.neurons:
         item = add_neuron()
@@ -110,7 +110,7 @@ def genome_to_message(genome: Genome) -> pb.Genome:
     for node, parent, parent_slot in walk(genome):
         entry = message.nodes.add()
         _write_part(node, parent, parent_slot, entry.part)
-        # What is empty is not even asked for: that alone takes time.
+        # Access to empty fields takes time, too.
         for gene in node.outputs:
             neuron = entry.outputs.add()
             neuron.kind = gene.kind
@@ -141,14 +141,14 @@ def genome_from_message(message: pb.Genome) -> Genome:
     """Return the genome of a message.
 
     Raises:
-        InvalidRobot: no tree of nodes.
+        InvalidRobot: nodes that are not a tree.
         MalformedMessage: an unknown neuron type or layer, a number that is not
             finite.
     """
     parts = [_part_from_message(item.part) for item in message.nodes]
     check_tree(parts)
     children: list[list[tuple[int, Node]]] = [[] for _ in parts]
-    # Backwards, so that a node's children are there before it is made.
+    # Backwards: children are made before their parent.
     for index in range(len(parts) - 1, -1, -1):
         part, item = parts[index], message.nodes[index]
         node = Node(
@@ -165,26 +165,36 @@ def genome_from_message(message: pb.Genome) -> Genome:
         if index == 0:
             return node
         children[part.parent].append((part.parent_slot, node))
-    raise MalformedMessage("genome: needs at least one node")
+    raise MalformedMessage("genome: must have at least one node")
+
+
+def birth_to_message(birth: BirthId) -> pb.BirthName:
+    """Return the id of an individual as a message."""
+    return pb.BirthName(island=birth.island, number=birth.number)
+
+
+def birth_from_message(message: pb.BirthName) -> BirthId:
+    """Return the id of an individual of a message."""
+    return BirthId(message.island, message.number)
 
 
 def identity_to_message(identity: Identity) -> pb.Identity:
-    """Return which evaluation it is as a message."""
-    origin, birth = identity.origin, identity.birth
+    """Return the identity of an evaluation as a message."""
+    origin = identity.origin
     return pb.Identity(
         seed=origin.seed,
         run=origin.run,
         island=origin.island,
-        birth=pb.BirthName(island=birth.island, number=birth.number),
+        birth=birth_to_message(identity.birth),
         trial=identity.trial,
     )
 
 
 def identity_from_message(message: pb.Identity) -> Identity:
-    """Return which evaluation a message speaks of; unsaid, that of nobody."""
+    """Return the identity of a message; an empty one gives ``NOBODY``."""
     return Identity(
         Origin(seed=message.seed, run=message.run, island=message.island),
-        BirthId(message.birth.island, message.birth.number),
+        birth_from_message(message.birth),
         message.trial,
     )
 
@@ -192,7 +202,7 @@ def identity_from_message(message: pb.Identity) -> Identity:
 def _write_part(
     part: Part | Node, parent: int, parent_slot: int, message: pb.Part
 ) -> None:
-    # Assignments take a quarter less time than keyword arguments.
+    # Assignments are faster than keyword arguments by a quarter.
     message.kind = part.kind
     message.parent = parent
     message.parent_slot = parent_slot

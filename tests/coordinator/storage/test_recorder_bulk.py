@@ -125,8 +125,8 @@ def test_no_rows_make_no_segment(tmp_path: Path) -> None:
     ("append", "message"),
     [
         (Append("poses", 4, bulk(1).columns), "must be 4 rows, got 3"),
-        (Append("poses", 3, b"no stream"), "no Arrow stream"),
-        (Append("poses", 3, bulk(1).columns[:-40]), "no Arrow stream"),
+        (Append("poses", 3, b"no stream"), "not an Arrow stream"),
+        (Append("poses", 3, bulk(1).columns[:-40]), "not an Arrow stream"),
         (Append("touches", 3, bulk(1).columns), "touches: columns must be island"),
     ],
 )

@@ -129,7 +129,7 @@ def test_a_bar_in_our_units() -> None:
         ("0 E C 0\n\t0 B a 0 0.05 x 0", "it.txt:2: must be a number, got 'x'"),
         ("0 E C 0\n\t0 B a 0 0.5 0 0", r"_length: must be in \[20.0, 100.0\]"),
         ("0 E C 0\n\t0 F a 0\n\t0 F b 0", "it.txt:3: slot 0 of 'C' is taken"),
-        ("0 E C 0\n\t0 F a 0\n\t\t3 F b 0", "it.txt:3: 'a' has 3 slots to put"),
+        ("0 E C 0\n\t0 F a 0\n\t\t3 F b 0", "it.txt:3: 'a' has 3 free slots"),
         ("0 E C 0\n\t\t0 F a 0", "it.txt:2: tabs must be 1..1, got 2"),
         ("0 E C 0\n0 F a 0", "it.txt:2: tabs must be 1..1, got 0"),
         ("0 E C 0\n\t0 F C 0", "it.txt:2: duplicate part 'C'"),

@@ -91,7 +91,7 @@ def test_outputs_without_saying_and_hidden_neurons_by_name() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("early: {type", "earlier: {type", r"its\.yaml:9: brain.params.earlier: no s"),
+        ("early: {type", "earlier: {type", r"its\.yaml:9: brain.params.earlier: unkn"),
         ("gain: 0.25", "phase: 0.25", r"its\.yaml:4: .*late\.phase: no such key"),
         ("src: late", "src: later", r"its\.yaml:12: .*'late'"),
         ("layer: hidden", "layer: input", r"its\.yaml:4: .*layer: must be one of hid"),

@@ -156,7 +156,7 @@ def test_an_advance_that_is_none_is_malformed(advance: Advance) -> None:
     "message", [pb.AdvanceAnswer(epoch=1), pb.AdvanceAnswer(needs_state=False)]
 )
 def test_an_answer_holds_an_advance_or_asks(message: pb.AdvanceAnswer) -> None:
-    with pytest.raises(MalformedMessage, match="holds no advance"):
+    with pytest.raises(MalformedMessage, match="must hold an advance"):
         decode_advance_answer(message.SerializeToString())
 
 
@@ -173,5 +173,5 @@ def test_no_advance_goes_back() -> None:
 
 def test_a_state_without_the_word_to_rebuild_is_malformed() -> None:
     message = pb.AdvanceRequest(snapshot=b"x")
-    with pytest.raises(MalformedMessage, match="no word to do so"):
+    with pytest.raises(MalformedMessage, match="need is_rebuild"):
         decode_advance_request(message.SerializeToString())

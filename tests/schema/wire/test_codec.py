@@ -184,7 +184,7 @@ def test_nothing_is_no_robot(decode: Callable[[bytes], object]) -> None:
 
 
 def test_an_answer_holds_a_result() -> None:
-    with pytest.raises(MalformedMessage, match="holds no result"):
+    with pytest.raises(MalformedMessage, match="has no result"):
         decode_answer(pb.Answer(epoch=1, number=2).SerializeToString())
 
 
