@@ -106,7 +106,7 @@ def _deployment(
     options: argparse.Namespace, experiments: tuple[Experiment, ...]
 ) -> Deployment:
     """Return who does the work; this names the other rooms."""
-    import analyzer.jobs
+    import analyzer.report
     import analyzer.service
     import worker.serve.jobs
     import worker.serve.service
@@ -123,7 +123,7 @@ def _deployment(
     is_one_arena = len(experiments) == 1 and _has_one_arena(experiments[0], options)
     threads = options.threads or (cores() if is_one_arena else 1)
     answers: dict[AgentKind, Callable[[bytes], bytes]] = {
-        "analyzer": analyzer.jobs.answer,
+        "analyzer": analyzer.report.answer,
         "worker": worker.serve.jobs.Jobs(threads=threads).answer,
     }
     return Deployment(

@@ -331,3 +331,8 @@ def requester_of(about: Vet | Evaluate | Answered) -> int:
     if isinstance(about, Vet | Vetted | VettingFailed) or about.requester is None:
         return about.birth.island
     return about.requester
+
+
+def fitness_of(outcome: Evaluated | EvaluationFailed) -> float | None:
+    """Return the fitness of an outcome; None if the evaluation failed."""
+    return outcome.evaluation.fitness if isinstance(outcome, Evaluated) else None
