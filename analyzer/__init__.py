@@ -1,4 +1,4 @@
-"""Can this body be built, how large is it, do its parts intersect?
+"""Analyzer: can a body be built, how large is it, do its parts intersect?
 
-Everything but `service` and `__main__` is a pure function of its arguments.
+All but `service` and `__main__` is a pure function of its arguments.
 """

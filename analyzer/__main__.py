@@ -1,4 +1,4 @@
-"""``revolve analyzer``: vet bodies for a coordinator, here or far away."""
+"""``revolve analyzer``: vet bodies for a coordinator."""
 
 import sys
 
@@ -6,7 +6,7 @@ from schema.agent.supervisor import prepare_process
 
 
 def main(arguments: list[str]) -> int:
-    """Serve until told to end.
+    """Serve until stopped.
 
     Args:
         arguments: the command's name first.

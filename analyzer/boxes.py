@@ -1,4 +1,4 @@
-"""A body as boxes in the core's frame, joints at zero."""
+"""Boxes of a body in the core's frame, joints at zero."""
 
 import math
 from dataclasses import dataclass
@@ -21,12 +21,12 @@ class Boxes:
     """All boxes of a body, in the core's frame.
 
     Attributes:
-        count: (P,) number of each part's boxes, which stand one after another.
+        count: (P,) number of boxes of each part; boxes are ordered by part.
         rotation: (N, 3, 3) box frame to core frame.
         centre: (N, 3) [m].
         half: (N, 3) half of the lengths along the box's own axes [m].
-        lower, upper: (N, 3) corners of its axis-aligned hull [m].
-        mass: of all boxes together [kg].
+        lower, upper: (N, 3) corners of each box's axis-aligned hull [m].
+        mass: total mass [kg].
     """
 
     count: Indices
@@ -39,14 +39,14 @@ class Boxes:
 
 
 def place_boxes(robot: Robot, space: BodySpace) -> Boxes:
-    """Return where every box of a checked robot sits.
+    """Return the boxes of a checked robot.
 
     Args:
         robot: a checked robot.
         space: its part types.
 
     Returns:
-        Its boxes, part after part, in the order of each part's shape.
+        Its boxes by part, in the order of each part's shape.
     """
     shapes = shapes_of(robot, space)
     rotations, positions = place_parts(robot, shapes)
@@ -70,12 +70,12 @@ def place_boxes(robot: Robot, space: BodySpace) -> Boxes:
 
 @dataclass(frozen=True, slots=True)
 class _Table:
-    """Boxes of a shape in its part's frame: the same wherever the part sits.
+    """Boxes of a shape in the frame of its part.
 
     Attributes:
         lengths: (B, 6) size, then centre [m].
-        masses: [kg].
-        tilts: index of a box that does not stand as its part does, and (3, 3) how.
+        masses: mass of each box [kg].
+        tilts: index and (3, 3) rotation of each box that is rotated in its part.
     """
 
     lengths: Floats

@@ -1,8 +1,8 @@
-"""Which parts of a body intersect: oriented boxes and their separating axes.
+"""Intersecting parts of a body, by the separating axes of their oriented boxes.
 
-Two boxes are apart along some direction exactly if they are apart along one of
-15: the three axes of each and the nine cross products of an axis of either.
-The least overlap along these is how deep they intersect.
+Two boxes are apart exactly if they are apart along one of 15 directions: the three
+axes of each box and the nine cross products of an axis of either. The least overlap
+along these directions is the depth of the intersection.
 
 Source: Gottschalk, Lin, Manocha, *OBBTree*, 1996, section 5.
 """
@@ -10,21 +10,20 @@ Source: Gottschalk, Lin, Manocha, *OBBTree*, 1996, section 5.
 import numpy as np
 import numpy.typing as npt
 
-from analyzer.boxes import Boxes
+from analyzer.boxes import Boxes, Indices
 from schema.experiment.document import Vetting
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 
-Indices = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
 PARALLEL = 1e-12
-"""Squared sine below which two edges count as parallel and span no axis.
+"""Squared sine below which two edges count as parallel and have no cross product.
 
 At 0.1 m this hides less than 1e-7 m of separation, a tenth of the tolerance.
 """
 ALIGNED = 1e-12
-"""A box this close to the axes equals its axis-aligned hull."""
+"""Greatest deviation of a box from the axes that counts as axis-aligned."""
 
 _NEXT = np.array([1, 2, 0])
 _AFTER = np.array([2, 0, 1])
@@ -33,16 +32,15 @@ _AFTER = np.array([2, 0, 1])
 def intersecting_parts(
     boxes: Boxes, robot: Robot, vetting: Vetting
 ) -> tuple[tuple[int, int], ...]:
-    """Return which parts intersect, joints at zero.
+    """Return the pairs of parts that intersect, joints at zero.
 
-    Boxes of one part, or of two parts that sit on each other, may intersect:
-    nothing but their shape decides about that.
+    Boxes of one part, or of two parts that are attached to each other, may intersect.
 
     Args:
         boxes: the robot's boxes.
-        robot: says which parts sit on each other.
-        vetting: ``overlap`` wants a depth > ``tolerance_m``; ``contact`` is content
-            with a gap <= ``tolerance_m`` along every axis.
+        robot: the robot; it tells which parts are attached to each other.
+        vetting: ``overlap`` counts depths > ``tolerance_m``; ``contact`` counts gaps
+            <= ``tolerance_m`` along every axis.
 
     Returns:
         Index pairs of parts, each ascending, in ascending order.
@@ -51,10 +49,13 @@ def intersecting_parts(
     if not np.count_nonzero(near):
         return ()
     one, other = np.nonzero(near.repeat(boxes.count, 0).repeat(boxes.count, 1))
-    hit = _hulls_meet(boxes, one, other, vetting)
+    gap = np.maximum(
+        boxes.lower[one] - boxes.upper[other], boxes.lower[other] - boxes.upper[one]
+    )
+    hit = _is_hit(gap.max(axis=1), vetting)
     one, other = one[hit], other[hit]
-    # Among axis-aligned boxes the hulls have decided already.
-    is_tilted = _is_tilted(boxes)
+    # Axis-aligned boxes equal their hulls.
+    is_tilted = np.abs(boxes.rotation).max(axis=2).min(axis=1) < 1.0 - ALIGNED
     tilted = np.flatnonzero(is_tilted[one] | is_tilted[other])
     if tilted.size:
         hit = np.ones(one.size, dtype=bool)
@@ -66,20 +67,20 @@ def intersecting_parts(
 
 
 def separation(boxes: Boxes, first: Indices, second: Indices) -> Floats:
-    """Return how far boxes are apart along the best of their 15 axes.
+    """Return the greatest separation of boxes along their 15 axes.
 
     Args:
-        boxes: where they sit.
-        first: (K,) indices of boxes.
-        second: (K,) indices of the boxes that they are held against.
+        boxes: all boxes.
+        first: (K,) indices of the first box of each pair.
+        second: (K,) indices of the second box of each pair.
 
     Returns:
-        (K,) [m]: positive is a gap (at most the distance), zero touching, negative
-        minus the depth.
+        (K,) [m]: a positive value is a gap (at most the distance), zero is contact, a
+        negative value is minus the depth.
     """
     half_a, half_b = boxes.half[first], boxes.half[second]
     to_a = boxes.rotation[first].transpose(0, 2, 1)
-    # Box b and its centre as box a sees them.
+    # Box b and its centre in the frame of box a.
     turn = to_a @ boxes.rotation[second]
     offset = boxes.centre[second] - boxes.centre[first]
     seen = np.einsum("kij,kj->ki", to_a, offset)
@@ -113,19 +114,13 @@ def _is_hit(apart: Floats, vetting: Vetting) -> Mask:
     return apart < -vetting.tolerance_m
 
 
-def _is_tilted(boxes: Boxes) -> Mask:
-    largest = np.abs(boxes.rotation).max(axis=2)
-    tilted: Mask = largest.min(axis=1) < 1.0 - ALIGNED
-    return tilted
-
-
 def _near_parts(boxes: Boxes, robot: Robot, vetting: Vetting) -> Mask:
-    """Return which parts are not joined and have hulls that meet, (P, P).
+    """Return (P, P) which parts are not attached and have hulls that meet.
 
-    A part lies within its hull, so hulls apart are parts apart. The lesser of two
-    indices comes first.
+    A part lies within its hull, so parts with separate hulls are apart. The lesser of
+    two indices comes first.
     """
-    # A part without boxes meets nobody, wherever it is.
+    # A part without boxes meets no other part.
     solid = np.flatnonzero(boxes.count)
     start = (boxes.count.cumsum() - boxes.count)[solid]
     lower = np.full((3, len(boxes.count)), np.inf)
@@ -134,15 +129,8 @@ def _near_parts(boxes: Boxes, robot: Robot, vetting: Vetting) -> Mask:
     upper[:, solid] = np.maximum.reduceat(boxes.upper.T, start, axis=1)
     gap = np.maximum.reduce(lower[:, :, None] - upper[:, None])
     meet = _is_hit(np.maximum(gap, gap.T), vetting)
-    # A parent stands before its children.
+    # Parents come before their children.
     parent = np.array([part.parent for part in robot.parts])
     index = np.arange(len(parent))
     near: Mask = meet & (index[:, None] < index) & (index[:, None] != parent)
     return near
-
-
-def _hulls_meet(boxes: Boxes, one: Indices, other: Indices, vetting: Vetting) -> Mask:
-    """Return whether the hulls of boxes meet; a box lies within its hull."""
-    lower, upper = boxes.lower, boxes.upper
-    gap = np.maximum(lower[one] - upper[other], lower[other] - upper[one])
-    return _is_hit(gap.max(axis=1), vetting)

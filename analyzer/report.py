@@ -1,11 +1,41 @@
-"""What the analyzer says of a body: how large, how heavy, may it live?"""
+"""Report on a body (size, mass, motors, intersections), also as an encoded answer."""
+
+import time
 
 from analyzer.boxes import bounding_box, place_boxes
 from analyzer.overlap import intersecting_parts
-from schema.experiment.document import Vetting
+from schema.experiment.document import Vetting, body_space
+from schema.experiment.settings import read_vetting_settings
 from schema.parts import BodySpace
 from schema.robot.results import Report
-from schema.robot.robot import Robot
+from schema.robot.robot import Robot, check_body
+from schema.wire.codec import Answer, decode_body, decode_request, encode_answer
+
+
+def answer(request: bytes) -> bytes:
+    """Return the encoded answer to an encoded request.
+
+    Args:
+        request: a ``Request`` with ``VettingSettings`` about a body; a brain in it is
+            ignored.
+
+    Returns:
+        An ``Answer`` with a report; apart from ``wall_s`` it depends on the request
+        alone.
+
+    Raises:
+        MalformedMessage: the bytes are no request.
+        ExperimentError: the settings are invalid or name what does not exist.
+        InvalidRobot: the body space does not allow the body.
+    """
+    start = time.perf_counter()
+    decoded = decode_request(request, decode_body)
+    settings = read_vetting_settings(decoded.settings)
+    space = body_space(settings.space)
+    check_body(decoded.robot.parts, space)
+    report = analyze(decoded.robot, space, settings.vetting)
+    wall_s = time.perf_counter() - start
+    return encode_answer(Answer(decoded.epoch, decoded.number, wall_s, report))
 
 
 def analyze(robot: Robot, space: BodySpace, vetting: Vetting) -> Report:
@@ -14,11 +44,11 @@ def analyze(robot: Robot, space: BodySpace, vetting: Vetting) -> Report:
     Args:
         robot: a checked robot.
         space: its part types.
-        vetting: what counts as intersecting.
+        vetting: what counts as an intersection.
 
     Returns:
         Intersections, bounding box, mass, motors; viable exactly if no two parts
-        that do not sit on each other intersect and at least one motor is there.
+        that are not attached to each other intersect and it has a motor.
     """
     boxes = place_boxes(robot, space)
     intersections = intersecting_parts(boxes, robot, vetting)
@@ -39,7 +69,7 @@ def analyze(robot: Robot, space: BodySpace, vetting: Vetting) -> Report:
 def _reason(
     robot: Robot, intersections: tuple[tuple[int, int], ...], motors: int
 ) -> str:
-    """Return in words why a body may not live; nothing if it may."""
+    """Return why a body is not viable; empty if it is."""
     if not motors:
         return "no part has a motor"
     if not intersections:

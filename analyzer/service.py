@@ -1,11 +1,11 @@
-"""The analyzer on the network: one process that vets bodies until told to end."""
+"""Analyzer process on the network."""
 
-from analyzer.jobs import answer
+from analyzer.report import answer
 from schema.agent.network import Agent
 from schema.agent.service import serve_as_process
 from schema.agent.supervision import ProcessSlot
 
 
 def process(agent: Agent, slot: ProcessSlot) -> None:
-    """Be one process of a crew of analyzers; returns when asked to end."""
+    """Run one process of a pool of analyzers until it is asked to stop."""
     serve_as_process(answer, agent, slot)

@@ -107,7 +107,7 @@ def _deployment(
     options: argparse.Namespace, experiments: tuple[Experiment, ...]
 ) -> Deployment:
     """Return processes and network; imports the rooms of worker and analyzer."""
-    import analyzer.jobs
+    import analyzer.report
     import analyzer.service
     import worker.serve.jobs
     import worker.serve.service
@@ -124,7 +124,7 @@ def _deployment(
     is_one_arena = len(experiments) == 1 and _has_one_arena(experiments[0], options)
     threads = options.threads or (cores() if is_one_arena else 1)
     answers: dict[AgentKind, Callable[[bytes], bytes]] = {
-        "analyzer": analyzer.jobs.answer,
+        "analyzer": analyzer.report.answer,
         "worker": worker.serve.jobs.Jobs(threads=threads).answer,
     }
     return Deployment(

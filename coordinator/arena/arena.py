@@ -1,28 +1,18 @@
 """On-line island: births, deaths and migration of robots in one world. A pure machine.
 
 A worker advances the world from one decision to the next. At each decision the arena
-samples, begins a birth, culls, and then inserts viable robots. Simulated time stops
-while a body is vetted. Founders are inserted first, one by one, the last made first;
-nothing else happens before all of them are in.
+samples, begins a birth, culls, and inserts viable robots. Simulated time stops during
+vetting. Before all that come the founders, one by one, the last made first.
 Source: Hupkes 2016, section 5.3.3; facts of the original, section 5.2.
 """
-
-from math import isfinite
 
 from coordinator.arena.arena_migration import ArenaMigration
 from coordinator.arena.candidates import VettingQueue
 from coordinator.arena.clock import ArenaClock
 from coordinator.arena.living import LivingRobots, Place
 from coordinator.arena.orders import Orders, inserted
-from coordinator.arena.rows import (
-    Moment,
-    casualty_record,
-    death_record,
-    living_records,
-    sample_records,
-    touch_records,
-)
-from coordinator.evolution.breeding import Breeder, Candidate
+from coordinator.arena.rows import Moment, death_record, sample_records, touch_records
+from coordinator.evolution.breeding import Candidate
 from coordinator.evolution.random_streams import Purpose
 from coordinator.evolution.selection import Individual, select_culled
 from coordinator.islands.events import (
@@ -33,9 +23,7 @@ from coordinator.islands.events import (
     ArenaEvent,
     Commanded,
     Finish,
-    Immigrated,
     MigrationEvent,
-    NeighbourClosed,
     Record,
     Started,
     Vet,
@@ -43,7 +31,7 @@ from coordinator.islands.events import (
     VettingFailed,
 )
 from coordinator.islands.migration import MigrationEpochs
-from coordinator.islands.rows import birth_record
+from coordinator.islands.rows import birth_record, population_records
 from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
 
@@ -80,14 +68,10 @@ class Arena:
         self.is_finished = self.is_extinct = False
         self._experiment = experiment
         self._rules = rules
-        self._clock = ArenaClock.of(rules, experiment.simulation)
+        self._clock = ArenaClock(rules, experiment.simulation)
         self._space = body_space(experiment.space)
         self._number = number
-        self._vetting_queue = VettingQueue(
-            Breeder(experiment, seed, run),
-            number,
-            experiment.selection.max_mating_attempts,
-        )
+        self._vetting_queue = VettingQueue(experiment, seed, run, number)
         self._living = LivingRobots(rules, seed=seed, run=run)
         self._orders = Orders(experiment, self._living)
         self._migration = (
@@ -135,15 +119,14 @@ class Arena:
         match event:
             case Started():
                 self._has_started = True
-                founders = self._experiment.selection.population
-                return [*self._vetting_queue.begin_founders(founders)]
+                return [*self._vetting_queue.begin_founders()]
             case Vetted() | VettingFailed():
                 return self._vetted(event)
             case Advanced():
                 return self._advanced(event) if self._is_awaited(event) else []
             case Commanded():
                 return self._commanded(event)
-            case Immigrated() | NeighbourClosed():
+            case _:
                 return self._migrated(event)
 
     def _vetted(self, event: Vetted | VettingFailed) -> list[ArenaCommand]:
@@ -171,12 +154,8 @@ class Arena:
             raise self._unexpected(
                 event, f"advance {awaited.number} to {awaited.until} is awaited"
             )
-        reported = [one.birth for one in advance.judgements]
-        reported += [one.birth for one in advance.casualties]
-        if sorted(reported) != [one.birth for one in self._living]:
-            raise self._unexpected(event, "it must report each living robot once")
-        if not all(isfinite(one.fitness) for one in advance.judgements):
-            raise self._unexpected(event, "fitness must be finite")
+        if why := self._living.mismatch(advance):
+            raise self._unexpected(event, why)
         return True
 
     def _advanced(self, event: Advanced) -> list[ArenaCommand]:
@@ -191,11 +170,10 @@ class Arena:
             commands.append(Append("poses", event.pose_rows, advance.poses))
         commands += touch_records(advance.touches, self._moment, over_s)
         for casualty in advance.casualties:
-            self._living.lose(casualty.birth)
             died_s = self._clock.seconds(casualty.step)
-            moment = Moment(self._number, self.births, died_s)
-            commands.append(casualty_record(casualty, moment))
-        self._living.judge(advance.judgements)
+            moment = self._moment._replace(sim_time_s=died_s)
+            commands.append(death_record(casualty, "diverged", moment))
+        self._living.update(advance)
         return commands + self._decide()
 
     def _decide(self) -> list[ArenaCommand]:
@@ -258,9 +236,8 @@ class Arena:
 
     def _finish(self) -> Finish:
         self.is_finished = True
-        migration = self._migration
-        neighbours = migration.epochs.links.neighbours if migration else ()
-        return Finish(self._number, neighbours)
+        links = self._migration.epochs.links.neighbours if self._migration else ()
+        return Finish(self._number, links)
 
     def _migrated(self, event: MigrationEvent) -> list[ArenaCommand]:
         """Handle an event of a neighbour; a finished arena ignores it."""
@@ -273,7 +250,7 @@ class Arena:
 
     def _commanded(self, event: Commanded) -> list[ArenaCommand]:
         """Store an order until the next decision; carry it out now if paused."""
-        if self._orders.has(event.command_id) or self.is_finished:
+        if event.command_id in self._orders.ids or self.is_finished:
             return []
         if (event.island, event.step) != (self._number, self.next_step):
             raise self._unexpected(event, f"orders take effect at {self.next_step}")
@@ -282,9 +259,7 @@ class Arena:
 
     def _advance(self) -> AdvanceShard:
         clock, step = self._clock, self.step
-        until = (
-            clock.next_founder(step) if self._founders else clock.next_decision(step)
-        )
+        until = clock.next_decision(step, is_founding=bool(self._founders))
         self._awaited = AdvanceShard(
             self._number,
             self._advances,
@@ -297,15 +272,20 @@ class Arena:
     def _insert(self, candidate: Candidate, place: Place | None = None) -> list[Record]:
         """Insert a robot at a place, random if None; return the rows of its birth."""
         birth = candidate.birth
-        individual = Individual(birth, candidate.genome, 0.0, candidate.rank, None)
+        individual = candidate.individual(generation=None)
         place = place or self._living.random_place(birth, Purpose.PLACE)
         self._living.insert(individual, candidate.robot, place)
         self.births += 1
         moment = self._moment
         born = birth_record(
-            candidate, None, self._space, sim_time_s=moment.sim_time_s, place=place
+            candidate,
+            individual,
+            self._space,
+            sim_time_s=moment.sim_time_s,
+            place=place,
         )
-        return [born, *living_records(self._living, moment)]
+        fitness = [(one.birth, one.known_fitness) for one in self._living]
+        return [born, *population_records(self._number, self.births, fitness)]
 
     @property
     def _moment(self) -> Moment:

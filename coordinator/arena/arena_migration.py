@@ -78,8 +78,7 @@ class ArenaMigration:
         known = {one.birth for one in [*self._living, *self._queue]}
         immigrants = [
             replace(one, fitness=0.0, has_failed=False)
-            for one, _ in self.epochs.receive(moment.births, moment.sim_time_s)
-            if one.birth not in known
+            for one, _ in self.epochs.receive(known, moment.births, moment.sim_time_s)
         ]
         self._queue += immigrants
         return bool(immigrants)

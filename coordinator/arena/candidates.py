@@ -7,6 +7,7 @@ from coordinator.evolution.breeding import Breeder, Candidate
 from coordinator.evolution.selection import Couple, Individual
 from coordinator.islands.events import Vet, Vetted, VettingFailed
 from schema.errors import UnexpectedEvent
+from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
 
 
@@ -17,15 +18,16 @@ class VettingQueue:
     counted on at the next birth, so that each attempt has its own stream.
     """
 
-    def __init__(self, breeder: Breeder, island: int, attempts: int) -> None:
-        """Initialise an empty queue; a couple has ``attempts`` attempts at a child."""
-        self._breeder = breeder
+    def __init__(
+        self, experiment: Experiment, seed: int, run: int, island: int
+    ) -> None:
+        self._breeder = Breeder(experiment, seed, run)
         self._island = island
-        self._attempts = attempts
+        self._attempts = experiment.selection.max_mating_attempts
         self._viable: dict[int, Candidate] = {}
         self._in_vetting: dict[int, Candidate] = {}
         self._mature: tuple[Individual, ...] = ()
-        self._next = 0
+        self._next = experiment.selection.population
         self._failed = 0
         self._end = 0
 
@@ -34,11 +36,10 @@ class VettingQueue:
         """A report is awaited."""
         return bool(self._in_vetting)
 
-    def begin_founders(self, count: int) -> list[Vet]:
+    def begin_founders(self) -> list[Vet]:
         """Generate the founders; return their vettings."""
-        self._next = count
         vets: list[Vet] = []
-        for number in range(count):
+        for number in range(self._next):
             vets += self._try(number, 0, None, "")
         return vets
 

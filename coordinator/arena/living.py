@@ -1,15 +1,16 @@
 """Living robots of an arena, their places, and the changes that await an advance."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import cos, dist, sin, tau
+from functools import partial
+from math import cos, dist, isfinite, sin, tau
 
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import Individual
 from schema.experiment.document import Arena
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-from schema.wire.arena import BrainChange, Changes, Insertion, Judgement
+from schema.wire.arena import Advance, BrainChange, Changes, Insertion, Judgement
 
 Place = tuple[float, float]
 """A point of the ground plane [m]."""
@@ -22,13 +23,13 @@ class LivingRobot:
     Attributes:
         individual: the individual; its fitness is the last one reported.
         robot: its current body and brain.
-        place: place where it was inserted [m].
+        inserted_at: place where it was inserted [m].
         judgement: the last report; None before the first advance.
     """
 
     individual: Individual
     robot: Robot
-    place: Place
+    inserted_at: Place
     judgement: Judgement | None = None
 
     @property
@@ -42,9 +43,14 @@ class LivingRobot:
         return self.judgement is not None and self.judgement.is_mature
 
     @property
-    def last_place(self) -> Place:
-        """Its last known place [m]."""
-        return self.place if self.judgement is None else self.judgement.place[:2]
+    def known_fitness(self) -> float | None:
+        """Its fitness; None while it is immature."""
+        return self.individual.fitness if self.is_mature else None
+
+    @property
+    def position(self) -> tuple[float, float, float | None]:
+        """Its last known position [m]; z is None before the first advance."""
+        return self.judgement.place if self.judgement else (*self.inserted_at, None)
 
 
 class LivingRobots:
@@ -56,7 +62,7 @@ class LivingRobots:
 
     def __init__(self, rules: Arena, *, seed: int, run: int) -> None:
         self._rules = rules
-        self._seed, self._run = seed, run
+        self._stream = partial(stream, seed, run)
         self._living: dict[BirthId, LivingRobot] = {}
         self._removals: list[BirthId] = []
         self._insertions: dict[BirthId, Insertion] = {}
@@ -83,8 +89,8 @@ class LivingRobots:
 
     def random_place(self, name: BirthId, purpose: Purpose) -> Place:
         """Return a random place away from the living; the name is that of a stream."""
-        draws = BufferedRng(stream(self._seed, self._run, name, 0, purpose))
-        return draw_place(draws, [one.last_place for one in self], self._rules)
+        draws = BufferedRng(self._stream(name, 0, purpose))
+        return draw_place(draws, [one.position[:2] for one in self], self._rules)
 
     def insert(self, individual: Individual, robot: Robot, place: Place) -> None:
         """Insert a robot."""
@@ -100,10 +106,6 @@ class LivingRobots:
             self._removals.append(birth)
         return removed
 
-    def lose(self, birth: BirthId) -> None:
-        """Remove a living robot that the world has removed already."""
-        del self._living[birth]
-
     def replace_brain(self, robot: LivingRobot, changed: Robot) -> None:
         """Replace the brain of a living robot by that of ``changed``."""
         robot.robot, birth = changed, robot.birth
@@ -113,9 +115,21 @@ class LivingRobots:
         else:
             self._insertions[birth] = replace(inserted, robot=changed)
 
-    def judge(self, judgements: Iterable[Judgement]) -> None:
-        """Store the reports on all living robots."""
-        for judgement in judgements:
+    def mismatch(self, advance: Advance) -> str:
+        """Return why an advance cannot be one of these robots; "" if it can."""
+        reported = [one.birth for one in advance.judgements]
+        reported += [one.birth for one in advance.casualties]
+        if sorted(reported) != sorted(self._living):
+            return "it must report each living robot once"
+        if not all(isfinite(one.fitness) for one in advance.judgements):
+            return "fitness must be finite"
+        return ""
+
+    def update(self, advance: Advance) -> None:
+        """Store the reports of an advance, and drop the robots that diverged."""
+        for casualty in advance.casualties:
+            del self._living[casualty.birth]
+        for judgement in advance.judgements:
             robot = self._living[judgement.birth]
             robot.judgement = judgement
             robot.individual = replace(robot.individual, fitness=judgement.fitness)

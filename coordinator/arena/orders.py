@@ -30,6 +30,7 @@ class Orders:
 
     Attributes:
         is_paused: the arena is paused, or will be after its advance.
+        ids: ids of all orders so far.
         pending: orders to carry out at the next decision.
         insertions: robots to insert as soon as there is room.
     """
@@ -41,11 +42,7 @@ class Orders:
         self._experiment = experiment
         self._space = body_space(experiment.space)
         self._living = living
-        self._ids: set[str] = set()
-
-    def has(self, command_id: str) -> bool:
-        """Return whether an order has arrived before."""
-        return command_id in self._ids
+        self.ids: set[str] = set()
 
     def take(self, event: Commanded) -> None:
         """Store an order until the next decision.
@@ -54,7 +51,7 @@ class Orders:
             InvalidRobot: as in ``check_order``; nothing has changed.
         """
         check_order(event.order, self._experiment)
-        self._ids.add(event.command_id)
+        self.ids.add(event.command_id)
         self.pending.append(event.order)
 
     def carry_out(self, moment: Moment) -> list[Record]:
@@ -66,10 +63,9 @@ class Orders:
                     self.is_paused = isinstance(order, Pause)
                 case Insert():
                     self.insertions.append(order)
-                case Remove(birth=birth):
-                    if self._living.get(birth):
-                        removed = self._living.remove(birth)
-                        records.append(death_record(removed, "removed", moment))
+                case Remove(birth=birth) if self._living.get(birth):
+                    removed = self._living.remove(birth)
+                    records.append(death_record(removed, "removed", moment))
                 case ReplaceBrain(birth=birth, brain=brain):
                     living = self._living.get(birth)
                     robot = living and _with_brain(living.robot, brain, self._space)

@@ -44,50 +44,18 @@ def sample_records(living: Iterable[LivingRobot], moment: Moment) -> list[Record
     ]
 
 
-def living_records(living: Iterable[LivingRobot], moment: Moment) -> list[Record]:
-    """Return the population rows at a birth; the immature have no fitness yet."""
-    return [
-        Record(
-            "population",
-            {
-                "island": moment.island,
-                "births": moment.births,
-                **named(one.birth, moment.island),
-                "fitness": one.individual.fitness if one.is_mature else None,
-            },
-        )
-        for one in living
-    ]
-
-
-def casualty_record(casualty: Casualty, moment: Moment) -> Record:
-    """Return the deaths row of a robot whose physics diverged."""
-    x, y, z = casualty.place
+def death_record(dead: LivingRobot | Casualty, reason: str, moment: Moment) -> Record:
+    """Return the deaths row of a robot that is removed or has diverged."""
+    x, y, z = dead.place if isinstance(dead, Casualty) else dead.position
     row = {
-        **named(casualty.birth, moment.island),
-        "sim_time_s": moment.sim_time_s,
-        "births": moment.births,
-        "reason": "diverged",
-        "detail": casualty.reason,
-        "x": x,
-        "y": y,
-        "z": z,
-    }
-    return Record("deaths", row)
-
-
-def death_record(removed: LivingRobot, reason: str, moment: Moment) -> Record:
-    """Return the deaths row of a robot that is removed from the arena."""
-    x, y = removed.last_place
-    row = {
-        **named(removed.birth, moment.island),
+        **named(dead.birth, moment.island),
         "sim_time_s": moment.sim_time_s,
         "births": moment.births,
         "reason": reason,
-        "detail": "",
+        "detail": dead.reason if isinstance(dead, Casualty) else "",
         "x": x,
         "y": y,
-        "z": removed.judgement and removed.judgement.place[2],
+        "z": z,
     }
     return Record("deaths", row)
 

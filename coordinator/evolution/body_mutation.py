@@ -9,7 +9,7 @@ that can be duplicated is a mean.
 from collections.abc import Iterable, Iterator
 from math import ceil
 
-from coordinator.evolution.growth import (
+from coordinator.evolution.generation import (
     endpoints,
     pick_growth,
     random_neuron,

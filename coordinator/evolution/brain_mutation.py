@@ -10,11 +10,11 @@ from decimal import Decimal
 
 from msgspec.structs import replace
 
-from coordinator.evolution.growth import connect, endpoints, random_neuron
+from coordinator.evolution.generation import connect, endpoints, random_neuron
 from coordinator.evolution.mutable_genome import MutableGenome, follow
 from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Experiment
-from schema.robot.brain import NEURON_TYPES
+from schema.robot.brain import NEURON_TYPES, Layer
 from schema.robot.genome import ConnectionGene, NeuronGene
 
 _HALF = Decimal("0.5")
@@ -59,26 +59,24 @@ def _renumbered(
     """Return a connection with new offsets; None if one of its neurons is deleted."""
     if "hidden" not in (gene.source[0], gene.target[0]):
         return gene
-    offsets = {"source": gene.source[1], "target": gene.target[1]}
     end = follow(owner, gene.path)
-    for name, branch, layer in (
-        ("source", owner, gene.source[0]),
-        ("target", end, gene.target[0]),
-    ):
-        after = new_offsets.get(branch) if branch is not None else None
-        if after is None or layer != "hidden":
-            continue
-        before = offsets[name]
+    source = _moved(gene.source, new_offsets.get(owner))
+    target = _moved(gene.target, new_offsets.get(end) if end else None)
+    return replace(gene, source=source, target=target) if source and target else None
+
+
+def _moved(
+    neuron: tuple[Layer, int], offsets: list[int | None] | None
+) -> tuple[Layer, int] | None:
+    """Return the layer and new offset of a neuron; None if it is deleted."""
+    layer, before = neuron
+    if offsets is None or layer != "hidden":
+        return neuron
+    if before >= len(offsets):
         # An offset beyond the layer stays beyond it.
-        new = after[before] if before < len(after) else before - after.count(None)
-        if new is None:
-            return None
-        offsets[name] = new
-    return replace(
-        gene,
-        source=(gene.source[0], offsets["source"]),
-        target=(gene.target[0], offsets["target"]),
-    )
+        return layer, before - offsets.count(None)
+    after = offsets[before]
+    return None if after is None else (layer, after)
 
 
 def delete_connections(
@@ -97,10 +95,8 @@ def vary_neurons(
 ) -> None:
     """Move the parameters of every neuron towards random values."""
     for branch in branches:
-        if branch.outputs:
-            branch.outputs = _varied(draws, branch.outputs, epsilon)
-        if branch.hidden:
-            branch.hidden = _varied(draws, branch.hidden, epsilon)
+        branch.outputs = _varied(draws, branch.outputs, epsilon)
+        branch.hidden = _varied(draws, branch.hidden, epsilon)
 
 
 def _varied(

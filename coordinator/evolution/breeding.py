@@ -6,9 +6,8 @@ Attempts are numbered through all couples of a birth, so that each has its own s
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf
-
-import numpy as np
 
 from coordinator.evolution.generation import generate
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
@@ -51,21 +50,18 @@ class Candidate:
     genome: Genome
     robot: Robot
 
-    @property
-    def rank(self) -> int:
-        """Rank of the individual (thesis eq. 6.1)."""
-        return 1 + max((parent.rank for parent in self.couple or ()), default=0)
+    def individual(self, generation: int | None) -> Individual:
+        """Return the individual that the candidate becomes, before its evaluation."""
+        rank = 1 + max((parent.rank for parent in self.couple or ()), default=0)
+        return Individual(self.birth, self.genome, 0.0, rank, generation)
 
 
 class Breeder:
     """Source of candidates and selector of survivors for one run of an experiment."""
 
-    __slots__ = ("_experiment", "_run", "_seed")
-
     def __init__(self, experiment: Experiment, seed: int, run: int) -> None:
         self._experiment = experiment
-        self._seed = seed
-        self._run = run
+        self._stream = partial(stream, seed, run)
 
     def candidate(
         self,
@@ -181,8 +177,3 @@ class Breeder:
 
     def _is_random(self, population: Sequence[Individual]) -> bool:
         return not population or self._experiment.selection.parents == "none"
-
-    def _stream(
-        self, birth: BirthId, attempt: int, purpose: Purpose
-    ) -> np.random.Generator:
-        return stream(self._seed, self._run, birth, attempt, purpose)

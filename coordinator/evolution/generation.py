@@ -1,37 +1,39 @@
-"""Random genomes: founders, and all robots of the no-reproduction baseline.
+"""Random genomes, and the random parts, neurons and connections that mutation adds.
 
-Source: Hupkes 2016, section 4.4.2; facts of the original, section 4.3. Two errors of
+Source: Hupkes 2016, section 4.4.2; facts of the original, 4.3 and 4.5. Two errors of
 the original are avoided: no robot has fewer parts than the experiment allows, and
 every part has its own identity beside the common colour.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from coordinator.evolution.growth import (
-    Place,
-    endpoints,
-    pick_growth,
-    random_neuron,
-    random_part,
-    usable_types,
-    wire,
-)
 from coordinator.evolution.mutable_genome import (
     MutableGenome,
+    SizeCounts,
     gene_ids,
     level,
+    path_between,
     preorder,
     size_of,
     to_genome,
 )
 from coordinator.evolution.random_streams import BufferedRng
 from schema.errors import ExperimentError
-from schema.experiment.document import Experiment, body_space
-from schema.parts import COLOURS
-from schema.robot.genome import Genome
+from schema.experiment.document import Experiment, Space, body_space
+from schema.parts import COLOURS, BodySpace, PartType
+from schema.robot.brain import NEURON_TYPES, Layer
+from schema.robot.genome import ConnectionGene, Genome, NeuronGene
 from schema.robot.ids import BirthId
+from schema.robot.robot import ORIENTATIONS
+
+Place = tuple[MutableGenome, int]
+"""A branch and one of its slots."""
+Endpoint = tuple[MutableGenome, tuple[Layer, int]]
+"""One end of a connection: a branch and one of its neurons."""
+
+_NEURONS = tuple(NEURON_TYPES.items())
 
 FIRST = BirthId(0, 0)
 MAX_TREES = 10_000
@@ -111,3 +113,88 @@ def _add_brain(
         endpoints(branches, "output", "hidden"),
         experiment.generation.p_connect_neurons,
     )
+
+
+def random_neuron(draws: BufferedRng) -> NeuronGene:
+    """Return an output or hidden neuron of uniform type with uniform parameters."""
+    kind, parameters = draws.pick(_NEURONS)
+    return NeuronGene(kind, draws.values(parameters))
+
+
+def random_part(
+    draws: BufferedRng,
+    kind: PartType,
+    genes: Iterator[int],
+    colour: tuple[float, ...] = (),
+) -> MutableGenome:
+    """Return a detached part without hidden neurons.
+
+    Args:
+        draws: source of its slot, orientation, parameters and neurons.
+        kind: its type; a root gets no slot and no orientation.
+        genes: the next of them becomes its identity.
+        colour: red, green, blue; empty for a random colour.
+    """
+    return MutableGenome(
+        kind,
+        -1 if kind.is_root else draws.below(kind.arity),
+        0 if kind.is_root else draws.pick(ORIENTATIONS),
+        draws.values(kind.own_parameters) + (colour or draws.values(COLOURS)),
+        next(genes),
+        tuple(random_neuron(draws) for _ in range(kind.outputs)),
+    )
+
+
+def usable_types(types: BodySpace, size: SizeCounts, space: Space) -> list[PartType]:
+    """Return the part types that fit a tree of some size within all limits."""
+    return [
+        kind
+        for kind in types.values()
+        if not kind.is_root
+        and size.parts < space.max_parts
+        and size.inputs + kind.inputs <= space.max_inputs
+        and size.outputs + kind.outputs <= space.max_outputs
+    ]
+
+
+def pick_growth(
+    draws: BufferedRng, places: list[Place], usable: list[PartType]
+) -> tuple[Place, PartType] | None:
+    """Return a free place and a type for it, or None if nothing fits.
+
+    The place is uniform among those that some type fits, the type uniform among
+    those that fit the place. The place is removed from ``places``, as is every place
+    that no type fits: a growing tree never makes more types usable.
+    """
+    while places and usable:
+        place = places.pop(draws.below(len(places)))
+        parent = place[0].kind.name
+        if fitting := [kind for kind in usable if parent not in kind.not_on]:
+            return place, draws.pick(fitting)
+    return None
+
+
+def endpoints(branches: Iterable[MutableGenome], *layers: Layer) -> list[Endpoint]:
+    """Return all neurons of some layers as ends of connections."""
+    return [(branch, end) for branch in branches for end in branch.neurons(*layers)]
+
+
+def connect(draws: BufferedRng, source: Endpoint, target: Endpoint) -> ConnectionGene:
+    """Return a connection of random weight from one neuron to another."""
+    path = path_between(source[0], target[0])
+    return ConnectionGene(source[1], path, target[1], draws.number())
+
+
+def wire(
+    draws: BufferedRng,
+    sources: list[Endpoint],
+    targets: list[Endpoint],
+    probability: float,
+) -> None:
+    """Add each connection of the full product with a probability."""
+    for source in sources:
+        source[0].connections += tuple(
+            connect(draws, source, target)
+            for target in targets
+            if draws.chance(probability)
+        )

@@ -10,6 +10,8 @@ from itertools import count
 from operator import add, le, sub
 from typing import NamedTuple
 
+from msgspec.structs import astuple
+
 from schema.experiment.document import Space
 from schema.parts import BodySpace, PartType
 from schema.robot.brain import Layer
@@ -62,11 +64,8 @@ class MutableGenome:
         """Return (layer, offset) of its own neurons, in the order of the layers."""
         found: list[tuple[Layer, int]] = []
         for layer in layers:
-            if layer == "input":
-                count = self.kind.inputs
-            else:
-                count = len(self.outputs if layer == "output" else self.hidden)
-            if count:
+            genes = self.outputs if layer == "output" else self.hidden
+            if count := self.kind.inputs if layer == "input" else len(genes):
                 found += [(layer, k) for k in range(count)]
         return found
 
@@ -84,16 +83,8 @@ def to_mutable(genome: Genome, space: BodySpace) -> MutableGenome:
     """Return a genome as a mutable tree."""
     branches: list[MutableGenome] = []
     for node, parent, slot in walk(genome):
-        branch = MutableGenome(
-            space[node.kind],
-            node.slot,
-            node.orientation,
-            node.parameters,
-            node.gene,
-            node.outputs,
-            node.hidden,
-            node.connections,
-        )
+        kind, *fields, _children = astuple(node)
+        branch = MutableGenome(space[kind], *fields)
         branches.append(branch)
         if parent >= 0:
             above = branch.parent = branches[parent]
@@ -244,8 +235,13 @@ def subtree_sizes(branches: Sequence[MutableGenome]) -> dict[MutableGenome, Size
     """
     sums: dict[MutableGenome, SizeCounts] = {}
     for branch in reversed(branches):
-        size = size_of([branch])
+        parts, inputs = 1, branch.kind.inputs
+        outputs, hidden = len(branch.outputs), len(branch.hidden)
         for child in branch.children.values():
-            size = size.plus(sums[child])
-        sums[branch] = size
+            below = sums[child]
+            parts += below.parts
+            inputs += below.inputs
+            outputs += below.outputs
+            hidden += below.hidden
+        sums[branch] = SizeCounts(parts, inputs, outputs, hidden)
     return dict(reversed(sums.items()))

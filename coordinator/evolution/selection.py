@@ -4,9 +4,8 @@ Source: Hupkes 2016, sections 5.3 and 8.2; facts of the original, sections 5.1 a
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import fsum
-from typing import Literal
 
 from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Arena, Culling, Selection
@@ -14,8 +13,6 @@ from schema.robot.genome import Genome
 from schema.robot.ids import BirthId
 
 Couple = tuple["Individual", "Individual"]
-
-CullReason = Literal["selection", "cull"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,14 +35,20 @@ class Individual:
     generation: int | None
     has_failed: bool = False
 
+    def evaluated(self, fitness: float | None) -> "Individual":
+        """Return the individual with a fitness; None where its evaluation failed."""
+        value = 0.0 if fitness is None else fitness
+        return replace(self, fitness=value, has_failed=fitness is None)
+
+    @property
+    def known_fitness(self) -> float | None:
+        """Its fitness; None where its evaluation failed."""
+        return None if self.has_failed else self.fitness
+
 
 def fittest_first(individuals: Sequence[Individual]) -> list[Individual]:
     """Return individuals by descending fitness; of equals the elder comes first."""
-    return sorted(individuals, key=_order)
-
-
-def _order(individual: Individual) -> tuple[float, BirthId]:
-    return -individual.fitness, individual.birth
+    return sorted(individuals, key=lambda one: (-one.fitness, one.birth))
 
 
 def select_parents(
@@ -72,7 +75,7 @@ def tournament(
     candidates: Sequence[Individual], draws: BufferedRng, size: int
 ) -> Individual:
     """Return the fittest of ``size`` candidates drawn without replacement."""
-    return min(draws.sample(candidates, size), key=_order)
+    return fittest_first(draws.sample(candidates, size))[0]
 
 
 def select_survivors(
@@ -133,7 +136,7 @@ def cull_population(
 
 def select_culled(
     mature: Sequence[Individual], rules: Arena | Culling
-) -> tuple[CullReason, list[Individual]]:
+) -> tuple[str, list[Individual]]:
     """Return the robots to cull and the reason, the least fit first.
 
     Robots below a share of the mean fitness are culled ("selection"). If there are

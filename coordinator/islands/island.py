@@ -27,10 +27,11 @@ from coordinator.islands.events import (
     Vet,
     Vetted,
     VettingFailed,
+    fitness_of,
 )
 from coordinator.islands.island_migration import IslandMigration
 from coordinator.islands.migration import MigrationEpochs
-from coordinator.islands.reevaluation import Reevaluations, with_duration
+from coordinator.islands.reevaluation import Reevaluations, with_durations
 from coordinator.islands.rows import birth_record, evaluation_record, population_records
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
@@ -86,13 +87,9 @@ class Island:
         self._space = body_space(experiment.space)
         self._breeder = Breeder(experiment, seed, run)
         self._reevaluations = (
-            None
-            if selection.reevaluation is None
-            else Reevaluations(experiment, selection.reevaluation, number)
+            Reevaluations(experiment, number) if selection.reevaluation else None
         )
-        self._migration = (
-            None if epochs is None else IslandMigration(experiment, epochs)
-        )
+        self._migration = IslandMigration(experiment, epochs) if epochs else None
         self._has_started = False
         self._generation = 0
         self._begun = 0
@@ -131,20 +128,24 @@ class Island:
                     raise self._unexpected(event, "it has started before")
                 self._has_started = True
                 commands = self._proceed()
-            case Immigrated() | NeighbourClosed():
+            case (
+                Immigrated()
+                | NeighbourClosed()
+                | Evaluated(requester=int())
+                | EvaluationFailed(requester=int())
+            ):
                 commands = self._migrated(event)
             case Evaluated() | EvaluationFailed() if event.trial:
-                commands = self._reevaluated(event)
+                if self._reevaluations is None:
+                    raise self._unexpected(event, "it re-evaluates no robot")
+                self._reevaluations.take(event)
+                commands = self._proceed()
             case _:
                 commands = self._answered(event)
-        if self._experiment.simulation.evaluation_s is None:
+        simulation = self._experiment.simulation
+        if simulation.evaluation_s is None:
             return commands
-        return [
-            with_duration(each, self._experiment.simulation, self._seed, self._run)
-            if isinstance(each, Evaluate)
-            else each
-            for each in commands
-        ]
+        return with_durations(commands, simulation, self._seed, self._run)
 
     def _answered(self, event: Answered) -> list[IslandCommand]:
         """Handle the answer to a vetting or to the first evaluation of a robot."""
@@ -228,20 +229,12 @@ class Island:
         self, candidate: Candidate, outcome: Evaluated | EvaluationFailed
     ) -> list[IslandCommand]:
         """Add an evaluated candidate to the brood; return its rows."""
-        is_evaluated = isinstance(outcome, Evaluated)
-        individual = Individual(
-            candidate.birth,
-            candidate.genome,
-            outcome.evaluation.fitness if isinstance(outcome, Evaluated) else 0.0,
-            candidate.rank,
-            self._generation,
-            has_failed=not is_evaluated,
-        )
         del self._in_flight[self.births]
-        self._brood.append(individual)
+        individual = candidate.individual(self._generation)
+        self._brood.append(individual.evaluated(fitness_of(outcome)))
         self.births += 1
         return [
-            birth_record(candidate, self._generation, self._space),
+            birth_record(candidate, individual, self._space),
             evaluation_record(outcome),
         ]
 
@@ -262,22 +255,13 @@ class Island:
         commands, self.population = migration.send(self.population, self.births)
         return [*rows, *commands, *self._receive(migration)]
 
-    def _migrated(self, event: MigrationEvent) -> list[IslandCommand]:
-        """Handle an event of a neighbour; a finished island ignores it."""
-        if self._migration is None:
-            raise self._unexpected(event, "it has no neighbours")
-        if self.is_finished:
-            return []
-        self._migration.epochs.take(event)
-        return [*self._receive(self._migration), *self._proceed()]
+    def _migrated(
+        self, event: MigrationEvent | Evaluated | EvaluationFailed
+    ) -> list[IslandCommand]:
+        """Handle an event of a neighbour or the re-evaluation of an immigrant.
 
-    def _reevaluated(self, event: Evaluated | EvaluationFailed) -> list[IslandCommand]:
-        """Handle the re-evaluation of a robot of this island or of an immigrant."""
-        if event.requester is None:
-            if self._reevaluations is None:
-                raise self._unexpected(event, "it re-evaluates no robot")
-            self._reevaluations.take(event)
-            return self._proceed()
+        A finished island ignores it.
+        """
         if self._migration is None:
             raise self._unexpected(event, "it has no neighbours")
         if self.is_finished:
@@ -296,7 +280,8 @@ class Island:
     def _open_brood(self) -> list[IslandCommand]:
         """Record the population and open the next brood, or finish."""
         commands: list[IslandCommand] = []
-        commands += population_records(self._number, self.births, self.population)
+        fitness = [(one.birth, one.known_fitness) for one in self.population]
+        commands += population_records(self._number, self.births, fitness)
         if self.is_finished:
             migration = self._migration
             neighbours = migration.epochs.links.neighbours if migration else ()

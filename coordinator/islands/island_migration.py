@@ -1,7 +1,6 @@
 """Migration of an off-line island: its emigrants, and immigrants until they settle."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import (
@@ -9,7 +8,9 @@ from coordinator.islands.events import (
     Evaluate,
     Evaluated,
     EvaluationFailed,
+    MigrationEvent,
     Record,
+    fitness_of,
 )
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import evaluation_record, migration_records
@@ -36,11 +37,8 @@ class IslandMigration:
         selection = experiment.selection
         self.epochs = epochs
         self._space = body_space(experiment.space)
-        self._limit = (
-            selection.population
-            if selection.culling is None
-            else selection.culling.population_limit
-        )
+        rules = selection.culling
+        self._limit = rules.population_limit if rules else selection.population
         self._stay = selection.parents_needed
         self._settled = 0
         self._immigrants: dict[BirthId, Individual] | None = None
@@ -55,22 +53,25 @@ class IslandMigration:
         rows = migration_records(sent, births)
         return [*rows, *sent], tuple(one for one in population if one not in moved)
 
-    def take(self, outcome: Outcome) -> None:
-        """Store the re-evaluation of an immigrant; duplicates are ignored.
+    def take(self, event: MigrationEvent | Outcome) -> None:
+        """Store an event until ``receive``; duplicate evaluations are ignored.
 
         Raises:
-            UnexpectedEvent: no such evaluation is open; nothing has changed.
+            UnexpectedEvent: the event is impossible now; nothing has changed.
         """
+        if not isinstance(event, Evaluated | EvaluationFailed):
+            self.epochs.take(event)
+            return
         epoch = self.epochs.epoch
-        is_known = outcome.trial < epoch or outcome.birth in self._outcomes
-        is_own = outcome.requester == self.epochs.island
-        if not is_own or outcome.trial > epoch or not is_known:
+        is_known = event.trial < epoch or event.birth in self._outcomes
+        is_own = event.requester == self.epochs.island
+        if not is_own or event.trial > epoch or not is_known:
             raise UnexpectedEvent(
                 f"island {self.epochs.island} awaits evaluations {epoch} of "
-                f"{list(self._outcomes)}, got {outcome}"
+                f"{list(self._outcomes)}, got {event}"
             )
-        if outcome.trial == epoch and self._outcomes[outcome.birth] is None:
-            self._outcomes[outcome.birth] = outcome
+        if event.trial == epoch and self._outcomes[event.birth] is None:
+            self._outcomes[event.birth] = event
 
     def receive(
         self, population: Sequence[Individual], births: int
@@ -89,13 +90,7 @@ class IslandMigration:
         for birth, outcome in self._outcomes.items():
             assert outcome is not None
             immigrant = self._immigrants[birth]
-            self._immigrants[birth] = (
-                replace(immigrant, fitness=0.0, has_failed=True)
-                if isinstance(outcome, EvaluationFailed)
-                else replace(
-                    immigrant, fitness=outcome.evaluation.fitness, has_failed=False
-                )
-            )
+            self._immigrants[birth] = immigrant.evaluated(fitness_of(outcome))
             commands.append(evaluation_record(outcome))
         settled = self._settle(population, self._immigrants.values())
         self._immigrants, self._outcomes = None, {}
@@ -104,11 +99,7 @@ class IslandMigration:
     def _arrive(self, population: Sequence[Individual], births: int) -> list[Evaluate]:
         """Begin the next epoch; return the re-evaluations of its immigrants."""
         living = {one.birth for one in population}
-        arrivals = [
-            (one, is_reevaluated)
-            for one, is_reevaluated in self.epochs.receive(births)
-            if one.birth not in living
-        ]
+        arrivals = self.epochs.receive(living, births)
         self._immigrants = {one.birth: one for one, _ in arrivals}
         evaluations = [
             Evaluate(

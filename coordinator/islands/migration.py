@@ -6,8 +6,9 @@ of epoch e or have finished. So the outcome does not depend on the speed of the
 islands, and no two islands can wait for each other.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
@@ -79,7 +80,7 @@ class MigrationEpochs:
         self.is_waiting = False
         self._migration = migration
         self._tournament_size = tournament_size
-        self._seed, self._run = seed, run
+        self._stream = partial(stream, seed, run)
         self._due_births = migration.epoch
         self._due_s = inf if migration.epoch_s is None else migration.epoch_s
         self._inbox: dict[tuple[int, int], tuple[Individual, ...]] = {}
@@ -162,11 +163,12 @@ class MigrationEpochs:
         self._inbox[source, event.epoch] = event.migrants
 
     def receive(
-        self, births: int, now_s: float = -inf
+        self, known: Collection[BirthId], births: int, now_s: float = -inf
     ) -> list[tuple[Individual, bool]]:
         """Begin the next epoch; return the immigrants of the last one, each once.
 
         Args:
+            known: ids of individuals that are left out.
             births: number of births on the island.
             now_s: simulated time of an arena [s].
 
@@ -180,7 +182,8 @@ class MigrationEpochs:
                 self._migration.judge_anew or source in self.links.differing
             )
             for one in self._inbox.pop((source, self.epoch)):
-                arrivals.setdefault(one.birth, (one, is_reevaluated))
+                if one.birth not in known:
+                    arrivals.setdefault(one.birth, (one, is_reevaluated))
         # Not the neighbours that are open now: that would depend on their speed.
         self._active = tuple(senders)
         self.epoch += 1
@@ -208,7 +211,7 @@ class MigrationEpochs:
 
     def _draws(self, number: int, purpose: Purpose) -> BufferedRng:
         name = BirthId(self.island, number)
-        return BufferedRng(stream(self._seed, self._run, name, 0, purpose))
+        return BufferedRng(self._stream(name, 0, purpose))
 
     def _choose(self, candidates: Sequence[Individual], count: int) -> list[Individual]:
         """Return the emigrants in the order of choice."""

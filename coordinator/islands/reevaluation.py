@@ -6,37 +6,44 @@ stream.
 Source: Hupkes 2016, section 8.2, on scenarios between his 2 and 3.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import fsum
 
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import Individual
-from coordinator.islands.events import Evaluate, Evaluated, EvaluationFailed, Record
+from coordinator.islands.events import (
+    Evaluate,
+    Evaluated,
+    EvaluationFailed,
+    IslandCommand,
+    Record,
+    fitness_of,
+)
 from coordinator.islands.rows import evaluation_record
 from schema.errors import UnexpectedEvent
-from schema.experiment.document import (
-    Experiment,
-    Reevaluation,
-    Simulation,
-    body_space,
-    steps_of,
-)
+from schema.experiment.document import Experiment, Simulation, body_space, steps_of
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 
 Outcome = Evaluated | EvaluationFailed
 
 
-def with_duration(
-    command: Evaluate, simulation: Simulation, seed: int, run: int
-) -> Evaluate:
-    """Return an evaluation with a random duration, uniform in ``evaluation_s``."""
+def with_durations(
+    commands: Iterable[IslandCommand], simulation: Simulation, seed: int, run: int
+) -> list[IslandCommand]:
+    """Return commands with random durations of evaluation, uniform in their range."""
     assert simulation.evaluation_s is not None
     shortest, longest = (steps_of(end, simulation) for end in simulation.evaluation_s)
-    rng = stream(seed, run, command.birth, command.trial, Purpose.DURATION)
-    steps = shortest + BufferedRng(rng).below(longest - shortest + 1)
-    return replace(command, steps=steps)
+    timed: list[IslandCommand] = []
+    for each in commands:
+        if isinstance(each, Evaluate):
+            rng = stream(seed, run, each.birth, each.trial, Purpose.DURATION)
+            steps = shortest + BufferedRng(rng).below(longest - shortest + 1)
+            timed.append(replace(each, steps=steps))
+        else:
+            timed.append(each)
+    return timed
 
 
 @dataclass(slots=True)
@@ -55,9 +62,9 @@ class _History:
 class Reevaluations:
     """Re-evaluations of the robots of one island."""
 
-    def __init__(
-        self, experiment: Experiment, rules: Reevaluation, island: int
-    ) -> None:
+    def __init__(self, experiment: Experiment, island: int) -> None:
+        rules = experiment.selection.reevaluation
+        assert rules is not None
         self._rules = rules
         self._space = body_space(experiment.space)
         self._island = island
@@ -88,8 +95,9 @@ class Reevaluations:
         chosen = sorted(natives, key=self._last_evaluation)[:count]
         commands = []
         for one in sorted(chosen, key=lambda one: one.birth):
-            known = None if one.has_failed else one.fitness
-            history = self._histories.setdefault(one.birth, _History([known]))
+            history = self._histories.setdefault(
+                one.birth, _History([one.known_fitness])
+            )
             history.births = births
             self._outcomes[one.birth] = None
             robot = develop(one.genome, self._space)
@@ -122,9 +130,7 @@ class Reevaluations:
         records = []
         for birth, outcome in sorted(outcomes.items()):
             assert outcome is not None
-            self._histories[birth].fitness.append(
-                outcome.evaluation.fitness if isinstance(outcome, Evaluated) else None
-            )
+            self._histories[birth].fitness.append(fitness_of(outcome))
             records.append(evaluation_record(outcome))
         evaluated = (
             self._evaluated(one) if one.birth in outcomes else one for one in population
@@ -136,9 +142,9 @@ class Reevaluations:
         trials = self._histories[individual.birth].fitness
         if self._rules.fitness == "replace":
             trials = trials[-1:]
-        value = fsum(each or 0.0 for each in trials) / len(trials)
-        has_failed = all(each is None for each in trials)
-        return replace(individual, fitness=value, has_failed=has_failed)
+        if all(each is None for each in trials):
+            return individual.evaluated(None)
+        return individual.evaluated(fsum(each or 0.0 for each in trials) / len(trials))
 
     def _last_evaluation(self, individual: Individual) -> tuple[int, BirthId]:
         """Return the number of births at the last evaluation, and the id for ties."""

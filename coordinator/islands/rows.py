@@ -1,6 +1,6 @@
 """Table rows of off-line islands, and those that arenas share with them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from coordinator.evolution.breeding import Candidate
 from coordinator.evolution.selection import Individual
@@ -22,7 +22,7 @@ def named(birth: BirthId, island: int) -> dict[str, int | None]:
 
 def birth_record(
     candidate: Candidate,
-    generation: int | None,
+    individual: Individual,
     space: BodySpace,
     *,
     sim_time_s: float | None = None,
@@ -32,7 +32,7 @@ def birth_record(
 
     Args:
         candidate: the candidate.
-        generation: number of its brood; None on-line.
+        individual: the individual that it becomes.
         space: the part types.
         sim_time_s: simulated time of its birth on-line [s].
         place: its place of birth in the ground plane [m].
@@ -44,8 +44,8 @@ def birth_record(
             {"island": parent.birth.island, "birth": parent.birth.number}
             for parent in candidate.couple or ()
         ],
-        "generation": generation,
-        "rank": candidate.rank,
+        "generation": individual.generation,
+        "rank": individual.rank,
         "attempts": candidate.attempt + 1,
         "genome": encode_genome(candidate.genome),
         "body": body_rows(candidate.robot),
@@ -79,20 +79,20 @@ def evaluation_record(outcome: Evaluated | EvaluationFailed) -> Record:
 
 
 def population_records(
-    island: int, births: int, population: Sequence[Individual]
+    island: int, births: int, fitness: Iterable[tuple[BirthId, float | None]]
 ) -> list[Record]:
-    """Return the population rows of the living at a number of births."""
+    """Return the population rows of the living, each with its fitness if known."""
     return [
         Record(
             "population",
             {
                 "island": island,
                 "births": births,
-                **named(individual.birth, island),
-                "fitness": None if individual.has_failed else individual.fitness,
+                **named(birth, island),
+                "fitness": value,
             },
         )
-        for individual in population
+        for birth, value in fitness
     ]
 
 
@@ -111,7 +111,7 @@ def migration_records(
                 "sim_time_s": sim_time_s,
                 "birth_island": one.birth.island,
                 "birth": one.birth.number,
-                "fitness": None if one.has_failed else one.fitness,
+                "fitness": one.known_fitness,
             },
         )
         for command in sent

@@ -46,7 +46,9 @@ def _graph(migration: Migration, islands: int, seed: int) -> list[Edge]:
     # A large package that only archipelagos need.
     import networkx as nx  # noqa: PLC0415
 
-    rows = _rows(islands)
+    # The most square grid.
+    sides = range(1, isqrt(islands) + 1)
+    rows = max(side for side in sides if islands % side == 0)
     degree, p_rewire = migration.degree, migration.p_rewire
     make: dict[str, Callable[[], Any]] = {
         "ring": lambda: nx.cycle_graph(islands),
@@ -65,8 +67,3 @@ def _graph(migration: Migration, islands: int, seed: int) -> list[Edge]:
     except nx.NetworkXError as error:
         raise ExperimentError(f"migration.topology: {error}") from None
     return [(int(one), int(other)) for one, other in graph.edges]
-
-
-def _rows(islands: int) -> int:
-    """Return the number of rows of the most square grid of the islands."""
-    return max(rows for rows in range(1, isqrt(islands) + 1) if islands % rows == 0)

@@ -7,7 +7,7 @@ import pytest
 
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Evaluate, Evaluated, EvaluationFailed
-from coordinator.islands.reevaluation import Reevaluations, with_duration
+from coordinator.islands.reevaluation import Reevaluations, with_durations
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import (
     Experiment,
@@ -30,7 +30,7 @@ def reevaluations(**rules: Any) -> Reevaluations:  # noqa: ANN401 - any setting
     wanted = Reevaluation(**{"interval": 5, "share": 0.5, **rules})
     selection = Selection(population=4, reevaluation=wanted)
     experiment = Experiment(name="test", selection=selection)
-    return Reevaluations(experiment, wanted, 0)
+    return Reevaluations(experiment, 0)
 
 
 def steps(
@@ -44,7 +44,9 @@ def steps(
     """Return the drawn duration of an evaluation in steps of 0.005 s."""
     command = Evaluate(BirthId(0, birth), ROBOT, trial)
     clock = Simulation(evaluation_s=range_s)
-    return with_duration(command, clock, seed, run).steps
+    (timed,) = with_durations([command], clock, seed, run)
+    assert isinstance(timed, Evaluate)
+    return timed.steps
 
 
 def one(number: int, fitness: float = 0.5, island: int = 0) -> Individual:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-import analyzer.jobs
+import analyzer.report
 from coordinator.arena.arena import Arena
 from coordinator.dispatch.events import DispatchEvent, Returned
 from coordinator.dispatch.fleet import Fleet
@@ -110,7 +110,7 @@ class Run:
         self.rows = Recorder(path, DETAILS)
         stack.callback(self.rows.close)
         shards = other.pop("shards", None) or Shards(FakeWorld)
-        agents = {"analyzer": analyzer.jobs.answer, "worker": shards.answer}
+        agents = {"analyzer": analyzer.report.answer, "worker": shards.answer}
         self.arena = Arena(EXPERIMENT, DETAILS.seed, DETAILS.run)
         platform = other.pop("platform", "any")
         self.fleet = Fleet(

@@ -11,7 +11,7 @@ from zlib import crc32
 import numpy as np
 import pytest
 
-import analyzer.jobs
+import analyzer.report
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.island import Island
 from coordinator.network.local import LocalAgents
@@ -65,7 +65,7 @@ def run(path: Path, *, answers: int = 10**9) -> int:
         rows = Recorder(path, DETAILS)
         fleet = Fleet(
             LocalAgents(
-                {"analyzer": analyzer.jobs.answer, "worker": worker.answer}, "any"
+                {"analyzer": analyzer.report.answer, "worker": worker.answer}, "any"
             )
         )
         loop = Loop(

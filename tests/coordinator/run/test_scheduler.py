@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-import analyzer.jobs
+import analyzer.report
 import worker.serve.null
 from coordinator.dispatch.events import DispatchEvent, Joined
 from coordinator.dispatch.fleet import Agents, Fleet
@@ -32,7 +32,7 @@ CAMPAIGN = Campaign(EXPERIMENTS, 2, 3)
 
 
 def local() -> LocalAgents:
-    answers = {"analyzer": analyzer.jobs.answer, "worker": worker.serve.null.answer}
+    answers = {"analyzer": analyzer.report.answer, "worker": worker.serve.null.answer}
     return LocalAgents(answers, "any")  # type: ignore[arg-type]
 
 

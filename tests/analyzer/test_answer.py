@@ -2,8 +2,7 @@
 
 import pytest
 
-from analyzer.jobs import answer
-from analyzer.report import analyze
+from analyzer.report import analyze, answer
 from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
 from schema.experiment.document import Experiment, body_space
 from schema.experiment.settings import vetting_settings
