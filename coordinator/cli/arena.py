@@ -9,7 +9,7 @@ from coordinator.cli.status import ask_status
 from coordinator.network.client_service import ask_coordinators
 from schema.agent.command import add_network_flags, tls_of
 from schema.errors import InvalidRobot, NetworkError
-from schema.flags import Flags, number, whole_number
+from schema.flags import Flags, add_count, number, whole_number
 from schema.formats.files import read_robot
 from schema.robot.ids import BirthId
 from schema.wire.operator import (
@@ -146,12 +146,6 @@ def _parser() -> argparse.ArgumentParser:
             "--run", default="", metavar="NAME",
             help="end of the run folder's name (default: the only run)",
         )  # fmt: skip
-        action.add_argument(
-            "--island",
-            type=whole_number(0),
-            default=0,
-            metavar="N",
-            help="island number (default: 0)",
-        )
+        add_count(action, "--island", 0, "island number", least=0)
         add_network_flags(action)
     return parser

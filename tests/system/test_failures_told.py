@@ -134,7 +134,7 @@ def made(once: Any) -> Path:  # noqa: ANN401 - the fixture
 def test_a_damaged_run_hides_none_beside_it(stage: Stage, made: Path) -> None:
     shutil.copytree(made, stage.folder / "all")
     twice = stage.folder / "all" / "twice"
-    told = "seeing-0/run.json: must have name, run, seed, document, has none"
+    told = "seeing-0/run.json: cannot be read: Object missing required field `name`"
     (twice / "seeing-0" / "run.json").write_text("{}")
     said = stage.run("status", "all", code=1)
     assert f"damaged: all/twice/{told}" in said
