@@ -1,4 +1,4 @@
-"""What two runs ran: documents of two versions, platforms of arenas."""
+"""Comparison of two runs: documents of two versions, platforms of arenas."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -62,7 +62,7 @@ def test_another_experiment_is_a_difference(
     assert line.startswith("runs: first at record 0, column document:")
 
 
-def test_where_nothing_is_evaluated_the_platforms_are_the_runs_(
+def test_platforms_of_arenas_are_compared(
     tmp_path: Path,
     make_records: Any,  # noqa: ANN401 - the fixture
 ) -> None:
