@@ -123,7 +123,7 @@ def test_worker_without_a_coordinator_says_so_and_keeps_trying(
 
 
 def _fill_the_disk(stage: Stage, *words: str, kilobytes: int) -> None:
-    """Run on a small disk until it is full; what stands there becomes ``moved``."""
+    """Run on a small disk until it is full; copy the folder to ``moved``."""
     disk = stage.folder / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(disk)]

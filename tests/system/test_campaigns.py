@@ -50,7 +50,7 @@ def _words(out: str, *more: str) -> tuple[str, ...]:
 
 @pytest.fixture(scope="session")
 def whole(once: Any) -> Path:  # noqa: ANN401 - the fixture
-    """Return a campaign that ran in one process, to which nothing happened."""
+    """Return an undisturbed campaign that ran in one process."""
 
     def make(stage: Stage) -> None:
         _write(stage.folder)
@@ -72,7 +72,7 @@ def _sizes(folder: Path) -> int:
 
 
 def _make_alone(stage: Stage, path: Path, name: str, run: int) -> None:
-    """Make a run by itself, before campaigns and environments were thought of."""
+    """Make a single run as an older version without environments made it."""
     text = experiment_text(read_experiment(str(stage.folder / f"{name}.toml")))
     document = json.loads(text)
     del document["environment"]

@@ -35,7 +35,7 @@ def _start(*words: str) -> subprocess.Popen[str]:
 def test_ctrl_c_pressed_twice_while_processes_start(
     stage: Stage, until: Callable[[Callable[[], bool], str], None], awaited: str
 ) -> None:
-    """It reaches the whole group: they import yet, or do not wait for it yet."""
+    """The signal reaches the whole group, which is still importing."""
     run = stage.folder / "run"
     process = _start("run", "scenario1", "--out", str(run))
     until((run / awaited).exists, awaited)
@@ -51,7 +51,7 @@ def test_ctrl_c_pressed_twice_while_processes_start(
 def test_ctrl_c_while_an_engine_is_loaded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It makes an import fail that knows nothing of it."""
+    """The engine turns the interrupt into an ImportError."""
     (tmp_path / "engine_of_a_test.py").write_text(
         "try:\n    raise KeyboardInterrupt\n"
         "except KeyboardInterrupt as error:\n    raise ImportError('no') from error\n"

@@ -33,7 +33,7 @@ def written(path: Path, birth: Record, **row: Any) -> Path:  # noqa: ANN401 - an
 
 
 def older(experiment: Experiment) -> str:
-    """Return a document from before some keys, whose defaults it means."""
+    """Return the document of an older version that lacks some keys."""
     document = msgspec.json.decode(experiment_text(experiment))
     del document["simulation"]["evaluation_s"]
     del document["selection"]["culling"]

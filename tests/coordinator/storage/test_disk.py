@@ -19,7 +19,7 @@ PAGE = 4096
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """Mount a disk of 64 KiB; skip where that takes rights that we lack."""
+    """Mount a disk of 64 KiB; skip without the permission."""
     mount = shutil.which("mount")
     command = ["mount", "-t", "tmpfs", "-o", f"size={ROOM}", "tmpfs", str(tmp_path)]
     if (
@@ -75,7 +75,7 @@ def test_a_failed_append_keeps_what_another_process_wrote_before(
     full_beyond: Callable[[int], AbstractContextManager[None]],
     room: int,
 ) -> None:
-    """A coordinator that slept through its replacement, on a full disk."""
+    """A replaced coordinator appends to a full disk."""
     old = AppendedFile(tmp_path / "f")
     old.append(b"old")
     new = AppendedFile(tmp_path / "f")

@@ -55,7 +55,7 @@ def test_the_epoch_grows_with_every_opening(tmp_path: Path) -> None:
 
 
 def test_a_new_run_in_a_removed_folder_has_another_name(tmp_path: Path) -> None:
-    """Workers that outlive a run would take the new one for an old incarnation."""
+    """Workers that outlive a run must not mistake the new run for it."""
     path = tmp_path / "run"
     with RunFolder(path, DETAILS) as first:
         assert first.name.endswith(f":{path}")
@@ -80,7 +80,7 @@ def test_a_description_without_nonce_is_read(tmp_path: Path) -> None:
 def test_a_lost_epoch_voids_nothing_that_is_written_later(
     tmp_path: Path, left: str | None
 ) -> None:
-    """The file is gone, or an older one was put in its place."""
+    """The file is missing, or an older one has replaced it."""
     path = tmp_path / "run"
     RunFolder(path, DETAILS).close()
     events = [VettingFailed(BirthId(0, number), 0, "refused") for number in range(5)]
@@ -112,7 +112,7 @@ def test_a_used_folder_is_refused(tmp_path: Path) -> None:
 def test_only_a_new_run_that_has_not_started_is_forgotten(
     tmp_path: Path,
 ) -> None:
-    """One that was archived without its epoch and journal is still described."""
+    """A run that was archived without epoch and journal keeps its description."""
     path = tmp_path / "run"
     with RunFolder(path, DETAILS) as folder:
         folder.forget()

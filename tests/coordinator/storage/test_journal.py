@@ -175,7 +175,7 @@ def test_a_repeated_record_is_damage(tmp_path: Path) -> None:
 
 
 def test_records_of_a_replaced_coordinator_are_void(tmp_path: Path) -> None:
-    """It slept before it wrote; the other went on from what it had found."""
+    """It stalls before it writes; the other continues from the records it found."""
     with Journal.open(tmp_path, epoch=1) as old:
         old.append(EVENTS[:2])
         with Journal.open(tmp_path, epoch=2) as new:

@@ -83,7 +83,7 @@ def test_rows_of_a_replaced_coordinator_count_once(
     check_complete: Check,
     begun: int,
 ) -> None:
-    """It slept with rows at hand, in a segment or before its first, and wakes up."""
+    """It stalls with buffered rows, before or after its first segment."""
     rows = make_records(30)
     old = feed_rows(tmp_path, rows[:begun])
     for record in rows[begun:25]:

@@ -23,7 +23,7 @@ def bulk(number: int, rows: int = 3) -> Append:
 
 
 def bare(append: Append) -> Append:
-    """Return what a replay says of rows that stand on disk."""
+    """Return the replayed command for rows that are on disk."""
     return Append(append.table, append.rows, b"")
 
 
