@@ -24,7 +24,7 @@ def test_a_saturated_coordinator_limits_the_rate() -> None:
 
 
 def test_waiting_for_a_job_costs_a_round_trip() -> None:
-    """With a queued job a round trip of 0.8 s hides behind 1 s, but not behind 0.1 s."""
+    """A round trip of 0.8 s hides behind a queued job of 1 s, but not of 0.1 s."""
     still = replace(FREE, workers=1, credits=2, spread=1e-9, latency_s=0.4)
     assert FleetModel(still).run().utilisation == pytest.approx(1.0, abs=0.01)
     quick = replace(still, evaluation_s=0.1)
