@@ -5,9 +5,8 @@ import sys
 from pathlib import Path
 from uuid import uuid4
 
-from coordinator.cli.status import ask_status
-from coordinator.network.client_service import ask_coordinators
-from schema.agent.command import add_network_flags, tls_of
+from coordinator.cli.status import ask, ask_status
+from schema.agent.command import add_network_flags
 from schema.errors import InvalidRobot, NetworkError
 from schema.flags import Flags, add_count, number, whole_number
 from schema.formats.files import read_robot
@@ -22,8 +21,6 @@ from schema.wire.operator import (
     ResumeWish,
     SnapshotWish,
     Wish,
-    decode_operator_reply,
-    encode_operator_request,
 )
 
 ACTIONS = {
@@ -61,14 +58,7 @@ def main(arguments: list[str]) -> int:
     wish = _wish(options)
     coordinator = _coordinator(options)
     request = OperatorRequest(uuid4().hex, options.island, wish, options.run)
-    data = ask_coordinators(
-        encode_operator_request(request),
-        connect=options.connect,
-        fleet=options.fleet,
-        tls=tls_of(options),
-        only=coordinator,
-    )[coordinator]
-    reply = decode_operator_reply(data)
+    reply = ask(options, request, coordinator)[coordinator]
     stream = sys.stderr if reply.is_refused else sys.stdout
     stream.write(f"{reply.text}\n")
     return 1 if reply.is_refused else 0
