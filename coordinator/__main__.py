@@ -23,7 +23,7 @@ from coordinator.storage.hints import stopped
 from schema.agent.command import tls_of
 from schema.agent.service import tell_user
 from schema.agent.supervisor import cores
-from schema.errors import NetworkError, RunFolderError
+from schema.errors import NetworkError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import (
     Experiment,
@@ -170,9 +170,6 @@ def _bench(options: argparse.Namespace) -> int:
 
 
 def _compare(options: argparse.Namespace) -> int:
-    for folder in (options.first, options.second):
-        if not Path(folder).is_dir():
-            raise RunFolderError(f"{folder}: no such run folder")
     differences = compare(Path(options.first), Path(options.second))
     for line in differences:
         print(line)

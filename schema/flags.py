@@ -36,14 +36,18 @@ def whole_number(least: int = 1) -> Callable[[str], int]:
 
 
 def add_count(
-    flags: argparse.ArgumentParser, name: str, default: int, what: str, least: int = 1
+    flags: argparse.ArgumentParser,
+    name: str,
+    default: int | None,
+    what: str,
+    least: int = 1,
 ) -> None:
     """Add a flag for a whole number.
 
     Args:
         flags: parser that gets the flag.
         name: name of the flag.
-        default: value if the flag is not given.
+        default: value if the flag is not given; ``what`` explains None.
         what: meaning of the number, for the help.
         least: smallest number allowed; not negative.
     """
@@ -52,7 +56,7 @@ def add_count(
         type=whole_number(least),
         default=default,
         metavar="N",
-        help=f"{what} (default: %(default)s)",
+        help=what if default is None else f"{what} (default: %(default)s)",
     )
 
 

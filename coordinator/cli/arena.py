@@ -5,11 +5,10 @@ import sys
 from pathlib import Path
 from uuid import uuid4
 
-from coordinator.cli.status import ask_status
-from coordinator.network.client_service import ask_coordinators
-from schema.agent.command import add_network_flags, tls_of
+from coordinator.cli.status import ask, ask_status
+from schema.agent.command import add_network_flags
 from schema.errors import InvalidRobot, NetworkError
-from schema.flags import Flags, number, whole_number
+from schema.flags import Flags, add_count, number, whole_number
 from schema.formats.files import read_robot
 from schema.robot.ids import BirthId
 from schema.wire.codec import encode_robot
@@ -23,8 +22,6 @@ from schema.wire.operator import (
     ResumeArena,
     SaveSnapshot,
     SetBrain,
-    decode_operator_reply,
-    encode_operator_request,
 )
 
 ACTIONS = {
@@ -62,14 +59,7 @@ def main(arguments: list[str]) -> int:
     action = _action(options)
     coordinator = _coordinator(options)
     request = OperatorRequest(uuid4().hex, options.island, action, options.run)
-    data = ask_coordinators(
-        encode_operator_request(request),
-        connect=options.connect,
-        fleet=options.fleet,
-        tls=tls_of(options),
-        only=coordinator,
-    )[coordinator]
-    reply = decode_operator_reply(data)
+    reply = ask(options, request, coordinator)[coordinator]
     stream = sys.stderr if reply.is_refused else sys.stdout
     stream.write(f"{reply.text}\n")
     return 1 if reply.is_refused else 0
@@ -147,12 +137,6 @@ def _parser() -> argparse.ArgumentParser:
             "--run", default="", metavar="NAME",
             help="end of the run folder's name (default: the only run)",
         )  # fmt: skip
-        action.add_argument(
-            "--island",
-            type=whole_number(0),
-            default=0,
-            metavar="N",
-            help="island number (default: 0)",
-        )
+        add_count(action, "--island", 0, "island number", least=0)
         add_network_flags(action)
     return parser

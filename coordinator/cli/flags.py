@@ -84,18 +84,8 @@ def _add_experiments(flags: argparse.ArgumentParser) -> None:
     flags.add_argument(
         "--seed", type=_seed, default=0, metavar="N", help="random seed (default: 0)"
     )
-    flags.add_argument(
-        "--repeats",
-        type=whole_number(),
-        metavar="N",
-        help="repeat each experiment N times, all in one campaign",
-    )
-    flags.add_argument(
-        "--births",
-        type=whole_number(),
-        metavar="N",
-        help="number of births (default: as each experiment says)",
-    )
+    add_count(flags, "--repeats", None, "repeat each experiment N times, as a campaign")
+    add_count(flags, "--births", None, "number of births (default: the experiment's)")
     flags.add_argument(
         "--out",
         metavar="FOLDER",
@@ -108,19 +98,20 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     if command == "coordinator":
         flags.set_defaults(workers=0, in_process=False, threads=1)
     else:
-        flags.add_argument(
+        add_count(
+            flags,
             "--workers",
-            type=whole_number(0),
-            metavar="N",
-            help="worker processes to start here (default: one per core, none with "
+            None,
+            "worker processes to start here (default: one per core, none with "
             "--connect)",
+            least=0,
         )
-        flags.add_argument(
+        add_count(
+            flags,
             "--threads",
-            type=whole_number(),
-            metavar="N",
-            help="threads of each worker that advance one arena together (default: "
-            "one per core for an arena, else 1)",
+            None,
+            "threads of each worker that advance one arena together (default: one per "
+            "core for an arena, else 1)",
         )
         flags.add_argument(
             "--in-process",

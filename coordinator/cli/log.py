@@ -21,7 +21,7 @@ from coordinator.storage.journal import (
     read_records,
 )
 from schema.errors import RunFolderError
-from schema.flags import Flags, whole_number
+from schema.flags import Flags, add_count, whole_number
 
 POLL_S = 0.5
 """Time between two looks at a journal that is followed [s]."""
@@ -166,12 +166,8 @@ def _flags() -> Flags:
         allow_abbrev=False,
     )
     flags.add_argument("folder", type=Path, metavar="RUN", help="run folder")
-    flags.add_argument(
-        "--island",
-        type=whole_number(0),
-        metavar="N",
-        help="only events that island N handles (default: all)",
-    )
+    islands = "only events that island N handles (default: all)"
+    add_count(flags, "--island", None, islands, least=0)
     flags.add_argument(
         "--birth",
         type=_birth,

@@ -22,6 +22,7 @@ from schema.flags import Flags
 from schema.tables.files import FINISHED, SEGMENTS
 from schema.wire.operator import (
     GetStatus,
+    OperatorReply,
     OperatorRequest,
     decode_operator_reply,
     encode_operator_request,
@@ -65,14 +66,31 @@ def ask_status(options: argparse.Namespace) -> dict[str, Status]:
     Raises:
         NetworkError: no coordinator answers.
     """
+    replies = ask(options, OperatorRequest(uuid4().hex, 0, GetStatus()))
+    return {name: reply.status for name, reply in replies.items() if reply.status}
+
+
+def ask(
+    options: argparse.Namespace, request: OperatorRequest, only: str = ""
+) -> dict[str, OperatorReply]:
+    """Return the replies of the coordinators at ``--connect``, by their names.
+
+    Args:
+        options: options of the command line with the network's flags.
+        request: request to all coordinators, or to one.
+        only: name of the only coordinator to ask; "" asks all.
+
+    Raises:
+        NetworkError: no coordinator answers.
+    """
     replies = ask_coordinators(
-        encode_operator_request(OperatorRequest(uuid4().hex, 0, GetStatus())),
+        encode_operator_request(request),
         connect=options.connect,
         fleet=options.fleet,
         tls=tls_of(options),
+        only=only,
     )
-    decoded = {name: decode_operator_reply(data) for name, data in replies.items()}
-    return {name: reply.status for name, reply in decoded.items() if reply.status}
+    return {name: decode_operator_reply(data) for name, data in replies.items()}
 
 
 def _live(folder: Path, options: argparse.Namespace) -> Status | None:

@@ -1,5 +1,6 @@
 """Comparison of two runs in all columns that the same seed repeats."""
 
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -89,17 +90,14 @@ def _differences(name: str, tables: list[pa.Table], columns: list[str]) -> list[
     rows = [table.num_rows for table in tables]
     if rows[0] != rows[1]:
         lines.append(f"{name}: {rows[0]} rows against {rows[1]}")
-    common = min(rows)
-    found: tuple[int, str, Any, Any] | None = None
-    for column in columns:
-        ours, theirs = (table[column][:common] for table in tables)
-        if ours.equals(theirs):
-            continue
-        row, one, other = _first_difference(ours.to_pylist(), theirs.to_pylist())
-        if row >= 0 and (found is None or row < found[0]):
-            found = (row, column, one, other)
-    if found is not None:
-        row, column, one, other = found
+    found = [
+        (row, column)
+        for column in columns
+        if (row := _first_difference(*(table[column] for table in tables))) is not None
+    ]
+    if found:
+        row, column = min(found, key=itemgetter(0))
+        one, other = (table[column][row].as_py() for table in tables)
         lines.append(
             f"{name}: first at record {row}, column {column}: "
             f"{_short(one)} against {_short(other)}"
@@ -107,15 +105,18 @@ def _differences(name: str, tables: list[pa.Table], columns: list[str]) -> list[
     return lines
 
 
-def _first_difference(ours: list[Any], theirs: list[Any]) -> tuple[int, Any, Any]:
-    """Return row and values of the first difference; row -1 if there is none.
+def _first_difference(ours: pa.ChunkedArray, theirs: pa.ChunkedArray) -> int | None:
+    """Return the row of the first difference in the common rows; None if equal.
 
     Values are equal if their representations are: a NaN equals itself.
     """
-    for row, (one, other) in enumerate(zip(ours, theirs, strict=True)):
-        if repr(one) != repr(other):
-            return row, one, other
-    return -1, None, None
+    common = min(len(ours), len(theirs))
+    ours, theirs = ours[:common], theirs[:common]
+    if ours.equals(theirs):
+        return None
+    pairs = zip(ours.to_pylist(), theirs.to_pylist(), strict=True)
+    rows = (row for row, (a, b) in enumerate(pairs) if repr(a) != repr(b))
+    return next(rows, None)
 
 
 def _short(value: Any) -> str:  # noqa: ANN401 - any value of any column

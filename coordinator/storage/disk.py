@@ -3,7 +3,7 @@
 import contextlib
 import errno
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from schema.errors import RunFolderError
@@ -31,13 +31,11 @@ class AppendedFile:
         self.path = path
         self._fsync = fsync
         flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
-        try:
+        with storage_errors(path):
             self._descriptor = os.open(path, flags, 0o644)
             self.size = os.fstat(self._descriptor).st_size
             if fsync:
                 _sync_folder(path.parent)
-        except OSError as error:
-            raise storage_error(path, error) from None
 
     def append(self, piece: bytes) -> None:
         """Append a piece; remove it again if a part of it cannot be written.
@@ -48,23 +46,21 @@ class AppendedFile:
             RunFolderError: the disk is full or failed.
         """
         rest = memoryview(piece)
-        try:
+        with storage_errors(self.path):
             # Read again: a process that replaced this one may have appended.
             self.size = os.fstat(self._descriptor).st_size
-            while rest:
-                rest = rest[os.write(self._descriptor, rest) :]
-            if self._fsync:
-                os.fsync(self._descriptor)
-        except OSError as error:
-            self._remove_end(len(piece) - len(rest))
-            raise storage_error(self.path, error) from None
+            try:
+                while rest:
+                    rest = rest[os.write(self._descriptor, rest) :]
+                if self._fsync:
+                    os.fsync(self._descriptor)
+            except OSError:
+                with contextlib.suppress(OSError):
+                    end = self.size + len(piece) - len(rest)
+                    if os.fstat(self._descriptor).st_size == end:
+                        self.cut(self.size)
+                raise
         self.size += len(piece)
-
-    def _remove_end(self, written: int) -> None:
-        """Remove the written part of a piece if it is the end of the file."""
-        with contextlib.suppress(OSError):
-            if os.fstat(self._descriptor).st_size == self.size + written:
-                self.cut(self.size)
 
     def cut(self, size: int) -> None:
         """Cut the file to ``size`` bytes; close it if that fails."""
@@ -93,16 +89,17 @@ def replace_durably(path: Path, write: Callable[[Path], object]) -> None:
         RunFolderError: the disk is full or failed; an old file is unchanged.
     """
     temporary = path.with_name(f".{path.name}.new")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write(temporary)
-        _sync(temporary, os.O_RDONLY)
-        temporary.replace(path)
-        _sync_folder(path.parent)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
-        raise storage_error(path, error) from None
+    with storage_errors(path):
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write(temporary)
+            _sync(temporary, os.O_RDONLY)
+            temporary.replace(path)
+            _sync_folder(path.parent)
+        except OSError:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+            raise
 
 
 def replace_text(path: Path, text: str) -> None:
@@ -127,12 +124,21 @@ def _sync(path: Path, flags: int) -> None:
         os.close(descriptor)
 
 
-def storage_error(path: Path, error: OSError) -> RunFolderError:
-    """Return the error to report for a failed write."""
-    why = error.strerror or str(error)
-    if error.errno in _FULL:
-        return RunFolderError(
-            f"{path}: disk full ({why}); all recorded data is intact: free some space "
-            "and resume the run"
-        )
-    return RunFolderError(f"{path}: cannot be written: {why}")
+@contextlib.contextmanager
+def storage_errors(path: Path) -> Iterator[None]:
+    """Raise the errors of a failed write as errors for the user.
+
+    Raises:
+        RunFolderError: the disk is full or failed.
+    """
+    try:
+        yield
+    except OSError as error:
+        why = error.strerror or str(error)
+        message = f"{path}: cannot be written: {why}"
+        if error.errno in _FULL:
+            message = (
+                f"{path}: disk full ({why}); all recorded data is intact: free some "
+                "space and resume the run"
+            )
+        raise RunFolderError(message) from None

@@ -10,9 +10,11 @@ import secrets
 import socket
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Literal, Self
 
-from coordinator.storage.disk import replace_text, storage_error
+import msgspec
+
+from coordinator.storage.disk import replace_text, storage_errors
 from coordinator.storage.hints import command
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.journal import newest_epoch
@@ -26,7 +28,6 @@ STATES: tuple[State, ...] = ("running", "stopped", "finished")
 DETAILS = "run.json"
 EPOCH = "epoch"
 STATE = "state"
-_NONCE = "nonce"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,20 +78,18 @@ class RunFolder:
         self._is_new = details is not None
         if details is None:
             read_details(path)
-        try:
-            if details is not None:
+        else:
+            with storage_errors(path):
                 path.mkdir(parents=True, exist_ok=True)
                 _refuse_foreign(path)
-        except OSError as error:
-            raise storage_error(path, error) from None
         self._lock = FolderLock(path)
         try:
             if details is not None:
                 _refuse_used(path)
-                entries = {**asdict(details), _NONCE: secrets.token_hex(4)}
+                entries = {**asdict(details), "nonce": secrets.token_hex(4)}
                 replace_text(path / DETAILS, json.dumps(entries, indent=1))
             self.details = read_details(path)
-            nonce = _read_entries(path).get(_NONCE, "")
+            nonce = _read_description(path).nonce
             self.name = f"{socket.gethostname()}:{nonce}:{path.resolve()}"
             # The journal's epoch counts, too: with a lower one, as a lost or older
             # file gives, all new records would be void.
@@ -163,36 +162,30 @@ def read_details(path: Path) -> RunDetails:
     Raises:
         RunFolderError: there is no run, or its description is damaged.
     """
-    file = path / DETAILS
-    entries = _read_entries(path)
-    entries.pop(_NONCE, None)  # older runs have none
-    types = {"name": str, "run": int, "seed": int, "document": str}
-    if entries.keys() != types.keys():
-        raise RunFolderError(
-            f"{file}: must have {', '.join(types)}, has {', '.join(entries) or 'none'}"
-        )
-    for key, kind in types.items():
-        if not isinstance(entries[key], kind):
-            raise RunFolderError(
-                f"{file}: {key}: must be {kind.__name__}, got {entries[key]!r}"
-            )
-    return RunDetails(**entries)
+    found = _read_description(path)
+    return RunDetails(found.name, found.run, found.seed, found.document)
 
 
-def _read_entries(path: Path) -> dict[str, Any]:
-    """Return all entries of a run's description file."""
+class _Description(msgspec.Struct, forbid_unknown_fields=True):
+    """Content of ``run.json``; runs of older versions have no nonce."""
+
+    name: str
+    run: int
+    seed: int
+    document: str
+    nonce: str = ""
+
+
+def _read_description(path: Path) -> _Description:
     file = path / DETAILS
     try:
-        entries = json.loads(file.read_text(encoding="utf-8"))
+        return msgspec.json.decode(file.read_bytes(), type=_Description)
     except (FileNotFoundError, NotADirectoryError):
         raise RunFolderError(
             f"{path}: no run is there ({DETAILS} is missing)"
         ) from None
-    except (OSError, ValueError) as error:
+    except (OSError, msgspec.MsgspecError) as error:
         raise RunFolderError(f"{file}: cannot be read: {error}") from None
-    if not isinstance(entries, dict):
-        raise RunFolderError(f"{file}: must be an object, got {entries!r}")
-    return entries
 
 
 def read_state(path: Path) -> State:

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 from typing import Self
 
-from coordinator.storage.disk import storage_error
+from coordinator.storage.disk import storage_errors
 from schema.errors import RunFolderError
 
 LOCK = "lock"
@@ -27,7 +27,7 @@ class FolderLock:
         Raises:
             RunFolderError: another process holds it (named), or the disk fails.
         """
-        try:
+        with storage_errors(folder):
             folder.mkdir(parents=True, exist_ok=True)
             flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC
             self._descriptor = os.open(folder / LOCK, flags, 0o644)
@@ -40,8 +40,6 @@ class FolderLock:
                     f"{folder}: in use by {holder}; stop that process first, or wait "
                     "for it"
                 ) from None
-        except OSError as error:
-            raise storage_error(folder, error) from None
         # A full disk must not refuse a coordinator: only messages show the name.
         with contextlib.suppress(OSError):
             os.ftruncate(self._descriptor, 0)

@@ -8,7 +8,7 @@ import contextlib
 from pathlib import Path
 
 from coordinator.islands.events import Append, Record
-from coordinator.storage.disk import storage_error
+from coordinator.storage.disk import storage_errors
 from coordinator.storage.folder import RunDetails
 from coordinator.storage.table_file import TableFile
 from schema.tables.columns import TABLES
@@ -35,16 +35,16 @@ class Recorder:
             RunFolderError: a segment has another version, or the disk fails.
         """
         self._folder = folder
-        paths = {
-            name: parquet_path(folder, details.name, details.run, name)
-            for name in TABLES
-        }
-        try:
+        with storage_errors(folder):
             (folder / SEGMENTS).mkdir(exist_ok=True)
-        except OSError as error:
-            raise storage_error(folder, error) from None
         self._tables = {
-            name: TableFile(folder, name, paths[name], fsync=fsync) for name in TABLES
+            name: TableFile(
+                folder,
+                name,
+                parquet_path(folder, details.name, details.run, name),
+                fsync=fsync,
+            )
+            for name in TABLES
         }
 
     def write(self, record: Record) -> None:
@@ -105,15 +105,13 @@ class Recorder:
         for table in self._tables.values():
             table.finish()
         self.close()
-        try:
+        with storage_errors(self._folder / SEGMENTS):
             for name in TABLES:
                 for _, path in segments_of(self._folder, name):
                     path.unlink()
-            # Fails if the folder holds foreign files; they stay.
-            with contextlib.suppress(OSError):
-                (self._folder / SEGMENTS).rmdir()
-        except OSError as error:
-            raise storage_error(self._folder / SEGMENTS, error) from None
+        # Fails if the folder holds foreign files; they stay.
+        with contextlib.suppress(OSError):
+            (self._folder / SEGMENTS).rmdir()
 
     def close(self) -> None:
         """Close all files; buffered rows are dropped, a replay adds them again."""

@@ -10,32 +10,20 @@ import re
 from hashlib import sha256
 from pathlib import Path
 
-from coordinator.storage.disk import replace_durably, storage_error
+from coordinator.storage.disk import replace_durably, storage_errors
 from schema.errors import RunFolderError
 
 FOLDER = "snapshots"
 
-_NAME = re.compile(r"island-(\d+)-(\d+)\.bin")
+_NAME = re.compile(r"island-\d+-(\d+)\.bin")
 
 
 class Snapshots:
     """Snapshots of a run folder that this process has locked."""
 
     def __init__(self, folder: Path) -> None:
-        """Find the snapshots of a run folder.
-
-        Raises:
-            RunFolderError: the disk fails.
-        """
+        """Open the snapshots of a run folder."""
         self._folder = folder / FOLDER
-        self._known: set[tuple[int, int]] = set()
-        try:
-            names = [path.name for path in self._folder.glob("island-*.bin")]
-        except OSError as error:
-            raise storage_error(self._folder, error) from None
-        for name in names:
-            if match := _NAME.fullmatch(name):
-                self._known.add((int(match[1]), int(match[2])))
 
     def has(self, shard: int, step: int, digest: bytes) -> bool:
         """Return whether there is a snapshot of a shard's step with this digest.
@@ -43,7 +31,7 @@ class Snapshots:
         Raises:
             RunFolderError: it cannot be read.
         """
-        if (shard, step) not in self._known:
+        if not self._path(shard, step).exists():
             return False
         return sha256(self.read(shard, step)).digest() == digest
 
@@ -54,7 +42,6 @@ class Snapshots:
             RunFolderError: the disk is full or failed.
         """
         replace_durably(self._path(shard, step), lambda path: path.write_bytes(data))
-        self._known.add((shard, step))
 
     def read(self, shard: int, step: int) -> bytes:
         """Return the state of a shard at a step.
@@ -77,14 +64,11 @@ class Snapshots:
         Raises:
             RunFolderError: the disk fails.
         """
-        for known in sorted(self._known):
-            if known[0] == shard and known[1] < step:
-                path = self._path(*known)
-                try:
+        with storage_errors(self._folder):
+            for path in self._folder.glob(f"island-{shard}-*.bin"):
+                match = _NAME.fullmatch(path.name)
+                if match and int(match[1]) < step:
                     path.unlink(missing_ok=True)
-                except OSError as error:
-                    raise storage_error(path, error) from None
-                self._known.discard(known)
 
     def _path(self, shard: int, step: int) -> Path:
         return self._folder / f"island-{shard}-{step}.bin"

@@ -8,7 +8,7 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet
 
-from coordinator.storage.disk import AppendedFile, replace_durably, storage_error
+from coordinator.storage.disk import AppendedFile, replace_durably, storage_errors
 from schema.errors import MalformedMessage, RunFolderError
 from schema.tables.columns import TABLES, read_columns
 from schema.tables.files import (
@@ -39,7 +39,6 @@ class TableFile:
         self._parquet = parquet
         self._fsync = fsync
         self._schema = TABLES[name]
-        self._columns = self._schema.names[1:]
         self._segment: AppendedFile | None = None
         self._seen = 0
         self._ahead = 0
@@ -48,11 +47,9 @@ class TableFile:
             self._stored: int = read_table(folder, name).num_rows
             return
         self._stored, unused = stored_rows(folder, name)
-        try:
+        with storage_errors(folder):
             for _, path in unused:
                 path.unlink()
-        except OSError as error:
-            raise storage_error(folder, error) from None
 
     def take(self, row: Mapping[str, Any]) -> None:
         """Add the next row, unless it is already on disk."""
@@ -153,11 +150,11 @@ class TableFile:
     def _batch(self) -> pa.RecordBatch:
         """Return the buffered rows as one batch with record numbers."""
         rows = self.buffered
-        numbers = range(self._stored, self._stored + len(rows))
-        arrays = [pa.array(numbers, self._schema.field(0).type)]
-        for index, column in enumerate(self._columns, start=1):
-            kind = self._schema.field(index).type
-            arrays.append(pa.array([row[column] for row in rows], kind))
+        first, *others = self._schema
+        arrays = [
+            pa.array(range(self._stored, self._stored + len(rows)), first.type),
+            *(pa.array([row[each.name] for row in rows], each.type) for each in others),
+        ]
         return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
 
 
@@ -168,7 +165,7 @@ def _remove_rows(folder: Path, table: str, rows: int) -> None:
         RunFolderError: it does not start a batch, or the disk fails.
     """
     seen = 0
-    try:
+    with storage_errors(folder / SEGMENTS):
         for _, path in segments_of(folder, table):
             size = 0
             for end, numbers in batch_ends(path, TABLES[table]):
@@ -178,8 +175,6 @@ def _remove_rows(folder: Path, table: str, rows: int) -> None:
                 os.truncate(path, size)
             else:
                 path.unlink()
-    except OSError as error:
-        raise storage_error(folder / SEGMENTS, error) from None
     if seen != rows:
         raise RunFolderError(
             f"{folder / SEGMENTS}: {table}: row {rows} must start a batch, got {seen}"

@@ -1,4 +1,4 @@
-"""Whatever a user gets wrong is told in one line, with a status that is not 0."""
+"""A user's errors are reported in one line, with an exit code other than 0."""
 
 import os
 import shutil
@@ -57,7 +57,7 @@ def test_restriction_that_no_robot_meets_ends_the_run_with_its_reason(
     assert "space" in _refused(stage, "run", _document(stage, text), *words)
 
 
-def test_a_seed_that_no_message_can_hold(stage: Stage) -> None:
+def test_a_seed_above_64_bits_is_refused(stage: Stage) -> None:
     words = ("scenario1", "--seed", str(2**64), "--out", "x", "--quiet")
     assert "--seed: must be < 2^64" in _refused(stage, "run", *words)
 
@@ -123,7 +123,7 @@ def test_worker_without_a_coordinator_says_so_and_keeps_trying(
 
 
 def _fill_the_disk(stage: Stage, *words: str, kilobytes: int) -> None:
-    """Run on a small disk until it is full; what stands there becomes ``moved``."""
+    """Run on a small disk until it is full; copy the folder to ``moved``."""
     disk = stage.folder / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(disk)]
@@ -162,7 +162,7 @@ def test_full_disk_loses_nothing_of_an_arena(
     assert "equal" in said
 
 
-def test_a_reader_that_leaves_early_is_no_error_to_tell_of(stage: Stage) -> None:
+def test_a_reader_that_closes_the_pipe_is_no_error(stage: Stage) -> None:
     stage.run("robot", "random", "some.yaml")
     process = stage.start("robot", "show", "some.yaml")
     process.stdout.close()

@@ -50,7 +50,7 @@ def _words(out: str, *more: str) -> tuple[str, ...]:
 
 @pytest.fixture(scope="session")
 def whole(once: Any) -> Path:  # noqa: ANN401 - the fixture
-    """Return a campaign that ran in one process, to which nothing happened."""
+    """Return an undisturbed campaign that ran in one process."""
 
     def make(stage: Stage) -> None:
         _write(stage.folder)
@@ -72,7 +72,7 @@ def _sizes(folder: Path) -> int:
 
 
 def _make_alone(stage: Stage, path: Path, name: str, run: int) -> None:
-    """Make a run by itself, before campaigns and environments were thought of."""
+    """Make a single run as an older version without environments made it."""
     text = experiment_text(read_experiment(str(stage.folder / f"{name}.toml")))
     document = json.loads(text)
     del document["environment"]
@@ -81,7 +81,7 @@ def _make_alone(stage: Stage, path: Path, name: str, run: int) -> None:
     stage.run("resume", str(path), "--in-process", "--quiet")
 
 
-def test_a_killed_campaign_goes_on_and_takes_what_is_there(
+def test_a_killed_campaign_resumes_and_adopts_existing_runs(
     stage: Stage, whole: Path, until: Until
 ) -> None:
     _write(stage.folder)
@@ -106,7 +106,7 @@ def test_a_killed_campaign_goes_on_and_takes_what_is_there(
     assert "4 of 4 runs are already finished" in again
 
 
-def test_ctrl_c_stops_all_runs_and_says_how_to_go_on(
+def test_ctrl_c_stops_all_runs_and_says_how_to_resume(
     stage: Stage, whole: Path, until: Until
 ) -> None:
     _write(stage.folder)
@@ -148,7 +148,7 @@ def test_two_coordinators_share_the_workers_of_a_hub(stage: Stage, whole: Path) 
             assert compare(whole / run, stage.folder / name / run) == []
 
 
-def test_status_of_all_who_share_a_hub(stage: Stage, until: Until) -> None:
+def test_status_of_all_coordinators_of_a_hub(stage: Stage, until: Until) -> None:
     _write(stage.folder)
     first = stage.start("coordinator", *_words("one")[1:], "--listen", HUB)
     until((stage.folder / "one" / "address").exists, "the first one listens")
@@ -181,7 +181,7 @@ def test_status_of_all_who_share_a_hub(stage: Stage, until: Until) -> None:
         (("run", "scenario1", "--connect", "tcp/127.0.0.1:9"), "no hub"),
     ],
 )
-def test_complaints_are_one_line(
+def test_errors_are_one_line(
     stage: Stage, words: tuple[str, ...], complaint: str
 ) -> None:
     said = stage.run(*words, code=2)

@@ -86,7 +86,7 @@ def test_experiments_of_the_experiments_page(tmp_path: Path) -> None:
             parse_experiment(document, str(tmp_path / page.name))
 
 
-def test_the_keys_of_an_arena_are_all_told_with_their_defaults() -> None:
+def test_the_arenas_page_lists_all_keys_with_their_defaults() -> None:
     page = (TOP / "docs" / "arenas.md").read_text()
     told = re.findall(r"^\| `(\w+)` \| (\S+) \|", page, re.MULTILINE)
     assert told == [

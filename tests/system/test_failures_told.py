@@ -1,4 +1,4 @@
-"""What did not come off is told: by the summary, by status, and before a resume."""
+"""Failures are reported by the summary, by status, and before a resume."""
 
 import json
 import shutil
@@ -76,7 +76,7 @@ def _run(stage: Stage, *words: str, code: int = 0) -> str:
     return said
 
 
-def test_a_run_that_judged_nobody_names_no_best_robot(stage: Stage) -> None:
+def test_a_run_without_any_fitness_names_no_best_robot(stage: Stage) -> None:
     source = _write(stage, "blind", "judge:none")
     said = _run(stage, source, "--out", "a b", code=1)
     assert "12 births; no robot of the last population has a fitness" in said
@@ -88,7 +88,7 @@ def test_a_run_that_judged_nobody_names_no_best_robot(stage: Stage) -> None:
     assert "best -" in stage.run("status", "a b")
 
 
-def test_a_run_tells_how_many_evaluations_failed_and_why(stage: Stage) -> None:
+def test_a_run_reports_failed_evaluations_and_the_reason(stage: Stage) -> None:
     said = _run(stage, _write(stage, "dim", "judge:few"), "--out", "a")
     failed = [line for line in said.splitlines() if "evaluations failed" in line]
     assert len(failed) == 1
@@ -98,7 +98,7 @@ def test_a_run_tells_how_many_evaluations_failed_and_why(stage: Stage) -> None:
     assert (stage.folder / "a" / "best.yaml").exists()
 
 
-def test_a_campaign_tells_which_of_its_runs_judged_nobody(stage: Stage) -> None:
+def test_a_campaign_reports_runs_without_any_fitness(stage: Stage) -> None:
     sources = [
         _write(stage, "blind", "judge:none"),
         _write(stage, "seeing", "worker.fitness:thesis"),
@@ -131,10 +131,10 @@ def made(once: Any) -> Path:  # noqa: ANN401 - the fixture
     return folder / "all"
 
 
-def test_a_damaged_run_hides_none_beside_it(stage: Stage, made: Path) -> None:
+def test_a_damaged_run_does_not_hide_others(stage: Stage, made: Path) -> None:
     shutil.copytree(made, stage.folder / "all")
     twice = stage.folder / "all" / "twice"
-    told = "seeing-0/run.json: must have name, run, seed, document, has none"
+    told = "seeing-0/run.json: cannot be read: Object missing required field `name`"
     (twice / "seeing-0" / "run.json").write_text("{}")
     said = stage.run("status", "all", code=1)
     assert f"damaged: all/twice/{told}" in said
@@ -157,7 +157,7 @@ def test_a_damaged_run_hides_none_beside_it(stage: Stage, made: Path) -> None:
     ],
     ids=["state", "births.parquet", "no tables"],
 )
-def test_what_is_damaged_or_lost_of_a_run_is_told(
+def test_damaged_and_missing_files_are_reported(
     tmp_path: Path, made: Path, file: str, content: str | None, told: str
 ) -> None:
     run = tmp_path / "run"
@@ -172,7 +172,7 @@ def test_what_is_damaged_or_lost_of_a_run_is_told(
         folder_status(run)
 
 
-def test_a_narrow_terminal_cuts_nothing_of_how_far_runs_are(
+def test_a_narrow_terminal_does_not_cut_the_status(
     made: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "40")
@@ -185,7 +185,7 @@ def test_a_narrow_terminal_cuts_nothing_of_how_far_runs_are(
         assert line.split()[1:6] == ["finished", "12", "of", "12", "best"]
 
 
-def test_tables_that_are_gone_are_written_anew(stage: Stage, made: Path) -> None:
+def test_missing_tables_are_written_again(stage: Stage, made: Path) -> None:
     run = stage.folder / "run"
     shutil.copytree(made / "twice" / "seeing-0", run)
     words = ("resume", "run", "--in-process", "--quiet")
@@ -198,7 +198,7 @@ def test_tables_that_are_gone_are_written_anew(stage: Stage, made: Path) -> None
 
 
 @pytest.mark.parametrize("tables", ["tables", "no tables"])
-def test_a_run_whose_journal_is_lost_does_not_begin_anew(
+def test_a_run_without_its_journal_does_not_start_again(
     stage: Stage, made: Path, tables: str
 ) -> None:
     run = stage.folder / "run"
@@ -216,8 +216,8 @@ def test_a_run_whose_journal_is_lost_does_not_begin_anew(
     assert told in stage.run(*words, code=2)
 
 
-def test_a_refusal_touches_nothing(stage: Stage, made: Path) -> None:
-    """Rows behind a gap come again from the journal, which has to be a sound one."""
+def test_a_refusal_changes_nothing(stage: Stage, made: Path) -> None:
+    """Rows behind a gap are written again only from an intact journal."""
     run = stage.folder / "run"
     shutil.copytree(made / "twice" / "seeing-0", run)
     shutil.rmtree(run / "tables")
@@ -236,7 +236,7 @@ def test_a_refusal_touches_nothing(stage: Stage, made: Path) -> None:
     assert [path.name for path in (run / "segments").iterdir()] == ["births-001.arrows"]
 
 
-def test_an_arenas_tables_are_promised_only_with_its_poses(tmp_path: Path) -> None:
+def test_tables_of_an_arena_are_rewritable_only_with_its_poses(tmp_path: Path) -> None:
     experiment = read_experiment("scenario3")
     details = RunDetails("scenario3", 0, 1, experiment_text(experiment))
     with RunFolder(tmp_path, details), Journal.open(tmp_path):
@@ -266,7 +266,7 @@ def test_status_follows_a_link_to_a_run(
     assert "1 of 1 runs finished, 12 of 12 births" in said
 
 
-def test_an_arena_that_judged_nobody_says_why(stage: Stage) -> None:
+def test_an_arena_without_any_fitness_reports_the_reason(stage: Stage) -> None:
     (stage.folder / "judge.py").write_text(FITNESS)
     text = ARENA.format(fitness="judge:none")
     (stage.folder / "arena.toml").write_text(text)
@@ -278,7 +278,7 @@ def test_an_arena_that_judged_nobody_says_why(stage: Stage) -> None:
 
 
 @pytest.mark.parametrize("repeats", [(), ("--repeats", "2")])
-def test_a_wrong_address_leaves_the_folder_to_the_right_one(
+def test_a_wrong_address_leaves_the_folder_usable(
     stage: Stage, repeats: tuple[str, ...]
 ) -> None:
     source = _write(stage, "seeing", "worker.fitness:thesis")
@@ -288,7 +288,7 @@ def test_a_wrong_address_leaves_the_folder_to_the_right_one(
     stage.run(*words, "--in-process")
 
 
-def test_a_folder_with_something_else_gets_no_lock(stage: Stage) -> None:
+def test_a_folder_with_foreign_files_gets_no_lock(stage: Stage) -> None:
     (stage.folder / "mine").mkdir()
     (stage.folder / "mine" / "thesis.tex").write_text("years of work")
     source = _write(stage, "seeing", "worker.fitness:thesis")
@@ -297,9 +297,7 @@ def test_a_folder_with_something_else_gets_no_lock(stage: Stage) -> None:
     assert [path.name for path in (stage.folder / "mine").iterdir()] == ["thesis.tex"]
 
 
-def test_a_folder_that_is_removed_is_said_to_be_gone(
-    stage: Stage, until: Until
-) -> None:
+def test_a_removed_folder_is_reported(stage: Stage, until: Until) -> None:
     words = ("scenario1", "--births", "3000", "--workers", "1", "--out", "gone")
     process = stage.start("run", *words, "--quiet")
     journal = stage.folder / "gone" / "journal.bin"

@@ -1,4 +1,4 @@
-"""What a user meets whose terminal, or what stands in its place, does odd things."""
+"""Behaviour with interrupted terminals, closed pipes and full devices."""
 
 import os
 import signal
@@ -35,7 +35,7 @@ def _start(*words: str) -> subprocess.Popen[str]:
 def test_ctrl_c_pressed_twice_while_processes_start(
     stage: Stage, until: Callable[[Callable[[], bool], str], None], awaited: str
 ) -> None:
-    """It reaches the whole group: they import yet, or do not wait for it yet."""
+    """The signal reaches the whole group, which is still importing."""
     run = stage.folder / "run"
     process = _start("run", "scenario1", "--out", str(run))
     until((run / awaited).exists, awaited)
@@ -51,7 +51,7 @@ def test_ctrl_c_pressed_twice_while_processes_start(
 def test_ctrl_c_while_an_engine_is_loaded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It makes an import fail that knows nothing of it."""
+    """The engine turns the interrupt into an ImportError."""
     (tmp_path / "engine_of_a_test.py").write_text(
         "try:\n    raise KeyboardInterrupt\n"
         "except KeyboardInterrupt as error:\n    raise ImportError('no') from error\n"
@@ -93,7 +93,7 @@ def test_output_on_a_full_device(words: str, unbuffered: str) -> None:
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("words", ["--help", "run --help"])
-def test_nothing_is_said_to_who_reads_no_more(words: str, unbuffered: str) -> None:
+def test_a_closed_pipe_ends_the_command_quietly(words: str, unbuffered: str) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     try:
@@ -102,7 +102,7 @@ def test_nothing_is_said_to_who_reads_no_more(words: str, unbuffered: str) -> No
         os.close(writer)
 
 
-def test_an_error_that_is_not_of_the_output_is_none_of_it(
+def test_other_errors_are_not_reported_as_output_errors(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(revolve, "_overview", lambda: Path("/nowhere").read_text())
@@ -131,7 +131,7 @@ def _shown(*words: str) -> str:
     return shown.decode()
 
 
-def test_benches_show_how_far_they_are(undisturbed: Path) -> None:
+def test_benchmarks_show_progress(undisturbed: Path) -> None:
     assert "100%" in _shown("bench", "evaluate", "--robots", "1")
     shown = _shown("bench", "fidelity", str(undisturbed), "--per-third", "1")
     assert "robots drawn" in shown

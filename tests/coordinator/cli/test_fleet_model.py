@@ -1,4 +1,4 @@
-"""A simulated fleet: what its figures must be where they can be told beforehand."""
+"""Simulated fleets whose results are known in advance."""
 
 from dataclasses import replace
 
@@ -9,13 +9,13 @@ from coordinator.cli.fleet_model import FleetModel, Setting, most_workers
 FREE = Setting(workers=20, evaluation_s=1.0, coordinator_s=1e-9, latency_s=0.0)
 
 
-def test_a_coordinator_that_costs_nothing_keeps_all_busy() -> None:
+def test_a_coordinator_without_cost_keeps_all_workers_busy() -> None:
     outcome = FleetModel(FREE).run()
     assert outcome.utilisation == pytest.approx(1.0, abs=0.02)
     assert outcome.births_per_s == pytest.approx(20.0, rel=0.02)
 
 
-def test_a_coordinator_at_its_limit_sets_the_pace() -> None:
+def test_a_saturated_coordinator_limits_the_rate() -> None:
     """20 workers could do 20 a second; the coordinator handles 10."""
     outcome = FleetModel(replace(FREE, coordinator_s=0.1)).run()
     assert outcome.coordinator == pytest.approx(1.0, abs=0.001)
@@ -23,8 +23,8 @@ def test_a_coordinator_at_its_limit_sets_the_pace() -> None:
     assert outcome.utilisation == pytest.approx(0.5, rel=0.03)
 
 
-def test_waiting_for_a_job_costs_the_way_there_and_back() -> None:
-    """With a job at hand, 0.8 s does not show beside 1 s, but beside 0.1 s it does."""
+def test_waiting_for_a_job_costs_a_round_trip() -> None:
+    """A round trip of 0.8 s hides behind a queued job of 1 s, but not of 0.1 s."""
     still = replace(FREE, workers=1, credits=2, spread=1e-9, latency_s=0.4)
     assert FleetModel(still).run().utilisation == pytest.approx(1.0, abs=0.01)
     quick = replace(still, evaluation_s=0.1)
@@ -32,7 +32,7 @@ def test_waiting_for_a_job_costs_the_way_there_and_back() -> None:
     assert FleetModel(quick).run().utilisation == pytest.approx(0.2 / 0.9, rel=0.02)
 
 
-def test_what_lost_workers_did_is_lost() -> None:
+def test_work_of_lost_workers_is_lost() -> None:
     """A loss each 0.5 s, of 20 workers with 1 s: half an evaluation each time."""
     outcome = FleetModel(replace(FREE, losses_per_s=2.0)).run()
     assert outcome.lost > 100

@@ -1,4 +1,4 @@
-"""``revolve robot random``: founders on paper."""
+"""``revolve robot random``: random robots in files."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from coordinator.cli.robot import main
 from schema.formats.files import read_robot
 
 
-def test_files_hold_different_robots_and_the_same_ones_again(tmp_path: Path) -> None:
+def test_random_robots_differ_and_repeat_with_the_seed(tmp_path: Path) -> None:
     words = ["robot random", str(tmp_path / "r.yaml"), "--seed", "7", "--count", "2"]
     assert main(words) == 0
     robots = [read_robot(tmp_path / f"r-{number}.yaml") for number in range(2)]
@@ -19,7 +19,7 @@ def test_files_hold_different_robots_and_the_same_ones_again(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize(("flag", "value"), [("--seed", "-1"), ("--count", "1.5")])
-def test_numbers_that_cannot_be_are_refused(
+def test_invalid_numbers_are_refused(
     flag: str, value: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     with pytest.raises(SystemExit) as end:

@@ -1,4 +1,4 @@
-"""What a campaign is, how it is written down, and which runs are taken as they are."""
+"""Campaigns: their description, their folder, and which existing runs they adopt."""
 
 import shlex
 from dataclasses import replace as changed
@@ -30,7 +30,7 @@ FIRST, SECOND = read_experiment("scenario1"), read_experiment("no-selection")
 CAMPAIGN = Campaign((FIRST, SECOND), 3, 5)
 
 
-def test_all_first_repeats_come_first(tmp_path: Path) -> None:
+def test_runs_are_ordered_repeat_by_repeat(tmp_path: Path) -> None:
     runs = CAMPAIGN.runs(tmp_path)
     assert [path.name for path, _ in runs] == [
         "scenario1-0", "no-selection-0", "scenario1-1", "no-selection-1",
@@ -43,7 +43,7 @@ def test_all_first_repeats_come_first(tmp_path: Path) -> None:
     assert {details.seed for _, details in runs} == {5}
 
 
-def test_the_thesis_is_its_five_experiments() -> None:
+def test_the_thesis_campaign_has_five_experiments() -> None:
     names = [experiment.name for experiment in read_experiments(["thesis"])]
     assert names == list(shipped_campaigns()["thesis"])
     assert set(names) == {
@@ -51,7 +51,7 @@ def test_the_thesis_is_its_five_experiments() -> None:
     }  # fmt: skip
 
 
-def test_a_campaign_comes_back_from_its_folder(tmp_path: Path) -> None:
+def test_a_campaign_is_read_as_it_was_written(tmp_path: Path) -> None:
     odd = replace(FIRST, name="it's \"odd\" ''' \\")
     campaign = Campaign((odd, replace(SECOND, births=77)), 3, 5)
     assert not is_campaign(tmp_path)
@@ -101,11 +101,11 @@ def _made(folder: Path, details: RunDetails) -> Path:
         return folder / "run"
 
 
-def test_a_run_made_alone_is_taken(tmp_path: Path) -> None:
+def test_a_separately_made_run_is_adopted(tmp_path: Path) -> None:
     check_adopted(tmp_path, WANTED, WANTED)
 
 
-def test_a_run_with_births_of_its_own_is_taken_as_it_is(tmp_path: Path) -> None:
+def test_a_run_with_another_number_of_births_is_adopted(tmp_path: Path) -> None:
     short = changed(WANTED, document=experiment_text(replace(FIRST, births=600)))
     check_adopted(tmp_path, short, WANTED)
 
@@ -129,7 +129,7 @@ def test_another_run_is_refused(tmp_path: Path, other: RunDetails) -> None:
         check_adopted(tmp_path, other, WANTED)
 
 
-def test_a_rate_is_that_of_the_last_seconds() -> None:
+def test_a_rate_covers_the_last_seconds() -> None:
     meter = RateMeter()
     assert meter.per_s == 0.0
     meter.note(0.0, 1000)
@@ -161,7 +161,7 @@ def test_a_command_can_be_pasted() -> None:
     assert shlex.split(said) == ["revolve", "resume", "runs/it's mine"]
 
 
-def test_the_best_of_few_islands_stand_side_by_side() -> None:
+def test_the_best_fitness_of_few_islands_is_shown_per_island() -> None:
     islands = (IslandStatus(1, 9, 0.25, 3), IslandStatus(0, 9, None, 0))
     run = RunStatus("a", "a", 0, "running", islands=islands)
     assert best_of(run) == "best 0.250 -"

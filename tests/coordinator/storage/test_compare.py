@@ -1,4 +1,4 @@
-"""Two runs side by side, finished or not."""
+"""Comparison of two runs, finished or not."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -47,9 +47,7 @@ def test_equal_runs_have_no_difference(
     assert compare(second, first) == []
 
 
-def test_who_evaluated_and_where_is_no_difference(
-    tmp_path: Path, make_records: Make
-) -> None:
+def test_provenance_is_no_difference(tmp_path: Path, make_records: Make) -> None:
     first = written(tmp_path / "a", make_records(12))
     second = written(tmp_path / "b", make_records(12, "worker-9", "arm"))
     assert compare(first, second) == []

@@ -1,4 +1,4 @@
-"""What two runs ran: documents of two versions, platforms of arenas."""
+"""Comparison of two runs: documents of two versions, platforms of arenas."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -33,7 +33,7 @@ def written(path: Path, birth: Record, **row: Any) -> Path:  # noqa: ANN401 - an
 
 
 def older(experiment: Experiment) -> str:
-    """Return a document from before some keys, whose defaults it means."""
+    """Return the document of an older version that lacks some keys."""
     document = msgspec.json.decode(experiment_text(experiment))
     del document["simulation"]["evaluation_s"]
     del document["selection"]["culling"]
@@ -62,7 +62,7 @@ def test_another_experiment_is_a_difference(
     assert line.startswith("runs: first at record 0, column document:")
 
 
-def test_where_nothing_is_evaluated_the_platforms_are_the_runs_(
+def test_platforms_of_arenas_are_compared(
     tmp_path: Path,
     make_records: Any,  # noqa: ANN401 - the fixture
 ) -> None:

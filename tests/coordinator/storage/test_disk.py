@@ -1,4 +1,4 @@
-"""Writing where there is no room left."""
+"""Durable files on a full disk."""
 
 import errno
 import os
@@ -19,7 +19,7 @@ PAGE = 4096
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """Mount a disk of 64 KiB; skip where that takes rights that we lack."""
+    """Mount a disk of 64 KiB; skip without the permission."""
     mount = shutil.which("mount")
     command = ["mount", "-t", "tmpfs", "-o", f"size={ROOM}", "tmpfs", str(tmp_path)]
     if (
@@ -31,7 +31,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", str(tmp_path)], check=True)
 
 
-def test_a_piece_for_which_there_is_no_room_leaves_nothing(small_disk: Path) -> None:
+def test_an_append_to_a_full_disk_leaves_nothing(small_disk: Path) -> None:
     file = AppendedFile(small_disk / "f", fsync=True)
     piece = b"x" * 10_000
     taken = 0
@@ -48,7 +48,7 @@ def test_a_piece_for_which_there_is_no_room_leaves_nothing(small_disk: Path) -> 
     file.close()
 
 
-def test_a_replacement_for_which_there_is_no_room_leaves_the_old(
+def test_a_replacement_on_a_full_disk_leaves_the_old_file(
     small_disk: Path,
 ) -> None:
     path = small_disk / "f"
@@ -60,7 +60,7 @@ def test_a_replacement_for_which_there_is_no_room_leaves_the_old(
     ]
 
 
-def test_a_closed_file_takes_nothing(tmp_path: Path) -> None:
+def test_appending_to_a_closed_file_fails(tmp_path: Path) -> None:
     file = AppendedFile(tmp_path / "f")
     file.append(b"one")
     file.close()
@@ -70,12 +70,12 @@ def test_a_closed_file_takes_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("room", [0, 3])
-def test_a_failure_takes_back_nothing_that_another_wrote(
+def test_a_failed_append_keeps_what_another_process_wrote_before(
     tmp_path: Path,
     full_beyond: Callable[[int], AbstractContextManager[None]],
     room: int,
 ) -> None:
-    """A coordinator that slept through its replacement, on a full disk."""
+    """A replaced coordinator appends to a full disk."""
     old = AppendedFile(tmp_path / "f")
     old.append(b"old")
     new = AppendedFile(tmp_path / "f")
@@ -88,7 +88,7 @@ def test_a_failure_takes_back_nothing_that_another_wrote(
         file.close()
 
 
-def test_a_failure_behind_which_another_wrote_takes_back_nothing(
+def test_a_failed_append_keeps_what_another_process_wrote_after(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     old = AppendedFile(tmp_path / "f", fsync=True)
@@ -115,6 +115,6 @@ def test_a_file_is_continued_at_its_end(tmp_path: Path) -> None:
     assert (tmp_path / "f").read_bytes() == b"one two"
 
 
-def test_a_missing_folder_is_an_error_in_words(tmp_path: Path) -> None:
+def test_a_missing_folder_is_a_run_folder_error(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="No such file"):
         AppendedFile(tmp_path / "none" / "f")

@@ -1,4 +1,4 @@
-"""Who may run in a folder, and how often it was opened."""
+"""Run folders: lock, description, epoch, state."""
 
 import fcntl
 import json
@@ -37,7 +37,7 @@ with RunFolder(Path(sys.argv[1])):
 LOOKED_AT_S = 0.05
 
 
-def test_what_is_run_there_comes_back(tmp_path: Path) -> None:
+def test_a_description_is_read_as_it_was_written(tmp_path: Path) -> None:
     path = tmp_path / "deep" / "run"
     with RunFolder(path, DETAILS) as folder:
         assert folder.details == DETAILS
@@ -54,8 +54,8 @@ def test_the_epoch_grows_with_every_opening(tmp_path: Path) -> None:
     assert epochs == [2, 3, 4]
 
 
-def test_a_folder_that_is_begun_anew_is_another_run(tmp_path: Path) -> None:
-    """Workers that outlive a run would take the new one for an old incarnation."""
+def test_a_new_run_in_a_removed_folder_has_another_name(tmp_path: Path) -> None:
+    """Workers that outlive a run must not mistake the new run for it."""
     path = tmp_path / "run"
     with RunFolder(path, DETAILS) as first:
         assert first.name.endswith(f":{path}")
@@ -67,7 +67,7 @@ def test_a_folder_that_is_begun_anew_is_another_run(tmp_path: Path) -> None:
         assert anew.name != first.name
 
 
-def test_a_run_of_before_names_were_unique_is_still_read(tmp_path: Path) -> None:
+def test_a_description_without_nonce_is_read(tmp_path: Path) -> None:
     RunFolder(tmp_path, DETAILS).close()
     entries = json.loads((tmp_path / "run.json").read_text())
     del entries["nonce"]
@@ -80,7 +80,7 @@ def test_a_run_of_before_names_were_unique_is_still_read(tmp_path: Path) -> None
 def test_a_lost_epoch_voids_nothing_that_is_written_later(
     tmp_path: Path, left: str | None
 ) -> None:
-    """The file is gone, or an older one was put in its place."""
+    """The file is missing, or an older one has replaced it."""
     path = tmp_path / "run"
     RunFolder(path, DETAILS).close()
     events = [VettingFailed(BirthId(0, number), 0, "refused") for number in range(5)]
@@ -109,10 +109,10 @@ def test_a_used_folder_is_refused(tmp_path: Path) -> None:
     assert RunFolder(tmp_path / "run").epoch == 2
 
 
-def test_only_who_described_a_run_and_did_not_begin_it_forgets_it(
+def test_only_a_new_run_that_has_not_started_is_forgotten(
     tmp_path: Path,
 ) -> None:
-    """One that was archived without its epoch and journal is still described."""
+    """A run that was archived without epoch and journal keeps its description."""
     path = tmp_path / "run"
     with RunFolder(path, DETAILS) as folder:
         folder.forget()
@@ -128,7 +128,7 @@ def test_only_who_described_a_run_and_did_not_begin_it_forgets_it(
     assert read_details(other) == DETAILS
 
 
-def test_a_folder_with_something_else_is_refused_and_left_alone(
+def test_a_folder_with_foreign_files_is_refused_and_unchanged(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
@@ -138,7 +138,7 @@ def test_a_folder_with_something_else_is_refused_and_left_alone(
 
 
 @pytest.mark.parametrize("leftover", ["lock", ".run.json.new"])
-def test_a_kill_while_a_folder_was_taken_does_not_spoil_it(
+def test_a_folder_is_usable_after_a_kill_while_it_was_created(
     tmp_path: Path, leftover: str
 ) -> None:
     (tmp_path / leftover).write_text("{")
@@ -147,7 +147,7 @@ def test_a_kill_while_a_folder_was_taken_does_not_spoil_it(
 
 
 @pytest.mark.parametrize("details", [None, DETAILS])
-def test_a_second_coordinator_is_refused_with_the_first_ones_name(
+def test_a_second_coordinator_is_refused_and_told_the_holder(
     tmp_path: Path, details: RunDetails | None
 ) -> None:
     path = tmp_path / "run"
@@ -172,7 +172,7 @@ def test_a_second_coordinator_is_refused_with_the_first_ones_name(
             assert folder.epoch == 3
 
 
-def test_who_looks_at_a_folder_is_no_reason_to_refuse_it(tmp_path: Path) -> None:
+def test_reading_the_holder_does_not_refuse_a_coordinator(tmp_path: Path) -> None:
     path = tmp_path / "run"
     RunFolder(path, DETAILS).close()
     with (path / "lock").open() as lock:
@@ -198,7 +198,7 @@ def test_a_child_process_does_not_keep_the_lock(tmp_path: Path) -> None:
             assert again.epoch == 2
 
 
-def test_a_coordinator_that_slept_through_its_replacement_finds_out(
+def test_a_replaced_coordinator_notices_it(
     tmp_path: Path,
 ) -> None:
     with RunFolder(tmp_path / "run", DETAILS) as old:
@@ -222,8 +222,11 @@ def test_a_folder_without_a_run_is_refused_and_nothing_is_made(tmp_path: Path) -
     ("text", "story"),
     [
         ("{", "cannot be read"),
-        ('{"name": "a"}', "must have name, run, seed, document, has name"),
-        ('{"name": "a", "run": "0", "seed": 1, "document": ""}', "run: must be int"),
+        ('{"name": "a"}', "missing required field `run`"),
+        (
+            '{"name": "a", "run": "0", "seed": 1, "document": ""}',
+            r"Expected `int`.*run",
+        ),
     ],
 )
 def test_a_damaged_description_is_refused(
@@ -234,7 +237,7 @@ def test_a_damaged_description_is_refused(
         read_details(tmp_path)
 
 
-def test_a_damaged_epoch_is_refused_and_the_lock_let_go(tmp_path: Path) -> None:
+def test_a_damaged_epoch_is_refused_and_the_lock_released(tmp_path: Path) -> None:
     RunFolder(tmp_path / "run", DETAILS).close()
     (tmp_path / "run" / "epoch").write_text("many")
     with pytest.raises(RunFolderError, match="greater than any before"):
@@ -242,7 +245,7 @@ def test_a_damaged_epoch_is_refused_and_the_lock_let_go(tmp_path: Path) -> None:
     assert read_holder(tmp_path / "run") == ""
 
 
-def test_the_state_can_be_read_from_outside(tmp_path: Path) -> None:
+def test_the_state_is_read_by_other_processes(tmp_path: Path) -> None:
     with RunFolder(tmp_path / "run", DETAILS) as folder:
         assert read_state(folder.path) == "running"
         folder.set_state("finished")

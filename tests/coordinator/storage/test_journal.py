@@ -96,14 +96,14 @@ def written(folder: Path) -> list[int]:
     return sizes
 
 
-def test_events_come_back_as_they_went_in(tmp_path: Path) -> None:
+def test_events_are_read_as_they_were_written(tmp_path: Path) -> None:
     written(tmp_path)
     with Journal.open(tmp_path) as journal:
         assert journal.replay() == EVENTS
         assert journal.dropped == 0
 
 
-def test_a_batch_reads_as_its_events_one_by_one(tmp_path: Path) -> None:
+def test_a_batch_has_the_same_bytes_as_single_events(tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
     (tmp_path / "all").mkdir()
     written(tmp_path / "one")
@@ -165,7 +165,7 @@ def test_the_remedy_for_damage_works(tmp_path: Path) -> None:
         assert journal.replay() == EVENTS[:2]
 
 
-def test_a_record_that_stands_twice_is_damage(tmp_path: Path) -> None:
+def test_a_repeated_record_is_damage(tmp_path: Path) -> None:
     sizes = written(tmp_path)
     path = tmp_path / NAME
     data = path.read_bytes()
@@ -174,8 +174,8 @@ def test_a_record_that_stands_twice_is_damage(tmp_path: Path) -> None:
         Journal.open(tmp_path)
 
 
-def test_what_one_writes_that_was_replaced_is_void(tmp_path: Path) -> None:
-    """It slept before it wrote; the other went on from what it had found."""
+def test_records_of_a_replaced_coordinator_are_void(tmp_path: Path) -> None:
+    """It stalls before it writes; the other continues from the records it found."""
     with Journal.open(tmp_path, epoch=1) as old:
         old.append(EVENTS[:2])
         with Journal.open(tmp_path, epoch=2) as new:
@@ -194,7 +194,7 @@ def test_what_one_writes_that_was_replaced_is_void(tmp_path: Path) -> None:
         assert journal.replay() == [*kept, EVENTS[8]]
 
 
-def test_a_later_epoch_that_begins_too_late_is_damage(tmp_path: Path) -> None:
+def test_a_gap_before_a_later_epoch_is_damage(tmp_path: Path) -> None:
     sizes = written(tmp_path)
     path = tmp_path / NAME
     with Journal.open(tmp_path, epoch=2) as journal:
@@ -205,7 +205,7 @@ def test_a_later_epoch_that_begins_too_late_is_damage(tmp_path: Path) -> None:
         Journal.open(tmp_path)
 
 
-def test_a_full_disk_takes_a_whole_batch_or_nothing(
+def test_a_full_disk_takes_the_whole_batch_or_nothing(
     tmp_path: Path, full_beyond: FullBeyond
 ) -> None:
     with Journal.open(tmp_path) as journal:
@@ -223,7 +223,7 @@ def test_a_full_disk_takes_a_whole_batch_or_nothing(
         assert journal.replay() == EVENTS
 
 
-def test_a_killed_process_loses_nothing_that_it_was_sure_of(tmp_path: Path) -> None:
+def test_a_killed_process_loses_no_confirmed_record(tmp_path: Path) -> None:
     program = """
 import sys
 from pathlib import Path
@@ -253,7 +253,7 @@ for number in range(10**9):
     assert len(births) > sure
 
 
-def test_a_file_that_is_no_journal_is_left_alone(tmp_path: Path) -> None:
+def test_a_file_that_is_no_journal_is_refused_and_unchanged(tmp_path: Path) -> None:
     (tmp_path / NAME).write_bytes(b"something else")
     with pytest.raises(RunFolderError, match="not a journal"):
         Journal.open(tmp_path)
@@ -265,7 +265,7 @@ def test_an_entry_round_trips(event: JournalledEvent) -> None:
     assert decode_entry(encode_entry(event)) == event
 
 
-def test_poses_do_not_go_to_the_journal() -> None:
+def test_poses_are_not_journalled() -> None:
     event = Advanced(0, 1, replace(ADVANCE, poses=b"bulk"), 4, Provenance("w", "x", 1))
     kept = decode_entry(encode_entry(event))
     assert kept == replace(event, advance=ADVANCE)

@@ -1,4 +1,4 @@
-"""The journal tells the trials of a robot apart."""
+"""Trials of a robot in the journal."""
 
 import pytest
 
@@ -12,7 +12,7 @@ JUDGED = Evaluation(0.5, 0.1, 0.08, 27.5)
 
 
 @pytest.mark.parametrize("trial", [0, 1, 200])
-def test_a_trial_comes_back_as_it_was(trial: int) -> None:
+def test_trials_are_read_as_they_were_written(trial: int) -> None:
     for event in (
         Evaluated(NAME, JUDGED, Provenance("w", "p", 0.5), trial),
         EvaluationFailed(NAME, "diverged", Provenance("w", "p", 0.5), trial),
@@ -20,7 +20,7 @@ def test_a_trial_comes_back_as_it_was(trial: int) -> None:
         assert decode_entry(encode_entry(event)) == event
 
 
-def test_a_first_trial_is_the_same_bytes_as_before_there_were_others() -> None:
+def test_a_first_trial_has_the_bytes_of_older_versions() -> None:
     first = encode_entry(Evaluated(NAME, JUDGED, Provenance("w", "p", 0.5)))
     second = encode_entry(Evaluated(NAME, JUDGED, Provenance("w", "p", 0.5), 1))
     # Field 12, a varint: its key is 12 << 3.

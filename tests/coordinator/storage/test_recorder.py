@@ -1,4 +1,4 @@
-"""Tables of a living run, killed at any byte, and on full disks."""
+"""Tables of a running run: killed at any byte, and on full disks."""
 
 import os
 from collections.abc import Callable
@@ -27,7 +27,7 @@ Check = Callable[[Path, list[Record]], None]
 FullBeyond = Callable[[int], AbstractContextManager[None]]
 
 
-def test_rows_come_back_before_and_after_the_end(
+def test_rows_are_read_before_and_after_the_end(
     tmp_path: Path, make_records: Make, feed_rows: Feed, check_complete: Check
 ) -> None:
     rows = make_records(20)
@@ -56,7 +56,7 @@ def test_enough_rows_are_on_disk_without_a_flush(
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_many_incarnations_write_what_one_does(
+def test_resumed_runs_write_the_same_rows_as_one(
     tmp_path: Path,
     make_records: Make,
     seed: int,
@@ -74,14 +74,14 @@ def test_many_incarnations_write_what_one_does(
 
 
 @pytest.mark.parametrize("begun", [0, 10])
-def test_rows_of_one_that_was_replaced_count_once(
+def test_rows_of_a_replaced_coordinator_count_once(
     tmp_path: Path,
     make_records: Make,
     feed_rows: Feed,
     check_complete: Check,
     begun: int,
 ) -> None:
-    """It slept with rows at hand, in a segment or before its first, and wakes up."""
+    """It stalls with buffered rows, before or after its first segment."""
     rows = make_records(30)
     old = feed_rows(tmp_path, rows[:begun])
     for record in rows[begun:25]:
@@ -194,7 +194,7 @@ def test_a_segment_of_another_version_is_refused(
         Recorder(tmp_path, DETAILS)
 
 
-def test_a_row_without_a_column_is_our_own_fault(
+def test_a_row_without_a_column_raises_key_error(
     tmp_path: Path, make_records: Make
 ) -> None:
     row = dict(make_records(1)[0].row)

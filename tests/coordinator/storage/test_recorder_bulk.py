@@ -1,4 +1,4 @@
-"""Rows that come as columns: on disk before the journal, counted after it."""
+"""Bulk rows: stored before the journal has their event, counted after it."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ def bulk(number: int, rows: int = 3) -> Append:
 
 
 def bare(append: Append) -> Append:
-    """Return what a replay says of rows that stand on disk."""
+    """Return the replayed command for rows that are on disk."""
     return Append(append.table, append.rows, b"")
 
 
@@ -53,7 +53,7 @@ def test_bulk_rows_are_on_disk_when_they_are_stored(tmp_path: Path) -> None:
     assert times(tmp_path) == [1.0] * 3 + [2.0] * 3
 
 
-def test_several_may_be_stored_before_they_are_counted(tmp_path: Path) -> None:
+def test_bulk_rows_may_be_stored_ahead_of_the_count(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path, DETAILS)
     for number in (1, 2, 3):
         recorder.store(bulk(number))
@@ -63,7 +63,7 @@ def test_several_may_be_stored_before_they_are_counted(tmp_path: Path) -> None:
     assert times(tmp_path)[::3] == [1.0, 2.0, 3.0, 4.0]
 
 
-def test_a_replay_passes_over_what_stands(tmp_path: Path) -> None:
+def test_a_replay_skips_stored_rows(tmp_path: Path) -> None:
     written(tmp_path, 1, 2).close()
     recorder = Recorder(tmp_path, DETAILS)
     for number in (1, 2):
@@ -77,7 +77,7 @@ def test_a_replay_passes_over_what_stands(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kept", [0, 1, 2, 3])
-def test_rows_that_no_journal_knows_are_cut(tmp_path: Path, kept: int) -> None:
+def test_rows_without_a_journalled_event_are_removed(tmp_path: Path, kept: int) -> None:
     """Three advances were stored over two segments; the journal has a few of them."""
     written(tmp_path, 1, 2).close()
     second = Recorder(tmp_path, DETAILS)
@@ -105,7 +105,7 @@ def test_a_cut_segment_reads_on_after_a_kill(tmp_path: Path) -> None:
     assert times(tmp_path)[::3] == [1.0, 2.0, 3.0]
 
 
-def test_rows_that_are_lost_are_not_passed_over(tmp_path: Path) -> None:
+def test_missing_rows_are_refused(tmp_path: Path) -> None:
     recorder = written(tmp_path, 1)
     recorder.close()
     recorder = Recorder(tmp_path, DETAILS)
@@ -140,7 +140,7 @@ def test_wrong_columns_are_refused_and_nothing_is_written(
     assert times(tmp_path)[::3] == [1.0, 2.0]
 
 
-def test_no_bytes_are_no_rows() -> None:
+def test_empty_bytes_are_no_rows() -> None:
     table = read_columns("poses", b"")
     assert table.num_rows == 0
     assert table.schema == POSES.remove(0)

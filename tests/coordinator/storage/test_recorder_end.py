@@ -1,4 +1,4 @@
-"""The end of a run: Parquet for segments, killed at any step; and its readers."""
+"""The end of a run: segments become Parquet, killed at any step; and its readers."""
 
 import os
 from collections.abc import Callable
@@ -93,7 +93,9 @@ def test_rows_after_the_end_are_refused(
         recorder.flush()
 
 
-def test_one_call_reads_a_campaign(tmp_path: Path, make_records: Make) -> None:
+def test_the_dataset_of_a_campaign_has_all_runs(
+    tmp_path: Path, make_records: Make
+) -> None:
     for run, count in enumerate((4, 7)):
         folder = tmp_path / "runs" / f"any-{run}"
         folder.mkdir(parents=True)
@@ -118,7 +120,7 @@ def test_one_call_reads_a_campaign(tmp_path: Path, make_records: Make) -> None:
     assert bodies.fetchall() == [(0, 10), (1, 16)]
 
 
-def test_a_campaign_without_a_finished_run_is_an_error_in_words(tmp_path: Path) -> None:
+def test_a_campaign_without_a_finished_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="no finished run"):
         campaign(tmp_path, "births")
     with pytest.raises(RunFolderError, match="no such folder"):
