@@ -31,13 +31,17 @@ from schema.wire.arena_messages import (
     write_brain_change,
 )
 from schema.wire.codec import (
-    decoded,
     evaluation_from_message,
     evaluation_to_message,
     report_from_message,
     write_report,
 )
-from schema.wire.messages import finite, genome_from_message, genome_to_message
+from schema.wire.messages import (
+    finite,
+    genome_from_message,
+    genome_to_message,
+    parsed,
+)
 
 
 def encode_entry(event: Journalled) -> bytes:
@@ -68,7 +72,7 @@ def decode_entry(data: bytes) -> Journalled:
     Raises:
         MalformedMessage: not an entry's bytes, or no event in it.
     """
-    return decoded(data, pb.Entry(), _journalled)
+    return _journalled(parsed(data, pb.Entry()))
 
 
 def _journalled(entry: pb.Entry) -> Journalled:

@@ -15,8 +15,7 @@ from schema.wire.arena_messages import (
     changes_from_message,
     changes_to_message,
 )
-from schema.wire.codec import decoded
-from schema.wire.messages import finite
+from schema.wire.messages import finite, parsed
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +150,7 @@ def decode_advance_request(data: bytes) -> AdvanceRequest:
             rules, a digest that is none, an advance that goes back, a number that
             is not finite.
     """
-    return decoded(data, pb.AdvanceRequest(), _request)
+    return _request(parsed(data, pb.AdvanceRequest()))
 
 
 def encode_advance_answer(answer: AdvanceAnswer) -> bytes:
@@ -176,7 +175,7 @@ def decode_advance_answer(data: bytes) -> AdvanceAnswer:
         MalformedMessage: not an answer's bytes, no result in it, a digest that is
             none, a number that is not finite.
     """
-    return decoded(data, pb.AdvanceAnswer(), _answer)
+    return _answer(parsed(data, pb.AdvanceAnswer()))
 
 
 def encode_live(live: Live) -> bytes:
@@ -192,7 +191,7 @@ def decode_live(data: bytes) -> Live:
     Raises:
         MalformedMessage: other bytes, or an advance that breaks its rules.
     """
-    return decoded(data, pb.Live(), _live)
+    return _live(parsed(data, pb.Live()))
 
 
 def _live(message: pb.Live) -> Live:

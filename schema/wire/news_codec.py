@@ -2,8 +2,7 @@
 
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena_messages import birth_from_message, birth_to_message
-from schema.wire.codec import decoded
-from schema.wire.messages import finite, robot_from_message, robot_to_message
+from schema.wire.messages import finite, parsed, robot_from_message, robot_to_message
 from schema.wire.news import Crewman, Departed, Level, Migrant, Newborn, News
 
 
@@ -59,7 +58,7 @@ def decode_news(data: bytes) -> News:
         MalformedMessage: other bytes, no tree of parts, a number that is not
             finite.
     """
-    return decoded(data, pb.News(), _news)
+    return _news(parsed(data, pb.News()))
 
 
 def _write_newborn(one: Newborn, message: pb.Newborn) -> None:

@@ -7,8 +7,7 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena_messages import birth_from_message, birth_to_message
-from schema.wire.codec import decoded
-from schema.wire.messages import finite, robot_from_message, robot_to_message
+from schema.wire.messages import finite, parsed, robot_from_message, robot_to_message
 from schema.wire.status import Status, status_from_message, status_to_message
 
 
@@ -143,7 +142,7 @@ def decode_operator_request(data: bytes) -> OperatorRequest:
         MalformedMessage: not a request's bytes, no name or no wish in it, a robot
             that breaks its rules, a place that is none.
     """
-    return decoded(data, pb.OperatorRequest(), _request)
+    return _request(parsed(data, pb.OperatorRequest()))
 
 
 def encode_operator_reply(reply: OperatorReply) -> bytes:
@@ -160,7 +159,7 @@ def decode_operator_reply(data: bytes) -> OperatorReply:
     Raises:
         MalformedMessage: not a reply's bytes, or a number that is not finite.
     """
-    return decoded(data, pb.OperatorReply(), _reply)
+    return _reply(parsed(data, pb.OperatorReply()))
 
 
 def _reply(message: pb.OperatorReply) -> OperatorReply:
