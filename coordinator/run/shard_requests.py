@@ -170,7 +170,7 @@ class ShardRequests:
         past, advance = self._past(event.island), event.advance
         requested = past.requested
         if requested is None or requested.number != event.number:
-            raise UnexpectedEvent(f"no such advance was asked for: {event}")
+            raise UnexpectedEvent(f"no such advance was requested: {event}")
         past.requested = None
         past.step, past.digest = advance.step, advance.digest
         agent, platform = event.provenance.agent, event.provenance.platform
@@ -194,7 +194,7 @@ class ShardRequests:
         """Return the error that stops a run whose arena cannot be advanced."""
         return JobRefused(
             f"arena {self._islands[end.shard]}: several workers cannot advance it, the "
-            f"last of them {end.agent}: {end.reason}; mend that and resume"
+            f"last of them {end.agent}: {end.reason}; fix that and resume"
         )
 
     def _past(self, shard: int) -> _Past:
