@@ -179,7 +179,7 @@ def test_first_advance_decides_the_platform() -> None:
 def test_second_request_for_a_shard_raises() -> None:
     dispatch = fleet("a")
     dispatch.handle(ShardRequested(0))
-    with pytest.raises(UnexpectedEvent, match="wanted already"):
+    with pytest.raises(UnexpectedEvent, match="requested already"):
         dispatch.handle(ShardRequested(0))
 
 
