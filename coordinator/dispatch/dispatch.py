@@ -1,16 +1,17 @@
-"""Who gets which job: a pure machine between those who ask and those who do.
+"""Assigns jobs to agents: a pure machine.
 
-Each requested job is delivered exactly once, unless it is withdrawn, whatever joins,
-leaves, dies, errs or answers late. An agent holds ``slots + 1`` jobs, so that the next
-one is always at hand, and some more while many short ones wait, so that nobody need be
-asked for each of them. Lower numbers go first, and so what was lost goes first again;
-the agent with the least to do gets it, ties break on its name.
+Each requested job is delivered exactly once, unless it is withdrawn, even if agents
+join, leave, die, fail or answer late. An agent holds ``slots + 1`` jobs, so that the
+next one is ready, and more of them while many short jobs wait. Jobs with lower numbers
+go first, so a lost job is repeated first. The least busy agent gets the job; ties break
+on its name.
 
-An agent that erred or lost a job without leaving rests before it is given more,
-longer each time in a row, so that a broken one cannot eat the queue.
+An agent that fails at a job, or loses one without leaving, gets no job until a backoff
+ends. The backoff grows with consecutive failures, so that a broken agent cannot empty
+the queue.
 
-A job that is late gets a second copy where somebody is idle; who answers first is
-heard. A job that ended several processes by its own doing is given to nobody more.
+Overdue jobs are duplicated on idle agents; the first answer counts. A job that crashed
+several processes is given up.
 """
 
 from collections.abc import Callable, Iterator
@@ -49,7 +50,7 @@ AGENT_OF: dict[JobKind, AgentKind] = {"vet": "analyzer", "evaluate": "worker"}
 MAX_ERRORS = 3
 MAX_DEATHS = 3
 VETS_AT_HAND = 16
-"""Vettings that an analyzer has beside the one it is at: some milliseconds' work."""
+"""Vettings that an analyzer holds beyond the current one: some milliseconds' work."""
 
 
 class Dispatch:
@@ -85,7 +86,7 @@ class Dispatch:
 
     @property
     def pending(self) -> int:
-        """How many jobs are asked for and not delivered."""
+        """Number of jobs that are requested and not delivered."""
         return len(self._jobs)
 
     def jobs_of(self, client: Client) -> list[int]:
@@ -93,42 +94,48 @@ class Dispatch:
         return [n for n, each in self._jobs.items() if each.job.client == client]
 
     def agents(self, kind: AgentKind) -> int:
-        """Return how many agents of a kind are there."""
+        """Return the number of agents of a kind."""
         return len(self._pools[kind].agents)
 
     def names(self, kind: AgentKind) -> list[str]:
-        """Return who of a kind is there, ascending."""
+        """Return the names of the agents of a kind, ascending."""
         return sorted(self._pools[kind].agents)
 
     def waiting(self, kind: AgentKind) -> int:
-        """Return how many jobs no agent of their kind has taken yet."""
+        """Return the number of jobs of a kind of agent that are not assigned."""
         return len(self._pools[kind].waiting)
 
+    @property
+    def credits(self) -> int:
+        """How many jobs all workers together hold while enough jobs wait."""
+        workers = self._pools["worker"].agents.values()
+        return sum(worker.joined.slots + 1 for worker in workers)
+
     def platform(self, agent: str) -> str:
-        """Return what an agent's machine is; empty once it has left."""
+        """Return the platform of an agent; empty once it has left."""
         kind = self._kind_of.get(agent)
         return self._pools[kind].agents[agent].joined.platform if kind else ""
 
     @property
     def leisure_s(self) -> float:
-        """How long no worker will want for a job whatever comes meanwhile [s]."""
+        """Estimated time until some worker runs out of jobs [s]."""
         return self._pools["worker"].leisure_s
 
     @property
     def wake_s(self) -> float | None:
-        """When the next ``Ticked`` can change something [s]; None: no need."""
+        """Time at which the next ``Ticked`` is needed [s]; None: it is not."""
         return self._backoff.wake_s
 
     def handle(self, event: DispatchEvent) -> list[DispatchCommand]:
-        """Take an event and return what is to be done, in this order.
+        """Handle an event and return the commands, in order of execution.
 
-        Late answers, second answers and whoever joins or leaves twice change
+        Late answers, second answers and agents that join or leave twice change
         nothing.
 
         Raises:
-            UnexpectedEvent: a job number that does not ascend or that names
-                another job, an agent with less than one slot or that joins as
-                another than it is, a clock that runs backwards.
+            UnexpectedEvent: a job number that does not ascend or belongs to another
+                job, an agent with less than one slot, an agent that joins again with
+                other properties, or a clock that runs backwards.
         """
         return list(self._doors[type(event)](event))
 
@@ -157,7 +164,7 @@ class Dispatch:
         yield from self._assign(pool)
 
     def _put_back(self, pending: Pending, agent: str) -> None:
-        """Take a job from an agent; it waits again if that was the only one."""
+        """Take a job from an agent; it waits again if no other agent has it."""
         del pending.holders[agent]
         if not pending.holders:
             number = pending.job.number
@@ -242,7 +249,7 @@ class Dispatch:
         self._put_back(pending, event.agent)
 
     def _close(self, pending: Pending) -> Iterator[DispatchCommand]:
-        """Forget a job that is done with; whoever is still at it may stop."""
+        """Remove a job that has ended, and cancel its copies."""
         job = pending.job
         del self._jobs[job.number]
         if job.twin not in self._jobs:
@@ -280,7 +287,7 @@ class Dispatch:
                 yield from self._copy(pool, event.now_s)
 
     def _copy(self, pool: Pool, now_s: float) -> Iterator[DispatchCommand]:
-        """Give who is idle a second copy of what is late, the oldest first."""
+        """Duplicate overdue jobs on idle agents, oldest first."""
         idle = pool.idle()
         if not idle:
             return
@@ -299,7 +306,7 @@ class Dispatch:
                 yield self._give(pending, pool, name)
 
     def _give(self, pending: Pending, pool: Pool, name: str) -> Assign:
-        """Have an agent do a job."""
+        """Assign a job to an agent."""
         job = pending.job
         self._pairs.note(job, name)
         agent = pool.agents[name]
@@ -310,7 +317,7 @@ class Dispatch:
         return Assign(job, name)
 
     def _assign(self, pool: Pool) -> Iterator[DispatchCommand]:
-        """Give out what can be given out."""
+        """Assign the jobs that can be assigned."""
         passed: list[str] = []
         while pool.waiting and (name := pool.best()):
             pending = pool.take(name, self._jobs, self._pairs.avoided)

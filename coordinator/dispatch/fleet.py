@@ -13,7 +13,6 @@ from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
     Assign,
     AssignShard,
-    Cancel,
     Client,
     Deliver,
     Died,
@@ -85,7 +84,6 @@ class Fleet:
         self._shard_numbers = count()
         self._shard_clients: dict[int, tuple[Client, Encode]] = {}
         self._advance_reads: dict[int, Read] = {}
-        self._credits: dict[str, int] = {}
         self._ends: dict[Client, list[End]] = {}
         self._advancing: set[int] = set()
 
@@ -98,11 +96,6 @@ class Fleet:
     def open(self) -> int:
         """How many jobs and advances are requested and not done."""
         return self.dispatch.pending + len(self._advancing)
-
-    @property
-    def credits(self) -> int:
-        """How many jobs all workers together may have at a time."""
-        return sum(self._credits.values())
 
     def new_number(self) -> int:
         """Return a number for a job."""
@@ -174,14 +167,10 @@ class Fleet:
                 if self._shard_clients[shard][0] == (event.run, event.epoch):
                     self._move(Killed(event.number, event.agent, event.cause))
                 return
-        elif isinstance(event, Joined):
-            if event.kind == "worker":
-                self._credits[event.agent] = event.slots + 1
-                self._move(event)
-        elif isinstance(event, Left):
-            self._credits.pop(event.agent, None)
-            self._move(event)
-        elif self._shard_clients and isinstance(event, Ticked):
+        # Without shards time changes nothing for them.
+        elif isinstance(event, Joined | Left) or (
+            self._shard_clients and isinstance(event, Ticked)
+        ):
             self._move(event)
         self._obey(self.dispatch.handle(event))
 
@@ -205,7 +194,7 @@ class Fleet:
                 self._agents.send(job.number, command.agent, job.payload)
             elif isinstance(command, Deliver):
                 self._ends.setdefault(job.client, []).append(command)
-            elif isinstance(command, Cancel):
+            else:
                 self._agents.cancel(command.agent, job.payload)
 
     def _move(self, event: ShardEvent) -> None:

@@ -1,4 +1,4 @@
-"""All agents of one kind, who has the least to do, and the jobs that wait for them."""
+"""Agents of one kind, their load, and the jobs that wait for them."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -9,14 +9,14 @@ from math import inf
 from coordinator.dispatch.events import Job, JobKind, Joined
 
 MOST_AHEAD = 16
-"""Jobs more than the one that is always at hand."""
+"""Most jobs that an agent holds beyond the one that is always ready."""
 AHEAD_S = 0.8
-"""What these may take together [s]: nobody else can have them meanwhile."""
+"""Most time that these jobs may take together [s]: other agents cannot have them."""
 PAUSE_S = 0.2
-"""The coordinator looks away from agents that are well provided so long [s]."""
+"""Longest time that the coordinator lets answers collect [s]."""
 _NEWEST_WEIGHT = 0.1
 _PROVIDED = 1e6
-"""More than any load of who has not enough at hand."""
+"""Above the load of any agent that needs jobs."""
 
 
 @dataclass(slots=True)
@@ -24,12 +24,12 @@ class Pending:
     """A job that is not delivered yet.
 
     Attributes:
-        job: which.
-        holders: who is at it, one, or two if the first is late: when it was given it
-            [s], and as the first, second, ... job of a slot of its.
-        errors: how often somebody could not do it.
-        avoid: who failed at it.
-        killed: processes that it ended, and by what.
+        job: the job.
+        holders: agents that have it, two if the first is late: time of assignment
+            [s], and its place in the queue of a slot (1.0 is first).
+        errors: number of agents that could not do it.
+        avoid: agents that failed at it.
+        killed: processes that it crashed, with the causes.
     """
 
     job: Job
@@ -40,17 +40,21 @@ class Pending:
 
     @property
     def since_s(self) -> float:
-        """When whoever has it longest was given it [s]."""
+        """Time of the first assignment that still holds [s]."""
         return min(since_s for since_s, _ in self.holders.values())
 
 
 @dataclass(slots=True)
 class AgentState:
-    """One that does jobs.
+    """An agent and its jobs.
 
-    ``stamp`` names its only valid entry in its pool's heap; ``failures`` counts
-    errors and losses since its last answer; ``job_s`` is how long a slot of its is at
-    a job, typically [s], 0 before one is done.
+    Attributes:
+        joined: its properties.
+        held: numbers of its jobs, oldest first.
+        job_s: typical time that a slot takes for a job [s]; 0 before the first.
+        failures: errors and losses since its last answer.
+        rests: it gets no jobs until its backoff ends.
+        stamp: of its only valid entry in the pool's heap.
     """
 
     joined: Joined
@@ -61,13 +65,13 @@ class AgentState:
     stamp: int = 0
 
     def learn(self, duration_s: float) -> None:
-        """Note how long a slot was at a job [s]."""
+        """Note the time that a slot took for a job [s]."""
         known = self.job_s or duration_s
         self.job_s = known + _NEWEST_WEIGHT * (duration_s - known)
 
     @property
     def most_ahead(self) -> int:
-        """How many jobs it can be given ahead: a slow one's would wait too long."""
+        """Most jobs that it holds ahead; fewer if it is slow, as they wait for it."""
         return min(MOST_AHEAD, int(AHEAD_S / self.job_s)) if self.job_s else 0
 
 
@@ -76,10 +80,10 @@ class Pool:
     """All agents of one kind and the jobs that wait for them.
 
     Attributes:
-        at_hand: jobs beyond its slots that an agent has in any case.
+        at_hand: jobs beyond its slots that an agent always holds.
         agents: by their names.
         free: (load, name, stamp) of each agent that does not rest, a heap; entries
-            with an old stamp are dead and dropped when met.
+            with an old stamp are invalid.
         waiting: numbers of jobs, a heap.
     """
 
@@ -89,7 +93,7 @@ class Pool:
     waiting: list[int] = field(default_factory=list)
 
     def offer(self, name: str, stamp: int) -> None:
-        """Note what an agent has to do now; its earlier entry dies."""
+        """Note the load of an agent; its earlier entry becomes invalid."""
         agent = self.agents[name]
         agent.stamp = stamp
         if agent.rests:
@@ -100,10 +104,10 @@ class Pool:
         heappush(self.free, (self._load(agent), name, stamp))
 
     def _load(self, agent: AgentState) -> float:
-        """Return how much an agent has to do; 0 is nothing.
+        """Return the load of an agent; 0 is idle.
 
-        Who has not what it must have at hand comes before all others, and these are
-        as loaded as what they can be given ahead is used up.
+        Agents with fewer jobs than they must hold come first. The others are loaded
+        by the share of the jobs ahead that they hold.
         """
         spare = self._spare(agent)
         if spare < 0:
@@ -111,7 +115,7 @@ class Pool:
         return _PROVIDED + (spare / agent.most_ahead if agent.most_ahead else inf)
 
     def best(self) -> str:
-        """Return who has the least to do and may have more, empty if nobody may."""
+        """Return the least busy agent if it may have another job, else ""."""
         name = self._least_busy()
         if not name:
             return ""
@@ -126,22 +130,23 @@ class Pool:
         return ""
 
     def _spare(self, agent: AgentState) -> int:
-        """Return how many jobs an agent has beyond what it must have at hand."""
+        """Return how many jobs an agent has beyond those it must hold."""
         return len(agent.held) - agent.joined.slots - self.at_hand
 
     def _ahead(self, agent: AgentState) -> int:
         """Return how many jobs beyond that an agent may have: fewer near the end.
 
-        Half of what waits is shared out, so that the last jobs go to whoever is done
-        first.
+        Only half of the waiting jobs are assigned ahead, so that the last ones go to
+        the agents that finish first.
         """
         return min(agent.most_ahead, len(self.waiting) // (2 * len(self.agents)))
 
     @property
     def leisure_s(self) -> float:
-        """How long nobody will want for a job, as far as one can tell [s].
+        """Estimated time until some agent runs out of jobs [s].
 
-        Half of what the agent has to spare that is done first: jobs differ.
+        Half of the time that the spare jobs of the first such agent take, as jobs
+        differ.
         """
         name = self._least_busy()
         if not name or self._spare(self.agents[name]) <= 0:
@@ -154,7 +159,7 @@ class Pool:
         return min(PAUSE_S, spare_s / 2)
 
     def idle(self) -> list[str]:
-        """Return who has nothing to do and does not rest, by name."""
+        """Return the agents without a job that do not rest, by name."""
         if not self._least_busy() or self.free[0][0] > 0.0:
             return []
         return sorted(
@@ -168,7 +173,7 @@ class Pool:
         return agent is not None and agent.stamp == entry[2]
 
     def may_take(self, name: str, avoid: tuple[str, ...]) -> bool:
-        """Return whether a job may go to an agent: others first, if there are any."""
+        """Return whether an agent may have a job that avoids others where it can."""
         if name not in avoid:
             return True
         return sum(other in self.agents for other in avoid) == len(self.agents)
@@ -179,12 +184,12 @@ class Pool:
         jobs: Mapping[int, Pending],
         avoided: Callable[[Pending], tuple[str, ...]],
     ) -> Pending | None:
-        """Take the first waiting job that may go to an agent, if there is one.
+        """Remove and return the first waiting job that an agent may have, if any.
 
         Args:
             name: of the agent.
             jobs: by their numbers.
-            avoided: tells who shall not do a job if another one can.
+            avoided: returns the agents that a job avoids if there are others.
         """
         passed: list[int] = []
         taken: Pending | None = None
@@ -200,7 +205,7 @@ class Pool:
         return taken
 
     def drop(self, number: int) -> None:
-        """Let a job wait no more."""
+        """Remove a waiting job."""
         self.waiting.remove(number)
         heapify(self.waiting)
 
@@ -210,20 +215,19 @@ LONGEST_REST_S = 3.2
 
 
 class Backoff:
-    """Who rests, and until when."""
+    """Backoff of agents that failed."""
 
     def __init__(self) -> None:
-        """Nobody rests."""
         self._until: list[tuple[float, int, str]] = []
         self._order = count()
 
     @property
     def wake_s(self) -> float | None:
-        """When the next rest is over [s]; None if nobody rests."""
+        """Time at which the next rest ends [s]; None if there is none."""
         return self._until[0][0] if self._until else None
 
     def begin(self, agent: AgentState, now_s: float) -> None:
-        """Let an agent rest; one rest at a time."""
+        """Start the rest of an agent, unless it rests already."""
         if agent.rests:
             return
         agent.rests = True
@@ -232,70 +236,64 @@ class Backoff:
         heappush(self._until, (now_s + rest_s, next(self._order), agent.joined.agent))
 
     def over(self, now_s: float) -> Iterator[str]:
-        """Yield the names of those whose rest is over; some may have left."""
+        """Yield the agents whose rest is over; some may have left."""
         while self._until and self._until[0][0] <= now_s:
             yield heappop(self._until)[2]
 
 
 class PairedJobs:
-    """Who was given a job whose twin somebody else is to do."""
+    """Agents that were given a job whose twin another agent is to do."""
 
     def __init__(self) -> None:
-        """Know of no pair."""
-        self._doers: dict[int, dict[str, None]] = {}
-
-    def __len__(self) -> int:
-        """Return how many jobs are remembered."""
-        return len(self._doers)
+        self._agents: dict[int, dict[str, None]] = {}
 
     def note(self, job: Job, agent: str) -> None:
-        """Remember who is given a job."""
+        """Note that a job is assigned to an agent."""
         if job.twin >= 0:
-            self._doers.setdefault(job.number, {})[agent] = None
+            self._agents.setdefault(job.number, {})[agent] = None
 
     def avoided(self, pending: Pending) -> tuple[str, ...]:
-        """Return who shall not do a job if another one can."""
-        doers = self._doers.get(pending.job.twin)
-        if not doers:
+        """Return the agents that a job avoids if there are others."""
+        others = self._agents.get(pending.job.twin)
+        if not others:
             return pending.avoid
-        return (*pending.avoid, *(each for each in doers if each not in pending.avoid))
+        return (*pending.avoid, *(each for each in others if each not in pending.avoid))
 
     def forget(self, job: Job) -> None:
-        """Forget a pair, both of which are done."""
-        self._doers.pop(job.number, None)
-        self._doers.pop(job.twin, None)
+        """Remove a pair, both jobs of which have ended."""
+        self._agents.pop(job.number, None)
+        self._agents.pop(job.twin, None)
 
 
 PATIENCE = 4.0
-"""A job is late after so many times the typical duration of its kind."""
+"""A job is late after this multiple of the typical duration of its kind."""
 LEAST_S = 1.0
-"""And never before [s]: a second copy costs more than waiting so long."""
+"""A job is never late before this time [s]: a second copy would cost more."""
 LOOK_S = 0.25
-"""Time between two looks for jobs that are late [s]."""
+"""Interval between checks for late jobs [s]."""
 
 
 class Stragglers:
-    """How long jobs of each kind take, from when they are given out [s]."""
+    """Typical duration of the jobs of each kind, from their assignment [s]."""
 
     def __init__(self) -> None:
-        """Know of no job yet."""
         self._typical_s: dict[JobKind, float] = {}
         self._next_look_s = 0.0
 
     def learn(self, kind: JobKind, duration_s: float) -> None:
-        """Note how long a job took."""
+        """Note the duration of a job."""
         known = self._typical_s.get(kind, duration_s)
         self._typical_s[kind] = known + _NEWEST_WEIGHT * (duration_s - known)
 
     def is_time(self, now_s: float) -> bool:
-        """Return whether to look for late jobs now; if so, not again for a while."""
+        """Return whether a check for late jobs is due; starts the next interval."""
         if now_s < self._next_look_s:
             return False
         self._next_look_s = now_s + LOOK_S
         return True
 
     def is_late(self, kind: JobKind, elapsed_s: float) -> bool:
-        """Return whether a job that is out is late; never before one came back."""
+        """Return whether an assigned job is late; False before one was done."""
         typical_s = self._typical_s.get(kind)
         if typical_s is None:
             return False

@@ -1,10 +1,10 @@
-"""Which worker holds which arena shard: a pure machine.
+"""Assigns arena shards to workers: a pure machine.
 
-A shard's state lives in one worker, and its advances go there. If that worker is
-gone, errs or does not have the state after all, the advance goes, with all that is
-needed to rebuild the state, to another one of an equal platform: the one with the
-fewest shards, ties break on the name. Where none is there the shard waits; for ever,
-unless the user allows a drift: then one of another platform gets it after a while.
+One worker holds the state of a shard and makes its advances. If that worker is gone,
+fails or lacks the state, the advance goes, with all that is needed to rebuild the
+state, to another worker of an equal platform: the one with the fewest shards; ties
+break on the name. A shard without such a worker waits. If the user allows a drift, a
+worker of another platform gets it after a while.
 """
 
 from collections.abc import Iterator
@@ -31,16 +31,27 @@ MAX_ERRORS = 3
 REST_S = 0.05
 LONGEST_REST_S = 3.2
 DRIFT_S = 30.0
-"""A shard waits so long for its own platform before it may drift to another."""
+"""Time that a shard waits for its own platform before it may drift [s]."""
 
 
 @dataclass(slots=True)
 class _Shard:
-    """A shard; ``holder`` is bound to it and, if ``has_state``, fit to go on.
+    """A shard and its present advance.
 
-    ``number`` is that of the job that is out, -1 if none is. Of the present advance:
-    ``avoid`` are those who failed at it, ``lost`` the numbers of the jobs of which no
-    word came, ``killed`` whom it ended and by what.
+    Attributes:
+        platform: of the last advance; empty before the first.
+        holder: the worker that is bound to it; empty if none is.
+        has_state: the holder has its state.
+        is_wanted: an advance is requested.
+        number: of the job that is assigned; -1 if none is.
+        is_whole: that job includes what is needed to rebuild the state.
+        errors: number of workers that could not make the advance.
+        failures: errors and losses since the last advance.
+        avoid: workers that failed at the advance.
+        lost: numbers of its jobs that got no reply.
+        killed: workers that it crashed, with the causes.
+        rests_until_s: end of the backoff [s].
+        drifts_at_s: when it may drift to another platform [s].
     """
 
     platform: str = ""
@@ -59,14 +70,14 @@ class _Shard:
 
 
 class ShardDispatch:
-    """The machine; ``handle`` is its only door."""
+    """The machine; events enter only through ``handle``."""
 
     def __init__(self, numbers: Iterator[int], *, allows_drift: bool = False) -> None:
-        """Know nobody.
+        """Initialise without shards.
 
         Args:
             numbers: of jobs, each used once.
-            allows_drift: a shard may go to another platform where its own is gone.
+            allows_drift: a shard may move to another platform if its own is gone.
         """
         self._numbers = numbers
         self._allows_drift = allows_drift
@@ -77,10 +88,10 @@ class ShardDispatch:
 
     @property
     def wake_s(self) -> float | None:
-        """When the next ``Ticked`` can change something [s]; None: no need."""
+        """Time at which the next ``Ticked`` is needed [s]; None: it is not."""
         shards = self._shards.values()
         wakes = [*(s.rests_until_s for s in shards), *(s.drifts_at_s for s in shards)]
-        # What was due is done; who may drift by now waits for a worker, not for a time.
+        # A shard that may drift by now waits for a worker, not for a time.
         return min(
             (wake for wake in wakes if wake is not None and wake > self._now_s),
             default=None,
@@ -96,24 +107,24 @@ class ShardDispatch:
         }
 
     def holder(self, shard: int) -> str:
-        """Return which worker holds a shard; empty if none does."""
+        """Return the name of the worker that holds a shard; empty if none does."""
         known = self._shards.get(shard)
         return known.holder if known else ""
 
     def shard_that_lost(self, number: int) -> int | None:
-        """Return whose present advance a job was of which no word came."""
+        """Return the shard whose present advance lost a job without reply."""
         for shard, state in self._shards.items():
             if number in state.lost:
                 return shard
         return None
 
     def handle(self, event: ShardEvent) -> list[ShardCommand]:
-        """Take an event and return what is to be done, in this order.
+        """Handle an event and return the commands, in order of execution.
 
-        Late news of a job, and whoever joins or leaves twice, change nothing.
+        Late outcomes of a job, and workers that join or leave twice, change nothing.
 
         Raises:
-            UnexpectedEvent: a shard that is wanted twice.
+            UnexpectedEvent: a second request for the same shard.
         """
         match event:
             case Joined():
@@ -129,7 +140,7 @@ class ShardDispatch:
             case ShardRequested():
                 self._want(event.shard)
             case ShardReturned():
-                return [*self._came(event), *self._assignments()]
+                return [*self._returned(event), *self._assignments()]
             case Killed():
                 return [*self._killed(event), *self._assignments()]
             case Released():
@@ -143,7 +154,7 @@ class ShardDispatch:
     def _want(self, number: int) -> None:
         shard = self._shard(number)
         if shard.is_wanted:
-            raise UnexpectedEvent(f"shard {number}: is wanted already")
+            raise UnexpectedEvent(f"shard {number}: is requested already")
         shard.is_wanted = True
 
     def _leave(self, agent: str) -> None:
@@ -166,14 +177,14 @@ class ShardDispatch:
                 self._wait(shard)
 
     def _wait(self, shard: _Shard) -> None:
-        """Note since when a shard has been without a worker of its platform."""
+        """Set when a shard without a worker of its platform may drift."""
         is_alone = shard.is_wanted and bool(shard.platform) and not self._equal(shard)
         if not is_alone:
             shard.drifts_at_s = None
         elif shard.drifts_at_s is None:
             shard.drifts_at_s = self._now_s + DRIFT_S
 
-    def _came(self, event: ShardReturned) -> list[ShardCommand]:
+    def _returned(self, event: ShardReturned) -> list[ShardCommand]:
         number = self._out.pop(event.number, None)
         if number is None:
             return []
@@ -199,7 +210,7 @@ class ShardDispatch:
         shard.errors += event.outcome != "lost"
         if shard.errors < MAX_ERRORS:
             return []
-        reason = event.reason or "asks for a state that it was given"
+        reason = event.reason or "lacks the state that it was given"
         return self._give_up(number, agent, reason)
 
     def _killed(self, event: Killed) -> list[ShardCommand]:
@@ -216,18 +227,18 @@ class ShardDispatch:
         return self._give_up(number, event.agent, reason)
 
     def _give_up(self, number: int, agent: str, reason: str) -> list[ShardCommand]:
-        """Try a shard's advance no more."""
+        """Give up a shard's advance."""
         shard = self._shards[number]
         shard.is_wanted = False
         self._forgive(shard)
         return [ShardFailed(number, agent, reason)]
 
     def _forgive(self, shard: _Shard) -> None:
-        """Forget who failed at an advance that is over."""
+        """Forget the failures at an advance that has ended."""
         shard.errors, shard.avoid, shard.lost, shard.killed = 0, (), (), {}
 
     def _assignments(self) -> Iterator[ShardCommand]:
-        """Hand out what waits and may go to somebody."""
+        """Assign the shards that wait and have a worker."""
         for number, shard in sorted(self._shards.items()):
             is_ready = shard.is_wanted and shard.number < 0
             if not is_ready or shard.rests_until_s is not None:
@@ -260,7 +271,7 @@ class ShardDispatch:
         ]
 
     def _choice(self, shard: _Shard) -> str:
-        """Return the best worker for a shard, others before those who failed."""
+        """Return the best worker for a shard; those that failed come last."""
         fit = self._fit(shard)
         fresh = [name for name in fit if name not in shard.avoid]
         holders = [each.holder for each in self._shards.values()]

@@ -1,4 +1,4 @@
-"""The network's end of those who ask a coordinator: operators, and the curious."""
+"""Queries to coordinators: for operators and for the status command."""
 
 import zenoh
 
@@ -17,17 +17,17 @@ def ask_coordinators(
     tls: Tls | None = None,
     only: str = "",
 ) -> dict[str, bytes]:
-    """Return what the coordinators at an address reply, by their names.
+    """Return the replies of the coordinators at an address, by name.
 
     Args:
         data: an encoded ``OperatorRequest``.
         connect: address of the hub.
         fleet: name of the fleet.
         tls: files, for a ``tls/`` address.
-        only: name of the one to ask; empty asks all.
+        only: name of the coordinator to query; empty queries all.
 
     Raises:
-        NetworkError: no hub, or no coordinator that answers.
+        NetworkError: no hub, or no coordinator replies.
     """
     config = client_config(connect, tls)
     check_name(fleet, "fleet")
@@ -36,7 +36,7 @@ def ask_coordinators(
         session = zenoh.open(zenoh.Config.from_json5(config))
     except zenoh.ZError:
         raise NetworkError(f"no coordinator at {connect}") from None
-    told: dict[str, bytes] = {}
+    replies_of: dict[str, bytes] = {}
     with session:
         tokens = session.liveliness().get(agents_alive(fleet, "coordinator"))
         there = [member_of(str(each.ok.key_expr)) for each in tokens if each.ok]
@@ -51,9 +51,9 @@ def ask_coordinators(
             )
             for reply in replies:
                 if reply.ok is not None:
-                    told[member.name] = reply.ok.payload.to_bytes()
-    if not told:
+                    replies_of[member.name] = reply.ok.payload.to_bytes()
+    if not replies_of:
         raise NetworkError(
-            f"{connect}: of {len(there)} coordinators of fleet {fleet} none answers"
+            f"{connect}: none of {len(there)} coordinators of fleet {fleet} replies"
         )
-    return told
+    return replies_of

@@ -1,4 +1,4 @@
-"""Agents that live in this process: plain functions in place of the network."""
+"""Agents within this process: plain functions in place of the network."""
 
 import time
 from collections import deque
@@ -9,14 +9,14 @@ from schema.errors import RevolveError
 
 
 class LocalAgents:
-    """One worker and one analyzer that answer when they are asked to listen."""
+    """One worker and one analyzer that do their jobs during ``receive``."""
 
     def __init__(
         self,
         answers: Mapping[AgentKind, Callable[[bytes], bytes]],
         platform: str,
     ) -> None:
-        """Offer functions, encoded request to encoded answer, as agents."""
+        """Initialise agents with functions from encoded request to encoded answer."""
         self._answers = {f"local-{kind}": answers[kind] for kind in sorted(answers)}
         self._asked: deque[tuple[int, str, bytes]] = deque()
         self._news: list[DispatchEvent] = [
@@ -24,16 +24,16 @@ class LocalAgents:
         ]
 
     def send(self, number: int, agent: str, payload: bytes) -> None:
-        """Hand a job to an agent; it is done at the next ``receive``."""
+        """Queue a job; a later ``receive`` does it."""
         self._asked.append((number, agent, payload))
 
     def cancel(self, _agent: str, _payload: bytes) -> None:
-        """Do it all the same: of one worker's jobs there are no copies."""
+        """Do nothing: one worker's jobs have no copies to cancel."""
 
     def receive(
         self, timeout_s: float, _pause_s: float = 0.0, /
     ) -> Sequence[DispatchEvent]:
-        """Do the oldest job; the first call tells who is there."""
+        """Do the oldest job and return its outcome; the first call lets agents join."""
         news, self._news = self._news, []
         if self._asked:
             number, agent, payload = self._asked.popleft()
@@ -43,6 +43,6 @@ class LocalAgents:
             except RevolveError as error:
                 news.append(Returned(number, agent, "error", reason=str(error)))
         elif not news:
-            # Nothing ever comes from outside: somebody wants to wait.
+            # No other events can come: only the wait is left.
             time.sleep(timeout_s)
         return news

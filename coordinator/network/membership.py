@@ -1,6 +1,6 @@
-"""Who is there: which agents live, what they say they are, who may take part.
+"""Agents of a fleet: which ones are alive, their properties, and which may join.
 
-Pure: tokens and introductions in, news for the dispatch machine out.
+Pure: liveliness tokens and agent infos in, dispatch events out.
 """
 
 from google.protobuf.message import DecodeError
@@ -12,25 +12,26 @@ from schema.wire import revolve_pb2 as pb
 
 
 class Membership:
-    """All agents of a fleet whose token stands.
+    """All agents of a fleet whose token exists.
 
     Attributes:
-        refused: those that may not take part, and why.
+        members: the agents by name, refused ones included.
+        refused: agents that may not join, with the reasons.
     """
 
     def __init__(self, version: str) -> None:
-        """Begin with nobody; ``version`` is the one that agents must have."""
+        """Initialise without agents; ``version`` is the one that they must have."""
         self.members: dict[str, Member] = {}
         self.refused: dict[str, str] = {}
         self._version = version
         self._joined: set[str] = set()
-        self._mourned: set[str] = set()
+        self._known_deaths: set[str] = set()
 
     def appear(self, key: str) -> Member | None:
-        """Note a token; return whom to ask what it is, None if that is known.
+        """Note a token; return its agent if that is new, else None.
 
         Raises:
-            MalformedMessage: no agent's token.
+            MalformedMessage: not the token of an agent.
         """
         member = member_of(key)
         if member.name in self.members:
@@ -39,10 +40,10 @@ class Membership:
         return member
 
     def vanish(self, key: str) -> Left | None:
-        """Note that a token is gone; return what that means for jobs.
+        """Note that a token is gone; return the event if the agent had joined.
 
         Raises:
-            MalformedMessage: no agent's token.
+            MalformedMessage: not the token of an agent.
         """
         name = member_of(key).name
         self.members.pop(name, None)
@@ -53,15 +54,15 @@ class Membership:
         return Left(name)
 
     def is_stranger(self, agent: str) -> bool:
-        """Return whether an agent is there that has not said yet what it is."""
+        """Return whether an agent is alive but its properties are not known yet."""
         known = agent in self._joined or agent in self.refused
         return agent in self.members and not known
 
     def refuse(self, agent: str, why: str) -> Left | None:
-        """Let an agent take part no more; return what that means for jobs.
+        """Exclude an agent; return the event if it had joined.
 
         Args:
-            agent: that joined, or that is gone since.
+            agent: its name.
             why: for the user.
         """
         if agent not in self._joined:
@@ -71,18 +72,17 @@ class Membership:
         return Left(agent)
 
     def introduce(self, agent: str, data: bytes) -> list[Died | Joined]:
-        """Take what an agent says of itself and of those whose place it took.
+        """Take an agent's description of itself and of the processes it replaces.
 
         Args:
-            agent: that was asked; still a stranger.
+            agent: a stranger.
             data: bytes of an ``AgentInfo``.
 
         Returns:
-            Who died that was not known to be dead; last, if it may take part, that
-            the agent joined.
+            Deaths that were not known; last, if the agent may join, that it joined.
 
         Raises:
-            MalformedMessage: not such bytes, no slots, or it says it is another.
+            MalformedMessage: not such bytes, no slots, or another name or kind.
         """
         member = self.members[agent]
         try:
@@ -103,8 +103,8 @@ class Membership:
         return [*self._new_dead(info), joined]
 
     def _new_dead(self, info: pb.AgentInfo) -> list[Died]:
-        new = [each for each in info.deaths if each.agent not in self._mourned]
-        self._mourned.update(each.agent for each in new)
+        new = [each for each in info.deaths if each.agent not in self._known_deaths]
+        self._known_deaths.update(each.agent for each in new)
         return [
             Died(each.run, each.epoch, each.number, each.agent, each.cause[:100])
             for each in new

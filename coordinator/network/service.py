@@ -1,7 +1,7 @@
-"""The coordinator on the network: who is there, jobs out, answers in.
+"""The coordinator's end of the network: agents, jobs, answers, operators, viewers.
 
-The network's threads only enqueue; whoever owns ``Network`` calls ``send`` and
-``receive`` from one thread and sees events in the order in which they came.
+The network's threads only enqueue. One thread calls ``send`` and ``receive`` and gets
+events in the order of their arrival.
 """
 
 import json
@@ -40,13 +40,13 @@ _NOW = zenoh.ConsolidationMode.NONE
 _LONGEST_REASON = 1000
 _MOST_AT_ONCE = 1000
 _ASK_AGAIN_S = 1.0
-# What the engine itself replies when nobody did in time.
+# Reply of the engine itself after a timeout.
 _TIMEOUT = b"Timeout"
 
 
 @dataclass(slots=True)
 class _Asked:
-    """One question to one agent; ``number`` is the job's, -1 for "what are you?"."""
+    """A query to an agent; ``number`` is the job's, -1 asks for its ``AgentInfo``."""
 
     agent: str
     number: int
@@ -57,7 +57,7 @@ class _Asked:
         self.reply = reply
 
     def end(self) -> None:
-        """Comes exactly once, with a reply or without."""
+        """End the query; called exactly once, with a reply or without."""
         self.inbox.put(self)
 
 
@@ -66,14 +66,14 @@ _News = _Asked | zenoh.Sample | zenoh.Query
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What somebody asked, and where the reply goes; ``reply`` it once."""
+    """A query of an operator or a viewer; call ``reply`` once."""
 
     data: bytes
     query: zenoh.Query
     key: str
 
     def reply(self, data: bytes) -> None:
-        """Answer whoever asked, whether it still waits or not."""
+        """Reply, whether the other process still waits or not."""
         with self.query as query:
             query.reply(self.key, data)
 
@@ -83,8 +83,8 @@ class Network:
 
     Attributes:
         address: where agents connect to.
-        malformed: messages about peers that did not decode; they were dropped. Answers
-            are for whoever asked to decode.
+        malformed: messages about agents that did not decode and were dropped; answers
+            to jobs are not decoded here.
     """
 
     def __init__(
@@ -96,18 +96,18 @@ class Network:
         connect: str = "",
         tls: Tls | None = None,
     ) -> None:
-        """Prepare, open nothing.
+        """Configure the session; ``with`` opens it.
 
         Args:
-            name: of this process, never used again by another.
-            fleet: whose agents to use.
+            name: of this process, never used by another one.
+            fleet: name of the fleet.
             listen: addresses of the hub within this process.
-            connect: a hub elsewhere; then nothing listens here.
+            connect: address of a hub elsewhere; then nothing listens here.
             tls: files for ``tls/`` addresses.
 
         Raises:
-            NetworkError: names or addresses that are none, or that would let
-                strangers in.
+            NetworkError: invalid names or addresses, or an address that other
+                machines reach without TLS.
         """
         self.address = connect or listen[0]
         self.malformed = 0
@@ -131,10 +131,10 @@ class Network:
         return self._membership.refused
 
     def __enter__(self) -> Self:
-        """Open the session and begin to look for agents.
+        """Open the session and start to look for agents.
 
         Raises:
-            NetworkError: an address in use, a hub that is not there.
+            NetworkError: an address in use, or no hub.
         """
         zenoh.init_log_from_env_or("error")
         with ExitStack() as opened:
@@ -151,7 +151,7 @@ class Network:
         self._opened.close()
 
     def _why_not(self, error: str) -> str:
-        """Return the engine's complaint as one short line."""
+        """Return an error of the engine as one short line."""
         if not self._is_hub:
             return f"no hub at {self.address}"
         if "in use" in error:
@@ -178,19 +178,19 @@ class Network:
         self._token = self._session.liveliness().declare_token(self._me.alive)
 
     def _free_address(self) -> str:
-        """Return where the hub really listens."""
+        """Return the address with the port that the hub has chosen."""
         key = f"@/{self._session.zid()}/router"
         for reply in self._session.get(key, consolidation=_NOW):
             if reply.ok is not None:
                 return str(json.loads(reply.ok.payload.to_bytes())["locators"][0])
-        raise NetworkError(f"the hub does not tell which port of {self.address} it has")
+        raise NetworkError(f"the hub did not report its port on {self.address}")
 
     def send(self, number: int, agent: str, payload: bytes) -> None:
-        """Give a job to an agent; exactly one ``Returned`` will tell of it.
+        """Send a job to an agent; ``receive`` returns exactly one ``Returned`` for it.
 
         Args:
             number: of the job.
-            agent: that joined; one that left since loses the job.
+            agent: that has joined; if it has left since, the job is lost.
             payload: an encoded request.
         """
         asked = _Asked(agent, number, self._inbox)
@@ -200,11 +200,11 @@ class Network:
             asked.end()
 
     def cancel(self, agent: str, payload: bytes) -> None:
-        """Tell an agent that nobody waits for a job; it may have begun it.
+        """Tell an agent that a job is no longer wanted; it may have started it.
 
         Args:
             agent: that was given the job, and may have left.
-            payload: an encoded request that need name only the job.
+            payload: an encoded request, of which only the name of the job is needed.
         """
         if member := self._membership.members.get(agent):
             self._session.put(member.cancelled, payload)
@@ -216,18 +216,18 @@ class Network:
             key,
             zenoh.handlers.Callback(asked.take, asked.end, indirect=False),
             payload=payload,
-            # Agents share their time among those who send.
+            # Agents share their time between coordinators.
             attachment=self._me.name,
             timeout=timeout_s,
             consolidation=_NOW,
         )
 
     def receive(self, timeout_s: float, pause_s: float = 0.0, /) -> list[DispatchEvent]:
-        """Return what happened, in order; empty if nothing did in time.
+        """Return events in order of arrival; empty if none came in time.
 
         Args:
             timeout_s: how long to wait for the first event, after the pause [s].
-            pause_s: how long to let events come before looking at them [s].
+            pause_s: how long to let events collect first [s].
 
         Raises:
             NetworkError: another coordinator has taken this one's run over.
@@ -248,18 +248,18 @@ class Network:
             return events
 
     def orders(self) -> list[Order]:
-        """Return what operators sent since the last call; ``receive`` waits for it."""
+        """Return the operators' queries since the last call; ``receive`` takes them."""
         orders, self._orders = self._orders, []
         return orders
 
     def onlookers(self) -> list[Order]:
-        """Return who asked, since the last call, to be told all of a run."""
+        """Return the viewers' queries for the whole run since the last call."""
         onlookers, self._onlookers = self._onlookers, []
         return onlookers
 
     @property
     def has_viewers(self) -> bool:
-        """Somebody listens to the news."""
+        """A viewer subscribes to the news."""
         return self._outlet.has_listeners(self._me.events)
 
     def tell(self, data: bytes) -> None:
@@ -267,7 +267,7 @@ class Network:
         self._outlet.put(self._me.events, data)
 
     def _understand(self, news: _News) -> Sequence[DispatchEvent]:
-        """Return what news means for who gives out jobs, if anything."""
+        """Return the dispatch events of a message, if any."""
         if isinstance(news, zenoh.Query):
             data = b"" if news.payload is None else news.payload.to_bytes()
             is_onlooker = str(news.key_expr) == self._me.state
@@ -301,12 +301,12 @@ class Network:
             self._ask(asked, member.info, None, ASK_TIMEOUT_S)
 
     def _introduced(self, asked: _Asked) -> Sequence[DispatchEvent]:
-        """Let an agent take part that says what it is and is of our version."""
+        """Let an agent join if its properties are valid and its version is ours."""
         agent, reply = asked.agent, asked.reply
         if not self._membership.is_stranger(agent):
             return []
         if reply is None or reply.ok is None:
-            # It lives but does not answer (yet).
+            # It is alive but does not answer (yet).
             self._ask_again.append((time.monotonic() + _ASK_AGAIN_S, agent))
             return []
         events = self._membership.introduce(agent, reply.ok.payload.to_bytes())

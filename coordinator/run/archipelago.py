@@ -1,4 +1,4 @@
-"""All islands of an experiment, each with its settings and its neighbours."""
+"""Islands of an experiment, each with its settings and its neighbours."""
 
 from coordinator.arena.arena import Arena
 from coordinator.islands.island import Island
@@ -11,15 +11,15 @@ from schema.experiment.settings import evaluation_settings
 def archipelago(
     experiment: Experiment, seed: int, run: int
 ) -> dict[int, Island | Arena]:
-    """Return the islands by their numbers; nothing has happened to them.
+    """Return the islands by number, before their first event.
 
     Args:
-        experiment: what is evolved, and how.
+        experiment: the document.
         seed: of the experiment's execution.
         run: number of the repeat, from 0.
 
     Raises:
-        ExperimentError: no graph is as the topology asks.
+        ExperimentError: no graph meets the topology.
     """
     count = island_count(experiment)
     owns = [island_experiment(experiment, number) for number in range(count)]
@@ -44,7 +44,7 @@ def archipelago(
 def _links(
     experiment: Experiment, owns: list[Experiment], seed: int, run: int
 ) -> list[Neighbours]:
-    """Return where each island lies."""
+    """Return the neighbours of each island."""
     edges: tuple[tuple[int, int], ...] = ()
     if experiment.migration is not None:
         edges = connections(experiment.migration, len(owns), seed, run)
@@ -62,7 +62,7 @@ def _links(
 
 
 def _differs(own: Experiment, other: Experiment) -> bool:
-    """Return whether another island judges robots in another way than this one."""
+    """Return whether another island evaluates robots differently."""
     if (own.arena is None) != (other.arena is None):
         return True
     return evaluation_settings(own) != evaluation_settings(other)

@@ -1,8 +1,8 @@
-"""Evaluations that are done twice, by two workers, to see whether they agree. Pure.
+"""Cross-checks: evaluations that two workers do, to see whether they agree. Pure.
 
-Which ones is a matter of who is evaluated, so that a resumed run audits the same.
-An audit changes no birth: equal answers are one answer, and unequal ones stop the
-run, for nobody here knows which of them is right.
+The birth decides whether an evaluation is checked, so that a resumed run checks the
+same ones. A check changes no birth: equal answers count as one, and different answers
+stop the run, as it is unknown which of them is right.
 """
 
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _WHOLE = 2**32
 
 @dataclass(frozen=True, slots=True)
 class Checks:
-    """What a user wants to be careful about; none of it changes a birth.
+    """Checks that a user wants; none of them changes a birth.
 
     Attributes:
         audit: share of evaluations that two workers do.
@@ -38,39 +38,39 @@ NO_CHECKS = Checks()
 
 
 class CrossChecks:
-    """The evaluations of a run that are done twice."""
+    """Evaluations of a run that are done twice."""
 
     def __init__(self, share: float) -> None:
-        """Choose a share of them.
+        """Initialise the checks.
 
         Args:
-            share: from 0, none, to 1, all.
+            share: of the evaluations, from 0 to 1.
         """
         self._share = share
         self._others: dict[int, int] = {}
         self._outcomes: dict[int, Evaluated | EvaluationFailed] = {}
 
     def chooses(self, command: Evaluate) -> bool:
-        """Return whether an evaluation is to be done twice."""
+        """Return whether an evaluation is done twice."""
         birth = command.birth
         name = f"{birth.island}/{birth.number}/{command.trial}"
         digest = sha256(name.encode()).digest()
         return int.from_bytes(digest[:4]) < self._share * _WHOLE
 
     def pair(self, first: int, second: int) -> None:
-        """Note the numbers of two jobs that are the same question."""
+        """Note the numbers of two jobs that are the same evaluation."""
         self._others[first], self._others[second] = second, first
 
     def settle(self, number: int, outcome: Answered) -> list[Answered | Audited]:
-        """Return what a job's outcome comes to, now that it is known.
+        """Return the events that follow from the outcome of a job.
 
         Args:
             number: of the job.
-            outcome: its own.
+            outcome: its event.
 
         Returns:
-            The outcome, if nobody else was asked; of a pair nothing at the first one,
-            and at the second what was found and, if they agree, the outcome.
+            The outcome, if the job is not one of a pair; for a pair nothing at the
+            first, and at the second the check and, if they agree, the outcome.
         """
         if not isinstance(outcome, Evaluated | EvaluationFailed):
             return [outcome]
@@ -87,8 +87,8 @@ class CrossChecks:
 
 
 def describe(event: Audited) -> str:
-    """Return, in a line, between whom there is no agreement about what."""
-    told = [
+    """Describe which workers disagree on which evaluation."""
+    outcomes = [
         f"{each.provenance.agent} ({each.provenance.platform or 'gone'}) says "
         + (
             f"fitness {each.evaluation.fitness!r}"
@@ -99,8 +99,8 @@ def describe(event: Audited) -> str:
     ]
     birth = event.first.birth
     return (
-        f"birth {birth.number} of island {birth.island}: {', '.join(told)}; both are "
-        "in the table 'audits'; take one of these machines away and resume"
+        f"birth {birth.number} of island {birth.island}: {', '.join(outcomes)}; "
+        "both are in the table 'audits'; remove one of these machines and resume"
     )
 
 

@@ -33,9 +33,9 @@ class Drift:
 
     def __str__(self) -> str:
         return (
-            f"arena {self.island}: goes on to step {self.step} by {self.worker} on "
-            f"{self.after}, before that on {self.before}: from here on this run is "
-            "another one than on one platform"
+            f"arena {self.island}: worker {self.worker} continues it to step "
+            f"{self.step} on {self.after}, after {self.before}: from here on results "
+            "differ from those of a run on one platform"
         )
 
 

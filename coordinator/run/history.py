@@ -1,4 +1,4 @@
-"""What became of an arena, from the journal of its run, so as to do it again."""
+"""History of an arena from the journal of its run, for a re-simulation."""
 
 import shutil
 import tempfile
@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from coordinator.dispatch.events import DispatchEvent
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Append, JournalledEvent, Record
+from coordinator.network.local import LocalAgents
 from coordinator.run.archipelago import archipelago
 from coordinator.run.loop import Loop
 from coordinator.run.run_context import RunContext
@@ -22,13 +22,13 @@ from schema.wire.arena_codec import Rebuild
 
 
 def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebuild]:
-    """Return what a worker needs to do again what happened in an arena.
+    """Return what a worker needs to re-simulate an arena.
 
     Args:
         folder: of a run, finished or not; nothing in it is changed.
-        island: whose arena.
-        from_s: what is to be seen; a kept snapshot from before it spares what came
-            before that [s].
+        island: of the arena.
+        from_s: time of interest; the re-simulation starts at the newest snapshot
+            before it [s].
 
     Returns:
         JSON of the arena's settings; a state, and all advances since then.
@@ -47,13 +47,13 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
     loop = Loop(
         archipelago(experiment, details.seed, details.run),
         context=context,
-        fleet=Fleet(_Nobody()),
+        fleet=Fleet(LocalAgents({}, "")),
         log=_Nothing(),
         rows=_Nothing(),
         snapshot_store=snapshot_store,
     )
     with tempfile.TemporaryDirectory() as place:
-        # A copy: opening a journal mends it, and its run may be alive.
+        # A copy: opening a journal repairs it, and its run may be active.
         shutil.copy(folder / NAME, place)
         with Journal.open(Path(place)) as journal:
             loop.start(journal.replay())
@@ -62,7 +62,7 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
 
 @dataclass(frozen=True, slots=True)
 class _SnapshotStore:
-    """The snapshots of a run up to a step; none is made or removed."""
+    """Snapshots of a run up to a step, read-only."""
 
     kept: Snapshots
     until: int
@@ -80,23 +80,8 @@ class _SnapshotStore:
         """Remove nothing."""
 
 
-class _Nobody:
-    """No agent is there: what is asked stays open."""
-
-    def send(self, number: int, agent: str, payload: bytes) -> None:
-        """Send nothing."""
-
-    def cancel(self, _agent: str, _payload: bytes, /) -> None:
-        """Cancel nothing."""
-
-    def receive(
-        self, _timeout_s: float, _pause_s: float = 0.0, /
-    ) -> Sequence[DispatchEvent]:
-        return ()
-
-
 class _Nothing:
-    """Rows and events that stand on disk already."""
+    """Journal and tables that take nothing: all is on disk already."""
 
     def write(self, record: Record) -> None:
         """Write nothing."""

@@ -148,7 +148,7 @@ def _event(end: Deliver) -> Answered:
     if reason and not end.is_deadly:
         raise JobRefused(
             f"birth {birth.number}: several agents cannot {job.kind} it, the last "
-            f"of them {end.agent}: {reason}; mend that and resume"
+            f"of them {end.agent}: {reason}; fix that and resume"
         )
     wall_s, result = 0.0, None
     if isinstance(end.answer, Answer):

@@ -1,9 +1,9 @@
-"""Runs side by side through one fleet: as many at once as keep it busy.
+"""Runs side by side on one fleet: as many at once as keep it busy.
 
-A run that needs the outcome of one birth before the next has a single question open;
-many such runs together fill all workers. So another run is begun whenever fewer
-questions are open than twice the jobs that the workers may have: one half is with
-them, the other on its way to or from the analyzers and this process.
+A run that needs the result of one birth before the next has a single open request;
+many such runs together keep all workers busy. Another run is therefore started
+whenever fewer requests are open than twice the jobs that the workers may hold: one half
+is with them, the other on its way to or from the analyzers and this process.
 """
 
 from collections import deque
@@ -21,17 +21,17 @@ from schema.errors import RevolveError
 from schema.wire.status import RunStatus, Status
 
 SLACK = 2
-"""Open questions per job that the workers may have at a time."""
+"""Open requests per job that the workers may hold at a time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Planned:
-    """A run to be done.
+    """A run that is planned.
 
     Attributes:
-        details: what is to be run.
-        status: how far it is before it is begun.
-        take: takes its folder.
+        details: of the run.
+        status: its progress before it is started.
+        take: locks its folder.
     """
 
     details: RunDetails
@@ -43,9 +43,8 @@ class RunScheduler:
     """All runs of this process.
 
     Attributes:
-        fleet: who does the work.
-        active: runs on their way, in the order in which they were begun.
-        failed: runs that could not go on, and why.
+        fleet: the agents.
+        failed: runs that could not continue, with their errors.
     """
 
     def __init__(
@@ -58,17 +57,16 @@ class RunScheduler:
         conclude: Callable[[RunSession], object],
         report: Callable[[RunDetails, RevolveError], None],
     ) -> None:
-        """Begin nothing yet.
+        """Plan runs; ``turn`` starts them.
 
         Args:
-            planned: all runs in order, those that are finished, too.
-            fleet: who does the work.
-            open_run: opens the run of a folder; told whether it may be watched.
-            most: runs that there may be at once.
-            conclude: told of each run that is finished.
-            report: told of each run that cannot go on, and why.
+            planned: all runs in order, finished ones included.
+            fleet: the agents.
+            open_run: opens the run of a folder; the flag says whether it is watched.
+            most: number of runs that there may be at once.
+            conclude: called with each run that is finished.
+            report: called with each run that cannot continue, and its error.
         """
-        self.active: list[RunSession] = []
         self.failed: list[tuple[RunDetails, RevolveError]] = []
         self.fleet = fleet
         self._open_run = open_run
@@ -87,27 +85,32 @@ class RunScheduler:
         self._is_stopped = False
 
     @property
+    def active(self) -> list[RunSession]:
+        """Runs in progress, in the order of their start."""
+        return list(self._places)
+
+    @property
     def is_finished(self) -> bool:
-        """Nothing is left to do."""
-        return not (self.active or self._planned or self._is_stopped)
+        """All runs have ended."""
+        return not (self._places or self._planned or self._is_stopped)
 
     @property
     def watched(self) -> RunSession | None:
-        """The run that those who watch are shown."""
-        return next((run for run in self.active if run.feed is not None), None)
+        """The run that viewers are shown."""
+        return next((run for run in self._places if run.feed is not None), None)
 
     def turn(self, timeout_s: float, clock: Callable[[], float]) -> None:
-        """Begin runs, listen, and let every run with news act on it.
+        """Start runs, receive answers, and let the runs act on them.
 
         Args:
-            timeout_s: how long to wait when nothing is there [s].
-            clock: tells the time; it only goes forward [s].
+            timeout_s: how long to wait for the first answer [s].
+            clock: returns the time, monotonic [s].
         """
         while self._planned and self._has_room():
             self._begin(*self._planned.popleft())
         now_s = clock()
         acting: dict[RunSession, list[End]] = {}
-        for run in self.active:
+        for run in self._places:
             if (throttle := run.loop.throttle) is not None:
                 acting[run] = []
                 timeout_s = min(timeout_s, max(0.0, throttle.wake_s - now_s))
@@ -119,10 +122,10 @@ class RunScheduler:
             self.guard(run, partial(run.loop.act, now_s, ends))
 
     def _has_room(self) -> bool:
-        if not self.active:
+        if not self._places:
             return True
-        is_full = self.fleet.open >= SLACK * self.fleet.credits
-        return not is_full and len(self.active) < self._most
+        is_full = self.fleet.open >= SLACK * self.fleet.dispatch.credits
+        return not is_full and len(self._places) < self._most
 
     def _begin(self, place: int, planned: Planned) -> None:
         try:
@@ -130,13 +133,12 @@ class RunScheduler:
         except RevolveError as error:
             self._fail(place, planned.details, error)
             return
-        self.active.append(run)
         self._places[run] = place
         self._run_of[run.loop.client] = run
         self.guard(run, run.start)
 
     def guard(self, run: RunSession, act: Callable[[], None]) -> None:
-        """Let a run act; what goes wrong is its own affair."""
+        """Let a run act; an error ends this run only."""
         try:
             act()
             if run.loop.is_finished:
@@ -157,44 +159,42 @@ class RunScheduler:
 
     def _dismiss(self, run: RunSession) -> None:
         run.close()
-        self.active.remove(run)
         del self._places[run]
         del self._run_of[run.loop.client]
 
     def do_chores(self, now_s: float) -> None:
-        """Bring all rows to disk; find out which runs went on without us.
+        """Flush all rows to disk; find runs that another coordinator took over.
 
         Args:
-            now_s: the time, of any clock that only goes forward [s].
+            now_s: the time, of a monotonic clock [s].
         """
-        # So that whoever asks hears a pace, though nobody here looks.
+        # Operators are told a rate even if no progress is shown here.
         self.status(now_s)
-        for run in list(self.active):
+        for run in self.active:
             self.guard(run, run.do_chores)
 
     def stop(self) -> None:
-        """Leave all runs as they are, to go on another day."""
+        """Stop all runs so that they can be resumed."""
         self._is_stopped = not self.is_finished
-        for run in list(self.active):
+        for run in self.active:
             self.guard(run, run.stop)
             if run in self._places:
                 self._dismiss(run)
 
     def close(self) -> None:
-        """Let go of whatever is still in hand."""
-        for run in list(self.active):
+        """Close the runs that are still open."""
+        for run in self.active:
             self._dismiss(run)
 
     def status(self, now_s: float) -> Status:
-        """Return how far all runs are.
+        """Return the progress of all runs.
 
         Args:
-            now_s: the time, of any clock that only goes forward [s].
+            now_s: the time, of a monotonic clock [s].
         """
         runs = list(self._known)
         born = sum(run.births for run in runs)
-        for run in self.active:
-            place = self._places[run]
+        for run, place in self._places.items():
             new = run.status(now_s)
             born += new.births - runs[place].births
             runs[place] = new
@@ -208,10 +208,9 @@ class RunScheduler:
 
 
 def _cause(run: RunSession, error: RevolveError) -> RevolveError:
-    """Return why a run cannot go on.
+    """Return why a run cannot continue.
 
-    Where another coordinator took it over while this one slept, whatever went wrong
-    here is of no interest.
+    If another coordinator took it over while this one slept, that is the cause.
     """
     try:
         run.held.confirm()

@@ -1,4 +1,4 @@
-"""A run that this process has in hand, from opening its folder to its last row."""
+"""A run in this process, from opening its folder to its last row."""
 
 import json
 from collections import deque
@@ -34,22 +34,21 @@ from schema.wire.status import IslandStatus, RunStatus
 
 _LIBRARIES = ("mujoco-core", "eclipse-zenoh", "numpy", "pyarrow", "protobuf")
 SPAN_S = 10.0
-"""Over how long a rate is taken [s]."""
+"""Time over which a rate is averaged [s]."""
 
 
 class RateMeter:
-    """The rate of a count that somebody looks at now and then."""
+    """Rate of a growing count."""
 
     def __init__(self) -> None:
-        """Have seen nothing."""
         self._seen: deque[tuple[float, float]] = deque()
 
     def note(self, now_s: float, count: float) -> None:
-        """See how far the count is.
+        """Note the count at a time.
 
         Args:
-            now_s: the time, of any clock that only goes forward [s].
-            count: that only grows.
+            now_s: the time, of a monotonic clock [s].
+            count: does not decrease.
         """
         self._seen.append((now_s, count))
         while now_s - self._seen[0][0] > SPAN_S:
@@ -57,7 +56,7 @@ class RateMeter:
 
     @property
     def per_s(self) -> float:
-        """Growth per second over the last seconds; 0 if less than two were seen."""
+        """Growth per second over the last seconds; 0 with fewer than two counts."""
         if not self._seen:
             return 0.0
         (first_s, first), (last_s, last) = self._seen[0], self._seen[-1]
@@ -65,13 +64,13 @@ class RateMeter:
 
 
 class RunSession:
-    """One run on its way.
+    """A run in progress.
 
     Attributes:
-        held: its folder, which this process holds.
-        experiment: what is run.
-        loop: its machines, and what connects them to the world.
-        feed: hears of its rows for those who watch; None if nobody can.
+        held: its folder, which this process has locked.
+        experiment: the document.
+        loop: its islands and their connections.
+        feed: collects its rows for viewers; None without a network.
     """
 
     def __init__(
@@ -84,15 +83,15 @@ class RunSession:
         is_watched: bool = False,
         checks: Checks = NO_CHECKS,
     ) -> None:
-        """Open all of a run; nothing happens before ``start``.
+        """Open the files of a run; ``start`` starts it.
 
         Args:
             held: the folder; closed with the run, or at once if this fails.
-            fleet: who does the work.
+            fleet: the agents.
             fsync: survive power loss, too.
             speed: simulated seconds per second at most, of arenas; None: no limit.
             is_watched: have a feed.
-            checks: what to look out for.
+            checks: cross-checks to make.
 
         Raises:
             RunFolderError: a damaged journal, or a disk that fails.
@@ -114,6 +113,7 @@ class RunSession:
             stack.callback(self._recorder.close)
             self.experiment = experiment_from_text(details.document)
             self.feed = Feed(held.name, held.epoch, details) if is_watched else None
+            timestep_s = self.experiment.simulation.timestep_s
             self.loop = Loop(
                 archipelago(self.experiment, details.seed, details.run),
                 context=RunContext.of(
@@ -123,23 +123,19 @@ class RunSession:
                 log=self._journal,
                 rows=self._recorder,
                 snapshot_store=Snapshots(held.path),
-                throttle=_throttle(self.experiment, speed),
+                throttle=RealTimeThrottle(speed, timestep_s) if speed else None,
                 checks=checks,
                 confirm=held.confirm,
                 watch=self.feed.unread.append if self.feed else None,
             )
             self._births, self._simulated = RateMeter(), RateMeter()
-            self._owns = {
-                number: island_experiment(self.experiment, number)
-                for number in self.loop.islands
-            }
             self._opened = stack.pop_all()
 
     def start(self) -> None:
-        """Begin, or go on where the journal ends.
+        """Start, or resume where the journal ends.
 
         Raises:
-            RevolveError: the run cannot go on; see ``Loop.start``.
+            RevolveError: the run cannot continue; see ``Loop.start``.
         """
         self.loop.start(self._replay())
         self.held.set_state("running")
@@ -152,7 +148,7 @@ class RunSession:
                 self.feed.read()
 
     def do_chores(self) -> None:
-        """Find out whether the folder is still ours; bring rows to disk.
+        """Check that the folder is still ours; flush rows to disk.
 
         Raises:
             RunFolderError: it is not, or the disk is full or failed.
@@ -161,7 +157,7 @@ class RunSession:
         self._recorder.flush()
 
     def finish(self) -> None:
-        """Write the last row, and turn all tables into their final form.
+        """Write the last row, and convert all tables to their final form.
 
         Raises:
             RunFolderError: the folder is not ours, or the disk is full or failed.
@@ -172,7 +168,7 @@ class RunSession:
         self.held.set_state("finished")
 
     def stop(self) -> None:
-        """Leave all as it is, to go on another day.
+        """Flush everything, so that the run can be resumed.
 
         Raises:
             RunFolderError: the folder is not ours, or the disk is full or failed.
@@ -182,18 +178,18 @@ class RunSession:
         self.held.set_state("stopped")
 
     def close(self) -> None:
-        """Wait for no answer; let go of the folder and all files."""
+        """Drop open requests; close the folder and all files."""
         self.loop.leave()
         self._opened.close()
 
     def status(self, now_s: float) -> RunStatus:
-        """Return how far it is.
+        """Return the progress of the run.
 
         Args:
-            now_s: the time, of any clock that only goes forward [s].
+            now_s: the time, of a monotonic clock [s].
         """
         islands = tuple(
-            _island_status(island, self._owns[number])
+            _island_status(island, island_experiment(self.experiment, number))
             for number, island in sorted(self.loop.islands.items())
         )
         self._births.note(now_s, sum(island.births for island in islands))
@@ -212,10 +208,10 @@ class RunSession:
 
 
 def _check_journal(folder: Path) -> None:
-    """Raise if a run has lost its journal; nothing is touched before.
+    """Raise if a run has lost its journal; call it before any file is changed.
 
     Raises:
-        RunFolderError: it has none, and had.
+        RunFolderError: there is no journal, and there was one.
     """
     is_old = (folder / STATE).exists() or any(has_rows(folder, name) for name in TABLES)
     if is_old and not is_begun(folder):
@@ -223,15 +219,6 @@ def _check_journal(folder: Path) -> None:
             f"{folder / JOURNAL}: is lost: put a sound copy of it in its place, or "
             "begin anew in another folder"
         )
-
-
-def _throttle(experiment: Experiment, speed: float | None) -> RealTimeThrottle | None:
-    """Return what holds arenas back, None if nothing shall."""
-    return (
-        None
-        if speed is None
-        else RealTimeThrottle(speed, experiment.simulation.timestep_s)
-    )
 
 
 def _island_status(island: Island | Arena, own: Experiment) -> IslandStatus:

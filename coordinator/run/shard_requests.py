@@ -55,7 +55,8 @@ class _Past:
 
     Its state at ``step`` is that of the newest snapshot, at ``base`` (0 is the empty
     arena), after ``history``. ``platform`` is that of the last advance, empty before
-    the first; ``places`` are those of the robots that lived after it.
+    the first; ``places`` are those of the robots that lived after it. The requested
+    advance may have a snapshot in the store if ``may_be_kept``, as in any replay.
     """
 
     step: int = 0
@@ -66,6 +67,7 @@ class _Past:
     places: dict[BirthId, Vector] = field(default_factory=dict)
     requested: AdvanceShard | None = None
     wants_snapshot: bool = False
+    may_be_kept: bool = True
 
     def drifts_to(self, platform: str) -> bool:
         """Return whether a platform differs from that of the last advance."""
@@ -168,7 +170,7 @@ class ShardRequests:
         past, advance = self._past(event.island), event.advance
         requested = past.requested
         if requested is None or requested.number != event.number:
-            raise UnexpectedEvent(f"no such advance was asked for: {event}")
+            raise UnexpectedEvent(f"no such advance was requested: {event}")
         past.requested = None
         past.step, past.digest = advance.step, advance.digest
         agent, platform = event.provenance.agent, event.provenance.platform
@@ -181,16 +183,18 @@ class ShardRequests:
             PastAdvance(requested.changes, requested.until, advance.digest)
         )
         past.places = {one.birth: one.place for one in advance.judgements}
-        if self._snapshot_store.has(event.island, past.step, past.digest):
+        store, may_be_kept = self._snapshot_store, past.may_be_kept
+        if may_be_kept and store.has(event.island, past.step, past.digest):
             past.base, past.history = past.step, []
-            self._snapshot_store.drop_before(event.island, past.step)
+            store.drop_before(event.island, past.step)
+        past.may_be_kept = True
         return drift
 
     def refusal(self, end: ShardFailed) -> JobRefused:
         """Return the error that stops a run whose arena cannot be advanced."""
         return JobRefused(
             f"arena {self._islands[end.shard]}: several workers cannot advance it, the "
-            f"last of them {end.agent}: {end.reason}; mend that and resume"
+            f"last of them {end.agent}: {end.reason}; fix that and resume"
         )
 
     def _past(self, shard: int) -> _Past:
@@ -205,7 +209,7 @@ class ShardRequests:
         is_drift = past.drifts_to(command.platform)
         # Nothing from before a drift is ever repeated.
         wants_snapshot = requested.wants_snapshot or past.wants_snapshot or is_drift
-        past.wants_snapshot = False
+        past.wants_snapshot, past.may_be_kept = False, wants_snapshot
         past.requested = replace(requested, wants_snapshot=wants_snapshot)
         rebuild: Rebuild | None = None
         if command.is_whole:

@@ -29,7 +29,6 @@ from schema.wire.arena_messages import (
     write_brain_change,
 )
 from schema.wire.codec import (
-    decoded,
     evaluation_from_message,
     evaluation_to_message,
     report_from_message,
@@ -41,6 +40,7 @@ from schema.wire.messages import (
     finite,
     genome_from_message,
     genome_to_message,
+    parsed,
 )
 
 
@@ -72,7 +72,7 @@ def decode_entry(data: bytes) -> JournalledEvent:
     Raises:
         MalformedMessage: the bytes are no entry, or it holds no event.
     """
-    return decoded(data, pb.Entry(), _journalled)
+    return _journalled(parsed(data, pb.Entry()))
 
 
 def _journalled(entry: pb.Entry) -> JournalledEvent:

@@ -1,8 +1,8 @@
-"""``revolve worker`` and ``revolve analyzer``: the same flags, the same life.
+"""Commands ``revolve worker`` and ``revolve analyzer``.
 
-One process does one job at a time; the command starts as many as it is told,
-starts those again that end, and ends all on Ctrl-C. It gives up when none is left and
-all ended by themselves.
+One process does one job at a time. The command starts the given number of processes,
+restarts those that end, and stops all on Ctrl-C. It gives up when all of them exited by
+themselves.
 """
 
 import argparse
@@ -23,26 +23,27 @@ _POLL_S = 0.5
 
 
 def add_network_flags(flags: argparse.ArgumentParser) -> None:
-    """Add what everybody on a network needs: its fleet and its certificates."""
+    """Add the flags for the fleet and its certificates."""
     flags.add_argument(
-        "--fleet", default=DEFAULT_FLEET, help=f"its name (default: {DEFAULT_FLEET})"
+        "--fleet",
+        default=DEFAULT_FLEET,
+        help=f"name of the fleet (default: {DEFAULT_FLEET})",
     )
     flags.add_argument(
         "--tls-ca", metavar="FILE", help="certificate authority of the fleet (PEM)"
     )
-    flags.add_argument("--tls-certificate", metavar="FILE", help="own one (PEM)")
-    flags.add_argument("--tls-key", metavar="FILE", help="own key (PEM, PKCS#8)")
+    flags.add_argument("--tls-certificate", metavar="FILE", help="certificate (PEM)")
+    flags.add_argument("--tls-key", metavar="FILE", help="private key (PEM, PKCS#8)")
 
 
 def add_cpu_limit(flags: argparse.ArgumentParser) -> None:
-    """Add how much CPU time a job may take before its process is ended."""
+    """Add the flag for the CPU time limit of a job."""
     flags.add_argument(
         "--cpu-limit",
         type=positive_number,
         default=CPU_LIMIT_S,
         metavar="S",
-        help="CPU seconds after which a job counts as one that never ends "
-        f"(default: {CPU_LIMIT_S:.0f})",
+        help=f"CPU time limit of one job in seconds (default: {CPU_LIMIT_S:.0f})",
     )
 
 
@@ -68,7 +69,7 @@ def tls_of(options: argparse.Namespace) -> Tls | None:
 
 
 def host_name() -> str:
-    """Return this machine's name as it may stand in a key."""
+    """Return this machine's name with the characters that a key allows."""
     return re.sub(r"[^A-Za-z0-9-]", "-", socket.gethostname()).strip("-")[:40] or "host"
 
 
@@ -82,9 +83,9 @@ def run_pool(
 
     Args:
         role: "worker" or "analyzer".
-        body: what each process does with its agent and its place.
+        body: run by each process, with its agent and its slot.
         arguments: of the user, after the command's name.
-        processes: how many unless the user says so.
+        processes: default number of processes.
     """
     flags = _flags(role, processes)
     options = flags.parse_args(arguments)
@@ -113,7 +114,7 @@ def run_pool(
                 for death in process_pool.deaths[deaths:]:
                     sys.stderr.write(f"{tell_death(death)}\n")
                 if process_pool.restarts > restarts:
-                    sys.stderr.write(f"a {role} is gone; another takes its place\n")
+                    sys.stderr.write(f"a {role} process ended and is restarted\n")
                 restarts, deaths = process_pool.restarts, len(process_pool.deaths)
                 if len(process_pool.exit_codes) == options.processes:
                     return max(process_pool.exit_codes)
@@ -123,7 +124,7 @@ def run_pool(
 
 
 def tell_death(death: Death) -> str:
-    """Return, in a line, what a process died of."""
+    """Return a line about the job that crashed a process."""
     task = death.task
     return f"{task.agent} died of job {task.number} of {task.run}: {death.cause}"
 
@@ -131,7 +132,7 @@ def tell_death(death: Death) -> str:
 def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
     flags = Flags(
         prog=f"revolve {role}",
-        description=f"Serve a coordinator as {role} until Ctrl-C, or wait for one.",
+        description=f"Serve coordinators as {role} until Ctrl-C.",
         epilog=f"example: revolve {role} --connect tcp/127.0.0.1:7447 --processes 2",
         allow_abbrev=False,
     )
@@ -146,15 +147,17 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
         type=whole_number(),
         default=processes,
         metavar="N",
-        help=f"how many at a time (default: {processes})",
+        help=f"number of processes (default: {processes})",
     )
     flags.add_argument(
-        "--name", default=host_name(), help="of this machine (default: its host name)"
+        "--name",
+        default=host_name(),
+        help="name of this machine (default: its host name)",
     )
     flags.add_argument(
         "--until-closed",
         action="store_true",
-        help="end when standard input is closed, too",
+        help="stop when standard input is closed, too",
     )
     add_cpu_limit(flags)
     flags.set_defaults(threads=1)
@@ -163,7 +166,7 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
             "--threads",
             type=whole_number(),
             metavar="N",
-            help="of each process, to advance one arena together (default: 1)",
+            help="threads of each process for one arena (default: 1)",
         )
     add_network_flags(flags)
     return flags

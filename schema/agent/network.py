@@ -1,7 +1,7 @@
-"""How the processes of a fleet find each other, as Zenoh configurations.
+"""Zenoh configurations of the processes of a fleet.
 
-One hub, everybody else a client with one explicit address. No discovery, and
-nothing listens beyond this machine unless certificates guard it.
+One process is the hub; all others are clients with its explicit address. There is no
+discovery, and only addresses with certificates are reachable from other machines.
 """
 
 import json
@@ -14,15 +14,15 @@ from schema.agent.supervision import CPU_LIMIT_S
 from schema.agent.topics import Role
 from schema.errors import NetworkError
 
-# Port 0: whichever is free.
+# Port 0: any free port.
 THIS_MACHINE = "tcp/127.0.0.1:0"
 DEFAULT_FLEET = "default"
 
-# How an agent's refusal begins if a newer coordinator has taken the run over.
+# Prefix of an agent's refusal if a newer coordinator has taken the run over.
 FENCED = "fenced: "
-# And if it cannot do any job of the run, for want of the run's plug-ins.
+# Prefix of a refusal if the agent lacks the plug-ins of the run.
 UNFIT = "unfit: "
-# No clock of ours ends a job: a week is longer than any [s].
+# Effectively no limit: a week is longer than any job [s].
 JOB_TIMEOUT_S = 7 * 24 * 3600.0
 ASK_TIMEOUT_S = 10.0
 # A frozen process counts as gone after this [ms].
@@ -34,10 +34,10 @@ _LAST_PORT = 65535
 
 @dataclass(frozen=True, slots=True)
 class Tls:
-    """Files (PEM) with which a process proves who it is and checks the others.
+    """Files (PEM) with which a process authenticates itself and checks the others.
 
     Attributes:
-        ca: certificate of the authority that signed all of a fleet.
+        ca: certificate of the authority that signed all certificates of a fleet.
         certificate: own certificate.
         key: own private key (PKCS#8).
     """
@@ -49,11 +49,11 @@ class Tls:
 
 @dataclass(frozen=True, slots=True)
 class Agent:
-    """One that does jobs, and where its hub is.
+    """A process that does jobs, and the address of its hub.
 
     Attributes:
         role: "worker" or "analyzer".
-        name: never used again by another process.
+        name: never used by another process.
         connect: address of the hub.
         fleet: name of the fleet.
         slots: jobs at a time; one process does one.
@@ -61,7 +61,7 @@ class Agent:
         platform: tag of CPU, system and libraries.
         version: of Revolve Islands.
         threads: that advance one arena together.
-        cpu_limit_s: CPU time of a job after which it counts as one that hangs [s].
+        cpu_limit_s: CPU time limit of a job [s].
     """
 
     role: Role
@@ -112,8 +112,8 @@ def hub_config(listen: tuple[str, ...], tls: Tls | None = None) -> str:
         tls: files for the ``tls/`` ones among them.
 
     Raises:
-        NetworkError: no address; one that is none, that is reached from beyond
-            this machine without TLS, or that needs files.
+        NetworkError: no address, an invalid one, one that other machines reach
+            without TLS, or one that needs files.
     """
     protocols = set()
     if not listen:
@@ -142,7 +142,7 @@ def hub_config(listen: tuple[str, ...], tls: Tls | None = None) -> str:
     config["mode"] = "router"
     config["listen"] = {"endpoints": list(listen), "exit_on_failure": True}
     config["connect"] = {"endpoints": []}
-    # Only on this machine: tells which port was free.
+    # Only on this machine: reports the port that was chosen.
     config["adminspace"] = {
         "enabled": protocols == {"tcp"},
         "permissions": {"read": True, "write": False},
@@ -152,10 +152,10 @@ def hub_config(listen: tuple[str, ...], tls: Tls | None = None) -> str:
 
 
 def client_config(connect: str, tls: Tls | None = None) -> str:
-    """Return the configuration (JSON5) of everybody who is not the hub.
+    """Return the configuration (JSON5) of a client.
 
     Raises:
-        NetworkError: no address, or one that needs files.
+        NetworkError: an invalid address, or one that needs files.
     """
     protocol, _, _ = parse_address(connect)
     _check_tls(connect, protocol, tls)
@@ -191,7 +191,7 @@ def _link(protocols: set[str]) -> dict[str, Any]:
 
 
 def _common(link: dict[str, Any]) -> dict[str, Any]:
-    """Return what hub and clients share: no discovery, no shared memory."""
+    """Return the settings of hub and clients: no discovery, no shared memory."""
     return {
         "scouting": {
             "multicast": {"enabled": False},

@@ -1,6 +1,6 @@
-"""What decides the last bit of a number: CPU class, system, libraries.
+"""Platform tag: CPU class, system and libraries, which decide rounding.
 
-Two machines with equal tags give equal results; with other tags they may.
+Two machines with equal tags give equal results; others may.
 """
 
 import platform
@@ -13,12 +13,12 @@ from pathlib import Path
 from schema.wire.revolve_pb2 import DESCRIPTOR
 
 MEANING = 1
-"""Counts the times that messages came to mean something else and looked the same.
+"""Number of changes in the meaning of messages whose format stayed the same.
 
-1: what is to be vetted is a body, without the brain of its robot.
+1: a vetting request holds a body, without the brain of its robot.
 """
-# What compilers and libraries choose their code by (x86-64 psABI levels); each
-# level includes those before it.
+# x86-64 psABI levels, by which compilers and libraries choose their code; each level
+# includes those before it.
 _LEVELS = {
     "v2": {"cx16", "lahf_lm", "popcnt", "pni", "sse4_1", "sse4_2", "ssse3"},
     "v3": {"abm", "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe", "xsave"},
@@ -33,18 +33,18 @@ def platform_tag() -> str:
     library, number = platform.libc_ver()
     numpy = _version("numpy")
     mujoco = _version("mujoco-core")
-    # Without a C library's name the system's release stands for it.
+    # Without the name of a C library, use the release of the system.
     library = f"{library}{number}" if library else platform.release()
     return f"{system}-{machine}-{library}-mujoco{mujoco}-numpy{numpy}"
 
 
 def our_version() -> str:
-    """Return the version of Revolve Islands, 0 if it is run without installing."""
+    """Return the version of Revolve Islands, "0" if it is not installed."""
     return _version("revolve-islands")
 
 
 def wire_version() -> str:
-    """Return our version and, after a ``+``, which messages it speaks, and how."""
+    """Return our version and, after a ``+``, that of the messages."""
     messages = sha256(DESCRIPTOR.serialized_pb).hexdigest()
     return f"{our_version()}+{messages[:8]}.{MEANING}"
 
@@ -54,7 +54,7 @@ def cpu_class(machine: str, flags: Collection[str]) -> str:
 
     Args:
         machine: name of the architecture.
-        flags: what the CPU can do, in Linux's words.
+        flags: features of the CPU, as Linux names them.
     """
     reached = machine
     if machine in {"x86_64", "amd64"}:
@@ -67,7 +67,7 @@ def cpu_class(machine: str, flags: Collection[str]) -> str:
 
 
 def cpu_flags(cpuinfo: Path) -> frozenset[str]:
-    """Return what the first CPU of Linux's list can do; empty if there is no list."""
+    """Return the features of the first CPU of Linux's list; empty without a list."""
     try:
         lines = cpuinfo.read_text("utf-8", errors="replace").splitlines()
     except OSError:

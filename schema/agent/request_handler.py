@@ -1,7 +1,7 @@
-"""One request in, one reply out: what an agent does with a request but compute.
+"""Order of an agent's requests, and one reply for each.
 
-It refuses who was replaced, what it has not the plug-ins for and what nobody waits
-for any more, and counts. Whatever a peer sends or a plug-in raises becomes a reply.
+Requests of replaced coordinators, requests that need other plug-ins and cancelled jobs
+are refused and counted. Any bytes from a peer and any error of a plug-in get a reply.
 """
 
 from collections import deque
@@ -22,25 +22,31 @@ _MOST_CANCELLED = 1000
 T = TypeVar("T")
 
 MOST_SOURCES = 1000
-"""Accounts that are kept of those who have nothing waiting."""
+"""Most accounts that are kept of sources without waiting items."""
 
 
 class FairQueue(Generic[T]):
-    """What waits, by who sent it."""
+    """Waiting items of several sources, each of which gets the same share of time.
+
+    Each source has an account of the time that it was served. The waiting source with
+    the least time is next; its own items come in order of arrival. A source that comes
+    back continues at the level of the others: it cannot save up unused time.
+    Source: start-time fair queueing (Goyal, Vin and Cheng 1996), with served time for
+    packet lengths.
+    """
 
     def __init__(self) -> None:
-        """Have nothing waiting."""
         self._waiting: dict[bytes, deque[T]] = {}
         self._accounts: dict[bytes, float] = {}
         self._served = b""
         self._level_s = 0.0
 
     def __len__(self) -> int:
-        """Return how many items wait."""
+        """Return the number of waiting items."""
         return sum(map(len, self._waiting.values()))
 
     def put(self, source: bytes, item: T) -> None:
-        """Let an item wait."""
+        """Add an item."""
         if source not in self._waiting:
             account_s = max(self._accounts.pop(source, 0.0), self._level_s)
             self._accounts[source] = account_s
@@ -48,13 +54,13 @@ class FairQueue(Generic[T]):
         self._waiting[source].append(item)
 
     def take(self) -> T:
-        """Return the item whose turn it is.
+        """Remove and return the next item.
 
         Raises:
-            IndexError: nothing waits.
+            IndexError: the queue is empty.
         """
         if not self._waiting:
-            raise IndexError("nothing waits")
+            raise IndexError("the queue is empty")
         source = min(self._waiting, key=self._accounts.__getitem__)
         self._served, self._level_s = source, self._accounts[source]
         queue = self._waiting[source]
@@ -65,29 +71,26 @@ class FairQueue(Generic[T]):
         return item
 
     def spent(self, seconds: float) -> None:
-        """Note how long the item that was taken last took."""
+        """Note the time that the last item took [s]."""
         if self._served in self._accounts:
             self._accounts[self._served] += seconds
 
     def _forget(self) -> None:
-        """Drop the oldest accounts of those who have nothing waiting."""
+        """Drop the accounts of sources without waiting items if there are too many."""
         if len(self._accounts) - len(self._waiting) > MOST_SOURCES:
-            for source in [
-                each for each in self._accounts if each not in self._waiting
-            ]:
-                if source != self._served:
-                    del self._accounts[source]
+            kept = {*self._waiting, self._served}
+            self._accounts = {k: v for k, v in self._accounts.items() if k in kept}
 
 
 @dataclass(slots=True)
 class Tally:
-    """What an agent did.
+    """Counts of an agent's replies.
 
     Attributes:
         answered: jobs with an answer.
-        refused: jobs with a reason why not, the malformed among them.
+        refused: jobs with a reason, malformed requests included.
         malformed: requests that do not decode.
-        skipped: jobs that nobody waited for any more.
+        skipped: cancelled jobs.
     """
 
     answered: int = 0
@@ -98,7 +101,7 @@ class Tally:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """An answer, or the reason why there is none."""
+    """An answer, or the reason for the lack of one."""
 
     answer: bytes = b""
     reason: str = ""
@@ -111,9 +114,9 @@ class Server:
     Attributes:
         compute: bytes of a ``Request`` to bytes of an ``Answer``; it raises if the
             request is bad.
-        agent: who this is.
-        slot: its place in a crew.
-        tally: what it did.
+        agent: this agent.
+        slot: its slot in a pool.
+        tally: counts of its replies.
     """
 
     compute: Callable[[bytes], bytes]
@@ -125,7 +128,7 @@ class Server:
 
     @property
     def info(self) -> bytes:
-        """Bytes of the ``AgentInfo`` that says what this agent is."""
+        """Bytes of the ``AgentInfo`` of this agent."""
         agent = self.agent
         info = pb.AgentInfo(
             agent=agent.name,
@@ -146,10 +149,10 @@ class Server:
         return info.SerializeToString()
 
     def cancel(self, data: bytes) -> None:
-        """Note that nobody waits for a job any more; may come from any thread.
+        """Note that a job is cancelled; may be called from any thread.
 
         Args:
-            data: bytes of a ``Request`` that need name only the job.
+            data: bytes of a ``Request``, of which only the name of the job is needed.
         """
         try:
             task = self._task(pb.Request.FromString(data))
@@ -161,14 +164,14 @@ class Server:
             del self._cancelled[next(iter(self._cancelled))]
 
     def reply(self, data: bytes) -> Reply:
-        """Return the reply to a request; whatever it is, one comes."""
+        """Return the reply to any bytes."""
         try:
             request = self._checked(data)
             task = self._task(request)
             if task in self._cancelled:
                 del self._cancelled[task]
                 self.tally.skipped += 1
-                return Reply(reason="nobody waits for this job any more")
+                return Reply(reason="the job was cancelled")
             with self.slot.doing(task, self.agent.cpu_limit_s):
                 answer = self.compute(data)
         except (UnknownPlugin, PluginDiffers) as error:
@@ -188,12 +191,12 @@ class Server:
         return Task(self.agent.name, request.run, request.epoch, request.number)
 
     def _checked(self, data: bytes) -> pb.Request:
-        """Return what every kind of request begins with.
+        """Return the fields that requests of all kinds share.
 
         Raises:
-            MalformedMessage: not a request's bytes, or one that names no run.
-            PluginDiffers: a plug-in that is not here, or another one.
-            RevolveError: an older epoch than the newest seen of its run.
+            MalformedMessage: not the bytes of a request, or one without a run.
+            PluginDiffers: a plug-in that is missing or has another source here.
+            RevolveError: an older epoch than the newest one of its run.
         """
         try:
             request = pb.Request.FromString(data)

@@ -1,8 +1,8 @@
-"""Jobs from the network: the serving loop that workers and analyzers share.
+"""The loop in which workers and analyzers do jobs from the network.
 
-An agent takes one job after the other from its own key; the next one already
-waits within the process. The callbacks of the network only enqueue. Whatever a
-peer sends, the loop goes on: bad requests are refused with a reason and counted.
+An agent does one job at a time; the next one already waits within the process. The
+callbacks of the network only enqueue. Bad requests are refused with a reason and
+counted; they never end the loop.
 """
 
 import sys
@@ -26,8 +26,8 @@ _POLL_S = 0.2
 _RETRY_S = 0.3
 _SAY_S = 5.0
 
-NOBODYS = ProcessSlot()
-"""The place of a process that nobody looks after."""
+UNSUPERVISED = ProcessSlot()
+"""Slot of a process without a supervisor."""
 
 
 def tell_user(line: str) -> None:
@@ -37,33 +37,32 @@ def tell_user(line: str) -> None:
 
 
 class Outlet:
-    """Where an agent publishes for those who watch: best effort, nothing waits."""
+    """Publisher of messages for viewers: best effort, never blocks."""
 
     def __init__(self) -> None:
-        """Lead nowhere until there is a session."""
         self._session: zenoh.Session | None = None
         self._publishers: dict[str, zenoh.Publisher] = {}
 
     def lead_to(self, session: zenoh.Session | None) -> None:
-        """Publish by a session from now on, or no more."""
+        """Publish through a session from now on; None stops publishing."""
         self._session = session
         self._publishers = {}
 
     def has_listeners(self, key: str) -> bool:
-        """Return whether somebody would get what is put: if not, spare the work."""
+        """Return whether any viewer subscribes to a key."""
         publisher = self._publisher(key)
         # Zenoh's stubs call it a bool; it is an object that is always true.
         status: Any = publisher and publisher.matching_status
         return publisher is not None and bool(status.matching)
 
     def put(self, key: str, data: bytes) -> None:
-        """Publish bytes; lost if nobody listens or the line is full."""
+        """Publish bytes; they are dropped if the connection is busy."""
         publisher = self._publisher(key)
         if publisher is not None:
             publisher.put(data)
 
     def _publisher(self, key: str) -> zenoh.Publisher | None:
-        """Return what publishes on a key; None while there is no session."""
+        """Return the publisher of a key; None while there is no session."""
         if self._session is None:
             return None
         if key not in self._publishers:
@@ -82,24 +81,24 @@ def serve(
     say: Callable[[str], None] = tell_user,
     *,
     outlet: Outlet | None = None,
-    slot: ProcessSlot = NOBODYS,
+    slot: ProcessSlot = UNSUPERVISED,
 ) -> Tally:
-    """Answer jobs until told to stop; wait for the hub as long as it takes.
+    """Do jobs until stopped; wait for the hub as long as needed.
 
-    The job at hand is finished, the one behind it dropped: whoever asked gives it
-    to somebody else.
+    The current job is finished and the next one dropped: its coordinator gives it to
+    another agent.
 
     Args:
-        answer: bytes of a ``Request`` to bytes of an ``Answer``; it raises if the
-            request is bad.
-        agent: who this is and where its hub is.
-        stop: ends it; looked at between jobs.
-        say: told, in one line, when there is no hub and when there is one again.
-        outlet: publishes by this agent's session while there is one.
-        slot: this process's place in a crew, if it has one.
+        answer: bytes of a ``Request`` to bytes of an ``Answer``; raises if the request
+            is bad.
+        agent: this agent, and the address of its hub.
+        stop: ends the loop; checked between jobs.
+        say: called with a line when the hub is gone and when it is back.
+        outlet: publishes through this agent's session while there is one.
+        slot: this process's slot in a pool, if it has one.
 
     Raises:
-        NetworkError: a name or an address that is none.
+        NetworkError: an invalid name or address.
     """
     check_name(agent.name, "name")
     check_name(agent.fleet, "fleet")
@@ -119,10 +118,10 @@ def serve(
 
 
 def own_agent(agent: Agent, index: int) -> Agent:
-    """Return what one process of a crew calls itself and says of itself.
+    """Return the agent of one process of a pool.
 
     Args:
-        agent: of the whole crew.
+        agent: of the whole pool.
         index: of the process.
     """
     return replace(
@@ -139,12 +138,12 @@ def serve_as_process(
     slot: ProcessSlot,
     outlet: Outlet | None = None,
 ) -> None:
-    """Be one process of a crew: serve until asked to end, or left alone.
+    """Serve as one process of a pool until a signal or until the parent is gone.
 
     Args:
         answer: as for ``serve``.
-        agent: of this process, or of the whole crew if it has no version yet.
-        slot: of the process; the first one speaks for all.
+        agent: of this process, or of the whole pool if it has no version yet.
+        slot: of the process; only the first one writes messages about the hub.
         outlet: as for ``serve``.
     """
     stop = stop_on_signals()
@@ -160,11 +159,11 @@ def serve_as_process(
 
 
 def _keep_quiet(_line: str) -> None:
-    """Let the first of the crew speak."""
+    """Write nothing: the first process of the pool does."""
 
 
 def _open(config: str, hub: "_Hub", stop: threading.Event) -> zenoh.Session | None:
-    """Return a session as soon as there is a hub; None if told to stop first."""
+    """Return a session as soon as there is a hub; None if stopped before."""
     while not stop.is_set():
         try:
             return zenoh.open(zenoh.Config.from_json5(config))
@@ -181,18 +180,18 @@ def _serve_session(
     inbox: SimpleQueue[zenoh.Query] = SimpleQueue()
     take = zenoh.handlers.Callback(inbox.put, indirect=False)
 
-    def tell_info(query: zenoh.Query) -> None:
+    def reply_info(query: zenoh.Query) -> None:
         with query:
             query.reply(me.info, server.info)
 
     def cancel(sample: zenoh.Sample) -> None:
         server.cancel(sample.payload.to_bytes())
 
-    # The keys first, the token last: whoever sees it may ask at once.
+    # The token comes last: a coordinator that sees it sends jobs at once.
     with (
         session.declare_queryable(me.jobs, take, complete=True),
         session.declare_queryable(
-            me.info, zenoh.handlers.Callback(tell_info), complete=True
+            me.info, zenoh.handlers.Callback(reply_info), complete=True
         ),
         session.declare_subscriber(
             me.cancelled, zenoh.handlers.Callback(cancel, indirect=False)
@@ -202,26 +201,26 @@ def _serve_session(
         hub.seen(is_there=True)
         turns: FairQueue[zenoh.Query] = FairQueue()
         while not stop.is_set():
-            if not _let_in(inbox, turns):
+            if not _queue_all(inbox, turns):
                 hub.seen(is_there=bool(session.info.routers_zid()))
                 continue
-            # A job that came after all was quiet: the hub is back.
+            # A job arrived: the hub is there.
             hub.seen(is_there=True)
             began_s = time.monotonic()
             with turns.take() as query:
                 _answer(query, server, me)
             turns.spent(time.monotonic() - began_s)
-    _let_in(inbox, turns)
+    _queue_all(inbox, turns)
     while turns:
         with turns.take():
-            pass  # its end without a reply is the asker's news
+            pass  # a query that ends without a reply is lost for its coordinator
 
 
-def _let_in(inbox: SimpleQueue[zenoh.Query], turns: FairQueue[zenoh.Query]) -> bool:
-    """Have all that came wait its turn; return whether anything waits now."""
+def _queue_all(inbox: SimpleQueue[zenoh.Query], turns: FairQueue[zenoh.Query]) -> bool:
+    """Move all queries that arrived to the queue; return whether any waits."""
     try:
         while True:
-            # Only who has nothing to do waits for more to come.
+            # Wait only while there is nothing to do.
             query = inbox.get_nowait() if turns else inbox.get(timeout=_POLL_S)
             sender = query.attachment
             turns.put(sender.to_bytes() if sender else b"", query)
@@ -230,7 +229,7 @@ def _let_in(inbox: SimpleQueue[zenoh.Query], turns: FairQueue[zenoh.Query]) -> b
 
 
 def _answer(query: zenoh.Query, server: Server, me: Member) -> None:
-    """Reply with an answer, or with the reason why there is none."""
+    """Reply with the answer, or with the reason why there is none."""
     payload = query.payload
     reply = server.reply(b"" if payload is None else payload.to_bytes())
     if reply.reason:
@@ -241,7 +240,7 @@ def _answer(query: zenoh.Query, server: Server, me: Member) -> None:
 
 @dataclass(slots=True)
 class _Hub:
-    """What the user knows of the hub."""
+    """State of the hub as the user knows it."""
 
     address: str
     say: Callable[[str], None]
@@ -249,11 +248,13 @@ class _Hub:
     said_s: float = 0.0
 
     def seen(self, *, is_there: bool) -> None:
-        """Say what is new, and every few seconds that the hub is still missing."""
+        """Write changes, and every few seconds that the hub is still missing."""
         now_s = time.monotonic()
         if is_there and not self.is_there:
             self.say(f"connected to {self.address}")
         if not is_there and (self.is_there or now_s - self.said_s >= _SAY_S):
-            self.say(f"no coordinator at {self.address}; trying on, Ctrl-C ends")
+            self.say(
+                f"no coordinator at {self.address}; retrying; press Ctrl-C to stop"
+            )
             self.said_s = now_s
         self.is_there = is_there

@@ -1,9 +1,9 @@
-"""What a process is at, so that whoever started it can say what it died of.
+"""Detection of jobs that crash their process.
 
-A process notes each job in memory that it shares with its parent, and gives itself
-so much CPU time for it and no more. If it then ends by a signal that only its own
-code brings about, the job did that; SIGKILL, SIGTERM and a machine that goes down
-are nobody's doing, and say nothing of the job.
+A process notes each job in memory that it shares with its parent, and limits the CPU
+time of the job. If the process then ends by a signal that only its own code can cause,
+the job is to blame. SIGKILL, SIGTERM and a machine that goes down say nothing about
+the job.
 """
 
 import signal
@@ -15,14 +15,14 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 
 CPU_LIMIT_S = 3600.0
-"""CPU time of one job [s]: far more than any takes that ends."""
+"""CPU time limit of one job [s]: far above that of any job that ends."""
 LAST_DEATHS = 8
-"""Of one place in a crew, those that are remembered."""
+"""Number of deaths that are remembered for each slot of a pool."""
 
 _SIZE = 2048
 _HEAD = struct.Struct("<HHQQ")
 _OUT_OF_TIME = signal.SIGPROF
-# What a process brings upon itself.
+# Signals that a process causes itself.
 _OWN_DOING = (
     signal.SIGABRT,
     signal.SIGBUS,
@@ -36,7 +36,7 @@ _OWN_DOING = (
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A process and the job that it is at.
+    """A process and its current job.
 
     Attributes:
         agent: the process's name.
@@ -51,17 +51,16 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Death:
-    """A process that died of its job, by the job's own doing, such as "SIGSEGV"."""
+    """A process that its job crashed, with the cause, such as "SIGSEGV"."""
 
     task: Task
     cause: str
 
 
 class CurrentJob:
-    """What a process is at; its parent reads it when the process has died."""
+    """The current job of a process, in memory that it shares with its parent."""
 
     def __init__(self) -> None:
-        """Be at nothing; made by the parent."""
         self._memory: Array[c_char] = get_context("spawn").RawArray(c_char, _SIZE)
 
     @property
@@ -69,11 +68,11 @@ class CurrentJob:
         return memoryview(self._memory).cast("B")
 
     def begin(self, task: Task) -> None:
-        """Note a job before it is begun."""
+        """Note a job before it starts."""
         name = task.agent.encode()[:255]
         run = task.run.encode()[: _SIZE - _HEAD.size - len(name)]
         end = _HEAD.size + len(name) + len(run)
-        # The lengths come last: half a note is none.
+        # The lengths come last: half a note does not count.
         view = self._view
         view[_HEAD.size : end] = name + run
         _HEAD.pack_into(view, 0, len(name), len(run), task.epoch, task.number)
@@ -83,7 +82,7 @@ class CurrentJob:
         self._view[:2] = b"\0\0"
 
     def read(self) -> Task | None:
-        """Return the job that was begun and not done, if there is one."""
+        """Return the job that was started and has not ended, if there is one."""
         view = self._view
         name, run, epoch, number = _HEAD.unpack_from(view)
         if not name:
@@ -98,11 +97,11 @@ class CurrentJob:
 
 
 def crash_cause(exit_code: int) -> str:
-    """Return what a process did that ended in the middle of a job; empty if nothing.
+    """Return the crash cause if the job itself ended its process, else "".
 
     Args:
-        exit_code: as ``multiprocessing`` has it: minus a signal's number, or what
-            the process ended itself with.
+        exit_code: as ``multiprocessing`` has it: minus the number of a signal, or the
+            exit status of the process.
     """
     if exit_code >= 0:
         return f"exit with status {exit_code}"
@@ -114,12 +113,12 @@ def crash_cause(exit_code: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ProcessSlot:
-    """A process's place in a crew.
+    """A process's slot in a pool.
 
     Attributes:
-        index: of the place.
-        note: where its job stands; None if nobody looks after it.
-        deaths: of those who had this place before, oldest first.
+        index: of the slot.
+        note: of its current job; None without a supervisor.
+        deaths: of earlier processes in this slot, oldest first.
     """
 
     index: int = 0

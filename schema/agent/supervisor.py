@@ -1,10 +1,9 @@
-"""A crew of processes that one process starts, watches and ends.
+"""A pool of processes that one process starts, supervises and stops.
 
-Processes are spawned, never forked: the network does not survive a fork. One that
-ends before its crew does is started again, whatever it ended by; if it ended itself
-and not by its job, after a rest that grows as long as it does so soon. None outlives
-the one that started it. Who takes a dead one's place is told what that one died of,
-if its job did it.
+Processes are spawned, never forked: the network does not survive a fork. A process
+that ends is restarted. If it exited by itself outside a job, the restart is delayed,
+longer each time while it exits soon after its start. No process outlives its parent.
+The new process of a slot is told which jobs crashed the earlier ones.
 """
 
 import contextlib
@@ -28,8 +27,8 @@ from schema.agent.supervision import (
     crash_cause,
 )
 
-# So that results depend on no library's number of threads. These count only if
-# set before numpy is imported: in whoever starts the crew.
+# Results must not depend on a library's number of threads. These count only if set
+# before numpy is imported: in the parent of the pool.
 _ONE_THREAD = (
     "OPENBLAS_NUM_THREADS",
     "OMP_NUM_THREADS",
@@ -37,41 +36,41 @@ _ONE_THREAD = (
     "VECLIB_MAXIMUM_THREADS",
     "NUMEXPR_NUM_THREADS",
 )
-# The network of one process is served by one thread: a job then costs two fifths
-# less CPU than when it is handed from thread to thread. The user's own word counts.
+# One thread serves the network of a process: a job then costs two fifths less CPU than
+# when it passes from thread to thread. A value set by the user has priority.
 _NETWORK = (
     "(rx: (worker_threads: 1), net: (handover: rx), acc: (handover: rx), "
     "tx: (handover: rx))"
 )
-# What glibc takes from the system in one piece, and gives back in one [bytes]. If left
-# to itself it raises this to the size of a robot's simulation, and robots that come and
-# go leave holes: a worker's memory then creeps up by a tenth over 3000 births.
-_ONE_PIECE = "131072"
+# Size from which glibc maps memory separately and returns it to the system [bytes]. By
+# default glibc raises it to the size of a robot's simulation, and the memory becomes
+# fragmented: that of a worker grows by a tenth over 3000 births.
+_MAP_BYTES = "131072"
 GRACE_S = 10.0
 _BETWEEN_STARTS_S = 1.0
 _LONGEST_REST_S = 30.0
-# What is pressed again sooner is one wish: a Ctrl-C of an impatient finger.
-_ONE_WISH_S = 1.0
+# A second Ctrl-C within this time does not count.
+_REPEAT_S = 1.0
 
 
 def prepare_process() -> None:
-    """Have this process and its children share a machine with many of their kind.
+    """Prepare this process and its children to share a machine with many others.
 
-    Libraries, and the network, use one thread; nobody who wakes up interrupts who
-    computes, for a few milliseconds; children give back the memory that they leave.
+    Libraries and the network use one thread; a process that wakes up does not interrupt
+    one that computes, for a few milliseconds; children return unused memory.
     """
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))
     os.environ.setdefault("ZENOH_RUNTIME", _NETWORK)
-    os.environ.setdefault("MALLOC_MMAP_THRESHOLD_", _ONE_PIECE)
-    _interrupt_nobody()
+    os.environ.setdefault("MALLOC_MMAP_THRESHOLD_", _MAP_BYTES)
+    _use_batch_policy()
 
 
-def _interrupt_nobody() -> None:
-    """Let this thread, and all that it starts, wait for the scheduler's next tick.
+def _use_batch_policy() -> None:
+    """Let this thread and its children wait for the scheduler's next tick.
 
-    Only where no core is free: a worker has its next job at hand, and a message that
-    waits costs nothing, but each interruption a cold cache. It halves the switches
-    from process to process. Who was given another policy keeps it.
+    It has an effect only if no core is free. A worker has its next job ready, so a
+    message may wait, but each interruption costs a cold cache. It halves the switches
+    between processes. Another policy, if one is set, is kept.
     """
     if sys.platform == "linux" and os.sched_getscheduler(0) == os.SCHED_OTHER:
         with contextlib.suppress(OSError):
@@ -79,17 +78,17 @@ def _interrupt_nobody() -> None:
 
 
 def cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores that this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)
     return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
 class ProcessPool:
-    """Processes that all run ``body(*arguments, post)``; use it in a ``with``.
+    """Processes that all run ``body(*arguments, slot)``; use it in a ``with``.
 
     Attributes:
-        restarts: how often one was started anew.
-        deaths: of those who died of their job.
+        restarts: number of restarts.
+        deaths: of the processes that their jobs crashed.
     """
 
     def __init__(
@@ -120,28 +119,28 @@ class ProcessPool:
 
     @property
     def pids(self) -> list[int]:
-        """Process ids of those who run."""
+        """Process ids of the running processes."""
         return [p.pid for p in self._processes if p and p.is_alive() and p.pid]
 
     @property
     def exit_codes(self) -> list[int]:
-        """How those ended that ended by themselves and rest since."""
+        """Exit codes of processes that exited by themselves and await restart."""
         return [code for code in self._codes if code is not None]
 
     def look_after(self) -> None:
-        """Start who is not there yet, and again who ended; not twice a second."""
+        """Start missing processes; each at most once a second."""
         now_s = time.monotonic()
         for index, process in enumerate(self._processes):
             if process is not None and process.exitcode is not None:
-                self._bury(index, process.exitcode, now_s)
+                self._note_end(index, process.exitcode, now_s)
             if self._processes[index] is None and now_s >= self._due_s[index]:
                 self.restarts += self._started_s[index] >= 0.0
                 self._started_s[index] = now_s
                 self._codes[index] = None
                 self._processes[index] = self._start(index)
 
-    def _bury(self, index: int, code: int, now_s: float) -> None:
-        """Note how a process ended, and when its place is to be taken."""
+    def _note_end(self, index: int, code: int, now_s: float) -> None:
+        """Note how a process ended, and when it is to be restarted."""
         self._processes[index] = None
         self._due_s[index] = self._started_s[index] + _BETWEEN_STARTS_S
         slot = self._slots[index]
@@ -164,8 +163,8 @@ class ProcessPool:
         process = self._context.Process(
             target=self._body, args=(*self._arguments, self._slots[index])
         )
-        # A Ctrl-C of the terminal reaches all; only this process shall act on it. The
-        # tracker first: whoever starts it lets SIGINT in again for all that follow.
+        # A Ctrl-C of the terminal reaches all; only this process may act on it. The
+        # tracker first: starting it unblocks SIGINT.
         resource_tracker.ensure_running()
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
@@ -175,7 +174,7 @@ class ProcessPool:
         return process
 
     def wait(self, timeout_s: float) -> None:
-        """Wait until one of them ends or time is up [s]."""
+        """Wait until a process ends or time is up [s]."""
         alive = [p.sentinel for p in self._processes if p and p.is_alive()]
         if alive:
             connection.wait(alive, timeout_s)
@@ -183,7 +182,7 @@ class ProcessPool:
             time.sleep(min(timeout_s, _BETWEEN_STARTS_S / 10))
 
     def end(self) -> None:
-        """Ask all to end, and end those who do not [after 10 s]."""
+        """Terminate all processes; kill those that remain after 10 s."""
         there = [process for process in self._processes if process]
         for process in there:
             process.terminate()
@@ -200,24 +199,24 @@ class ProcessPool:
 def stop_on_signals() -> threading.Event:
     """Return an event that Ctrl-C or SIGTERM sets; Ctrl-C a second later interrupts."""
     stop = threading.Event()
-    asked_s = -math.inf
+    signalled_s = -math.inf
 
-    def ask(number: int, _frame: object) -> None:
-        nonlocal asked_s
+    def handle(number: int, _frame: object) -> None:
+        nonlocal signalled_s
         now_s = time.monotonic()
         if not stop.is_set():
-            asked_s = now_s
+            signalled_s = now_s
             stop.set()
-        elif number == signal.SIGINT and now_s >= asked_s + _ONE_WISH_S:
+        elif number == signal.SIGINT and now_s >= signalled_s + _REPEAT_S:
             raise KeyboardInterrupt
 
-    signal.signal(signal.SIGINT, ask)
-    signal.signal(signal.SIGTERM, ask)
+    signal.signal(signal.SIGINT, handle)
+    signal.signal(signal.SIGTERM, handle)
     return stop
 
 
 def stop_with_input(stop: threading.Event) -> None:
-    """Set an event when standard input ends: whoever held its other end is gone."""
+    """Set an event when standard input is closed."""
 
     def watch() -> None:
         # Not by sys.stdin: its lock would be held when this process ends.
@@ -231,7 +230,7 @@ def stop_with_input(stop: threading.Event) -> None:
 def stop_with_parent(stop: threading.Event) -> None:
     """Set an event when the process that started this one is gone.
 
-    Whoever is still there some seconds later, because its job never ends, is ended.
+    This process exits if it still runs after a grace time: its job may not end.
     """
     parent = parent_process()
     if parent is None:

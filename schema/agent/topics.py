@@ -1,9 +1,9 @@
-"""Where on the network whom can be reached.
+"""Keys of the processes of a fleet.
 
 ``revolve/{fleet}/w/{worker}/...``, ``.../an/{analyzer}/...``,
-``.../co/{coordinator}/...``: all of one process stands under one prefix, so that
-one access rule covers it. A name belongs to one process for ever: who starts
-again has a new one, so nothing meant for the dead reaches the living.
+``.../co/{coordinator}/...``: all keys of a process have one prefix, so that one access
+rule covers them. A process that restarts takes a new name, so that it gets no messages
+for its predecessor.
 """
 
 import re
@@ -17,7 +17,7 @@ Role = Literal["worker", "analyzer", "coordinator"]
 
 _CHUNKS: dict[Role, str] = {"worker": "w", "analyzer": "an", "coordinator": "co"}
 _ROLES: dict[str, Role] = {chunk: role for role, chunk in _CHUNKS.items()}
-# No key separator, no wildcard, no leading "@": that is the engine's own space.
+# No key separator, no wildcard, no leading "@", which the engine reserves.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,95}")
 
 
@@ -43,12 +43,12 @@ class Member:
 
     @property
     def alive(self) -> str:
-        """Key of the token that stands while the process lives."""
+        """Key of the liveliness token of the process."""
         return f"{self._prefix}/alive"
 
     @property
     def info(self) -> str:
-        """Key that tells what the process is (an ``AgentInfo``)."""
+        """Key that gives the ``AgentInfo`` of the process."""
         return f"{self._prefix}/info"
 
     @property
@@ -72,7 +72,7 @@ class Member:
         return f"{self._prefix}/events"
 
     def poses(self, shard: int) -> str:
-        """Key on which a ``Live`` appears after each advance of a shard."""
+        """Key on which a ``Live`` is published after each advance of a shard."""
         return f"{self._prefix}/arena/{shard}/pose"
 
     @property
@@ -86,20 +86,20 @@ def agents_alive(fleet: str, role: Role) -> str:
 
 
 def poses_of_all(fleet: str) -> str:
-    """Return the key expression of all that ``Member.poses`` names."""
+    """Return the key expression of ``Member.poses`` of all workers."""
     return f"revolve/{fleet}/{_CHUNKS['worker']}/*/arena/*/pose"
 
 
 def news_of_all(fleet: str) -> str:
-    """Return the key expression of all that ``Member.events`` names."""
+    """Return the key expression of ``Member.events`` of all coordinators."""
     return f"revolve/{fleet}/{_CHUNKS['coordinator']}/*/events"
 
 
 def member_of(key: str) -> Member:
-    """Return whose token a key is.
+    """Return the process of a liveliness token.
 
     Raises:
-        MalformedMessage: no such key.
+        MalformedMessage: not the key of a token.
     """
     chunks = key.split("/")
     if len(chunks) == 5 and (chunks[0], chunks[4]) == ("revolve", "alive"):  # noqa: PLR2004 - five chunks
@@ -110,14 +110,14 @@ def member_of(key: str) -> Member:
 
 
 def check_name(name: str, what: str) -> str:
-    """Return a name that may stand in a key.
+    """Return a name if it is valid in a key.
 
     Args:
         name: of a fleet or a process.
         what: what it names, for the message.
 
     Raises:
-        NetworkError: empty, too long, or with characters that mean something else.
+        NetworkError: empty, too long, or with other characters.
     """
     if not _NAME.fullmatch(name):
         raise NetworkError(
@@ -128,5 +128,5 @@ def check_name(name: str, what: str) -> str:
 
 
 def unique_name(name: str) -> str:
-    """Return a name that no other process will ever have."""
+    """Return a name that is unique among all processes."""
     return f"{name}.{secrets.token_hex(4)}"

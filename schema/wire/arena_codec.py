@@ -13,8 +13,7 @@ from schema.wire.arena_messages import (
     changes_to_message,
     checked_digest,
 )
-from schema.wire.codec import decoded
-from schema.wire.messages import birth_from_message, birth_to_message, finite
+from schema.wire.messages import birth_from_message, birth_to_message, finite, parsed
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +148,7 @@ def decode_advance_request(data: bytes) -> AdvanceRequest:
             rules, a digest of wrong length, an end before the start, a number that
             is not finite.
     """
-    return decoded(data, pb.AdvanceRequest(), _request)
+    return _request(parsed(data, pb.AdvanceRequest()))
 
 
 def encode_advance_answer(answer: AdvanceAnswer) -> bytes:
@@ -174,7 +173,7 @@ def decode_advance_answer(data: bytes) -> AdvanceAnswer:
         MalformedMessage: not an answer's bytes, no result, a digest of wrong length,
             a number that is not finite.
     """
-    return decoded(data, pb.AdvanceAnswer(), _answer)
+    return _answer(parsed(data, pb.AdvanceAnswer()))
 
 
 def encode_live(live: Live) -> bytes:
@@ -190,7 +189,7 @@ def decode_live(data: bytes) -> Live:
     Raises:
         MalformedMessage: other bytes, or an advance that breaks its rules.
     """
-    return decoded(data, pb.Live(), _live)
+    return _live(parsed(data, pb.Live()))
 
 
 def _live(message: pb.Live) -> Live:

@@ -14,7 +14,6 @@ from schema.wire.arena import (
     Judgement,
     Touch,
 )
-from schema.wire.codec import vector_from_message, vector_to_message
 from schema.wire.messages import (
     birth_from_message,
     birth_to_message,
@@ -22,6 +21,8 @@ from schema.wire.messages import (
     read_brain,
     robot_from_message,
     robot_to_message,
+    vector_from_message,
+    vector_to_message,
     write_brain,
 )
 
@@ -48,8 +49,8 @@ def changes_from_message(message: pb.Changes) -> Changes:
     """Return the changes of a message.
 
     Raises:
-        InvalidRobot: a robot or a brain that breaks its rules.
-        MalformedMessage: an unknown layer, a number that is not finite.
+        MalformedMessage: a robot or a brain that breaks its rules, a number that is
+            not finite.
     """
     return Changes(
         removals=tuple(map(birth_from_message, message.removals)),
@@ -70,8 +71,7 @@ def read_brain_change(message: pb.BrainChange) -> BrainChange:
     The caller checks that the brain fits the robot.
 
     Raises:
-        InvalidRobot: a brain that breaks its rules.
-        MalformedMessage: an unknown layer.
+        MalformedMessage: a brain that breaks its rules, or an unknown layer.
     """
     parts = 1 + max((neuron.part for neuron in message.neurons), default=0)
     return BrainChange(birth_from_message(message.birth), read_brain(message, parts))

@@ -7,13 +7,9 @@ part types are checked by ``schema.robot.robot.check_robot``.
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
-from typing import TypeVar
 
-from google.protobuf.message import DecodeError, Message
-
-from schema.errors import InvalidRobot, MalformedMessage
+from schema.errors import MalformedMessage
 from schema.experiment.identity import NOBODY, Identity
-from schema.parts import Vector
 from schema.robot.genome import Genome
 from schema.robot.results import Evaluation, Report
 from schema.robot.robot import Robot
@@ -26,12 +22,11 @@ from schema.wire.messages import (
     genome_to_message,
     identity_from_message,
     identity_to_message,
+    parsed,
     robot_from_message,
+    vector_from_message,
     write_brain,
 )
-
-M = TypeVar("M", bound=Message)
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +96,7 @@ def decode_robot(data: bytes) -> Robot:
         MalformedMessage: not a robot's bytes, parts that are not a tree, or a brain
             that breaks its rules.
     """
-    return decoded(data, pb.Robot(), robot_from_message)
+    return robot_from_message(parsed(data, pb.Robot()))
 
 
 def decode_body(data: bytes) -> Robot:
@@ -110,7 +105,7 @@ def decode_body(data: bytes) -> Robot:
     Raises:
         MalformedMessage: not a robot's bytes, or parts that are not a tree.
     """
-    return decoded(data, pb.Robot(), lambda message: Robot(body_from_message(message)))
+    return Robot(body_from_message(parsed(data, pb.Robot())))
 
 
 def encode_genome(genome: Genome) -> bytes:
@@ -126,7 +121,7 @@ def decode_genome(data: bytes) -> Genome:
         MalformedMessage: not a genome's bytes, nodes that are not a tree, an unknown
             neuron type or layer, a number that is not finite.
     """
-    return decoded(data, pb.Genome(), genome_from_message)
+    return genome_from_message(parsed(data, pb.Genome()))
 
 
 def encode_request(
@@ -171,7 +166,17 @@ def decode_request(
     Raises:
         MalformedMessage: not a request's bytes, or its robot is malformed.
     """
-    return decoded(data, pb.Request(), lambda message: _request(message, read))
+    message = parsed(data, pb.Request())
+    has_identity = message.HasField("identity")
+    return Request(
+        run=message.run,
+        epoch=message.epoch,
+        number=message.number,
+        settings=message.settings,
+        robot=read(message.robot),
+        steps=message.steps,
+        identity=identity_from_message(message.identity) if has_identity else NOBODY,
+    )
 
 
 def is_advance_request(data: bytes) -> bool:
@@ -181,7 +186,7 @@ def is_advance_request(data: bytes) -> bool:
         MalformedMessage: bytes that are no request of either kind.
     """
     # Only a request about an arena has changes, even if they are empty.
-    return decoded(data, pb.AdvanceRequest(), lambda found: found.HasField("changes"))
+    return parsed(data, pb.AdvanceRequest()).HasField("changes")
 
 
 def encode_answer(answer: Answer) -> bytes:
@@ -203,7 +208,19 @@ def decode_answer(data: bytes) -> Answer:
         MalformedMessage: not an answer's bytes, no result, a number that is not
             finite.
     """
-    return decoded(data, pb.Answer(), _answer_from_message)
+    message = parsed(data, pb.Answer())
+    result: Report | Evaluation | str
+    match message.WhichOneof("result"):
+        case "report":
+            result = report_from_message(message.report)
+        case "evaluation":
+            result = evaluation_from_message(message.evaluation)
+        case "failure":
+            result = message.failure
+        case _:
+            raise MalformedMessage("answer: holds no result")
+    wall_s = finite(message.wall_s, "answer.wall_s")
+    return Answer(message.epoch, message.number, wall_s, result)
 
 
 def decode_answer_to(
@@ -283,63 +300,3 @@ def evaluation_from_message(message: pb.Evaluation) -> Evaluation:
     names = [field.name for field in fields(Evaluation)]
     numbers = (finite(getattr(message, name), f"evaluation.{name}") for name in names)
     return Evaluation(*numbers)
-
-
-def decoded(data: bytes, message: M, read: Callable[[M], T]) -> T:
-    """Return the value that ``read`` makes of a parsed message.
-
-    Raises:
-        MalformedMessage: not the bytes of such a message, or ``read`` raises.
-    """
-    name = message.DESCRIPTOR.name
-    try:
-        message.ParseFromString(data)
-    except DecodeError as error:
-        raise MalformedMessage(f"not the bytes of a {name}: {error}") from None
-    try:
-        return read(message)
-    except InvalidRobot as error:
-        raise MalformedMessage(f"{name}: {error}") from None
-
-
-def _request(message: pb.Request, read: Callable[[bytes], Robot]) -> Request:
-    has_identity = message.HasField("identity")
-    return Request(
-        run=message.run,
-        epoch=message.epoch,
-        number=message.number,
-        settings=message.settings,
-        robot=read(message.robot),
-        steps=message.steps,
-        identity=identity_from_message(message.identity) if has_identity else NOBODY,
-    )
-
-
-def _answer_from_message(message: pb.Answer) -> Answer:
-    result: Report | Evaluation | str
-    match message.WhichOneof("result"):
-        case "report":
-            result = report_from_message(message.report)
-        case "evaluation":
-            result = evaluation_from_message(message.evaluation)
-        case "failure":
-            result = message.failure
-        case _:
-            raise MalformedMessage("answer: has no result")
-    wall_s = finite(message.wall_s, "answer.wall_s")
-    return Answer(message.epoch, message.number, wall_s, result)
-
-
-def vector_to_message(vector: Vector) -> pb.Vector:
-    """Return a vector as a message."""
-    return pb.Vector(x=vector[0], y=vector[1], z=vector[2])
-
-
-def vector_from_message(message: pb.Vector, where: str) -> Vector:
-    """Return the vector of a message.
-
-    Raises:
-        MalformedMessage: a number that is not finite.
-    """
-    x, y, z = message.x, message.y, message.z
-    return finite(x, where), finite(y, where), finite(z, where)

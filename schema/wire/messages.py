@@ -5,9 +5,13 @@
 
 import math
 from collections.abc import Sequence
+from typing import TypeVar
 
-from schema.errors import MalformedMessage
+from google.protobuf.message import DecodeError, Message
+
+from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.identity import Identity, Origin
+from schema.parts import Vector
 from schema.robot.brain import (
     NEURON_TYPES,
     Brain,
@@ -21,12 +25,28 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot, check_tree
 from schema.wire import revolve_pb2 as pb
 
+M = TypeVar("M", bound=Message)
+
 _LAYER_CODES: dict[Layer, pb.Layer] = {
     "input": pb.LAYER_INPUT,
     "output": pb.LAYER_OUTPUT,
     "hidden": pb.LAYER_HIDDEN,
 }
 _LAYERS: dict[int, Layer] = {int(code): name for name, code in _LAYER_CODES.items()}
+
+
+def parsed(data: bytes, message: M) -> M:
+    """Return a message with the content of some bytes.
+
+    Raises:
+        MalformedMessage: not the bytes of such a message.
+    """
+    try:
+        message.ParseFromString(data)
+    except DecodeError as error:
+        name = message.DESCRIPTOR.name
+        raise MalformedMessage(f"not the bytes of a {name}: {error}") from None
+    return message
 
 
 def robot_to_message(robot: Robot) -> pb.Robot:
@@ -49,8 +69,8 @@ def robot_from_message(message: pb.Robot) -> Robot:
     """Return the robot of a message.
 
     Raises:
-        InvalidRobot: parts that are not a tree, or a brain that breaks its rules.
-        MalformedMessage: an unknown layer.
+        MalformedMessage: parts that are not a tree, a brain that breaks its rules, an
+            unknown layer.
     """
     parts = body_from_message(message)
     return Robot(parts, read_brain(message, len(parts)))
@@ -60,10 +80,10 @@ def body_from_message(message: pb.Robot) -> tuple[Part, ...]:
     """Return the body of a message; its brain is not read.
 
     Raises:
-        InvalidRobot: parts that are not a tree.
+        MalformedMessage: parts that are not a tree.
     """
     parts = tuple(map(_part_from_message, message.parts))
-    check_tree(parts)
+    _require_tree(parts, "Robot")
     return parts
 
 
@@ -87,8 +107,7 @@ def read_brain(message: pb.Robot | pb.BrainChange, part_count: int) -> Brain:
     """Return the brain of a message that has neurons and connections.
 
     Raises:
-        InvalidRobot: a brain that breaks its rules.
-        MalformedMessage: an unknown layer.
+        MalformedMessage: a brain that breaks its rules, or an unknown layer.
     """
     brain = Brain(
         neurons=tuple(
@@ -100,7 +119,10 @@ def read_brain(message: pb.Robot | pb.BrainChange, part_count: int) -> Brain:
             for item in message.connections
         ),
     )
-    check_brain(brain, part_count)
+    try:
+        check_brain(brain, part_count)
+    except InvalidRobot as error:
+        raise MalformedMessage(f"Robot: {error}") from None
     return brain
 
 
@@ -141,12 +163,11 @@ def genome_from_message(message: pb.Genome) -> Genome:
     """Return the genome of a message.
 
     Raises:
-        InvalidRobot: nodes that are not a tree.
-        MalformedMessage: an unknown neuron type or layer, a number that is not
-            finite.
+        MalformedMessage: nodes that are not a tree, an unknown neuron type or layer, a
+            number that is not finite.
     """
-    parts = [_part_from_message(item.part) for item in message.nodes]
-    check_tree(parts)
+    parts = tuple(_part_from_message(item.part) for item in message.nodes)
+    _require_tree(parts, "Genome")
     children: list[list[tuple[int, Node]]] = [[] for _ in parts]
     # Backwards: children are made before their parent.
     for index in range(len(parts) - 1, -1, -1):
@@ -224,6 +245,18 @@ def _part_from_message(message: pb.Part) -> Part:
     )
 
 
+def _require_tree(parts: Sequence[Part], name: str) -> None:
+    """Raise unless parts are a tree.
+
+    Raises:
+        MalformedMessage: they are not; begins with the name of the message.
+    """
+    try:
+        check_tree(parts)
+    except InvalidRobot as error:
+        raise MalformedMessage(f"{name}: {error}") from None
+
+
 def _neuron_gene(message: pb.NeuronGene) -> NeuronGene:
     if message.kind not in NEURON_TYPES:
         raise MalformedMessage(
@@ -262,3 +295,18 @@ def finite(value: float, where: str) -> float:
     if not math.isfinite(value):
         raise MalformedMessage(f"{where}: must be finite, got {value}")
     return value
+
+
+def vector_to_message(vector: Vector) -> pb.Vector:
+    """Return a vector as a message."""
+    return pb.Vector(x=vector[0], y=vector[1], z=vector[2])
+
+
+def vector_from_message(message: pb.Vector, where: str) -> Vector:
+    """Return the vector of a message.
+
+    Raises:
+        MalformedMessage: a number that is not finite.
+    """
+    x, y, z = message.x, message.y, message.z
+    return finite(x, where), finite(y, where), finite(z, where)

@@ -63,7 +63,7 @@ def test_an_agent_waits_for_a_coordinator_and_says_so(role: str) -> None:
     with command(role, "--connect", address, "--processes", "1") as process:
         assert process.stderr is not None
         line = process.stderr.readline()
-        assert line == f"no coordinator at {address}; trying on, Ctrl-C ends\n"
+        assert line == f"no coordinator at {address}; retrying; press Ctrl-C to stop\n"
         with Network(name="c", listen=(address,)) as network:
             (joined,) = until(network, 1)
             assert isinstance(joined, Joined)

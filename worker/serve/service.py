@@ -1,5 +1,7 @@
 """Worker process on the network."""
 
+from functools import lru_cache
+
 from schema.agent.network import Agent
 from schema.agent.service import Outlet, own_agent, serve_as_process
 from schema.agent.supervision import ProcessSlot
@@ -12,10 +14,11 @@ def process(agent: Agent, slot: ProcessSlot) -> None:
     """Run one process of a worker; returns when asked to stop."""
     own = own_agent(agent, slot.index)
     member = Member(own.fleet, own.role, own.name)
+    key_of = lru_cache(member.poses)
     outlet = Outlet()
 
     def publish(live: Live) -> None:
-        key = member.poses(live.shard)
+        key = key_of(live.shard)
         if outlet.has_listeners(key):
             outlet.put(key, encode_live(live))
 

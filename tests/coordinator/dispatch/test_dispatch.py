@@ -142,7 +142,7 @@ def test_a_slow_worker_is_given_no_more_ahead_than_it_can_do_soon() -> None:
     }
 
 
-def test_a_newcomer_is_given_nothing_ahead_before_it_did_a_job() -> None:
+def test_new_agent_gets_no_jobs_ahead_before_its_first_answer() -> None:
     dispatch, *_ = busy_pair(0.04, 0.04)
     dispatch.handle(worker("c"))
     for event in requests(*range(30, 190)):
@@ -152,7 +152,7 @@ def test_a_newcomer_is_given_nothing_ahead_before_it_did_a_job() -> None:
     assert dispatch.leisure_s == 0.0
 
 
-def test_nothing_is_given_ahead_near_the_end() -> None:
+def test_no_jobs_are_given_ahead_near_the_end() -> None:
     dispatch, *_ = busy_pair(0.04, 0.04)
     agents = dispatch._pools["worker"].agents
     while dispatch.waiting("worker"):
@@ -168,21 +168,21 @@ def test_long_jobs_are_not_given_ahead() -> None:
     assert dispatch.leisure_s == 0.0
 
 
-def test_the_agent_with_the_least_to_do_comes_first_then_the_name() -> None:
+def test_least_busy_agent_gets_the_job_and_ties_break_on_its_name() -> None:
     dispatch = told(worker("b"), worker("a"), worker("c", slots=4))
     out = [given_out(dispatch.handle(event)) for event in requests(*range(8))]
     # c has four slots: one job there weighs a quarter.
     assert [agent for ((_, agent),) in out] == ["a", "b", "c", "c", "c", "c", "a", "b"]
 
 
-def test_kinds_do_not_mix() -> None:
+def test_jobs_go_only_to_agents_of_their_kind() -> None:
     dispatch = told(Joined("an", "analyzer", 1, "p"))
     assert given_out(dispatch.handle(Requested(job(0)))) == []
     assert given_out(dispatch.handle(Requested(job(1, "vet")))) == [(1, "an")]
     assert (dispatch.agents("worker"), dispatch.waiting("worker")) == (0, 1)
 
 
-def test_what_an_agent_held_goes_first_to_others() -> None:
+def test_jobs_of_an_agent_that_left_go_first_to_others() -> None:
     dispatch = told(worker("a"), *requests(0, 1, 2, 3))
     dispatch.handle(worker("b"))  # takes 2 and 3
     assert given_out(dispatch.handle(Left("a"))) == []
@@ -190,7 +190,7 @@ def test_what_an_agent_held_goes_first_to_others() -> None:
     assert given_out(dispatch.handle(ok(2, "b"))) == [(1, "b")]
 
 
-def test_lost_after_left_is_no_news() -> None:
+def test_loss_of_a_job_after_its_agent_left_changes_nothing() -> None:
     dispatch = told(worker("a"), *requests(0), worker("b"))
     assert given_out(dispatch.handle(Left("a"))) == [(0, "b")]
     assert dispatch.handle(lost(0, "a")) == []
@@ -198,7 +198,7 @@ def test_lost_after_left_is_no_news() -> None:
     assert dispatch.handle(ok(0, "b")) == [Deliver(job(0), "b", "p", b"a0")]
 
 
-def test_an_agent_that_lost_a_job_rests_before_it_gets_it_back() -> None:
+def test_agent_that_lost_a_job_is_given_no_job_until_backoff_ends() -> None:
     dispatch = told(Ticked(10.0), worker("a"), *requests(0))
     assert dispatch.wake_s is None
     assert dispatch.handle(lost(0, "a")) == []
@@ -207,7 +207,7 @@ def test_an_agent_that_lost_a_job_rests_before_it_gets_it_back() -> None:
     assert given_out(dispatch.handle(Ticked(10.0 + 1.1 * REST_S))) == [(0, "a")]
 
 
-def test_rests_grow_until_an_answer_comes() -> None:
+def test_backoff_grows_until_an_answer_arrives() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0))
     rests = []
     for _ in range(9):
@@ -226,7 +226,7 @@ def test_rests_grow_until_an_answer_comes() -> None:
     assert dispatch.wake_s == pytest.approx(now_s + REST_S)
 
 
-def test_a_job_that_fails_goes_to_another_agent_though_that_one_waits() -> None:
+def test_failed_job_goes_to_another_agent() -> None:
     dispatch = told(Ticked(0.0), worker("a"), worker("b"), *requests(0, 1, 2, 3))
     # a holds 0 and 2, b holds 1 and 3 and has no credit.
     assert dispatch.handle(error(0, "a")) == []
@@ -243,7 +243,7 @@ def test_three_errors_are_delivered_with_the_last_reason() -> None:
     assert dispatch.pending == 0
 
 
-def test_a_lonely_agent_is_asked_again() -> None:
+def test_only_agent_gets_the_failed_job_again() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0))
     delivered: list[DispatchCommand] = []
     for tries in range(1, MAX_ERRORS + 1):
@@ -254,14 +254,14 @@ def test_a_lonely_agent_is_asked_again() -> None:
     assert delivered == [Deliver(job(0), "a", reason="a cannot")]
 
 
-def test_losses_never_end_a_job() -> None:
+def test_lost_jobs_are_never_given_up() -> None:
     dispatch = told(Ticked(0.0), worker("a"), *requests(0))
     for tries in range(1, 20):
         assert dispatch.handle(lost(0, "a")) == []
         assert given_out(dispatch.handle(Ticked(10.0 * tries))) == [(0, "a")]
 
 
-def test_answers_that_nobody_waits_for_change_nothing() -> None:
+def test_late_answers_change_nothing() -> None:
     dispatch = told(worker("a"), *requests(0))
     assert dispatch.handle(ok(7, "a")) == []
     assert dispatch.handle(ok(0, "b")) == []
@@ -269,7 +269,7 @@ def test_answers_that_nobody_waits_for_change_nothing() -> None:
     assert dispatch.handle(ok(0, "a")) == []
 
 
-def test_twice_the_same_is_once() -> None:
+def test_repeated_events_change_nothing() -> None:
     dispatch = told(worker("a"), *requests(0))
     assert dispatch.handle(worker("a")) == []
     assert dispatch.handle(Requested(job(0))) == []
@@ -288,7 +288,7 @@ def test_twice_the_same_is_once() -> None:
         Ticked(0.5),
     ],
 )
-def test_what_cannot_be_changes_nothing(event: DispatchEvent) -> None:
+def test_invalid_events_raise_and_change_nothing(event: DispatchEvent) -> None:
     dispatch = told(Ticked(1.0), worker("a"), Requested(job(5)))
     with pytest.raises(UnexpectedEvent):
         dispatch.handle(event)
@@ -307,7 +307,7 @@ def late(typical_s: float = 0.5) -> Dispatch:
 
 
 @pytest.mark.parametrize(("typical_s", "patience_s"), [(0.01, LEAST_S), (0.5, 2.0)])
-def test_a_late_job_gets_a_second_copy_where_somebody_is_idle(
+def test_late_job_is_duplicated_on_an_idle_agent(
     typical_s: float, patience_s: float
 ) -> None:
     assert PATIENCE == 4.0
@@ -319,7 +319,7 @@ def test_a_late_job_gets_a_second_copy_where_somebody_is_idle(
     assert given_out(dispatch.handle(Ticked(almost_s + 9.0))) == []
 
 
-def test_who_answers_first_is_heard_and_the_other_may_stop() -> None:
+def test_first_answer_counts_and_the_other_copy_is_cancelled() -> None:
     dispatch = late()
     dispatch.handle(Ticked(9.0))
     first = dispatch.handle(ok(1, "b"))
@@ -338,7 +338,9 @@ def test_who_answers_first_is_heard_and_the_other_may_stop() -> None:
     # has had its copy for 1 s.
     [("a", 0.9 * 0.5 + 0.1 * 9.5), ("b", 1.0)],
 )
-def test_of_two_at_a_job_each_tells_of_its_own_time(who: str, job_s: float) -> None:
+def test_each_copy_of_a_job_is_timed_from_its_own_assignment(
+    who: str, job_s: float
+) -> None:
     dispatch = late()
     dispatch.handle(Ticked(9.0))
     dispatch.handle(Ticked(10.0))
@@ -356,7 +358,7 @@ def test_a_copy_survives_the_loss_of_the_other() -> None:
         assert dispatch.handle(ok(1, other))[0] == Deliver(job(1), other, "p", b"a1")
 
 
-def test_nobody_is_given_a_copy_of_what_it_has_or_failed_at() -> None:
+def test_no_agent_gets_a_copy_of_a_job_that_it_has_or_failed_at() -> None:
     dispatch = late()
     dispatch.handle(Ticked(9.0))
     assert given_out(dispatch.handle(lost(1, "b"))) == []
@@ -365,7 +367,7 @@ def test_nobody_is_given_a_copy_of_what_it_has_or_failed_at() -> None:
     assert given_out(dispatch.handle(Ticked(199.0))) == []
 
 
-def test_a_job_that_ends_three_processes_is_given_to_nobody_more() -> None:
+def test_job_that_crashed_three_processes_is_given_up() -> None:
     dispatch = told(worker("a"), worker("b"), *requests(0))
     for number, name in enumerate(("a", "b")):
         assert given_out(dispatch.handle(Left(name))) == [(0, "b")][number:]
@@ -381,7 +383,7 @@ def test_a_job_that_ends_three_processes_is_given_to_nobody_more() -> None:
     assert dispatch.handle(died(0, "d")) == []
 
 
-def test_who_is_at_a_deadly_job_may_stop() -> None:
+def test_deadly_job_is_cancelled_where_it_still_runs() -> None:
     dispatch = told(worker("z"), *requests(0))
     commands = [dispatch.handle(died(0, name)) for name in ("a", "b", "c")]
     assert commands[2][1:] == [Cancel(job(0), "z")]
@@ -401,7 +403,7 @@ def test_twins_go_to_two_workers_if_there_are_two() -> None:
     # c did neither of them yet.
     assert given_out(dispatch.handle(lost(2, "b"))) == [(2, "c")]
     dispatch.handle(ok(2, "c"))
-    assert len(dispatch._pairs) == 0
+    assert not dispatch._pairs._agents
 
 
 class World:
@@ -566,7 +568,7 @@ ACTIONS = ["request"] * 3 + [
     seed=st.integers(0, 2**32 - 1),
     actions=st.lists(st.sampled_from(ACTIONS), max_size=120),
 )
-def test_each_job_is_delivered_once_whatever_happens(
+def test_each_job_is_delivered_once_for_any_events(
     seed: int, actions: list[str]
 ) -> None:
     world = World(seed)
@@ -585,7 +587,7 @@ def test_each_job_is_delivered_once_whatever_happens(
         assert delivered.answer == (b"" if failed else b"a%d" % number)
 
 
-def test_same_story_same_commands() -> None:
+def test_same_events_give_the_same_commands() -> None:
     stories = []
     for _ in range(2):
         world = World(7)

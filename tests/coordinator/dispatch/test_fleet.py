@@ -95,11 +95,11 @@ def test_an_answer_goes_to_its_client(fleet: Fleet, agents: Agents) -> None:
     assert fleet.listen(0.0, 2.0) == {}
 
 
-def test_credits_are_those_of_the_workers_that_are_there(fleet: Fleet) -> None:
-    assert fleet.credits == 5
+def test_credits_count_the_workers_that_joined(fleet: Fleet) -> None:
+    assert fleet.dispatch.credits == 5
     fleet.tell(Joined("judge", "analyzer", 4, "p"))
     fleet.tell(Left("two"))
-    assert fleet.credits == 2
+    assert fleet.dispatch.credits == 2
 
 
 def test_jobs_of_a_client_that_left_are_withdrawn(fleet: Fleet, agents: Agents) -> None:
@@ -220,7 +220,7 @@ def test_a_released_arena_leaves_room_for_another(fleet: Fleet, agents: Agents) 
     assert fleet.listen(0.0, 1.0) == {}
 
 
-def test_it_pauses_while_all_workers_have_more_than_enough(
+def test_fleet_pauses_while_all_workers_have_spare_jobs(
     fleet: Fleet, agents: Agents
 ) -> None:
     numbers = [request(fleet) for _ in range(200)]

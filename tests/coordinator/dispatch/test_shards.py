@@ -42,7 +42,7 @@ def test_first_advance_is_whole_and_the_next_goes_on() -> None:
     ]
 
 
-def test_waits_for_a_worker() -> None:
+def test_shard_waits_for_a_worker() -> None:
     dispatch = fleet()
     assert dispatch.handle(ShardRequested(0)) == []
     assert dispatch.waiting == {0: ""}
@@ -80,7 +80,7 @@ def test_holder_that_dies_between_advances() -> None:
     ]
 
 
-def test_one_that_has_not_the_state_is_given_it() -> None:
+def test_worker_without_the_state_is_given_it() -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(ShardRequested(0))
     dispatch.handle(ShardReturned(1, "done"))
@@ -96,7 +96,7 @@ def test_one_that_has_not_the_state_is_given_it() -> None:
 
 
 @pytest.mark.parametrize("outcome", ["error", "lost"])
-def test_after_a_failure_another_one_has_its_turn(outcome: str) -> None:
+def test_failed_advance_goes_to_another_worker_after_a_backoff(outcome: str) -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(Ticked(10.0))
     dispatch.handle(ShardRequested(0))
@@ -107,7 +107,7 @@ def test_after_a_failure_another_one_has_its_turn(outcome: str) -> None:
     ]
 
 
-def test_an_advance_that_kills_three_is_given_up() -> None:
+def test_advance_that_crashed_three_workers_is_given_up() -> None:
     dispatch = fleet("a", "b", "c")
     dispatch.handle(ShardRequested(0))
     for number, name, following in ((1, "a", "b"), (2, "b", "c")):
@@ -122,7 +122,7 @@ def test_an_advance_that_kills_three_is_given_up() -> None:
     assert dispatch.handle(joined("d")) == []
 
 
-def test_deaths_of_an_advance_that_is_done_are_forgotten() -> None:
+def test_crashes_of_a_finished_advance_are_forgotten() -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(ShardRequested(0))
     dispatch.handle(Left("a"))
@@ -131,7 +131,7 @@ def test_deaths_of_an_advance_that_is_done_are_forgotten() -> None:
     assert dispatch.handle(Killed(1, "a", "SIGSEGV")) == []
 
 
-def test_errors_of_several_end_it_and_losses_never_do() -> None:
+def test_errors_of_several_workers_end_an_advance_and_losses_do_not() -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(ShardRequested(0))
     now_s, number = 0.0, 1
@@ -150,7 +150,7 @@ def test_errors_of_several_end_it_and_losses_never_do() -> None:
     assert given_up == [ShardFailed(0, hand.agent, "no")]
 
 
-def test_only_an_equal_platform_may_go_on() -> None:
+def test_only_a_worker_of_an_equal_platform_continues_a_shard() -> None:
     dispatch = ShardDispatch(count(1))
     dispatch.handle(joined("a", "arm"))
     dispatch.handle(joined("b", "x86"))
@@ -165,7 +165,7 @@ def test_only_an_equal_platform_may_go_on() -> None:
     ]
 
 
-def test_whoever_made_the_first_advance_settles_the_platform() -> None:
+def test_first_advance_decides_the_platform() -> None:
     dispatch = ShardDispatch(count(1))
     dispatch.handle(joined("a", "arm"))
     dispatch.handle(ShardRequested(0))
@@ -176,10 +176,10 @@ def test_whoever_made_the_first_advance_settles_the_platform() -> None:
     assert dispatch.waiting == {0: "arm"}
 
 
-def test_wanted_twice_is_our_own_fault() -> None:
+def test_second_request_for_a_shard_raises() -> None:
     dispatch = fleet("a")
     dispatch.handle(ShardRequested(0))
-    with pytest.raises(UnexpectedEvent, match="wanted already"):
+    with pytest.raises(UnexpectedEvent, match="requested already"):
         dispatch.handle(ShardRequested(0))
 
 
@@ -195,7 +195,7 @@ def drifting(*, allows_drift: bool) -> ShardDispatch:
     return dispatch
 
 
-def test_another_platform_gets_a_shard_after_a_while_if_that_is_allowed() -> None:
+def test_shard_drifts_to_another_platform_after_a_while_if_allowed() -> None:
     dispatch = drifting(allows_drift=True)
     assert dispatch.wake_s == 100.0 + DRIFT_S
     assert dispatch.handle(Ticked(99.9 + DRIFT_S)) == []
@@ -209,7 +209,7 @@ def test_another_platform_gets_a_shard_after_a_while_if_that_is_allowed() -> Non
     ]
 
 
-def test_one_that_may_drift_waits_for_whoever_comes_and_not_for_a_time() -> None:
+def test_shard_that_may_drift_waits_for_a_worker_and_not_for_a_time() -> None:
     dispatch = ShardDispatch(count(1), allows_drift=True)
     dispatch.handle(ShardSeen(0, "theirs"))
     dispatch.handle(ShardRequested(0))
@@ -221,7 +221,7 @@ def test_one_that_may_drift_waits_for_whoever_comes_and_not_for_a_time() -> None
     ]
 
 
-def test_its_own_platform_comes_back_in_time() -> None:
+def test_shard_does_not_drift_if_its_platform_returns_in_time() -> None:
     dispatch = drifting(allows_drift=True)
     assert dispatch.handle(joined("z", "theirs")) == [
         AssignShard(1, 0, "z", "theirs", is_whole=True)
@@ -233,7 +233,7 @@ def test_its_own_platform_comes_back_in_time() -> None:
     assert len(dispatch.handle(Ticked(110.0 + DRIFT_S))) == 1
 
 
-def test_nothing_drifts_that_is_not_allowed_to() -> None:
+def test_shard_does_not_drift_unless_allowed() -> None:
     dispatch = drifting(allows_drift=False)
     assert dispatch.wake_s is None
     assert dispatch.handle(Ticked(1e9)) == []

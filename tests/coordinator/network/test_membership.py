@@ -29,7 +29,7 @@ def membership() -> Membership:
     return membership
 
 
-def test_an_agent_joins_by_saying_what_it_is_and_leaves(membership: Membership) -> None:
+def test_agent_joins_with_its_info_and_leaves(membership: Membership) -> None:
     assert membership.is_stranger("w")
     assert membership.introduce("w", info()) == [Joined("w", "worker", 2, "p")]
     assert not membership.is_stranger("w")
@@ -38,7 +38,7 @@ def test_an_agent_joins_by_saying_what_it_is_and_leaves(membership: Membership) 
     assert "w" not in membership.members
 
 
-def test_who_vanishes_unknown_is_no_news(membership: Membership) -> None:
+def test_unknown_agent_that_vanishes_gives_no_event(membership: Membership) -> None:
     assert membership.vanish(WORKER.alive) is None
     assert not membership.is_stranger("w")
     # A thawed one stands there again under the same token.
@@ -46,7 +46,9 @@ def test_who_vanishes_unknown_is_no_news(membership: Membership) -> None:
     assert membership.introduce("w", info()) != []
 
 
-def test_another_version_is_refused_until_it_goes(membership: Membership) -> None:
+def test_agent_of_another_version_is_refused_until_it_vanishes(
+    membership: Membership,
+) -> None:
     assert membership.introduce("w", info(version="2")) == []
     assert membership.refused == {"w": "is of version '2', the coordinator of '1'"}
     assert not membership.is_stranger("w")
@@ -54,7 +56,7 @@ def test_another_version_is_refused_until_it_goes(membership: Membership) -> Non
     assert membership.refused == {}
 
 
-def test_who_is_refused_takes_no_more_part_until_it_comes_again(
+def test_refused_agent_joins_again_only_after_it_vanished(
     membership: Membership,
 ) -> None:
     assert membership.refuse("w", "too early") is None
@@ -67,7 +69,7 @@ def test_who_is_refused_takes_no_more_part_until_it_comes_again(
     assert (membership.refused, membership.members) == ({}, {})
 
 
-def test_each_death_is_told_once_and_before_who_took_the_place(
+def test_each_death_is_reported_once_and_before_the_successor_joins(
     membership: Membership,
 ) -> None:
     message = pb.AgentInfo.FromString(info())
@@ -85,7 +87,7 @@ def test_each_death_is_told_once_and_before_who_took_the_place(
 @pytest.mark.parametrize(
     "data", [b"", b"\xff", info(agent="x"), info(kind="analyzer"), info(slots=0)]
 )
-def test_a_lie_is_malformed_and_changes_nothing(
+def test_false_info_is_malformed_and_changes_nothing(
     membership: Membership, data: bytes
 ) -> None:
     with pytest.raises(MalformedMessage):
@@ -105,7 +107,7 @@ def test_any_bytes_introduce_or_are_malformed(data: bytes) -> None:
 
 
 @pytest.mark.parametrize("key", ["", "revolve/f/w/alive", "revolve/f/x/w/alive"])
-def test_no_token(membership: Membership, key: str) -> None:
+def test_other_keys_are_malformed(membership: Membership, key: str) -> None:
     for take in (membership.appear, membership.vanish):
         with pytest.raises(MalformedMessage):
             take(key)

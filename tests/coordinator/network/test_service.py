@@ -125,7 +125,7 @@ class Driver:
                 self.tell(event)
 
 
-def test_an_agent_comes_with_all_that_it_is_and_goes(network: Network) -> None:
+def test_agent_joins_with_its_properties_and_leaves(network: Network) -> None:
     with agent(network, "an", role="analyzer") as process:
         assert until(network, has(1)) == [Joined("an", "analyzer", 1, "p")]
         process.terminate()
@@ -175,7 +175,7 @@ def test_a_worker_told_to_end_finishes_its_job_and_drops_the_next(
 
 
 @pytest.mark.slow
-def test_a_frozen_worker_is_gone_and_a_thawed_one_is_back(network: Network) -> None:
+def test_suspended_worker_leaves_and_joins_again_when_resumed(network: Network) -> None:
     with agent(network, "w") as process:
         joined = until(network, has(1))
         process.send_signal(signal.SIGSTOP)
@@ -187,7 +187,7 @@ def test_a_frozen_worker_is_gone_and_a_thawed_one_is_back(network: Network) -> N
         assert until(network, has(1)) == joined
 
 
-def test_a_job_that_is_called_off_before_it_is_begun_is_not_done(
+def test_cancelled_job_is_not_done(
     network: Network,
 ) -> None:
     with agent(network, "w", "slow") as process:
@@ -203,10 +203,10 @@ def test_a_job_that_is_called_off_before_it_is_begun_is_not_done(
         process.stdin.flush()
         events = until(network, has(2))
     told = {e.number: (e.outcome, e.reason) for e in events if isinstance(e, Returned)}
-    assert told == {0: ("ok", ""), 1: ("error", "nobody waits for this job any more")}
+    assert told == {0: ("ok", ""), 1: ("error", "the job was cancelled")}
 
 
-def test_who_lacks_a_plug_in_is_refused_and_leaves(network: Network) -> None:
+def test_agent_without_a_plugin_is_refused_and_leaves(network: Network) -> None:
     with agent(network, "w"):
         until(network, has(1))
         message = pb.Request(run="r", epoch=1, number=4, plugins="not_here=abc")
@@ -215,7 +215,7 @@ def test_who_lacks_a_plug_in_is_refused_and_leaves(network: Network) -> None:
         assert network.refused == {"w": "has no plug-in 'not_here'"}
 
 
-def test_workers_come_back_to_a_new_coordinator() -> None:
+def test_workers_connect_to_a_new_coordinator() -> None:
     with Network(name="c1") as first, agent(first, "w"):
         until(first, has(1))
         first.__exit__(None, None, None)
@@ -258,7 +258,7 @@ def test_a_coordinator_whose_run_was_taken_over_stops(network: Network) -> None:
             until(network, has(1))
 
 
-def test_a_job_for_who_is_gone_is_lost(network: Network) -> None:
+def test_job_for_an_agent_that_left_is_lost(network: Network) -> None:
     network.send(7, "nobody", request(7))
     assert until(network, has(1)) == [Returned(7, "nobody", "lost")]
 
@@ -300,7 +300,7 @@ def test_a_malformed_message_is_counted_and_dropped(
                 assert until(network, has(1)) == [Joined("w", "worker", 1, "p")]
 
 
-def test_a_port_in_use_is_one_line(network: Network) -> None:
+def test_port_in_use_is_reported_in_one_line(network: Network) -> None:
     with (
         pytest.raises(NetworkError, match=r"^cannot listen on .*: it is in use$"),
         Network(name="d", listen=(network.address,)),
@@ -308,7 +308,7 @@ def test_a_port_in_use_is_one_line(network: Network) -> None:
         pass
 
 
-def test_a_hub_that_is_not_there_is_one_line() -> None:
+def test_missing_hub_is_reported_in_one_line() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
     with (

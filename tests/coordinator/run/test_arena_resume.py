@@ -224,7 +224,7 @@ class Mortal(LocalAgents):
         return news
 
 
-def test_a_worker_that_forgets_everything_now_and_then(
+def test_worker_that_loses_its_state_repeatedly_changes_nothing(
     tmp_path: Path, calm: Path
 ) -> None:
     path = tmp_path / "run"
@@ -232,7 +232,7 @@ def test_a_worker_that_forgets_everything_now_and_then(
     assert compare(calm, path) == []
 
 
-def test_a_worker_that_computes_otherwise_stops_the_run(
+def test_worker_that_computes_other_results_stops_the_run(
     tmp_path: Path, calm: Path
 ) -> None:
     path = tmp_path / "run"
@@ -243,7 +243,7 @@ def test_a_worker_that_computes_otherwise_stops_the_run(
     assert compare(calm, path) == []
 
 
-def test_lost_snapshots_are_done_without(tmp_path: Path, calm: Path) -> None:
+def test_run_resumes_without_lost_snapshots(tmp_path: Path, calm: Path) -> None:
     path = tmp_path / "run"
     assert not run(path, Fuse(200))
     for file in (path / "snapshots").iterdir():
@@ -252,7 +252,7 @@ def test_lost_snapshots_are_done_without(tmp_path: Path, calm: Path) -> None:
     assert compare(calm, path) == []
 
 
-def test_pace_changes_nothing(tmp_path: Path, calm: Path) -> None:
+def test_throttle_changes_no_result(tmp_path: Path, calm: Path) -> None:
     path = tmp_path / "run"
     assert run(path, throttle=RealTimeThrottle(2.0, EXPERIMENT.simulation.timestep_s))
     assert compare(calm, path) == []
@@ -287,7 +287,7 @@ def ordered(path: Path, point: Point) -> list[str]:
     return said
 
 
-def test_orders_are_obeyed_again_in_a_replay(tmp_path: Path, calm: Path) -> None:
+def test_orders_are_repeated_in_a_replay(tmp_path: Path, calm: Path) -> None:
     undisturbed = tmp_path / "undisturbed"
     said = ordered(undisturbed, lambda _: None)
     assert said[:3] == ["takes effect at 60 s"] * 3
@@ -316,7 +316,7 @@ def test_orders_are_obeyed_again_in_a_replay(tmp_path: Path, calm: Path) -> None
         ),
     ],
 )
-def test_what_cannot_be_is_refused_and_not_journalled(
+def test_invalid_orders_are_refused_and_not_journalled(
     tmp_path: Path, action: OperatorAction, why: str
 ) -> None:
     with ExitStack() as stack:
@@ -327,13 +327,13 @@ def test_what_cannot_be_is_refused_and_not_journalled(
         assert (tmp_path / "run" / NAME).stat().st_size == before
 
 
-def test_request_for_an_unknown_island_is_refused(tmp_path: Path) -> None:
+def test_orders_for_other_islands_are_refused(tmp_path: Path) -> None:
     with ExitStack() as stack:
         operator = Run(tmp_path / "run", stack, lambda _: None).operator
         assert operator.reply_to(OperatorRequest("x", 7, PauseArena())).is_refused
 
 
-def test_snapshot_that_went_missing_is_named(tmp_path: Path) -> None:
+def test_missing_snapshot_is_named(tmp_path: Path) -> None:
     snapshots = Snapshots(tmp_path)
     snapshots.write(0, 5, b"five")
     snapshots.write(0, 9, b"nine")
@@ -350,7 +350,7 @@ def test_snapshot_that_went_missing_is_named(tmp_path: Path) -> None:
         again.read(0, 5)
 
 
-def test_another_platform_goes_on_where_that_is_allowed(
+def test_another_platform_continues_an_arena_if_allowed(
     tmp_path: Path, calm: Path
 ) -> None:
     """Recorded once, whatever comes then; nobody's end is forgotten."""
@@ -370,7 +370,7 @@ def test_another_platform_goes_on_where_that_is_allowed(
     assert "births" in {line.partition(":")[0] for line in compare(calm, path)}
 
 
-def test_a_drift_that_the_journal_does_not_have_leaves_no_state(
+def test_drift_that_is_not_in_the_journal_has_no_effect(
     tmp_path: Path, calm: Path
 ) -> None:
     """Its snapshot is there, and the old platform comes to that step after all."""

@@ -32,7 +32,7 @@ def chosen(share: float) -> list[int]:
     return [each.birth.number for each in births if audits.chooses(each)]
 
 
-def test_a_share_is_chosen_by_who_is_evaluated() -> None:
+def test_birth_decides_whether_an_evaluation_is_checked() -> None:
     assert chosen(0.0) == []
     assert len(chosen(1.0)) == 4000
     some = chosen(0.05)
@@ -42,7 +42,7 @@ def test_a_share_is_chosen_by_who_is_evaluated() -> None:
     assert set(some) < set(chosen(0.2))
 
 
-def test_the_first_of_equal_answers_is_the_answer_whoever_comes_first() -> None:
+def test_first_job_of_equal_answers_counts_in_any_order() -> None:
     for order in ((4, 5), (5, 4)):
         audits = CrossChecks(1.0)
         audits.pair(4, 5)
@@ -54,7 +54,7 @@ def test_the_first_of_equal_answers_is_the_answer_whoever_comes_first() -> None:
 
 
 @pytest.mark.parametrize("other", [FAILED, replace(DIFFERENT)])
-def test_unequal_answers_are_no_answer(other: Evaluated | EvaluationFailed) -> None:
+def test_different_answers_give_no_result(other: Evaluated | EvaluationFailed) -> None:
     audits = CrossChecks(1.0)
     audits.pair(4, 5)
     audits.settle(5, other)
@@ -76,7 +76,7 @@ def test_equal_failures_agree() -> None:
     assert not Audited(FAILED, replace(FAILED, reason="fell")).agrees
 
 
-def test_what_is_no_pair_passes() -> None:
+def test_outcome_of_a_single_job_passes_unchanged() -> None:
     audits = CrossChecks(1.0)
     vetted = VettingFailed(BIRTH, 0, "why")
     assert audits.settle(1, ONE) == [ONE]
@@ -84,7 +84,7 @@ def test_what_is_no_pair_passes() -> None:
 
 
 @pytest.mark.parametrize("event", [Audited(ONE, OTHER), Audited(FAILED, DIFFERENT)])
-def test_a_journal_keeps_both(event: Audited) -> None:
+def test_journal_keeps_both_outcomes(event: Audited) -> None:
     assert decode_entry(encode_entry(event)) == event
 
 

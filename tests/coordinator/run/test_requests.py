@@ -123,7 +123,7 @@ def test_a_request_carries_the_run_its_settings_and_the_robot(desk: Desk) -> Non
     assert (asked.settings, asked.robot) == (b"evaluation", ROBOT)
 
 
-def test_a_body_is_vetted_and_a_robot_evaluated_vetted_before_or_not(
+def test_vetting_sends_the_body_and_evaluation_the_whole_robot(
     desk: Desk,
 ) -> None:
     other = Robot(ROBOT.parts, Brain(ROBOT.brain.neurons))
@@ -151,7 +151,7 @@ def test_a_body_is_vetted_and_a_robot_evaluated_vetted_before_or_not(
     assert body != whole
 
 
-def test_noise_is_drawn_by_who_is_judged_for_whom_and_how_often(desk: Desk) -> None:
+def test_noise_depends_on_robot_island_and_trial(desk: Desk) -> None:
     guest = BirthId(3, 9)
     for context in (
         Evaluate(BIRTH, ROBOT),
@@ -166,7 +166,7 @@ def test_noise_is_drawn_by_who_is_judged_for_whom_and_how_often(desk: Desk) -> N
     assert found == [Identity(ORIGIN, BIRTH, 0), Identity(there, guest, 4), NOBODY]
 
 
-def test_the_two_of_an_audit_draw_the_same_noise() -> None:
+def test_both_jobs_of_a_cross_check_have_the_same_noise() -> None:
     desk = Desk(audit=1.0)
     desk.requests.send(Evaluate(BIRTH, ROBOT, trial=1))
     first, second = (decode_request(payload) for _, _, payload in desk.sent)
@@ -174,7 +174,7 @@ def test_the_two_of_an_audit_draw_the_same_noise() -> None:
     assert first.identity == second.identity == Identity(ORIGIN, BIRTH, 1)
 
 
-def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:
+def test_evaluation_names_its_worker_and_platform(desk: Desk) -> None:
     desk.requests.send(Evaluate(BIRTH, ROBOT))
     (event,) = desk.tell(desk.reply(JUDGED))
     assert isinstance(event, Evaluated)
@@ -184,7 +184,7 @@ def test_an_evaluation_comes_back_with_who_found_it(desk: Desk) -> None:
     assert event.provenance.wall_s == 0.5
 
 
-def test_robots_that_are_never_evaluated_are_forgotten(desk: Desk) -> None:
+def test_bodies_of_robots_that_are_never_evaluated_are_dropped(desk: Desk) -> None:
     """An arena's robots are vetted, born and gone: 3000 of them in a run."""
     for number in range(REMEMBERED + 50):
         desk.requests.send(Vet(BirthId(0, number), 0, ROBOT))
@@ -193,7 +193,7 @@ def test_robots_that_are_never_evaluated_are_forgotten(desk: Desk) -> None:
     assert len(desk.requests._bodies) == REMEMBERED
 
 
-def test_a_request_names_its_plug_ins_by_what_they_are() -> None:
+def test_request_names_its_plugins_with_their_digests() -> None:
     desk = Desk(
         b'{"fitness":{"function":"plugged:speed"},"space":["schema.parts:CORE"]}'
     )
@@ -203,7 +203,9 @@ def test_a_request_names_its_plug_ins_by_what_they_are() -> None:
 
 
 @pytest.mark.parametrize("kind", ["evaluate", "vet"])
-def test_a_robot_that_ends_three_processes_is_told_apart(desk: Desk, kind: str) -> None:
+def test_robot_that_crashes_three_processes_is_quarantined(
+    desk: Desk, kind: str
+) -> None:
     ask = Vet(BIRTH, 2, ROBOT) if kind == "vet" else Evaluate(BIRTH, ROBOT)
     desk.requests.send(ask)
     (number, agent, _) = desk.sent[0]
@@ -230,7 +232,7 @@ def test_a_failed_simulation_is_a_result(desk: Desk) -> None:
     assert event.reason == "diverged"
 
 
-def test_a_report_is_a_verdict_and_a_failure_a_failed_attempt(desk: Desk) -> None:
+def test_vetting_gives_a_report_or_a_failed_attempt(desk: Desk) -> None:
     desk.requests.send(Vet(BIRTH, 4, ROBOT))
     assert desk.tell(desk.reply(VIABLE)) == [Vetted(BIRTH, 4, VIABLE)]
     desk.requests.send(Vet(BIRTH, 5, ROBOT))
@@ -238,7 +240,7 @@ def test_a_report_is_a_verdict_and_a_failure_a_failed_attempt(desk: Desk) -> Non
     assert desk.tell(desk.reply("no box")) == [failed]
 
 
-def test_a_second_answer_and_one_to_nothing_change_nothing(desk: Desk) -> None:
+def test_second_answers_and_unknown_answers_change_nothing(desk: Desk) -> None:
     desk.requests.send(Evaluate(BIRTH, ROBOT))
     reply = desk.reply(JUDGED)
     assert len(desk.tell(reply)) == 1
@@ -256,7 +258,7 @@ def test_a_second_answer_and_one_to_nothing_change_nothing(desk: Desk) -> None:
     ],
     ids=["other epoch", "other job", "a verdict", "no message"],
 )
-def test_a_useless_answer_is_counted_and_the_job_goes_to_another(
+def test_malformed_answer_is_counted_and_the_job_goes_to_another_agent(
     desk: Desk, spoil: Callable[[Desk], Returned]
 ) -> None:
     desk.requests.send(Evaluate(BIRTH, ROBOT))
@@ -267,13 +269,13 @@ def test_a_useless_answer_is_counted_and_the_job_goes_to_another(
     assert isinstance(event, Evaluated)
 
 
-def test_a_lost_job_goes_to_another(desk: Desk) -> None:
+def test_lost_job_goes_to_another_agent(desk: Desk) -> None:
     desk.requests.send(Evaluate(BIRTH, ROBOT))
     assert desk.tell(Left("one")) == []
     assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
 
 
-def test_a_job_that_several_refuse_stops_the_run_and_is_no_result(
+def test_job_that_several_agents_refuse_stops_the_run(
     desk: Desk,
 ) -> None:
     desk.tell(Joined("three", "worker", 1, ""))

@@ -96,7 +96,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_no_answer_is_asked_for_twice(tmp_path: Path, undisturbed: Path) -> None:
+def test_answered_requests_are_not_repeated(tmp_path: Path, undisturbed: Path) -> None:
     path = tmp_path / "run"
     asked = [run(path, answers=answers) for answers in (0, 1, 5, 13, 2)]
     assert asked == [0, 1, 5, 13, 2]
@@ -109,7 +109,7 @@ def test_no_answer_is_asked_for_twice(tmp_path: Path, undisturbed: Path) -> None
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_lost_ends_of_all_files_are_made_good(
+def test_lost_ends_of_all_files_are_restored(
     tmp_path: Path, undisturbed: Path, seed: int
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -123,7 +123,7 @@ def test_lost_ends_of_all_files_are_made_good(
     assert compare(undisturbed, path) == []
 
 
-def test_a_finished_run_may_be_resumed_to_no_effect(
+def test_resuming_a_finished_run_changes_nothing(
     tmp_path: Path, undisturbed: Path
 ) -> None:
     path = tmp_path / "run"

@@ -82,7 +82,9 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_each_run_is_as_if_it_were_alone(tmp_path: Path, alone: Path) -> None:
+def test_runs_side_by_side_give_the_results_of_single_runs(
+    tmp_path: Path, alone: Path
+) -> None:
     scheduler = scheduler_of(plan(tmp_path), local())
     conduct(scheduler)
     status = scheduler.status(0.0)
@@ -94,7 +96,7 @@ def test_each_run_is_as_if_it_were_alone(tmp_path: Path, alone: Path) -> None:
     assert repeats != []
 
 
-def test_stopped_runs_go_on_and_finished_ones_are_not_begun(
+def test_stopped_runs_resume_and_finished_ones_are_not_started(
     tmp_path: Path, alone: Path
 ) -> None:
     for turns in (30, 60, 60):
@@ -112,7 +114,7 @@ def test_stopped_runs_go_on_and_finished_ones_are_not_begun(
     assert scheduler_of(finished, local()).is_finished
 
 
-def test_the_pace_is_known_though_nobody_looked_before(tmp_path: Path) -> None:
+def test_rate_is_known_at_the_first_query(tmp_path: Path) -> None:
     scheduler = scheduler_of(plan(tmp_path), local())
     scheduler.do_chores(0.0)
     conduct(scheduler, 100)
@@ -120,7 +122,7 @@ def test_the_pace_is_known_though_nobody_looked_before(tmp_path: Path) -> None:
     assert status.births_per_s == status.births / 2.0 > 0.0
 
 
-def test_whatever_fails_in_a_run_that_another_took_over_is_that(tmp_path: Path) -> None:
+def test_error_in_a_run_that_was_taken_over_is_the_takeover(tmp_path: Path) -> None:
     """It slept just after it had found the run its own."""
     scheduler = scheduler_of(plan(tmp_path)[:1], local())
     conduct(scheduler, 30)
@@ -171,7 +173,7 @@ class Silent:
         return news
 
 
-def test_so_many_runs_are_begun_that_questions_are_twice_the_credits(
+def test_runs_are_started_until_requests_are_twice_the_credits(
     tmp_path: Path,
 ) -> None:
     one_at_a_time = replace(
@@ -188,12 +190,12 @@ def test_so_many_runs_are_begun_that_questions_are_twice_the_credits(
     scheduler.turn(0.0, lambda: 1.0)
     # Five founders of each are open; credits are 2 x 2.
     assert scheduler.fleet.open == 10
-    assert scheduler.fleet.open >= SLACK * scheduler.fleet.credits
+    assert scheduler.fleet.open >= SLACK * scheduler.fleet.dispatch.credits
     assert len(scheduler.active) == 2
     scheduler.close()
 
 
-def test_a_run_that_cannot_go_on_stops_no_other(tmp_path: Path, alone: Path) -> None:
+def test_run_that_cannot_start_stops_no_other(tmp_path: Path, alone: Path) -> None:
     planned = plan(tmp_path)
     said: list[str] = []
     (tmp_path / "scenario2-1").mkdir()
@@ -211,9 +213,7 @@ def test_a_run_that_cannot_go_on_stops_no_other(tmp_path: Path, alone: Path) -> 
     assert compare(alone / "scenario2-0", tmp_path / "scenario2-0") == []
 
 
-def test_a_disk_that_fails_a_run_in_the_middle_stops_no_other(
-    tmp_path: Path, alone: Path
-) -> None:
+def test_run_whose_disk_fails_stops_no_other(tmp_path: Path, alone: Path) -> None:
     scheduler = scheduler_of(plan(tmp_path), local())
     conduct(scheduler, 60)
     # Another coordinator has opened it since, by its epoch.

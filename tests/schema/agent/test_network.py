@@ -38,7 +38,7 @@ def test_addresses(address: str, parsed: tuple[str, str, int]) -> None:
     "address",
     ["", "7447", "host:7447", "udp/h:1", "tcp/h", "tcp/h:", "tcp/h:65536", "tcp/h:1#x"],
 )
-def test_no_address(address: str) -> None:
+def test_invalid_addresses_are_refused(address: str) -> None:
     with pytest.raises(NetworkError, match="must be tcp/HOST:PORT or tls/HOST:PORT"):
         parse_address(address)
 
@@ -46,7 +46,7 @@ def test_no_address(address: str) -> None:
 @pytest.mark.parametrize(
     "address", [THIS_MACHINE, "tcp/localhost:1", "tcp/[::1]:1", "tcp/127.8.8.8:1"]
 )
-def test_a_hub_on_this_machine_needs_nothing(address: str) -> None:
+def test_hub_on_this_machine_needs_no_certificates(address: str) -> None:
     assert hub(address)["listen"]["endpoints"] == [address]
 
 
@@ -54,9 +54,7 @@ def test_a_hub_on_this_machine_needs_nothing(address: str) -> None:
     "address", ["tcp/0.0.0.0:1", "tcp/[::]:1", "tcp/192.168.1.2:1", "tcp/hub.example:1"]
 )
 @pytest.mark.parametrize("tls", [None, TLS])
-def test_nothing_listens_beyond_this_machine_unguarded(
-    address: str, tls: Tls | None
-) -> None:
+def test_hub_for_other_machines_needs_tls(address: str, tls: Tls | None) -> None:
     with pytest.raises(NetworkError, match="beyond this machine without protection"):
         hub_config((THIS_MACHINE, address), tls)
 
@@ -68,7 +66,7 @@ def test_tls_needs_its_files() -> None:
         client_config("tls/h:1")
 
 
-def test_a_guarded_hub_asks_for_certificates_and_tells_nothing() -> None:
+def test_tls_hub_requires_certificates_and_has_no_admin_space() -> None:
     config = hub("tcp/127.0.0.1:7447", "tls/0.0.0.0:7448", tls=TLS)
     link = config["transport"]["link"]
     assert link["protocols"] == ["tcp", "tls"]
@@ -76,12 +74,12 @@ def test_a_guarded_hub_asks_for_certificates_and_tells_nothing() -> None:
     assert config["adminspace"]["enabled"] is False
 
 
-def test_a_guarded_hub_needs_its_ports_told() -> None:
+def test_tls_hub_needs_explicit_ports() -> None:
     with pytest.raises(NetworkError, match="each address needs a port"):
         hub_config((THIS_MACHINE, "tls/h:1"), TLS)
 
 
-def test_a_hub_listens_somewhere() -> None:
+def test_hub_needs_an_address() -> None:
     with pytest.raises(NetworkError, match="got none"):
         hub_config(())
 
@@ -95,7 +93,7 @@ def test_a_hub_listens_somewhere() -> None:
         client_config("tls/h:1", TLS),
     ],
 )
-def test_the_engine_takes_them_and_nobody_looks_around(text: str) -> None:
+def test_engine_accepts_the_configurations_without_scouting(text: str) -> None:
     zenoh.Config.from_json5(text)  # raises on a key that it does not know
     config = json.loads(text)
     assert config["scouting"]["multicast"]["enabled"] is False
@@ -103,7 +101,7 @@ def test_the_engine_takes_them_and_nobody_looks_around(text: str) -> None:
     assert config["transport"]["shared_memory"]["enabled"] is False
 
 
-def test_a_client_listens_nowhere() -> None:
+def test_client_does_not_listen() -> None:
     config = json.loads(client_config("tcp/far.example:7447"))
     assert config["mode"] == "client"
     assert config["listen"]["endpoints"] == []

@@ -23,7 +23,7 @@ def server(compute: Callable[[bytes], bytes] = lambda _: b"answer") -> Server:
     return Server(compute, Agent("worker", "w", "tcp/h:1", version="1"))
 
 
-def test_an_answer() -> None:
+def test_request_gets_its_answer() -> None:
     made = server()
     assert made.reply(request()) == Reply(b"answer")
     assert (made.tally.answered, made.tally.refused) == (1, 0)
@@ -37,17 +37,17 @@ def test_an_older_epoch_is_fenced() -> None:
     assert made.reply(request(epoch=2)) == Reply(b"answer")
 
 
-def test_what_nobody_waits_for_is_not_done_once() -> None:
+def test_cancelled_job_is_skipped_once() -> None:
     made = server()
     made.cancel(request(7))
     made.cancel(b"\xff")
     assert made.reply(request(6)) == Reply(b"answer")
-    assert made.reply(request(7)).reason == "nobody waits for this job any more"
+    assert made.reply(request(7)).reason == "the job was cancelled"
     assert made.reply(request(7)) == Reply(b"answer")
     assert (made.tally.skipped, made.tally.malformed) == (1, 1)
 
 
-def test_cancelled_jobs_are_not_remembered_for_ever() -> None:
+def test_number_of_cancelled_jobs_is_limited() -> None:
     made = server()
     for number in range(3000):
         made.cancel(request(number))
@@ -70,13 +70,13 @@ def raising(error: Exception) -> Callable[[bytes], bytes]:
         (ZeroDivisionError("by zero"), "ZeroDivisionError: by zero"),
     ],
 )
-def test_an_error_is_a_reason(error: Exception, reason: str) -> None:
+def test_error_is_the_reason_of_the_reply(error: Exception, reason: str) -> None:
     made = server(raising(error))
     assert made.reply(request()) == Reply(reason=reason)
     assert made.tally.refused == 1
 
 
-def test_who_lacks_a_plug_in_is_unfit() -> None:
+def test_agent_without_a_plugin_is_unfit() -> None:
     reply = server().reply(request(plugins="nowhere_to_be_found=abc"))
     assert reply.reason == f"{UNFIT}has no plug-in 'nowhere_to_be_found'"
 
@@ -88,7 +88,7 @@ def test_any_bytes_get_a_reply(data: bytes) -> None:
     assert bool(reply.answer) != bool(reply.reason)
 
 
-def test_an_agent_tells_of_the_dead() -> None:
+def test_agent_info_holds_the_deaths() -> None:
     death = Death(Task("v", "r", 3, 7), "SIGSEGV")
     agent = Agent("worker", "w", "tcp/h:1", version="1", platform="p")
     info = pb.AgentInfo.FromString(
@@ -99,7 +99,7 @@ def test_an_agent_tells_of_the_dead() -> None:
     assert told.cause == "SIGSEGV"
 
 
-def test_plug_ins_are_known_by_their_source(
+def test_plugins_are_identified_by_their_source(
     tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = tmp_path_factory.mktemp("plugged")
@@ -166,7 +166,7 @@ def test_jobs_of_equal_length_take_turns() -> None:
     assert order == [b"a1", b"b1", b"c1", b"a2", b"b2", b"a3"]
 
 
-def test_who_was_away_has_saved_nothing_up() -> None:
+def test_absent_source_saves_up_no_time() -> None:
     turns: FairQueue[bytes] = FairQueue()
     for _ in range(100):
         turns.put(b"a", b"a")
@@ -181,7 +181,7 @@ def test_who_was_away_has_saved_nothing_up() -> None:
     assert 4 <= first.count(b"a") <= 6
 
 
-def test_who_never_comes_back_is_forgotten() -> None:
+def test_number_of_idle_accounts_is_limited() -> None:
     turns: FairQueue[int] = FairQueue()
     for number in range(3 * MOST_SOURCES):
         turns.put(str(number).encode(), number)

@@ -16,7 +16,7 @@ TASK = Task("worker-0.ab", "host:some/folder", 3, 2**40)
 PATIENCE_S = 30.0
 
 
-def test_a_note_stands_from_begin_to_end() -> None:
+def test_note_is_readable_from_begin_to_end() -> None:
     note = CurrentJob()
     assert note.read() is None
     note.begin(TASK)
@@ -25,7 +25,7 @@ def test_a_note_stands_from_begin_to_end() -> None:
     assert note.read() is None
 
 
-def test_a_note_of_a_longest_name_is_cut_and_not_refused() -> None:
+def test_note_of_a_long_name_is_cut() -> None:
     note = CurrentJob()
     note.begin(Task("a" * 999, "r" * 9999, 1, 2))
     held = note.read()
@@ -50,7 +50,7 @@ def test_a_note_of_a_longest_name_is_cut_and_not_refused() -> None:
         (-signal.SIGHUP, ""),
     ],
 )
-def test_only_some_ends_are_a_jobs_own_doing(code: int, doing: str) -> None:
+def test_only_some_exit_codes_are_crashes_by_the_job(code: int, doing: str) -> None:
     assert crash_cause(code) == doing
 
 
@@ -75,7 +75,7 @@ def test_a_job_is_noted_while_it_is_done_and_limited() -> None:
 @pytest.mark.parametrize(
     ("error", "is_noted"), [(ZeroDivisionError, False), (SystemExit, True)]
 )
-def test_an_error_is_no_death_but_leaving_is(
+def test_exit_leaves_the_note_and_an_error_does_not(
     error: type[BaseException], is_noted: object
 ) -> None:
     slot = ProcessSlot(0, CurrentJob())
@@ -114,7 +114,7 @@ def until(process_pool: ProcessPool, is_enough: Callable[[], bool]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_who_takes_a_dead_ones_place_is_told_what_it_died_of(tmp_path: Path) -> None:
+def test_successor_is_told_which_jobs_crashed_its_slot(tmp_path: Path) -> None:
     log = tmp_path / "log"
     with ProcessPool(die, (signal.SIGSEGV, str(log)), size=1) as process_pool:
         until(process_pool, lambda: process_pool.exit_codes == [0])
@@ -133,7 +133,9 @@ def leave(how: str, slot: ProcessSlot) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("how", "code"), [("as asked", 0), ("by an error", 1)])
-def test_who_ends_by_itself_is_replaced_later_each_time(how: str, code: int) -> None:
+def test_process_that_exits_by_itself_is_restarted_later_each_time(
+    how: str, code: int
+) -> None:
     """After 1 s, then 2 s: whatever befell it may befall it again."""
     began_s = time.monotonic()
     with ProcessPool(leave, (how,), size=1) as process_pool:

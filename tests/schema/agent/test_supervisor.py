@@ -35,11 +35,11 @@ def _said(policy: str, before: str = "") -> list[str]:
     return done.stdout.split()
 
 
-def test_nobody_who_wakes_up_interrupts_who_computes() -> None:
+def test_processes_use_the_batch_policy() -> None:
     assert _said("BATCH") == ["True", "True"]
 
 
-def test_a_policy_of_the_user_s_own_stays() -> None:
+def test_policy_set_by_the_user_is_kept() -> None:
     idle = "import os; os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))"
     assert _said("IDLE", idle) == ["True", "True"]
 
@@ -68,7 +68,7 @@ print((resident() - before) >> 20)
 """
 
 
-def test_a_child_gives_back_what_it_leaves() -> None:
+def test_child_returns_unused_memory() -> None:
     """Of 50 MiB of models whose robots died, with what lives on between them.
 
     Measured with and without our setting: where a C library returns the memory in both
@@ -108,7 +108,7 @@ if __name__ == "__main__":
 """
 
 
-def test_a_ctrl_c_reaches_no_child_from_its_birth_on(tmp_path: Path) -> None:
+def test_ctrl_c_reaches_no_child_from_its_start_on(tmp_path: Path) -> None:
     """Nor the first one, with which Python starts a process of its own."""
     script = tmp_path / "pool.py"
     script.write_text(_SHIELDED)
@@ -130,14 +130,14 @@ def _own_signals() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("_own_signals")
-def test_ctrl_c_pressed_twice_at_once_is_one_wish(
+def test_second_ctrl_c_at_once_does_not_count(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("schema.agent.supervisor._ONE_WISH_S", 60.0)
+    monkeypatch.setattr("schema.agent.supervisor._REPEAT_S", 60.0)
     stop = stop_on_signals()
     for _ in range(2):
         signal.raise_signal(signal.SIGINT)
         assert stop.is_set()
-    monkeypatch.setattr("schema.agent.supervisor._ONE_WISH_S", 0.0)
+    monkeypatch.setattr("schema.agent.supervisor._REPEAT_S", 0.0)
     with pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGINT)

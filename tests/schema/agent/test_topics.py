@@ -17,7 +17,7 @@ from schema.errors import MalformedMessage, NetworkError
         (Member("f", "coordinator", "c_1"), "revolve/f/co/c_1/"),
     ],
 )
-def test_all_of_a_process_stands_under_one_prefix(member: Member, prefix: str) -> None:
+def test_all_keys_of_a_process_have_one_prefix(member: Member, prefix: str) -> None:
     keys = [member.alive, member.info, member.jobs]
     assert keys == [prefix + "alive", prefix + "info", prefix + "jobs"]
     assert member_of(member.alive) == member
@@ -45,7 +45,7 @@ def test_any_text_is_a_token_or_malformed(key: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["a", "A9", "host-1.2_x", "x" * 96])
-def test_a_name_that_may_stand_in_a_key(name: str) -> None:
+def test_valid_names_are_returned(name: str) -> None:
     assert check_name(name, "--name") == name
 
 
@@ -53,11 +53,11 @@ def test_a_name_that_may_stand_in_a_key(name: str) -> None:
     "name",
     ["", "a/b", "*", "a$b", "a#b", "a?b", "@a", "-a", ".a", "ä", "a\n", "x" * 97],
 )
-def test_a_name_that_would_mean_something_else(name: str) -> None:
+def test_invalid_names_are_refused(name: str) -> None:
     with pytest.raises(NetworkError, match=r"^--name: must be 1 to 96 letters"):
         check_name(name, "--name")
 
 
-def test_a_process_that_starts_again_has_another_name() -> None:
+def test_process_that_restarts_has_another_name() -> None:
     names = {check_name(unique_name("box-0"), "name") for _ in range(100)}
     assert len(names) == 100
