@@ -218,7 +218,7 @@ def decode_answer(data: bytes) -> Answer:
         case "failure":
             result = message.failure
         case _:
-            raise MalformedMessage("answer: holds no result")
+            raise MalformedMessage("answer: has no result")
     wall_s = finite(message.wall_s, "answer.wall_s")
     return Answer(message.epoch, message.number, wall_s, result)
 

@@ -168,5 +168,5 @@ def test_the_best_fitness_of_few_islands_is_shown_per_island() -> None:
     assert best_of(islands[1]) == "best -"
     assert about_arenas(run) == ""
     arena = IslandStatus(1, 9, 0.5, 4, simulated_s=20.0, is_paused=True)
-    both = changed(run, islands=(*islands, arena))
+    both = replace(run, islands=(*islands, arena))
     assert about_arenas(both) == ", 20 s simulated, 4 alive, paused"
