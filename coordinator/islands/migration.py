@@ -111,7 +111,7 @@ class MigrationEpochs:
     def send(
         self, candidates: Sequence[Individual], living: int, spare: int
     ) -> tuple[list[Emigrate], list[Individual]]:
-        """End the epoch; return the migrants of each neighbour, and who was moved.
+        """End the epoch; return the commands, and the individuals that were moved.
 
         Args:
             candidates: possible emigrants, in a reproducible order.

@@ -1,4 +1,4 @@
-"""The analyzer's work on bytes."""
+"""Encoded answers to encoded requests."""
 
 import pytest
 
@@ -34,7 +34,7 @@ def request_for(
     )
 
 
-def test_an_answer_carries_the_report_and_whose_it_is() -> None:
+def test_an_answer_holds_the_report_and_the_request_number() -> None:
     request = request_for(ROBOT, epoch=3, number=17)
     found = decode_answer(answer(request))
     space = body_space(EXPERIMENT.space)
@@ -48,7 +48,7 @@ def test_an_answer_carries_the_report_and_whose_it_is() -> None:
     [Brain(), Brain((MOTOR, *INPUTS)), Brain((Neuron("output", "None", 7),))],
     ids=["none", "out of order", "of another body"],
 )
-def test_a_body_is_judged_whatever_brain_goes_with_it(brain: Brain) -> None:
+def test_the_brain_of_a_request_is_ignored(brain: Brain) -> None:
     found = decode_answer(answer(request_for(Robot(ROBOT.parts, brain))))
     assert found.result == decode_answer(answer(request_for(ROBOT))).result
 
@@ -58,13 +58,13 @@ def test_a_brain_without_a_body_is_malformed() -> None:
         answer(request_for(Robot((), ROBOT.brain)))
 
 
-def test_a_slot_that_a_type_does_not_have_is_refused() -> None:
+def test_a_slot_that_a_type_does_not_have_is_rejected() -> None:
     hinge = Part("ActiveHinge", 0, 4, 0, 90, GREY)
     with pytest.raises(InvalidRobot, match=r"parent_slot: Core has slots 0..3, got 4"):
         answer(request_for(Robot((ROBOT.parts[0], hinge))))
 
 
-def test_a_robot_that_the_space_does_not_allow_is_refused() -> None:
+def test_a_robot_that_the_space_does_not_allow_is_rejected() -> None:
     light = Part("LightSensor", 0, 2, 0, 0, GREY)
     robot = Robot((ROBOT.parts[0], light), Brain(INPUTS))
     request = request_for(robot)
@@ -72,7 +72,7 @@ def test_a_robot_that_the_space_does_not_allow_is_refused() -> None:
         answer(request)
 
 
-def test_settings_of_another_kind_are_refused() -> None:
+def test_settings_of_another_kind_are_rejected() -> None:
     request = request_for(ROBOT, b'{"space": 3}')
     with pytest.raises(ExperimentError, match="settings of a request"):
         answer(request)

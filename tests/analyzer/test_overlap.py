@@ -147,7 +147,7 @@ def test_bricks_around_a_corner_of_the_core_are_apart_by_the_overhang() -> None:
     assert intersecting_parts(boxes, robot, CONTACT) == ()
 
 
-def test_a_ring_of_bricks_runs_into_its_own_start() -> None:
+def test_a_ring_of_bricks_intersects_its_start() -> None:
     # Four left turns in a row: the fifth brick stands where the first one does.
     ring = [CORE, Part("FixedBrick", 0, 1, 0, 0, GREY)]
     ring += [Part("FixedBrick", index, 2, 0, 0, GREY) for index in range(1, 5)]
@@ -173,7 +173,7 @@ def test_pads_of_a_touch_sensor_reach_beyond_the_slot_they_sit_on() -> None:
 
 
 @pytest.mark.parametrize(("half_width", "expected"), [(0.1, ()), (0.05, ((0, 2),))])
-def test_of_parts_whose_hulls_meet_the_boxes_decide(
+def test_boxes_decide_if_hulls_meet(
     half_width: float, expected: tuple[tuple[int, int], ...]
 ) -> None:
     # Core, brick, and a fork whose tines reach back to both sides of the core.
@@ -190,7 +190,7 @@ def test_of_parts_whose_hulls_meet_the_boxes_decide(
 
 
 @pytest.mark.parametrize("ghosts", [0, 1, 2])
-def test_parts_without_boxes_hide_nothing_of_the_part_before(ghosts: int) -> None:
+def test_parts_without_boxes_keep_all_boxes_of_the_part_before(ghosts: int) -> None:
     # As above, but the tine that meets the core is the last of the boxes.
     tine = (0.02, 0.3, 0.02)
     tines = [Box(f"{x}", tine, (x, 0.0, 0.0), 0.1) for x in (0.2, -0.05)]
@@ -206,7 +206,7 @@ def test_parts_without_boxes_hide_nothing_of_the_part_before(ghosts: int) -> Non
 
 
 @pytest.mark.parametrize("order", [("Ghost", "FixedBrick"), ("FixedBrick", "Ghost")])
-def test_a_part_without_boxes_meets_nobody(order: tuple[str, str]) -> None:
+def test_a_part_without_boxes_intersects_no_part(order: tuple[str, str]) -> None:
     ghost = replace(BUILT_IN["FixedBrick"], name="Ghost", shape=shaped())
     space = {**BUILT_IN, "Ghost": ghost}
     # By so wide a tolerance even opposite bricks would meet.
@@ -263,7 +263,7 @@ def test_a_linear_programme_agrees_whether_random_boxes_meet(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_depth_is_the_shortest_way_out(seed: int) -> None:
+def test_depth_is_the_shortest_separating_distance(seed: int) -> None:
     # Moved by its depth along some direction the second box is free; sampled
     # directions never free it with less.
     rng = np.random.default_rng(1000 + seed)
@@ -298,7 +298,7 @@ def test_the_order_of_two_boxes_does_not_matter(seed: int) -> None:
 
 
 @pytest.mark.parametrize("mode", ["overlap", "contact"])
-def test_bodies_are_judged_as_all_pairs_one_by_one(
+def test_intersections_equal_those_of_all_pairs_one_by_one(
     mode: str, body_of: Callable[[int, int], Robot]
 ) -> None:
     vetting = OVERLAP if mode == "overlap" else CONTACT

@@ -1,4 +1,4 @@
-"""Reports on bodies whose size, mass and verdict are known by hand."""
+"""Reports on bodies whose size, mass and viability are known."""
 
 import pytest
 
@@ -44,7 +44,7 @@ def test_a_hinge_adds_its_length_on_its_side(
     assert report.reason == ""
 
 
-def test_a_bar_bent_upright_is_as_high_as_its_plate() -> None:
+def test_an_upright_bar_is_as_high_as_its_plate() -> None:
     # Turned by 90 degrees the bar tilts in the plane; by 0 out of it.
     flat = (100.0, 0.5, 0.0, *GREY)
     robot = Robot((CORE, Part("ParametricBarJoint", 0, 2, 0, 0, flat)))
@@ -70,7 +70,7 @@ def ring(count: int) -> Robot:
         (6, ((0, 4), (0, 5), (2, 6)), ", and 2 more pairs"),
     ],
 )
-def test_a_refusal_names_the_parts(
+def test_the_reason_names_the_intersecting_parts(
     count: int, pairs: tuple[tuple[int, int], ...], ending: str
 ) -> None:
     report = analyze(ring(count), BUILT_IN, Vetting())
@@ -79,7 +79,7 @@ def test_a_refusal_names_the_parts(
     assert report.reason == (f"parts 0 (Core) and 4 (FixedBrick) intersect{ending}")
 
 
-def test_touching_is_allowed_unless_contact_counts() -> None:
+def test_contact_is_allowed_in_overlap_mode() -> None:
     parts = (
         CORE,
         Part("ActiveHinge", 0, 0, 0, 0, GREY),

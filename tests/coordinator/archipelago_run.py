@@ -1,4 +1,4 @@
-"""Several islands in one process, whose questions are answered in any order."""
+"""Archipelago in one process, with answers in any order."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -34,25 +34,25 @@ Fit = Callable[[BirthId, int], float]
 
 
 def distinct_on_islands(birth: BirthId, island: int) -> float:
-    """Find everybody differently fit, and on each island otherwise; in (0, 1)."""
+    """Return a fitness in (0, 1) that differs between births and between islands."""
     return (birth.number * 0.618034 + birth.island * 0.31 + island * 0.07 + 0.1) % 1.0
 
 
 @dataclass
 class ArchipelagoRun:
-    """An archipelago and all that its islands said.
+    """An archipelago and all commands of its islands.
 
     Attributes:
-        order: how far to rotate the open questions before each answer.
+        order: how far to rotate the open requests before each answer.
         fit: fitness off-line, of a birth on an island.
-        lazy: islands whose questions wait until nobody else has one.
+        slow: islands whose requests are answered only if no other island has one.
     """
 
     experiment: Experiment
     seed: int = 1
     order: Iterator[int] | None = None
     fit: Fit = distinct_on_islands
-    lazy: tuple[int, ...] = ()
+    slow: tuple[int, ...] = ()
     islands: dict[int, Island | Arena] = field(default_factory=dict)
     worlds: dict[int, World] = field(default_factory=dict)
     commands: dict[int, list[IslandCommand | ArenaCommand]] = field(
@@ -69,7 +69,7 @@ class ArchipelagoRun:
         self.commands = {number: [] for number in self.islands}
 
     def live(self, turns: int = 1_000_000) -> "ArchipelagoRun":
-        """Go on to the end, or for some turns."""
+        """Run to the end, or for some turns."""
         if not any(self.commands.values()):
             self.start()
         for _ in range(turns):
@@ -83,10 +83,10 @@ class ArchipelagoRun:
             self.tell(number, Started())
 
     def turn(self) -> None:
-        """Answer one question."""
+        """Answer one request."""
         self.waiting.rotate(-next(self.order) if self.order else 0)
         for _ in range(len(self.waiting)):
-            if self.waiting[0][0] not in self.lazy:
+            if self.waiting[0][0] not in self.slow:
                 break
             self.waiting.rotate(-1)
         number, asked = self.waiting.popleft()
@@ -103,18 +103,20 @@ class ArchipelagoRun:
                 self.tell(number, self.worlds[number].advance(asked))
 
     def tell(self, number: int, event: Any) -> None:  # noqa: ANN401 - any event
-        told = deque([(number, event)])
-        while told:
-            number, event = told.popleft()
+        events = deque([(number, event)])
+        while events:
+            number, event = events.popleft()
             for command in self.islands[number].handle(event):
                 self.commands[number].append(command)
                 match command:
                     case Vet() | Evaluate() | AdvanceShard():
                         self.waiting.append((number, command))
                     case Emigrate(island, to, epoch, migrants):
-                        told.append((to, Immigrated(to, island, epoch, migrants)))
+                        events.append((to, Immigrated(to, island, epoch, migrants)))
                     case Finish(island, neighbours):
-                        told += [(to, NeighbourClosed(to, island)) for to in neighbours]
+                        events += [
+                            (to, NeighbourClosed(to, island)) for to in neighbours
+                        ]
 
     def rows(self, table: str) -> list[Any]:
         """Return the rows of a table, island by island."""
@@ -126,9 +128,9 @@ class ArchipelagoRun:
         ]
 
     @property
-    def story(self) -> dict[int, list[Any]]:
-        """All rows of each island and when it finished: what must repeat."""
+    def outcome(self) -> dict[int, list[Any]]:
+        """All rows of each island and its end: the reproducible part of a run."""
         return {
-            number: [one for one in said if isinstance(one, Record | Finish)]
-            for number, said in self.commands.items()
+            number: [one for one in commands if isinstance(one, Record | Finish)]
+            for number, commands in self.commands.items()
         }

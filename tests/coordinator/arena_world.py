@@ -1,4 +1,4 @@
-"""A world without physics: judges by a function, and remembers who is in it."""
+"""World without physics: fitness is a function, and robots only have a place."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -57,23 +57,23 @@ def experiment(births: int = 3000, **arena: Any) -> Experiment:  # noqa: ANN401
 
 
 def equal_fitness(birth: BirthId, step: int) -> float:
-    """Find everybody equally fit."""
+    """Return the same fitness for all robots."""
     del birth, step
     return 0.1
 
 
 def distinct_fitness(birth: BirthId, step: int) -> float:
-    """Find nobody as fit as another, or as at another time; in (0, 1)."""
+    """Return a fitness in (0, 1) that differs between robots and steps."""
     return (birth.number * 0.6180339887498949 + step * 1e-5 + 0.1) % 1.0
 
 
 def viable(vet: Vet) -> Vetted:
-    """Find every body viable."""
+    """Report that a body is viable."""
     return Vetted(vet.birth, vet.attempt, VIABLE)
 
 
 def reject_some(vet: Vet) -> Vetted | VettingFailed:
-    """Refuse every third attempt, and break at some."""
+    """Reject every third attempt, and fail at some."""
     if (vet.birth.number + vet.attempt) % 3 == 1:
         return Vetted(vet.birth, vet.attempt, CROWDED)
     if (vet.birth.number + vet.attempt) % 8 == 7:
@@ -83,7 +83,7 @@ def reject_some(vet: Vet) -> Vetted | VettingFailed:
 
 @dataclass
 class World:
-    """Who is where since when; ``diverges`` tells who diverges during an advance."""
+    """Robots, their births and places; ``diverges`` selects those that diverge."""
 
     fit: Fit = equal_fitness
     diverges: Callable[[BirthId, int], bool] = lambda _birth, _step: False
@@ -92,7 +92,7 @@ class World:
     places: dict[BirthId, tuple[float, float]] = field(default_factory=dict)
 
     def advance(self, command: AdvanceShard) -> Advanced:
-        """Do what a worker does."""
+        """Return the result of an advance, as a worker does."""
         for birth in command.changes.removals:
             del self.born[birth]
         for each in command.changes.insertions:
@@ -146,7 +146,7 @@ def poses(births: list[BirthId], time_s: float) -> bytes:
 
 @dataclass
 class ArenaRun:
-    """An arena, its world, and all that either said."""
+    """An arena, its world, and all events and commands."""
 
     arena: Arena
     world: World = field(default_factory=World)
@@ -164,7 +164,7 @@ class ArenaRun:
         return found
 
     def turn(self) -> list[ArenaCommand]:
-        """Answer one question."""
+        """Answer one request."""
         self.waiting.rotate(-next(self.order) if self.order else 0)
         asked = self.waiting.popleft()
         if isinstance(asked, Vet):
@@ -172,7 +172,7 @@ class ArenaRun:
         return self.tell(self.world.advance(asked))
 
     def live(self, until_s: float = 1e9) -> "ArenaRun":
-        """Go on to a time, or to the end."""
+        """Run to a time, or to the end."""
         if not self.events:
             self.tell(Started())
         while self.waiting and self.arena.next_step * DT <= until_s:

@@ -1,4 +1,4 @@
-"""An arena by hand: founders, births, culls, samples, ends; every rule once."""
+"""Arena by hand: founders, births, culls, samples, ends; each rule once."""
 
 from dataclasses import replace
 from typing import Any
@@ -46,7 +46,7 @@ def numbers(rows: list[dict[str, int]]) -> list[int]:
     return [row["birth"] for row in rows]
 
 
-def test_founders_come_one_a_second_the_last_made_first() -> None:
+def test_founders_are_inserted_each_second_the_last_made_first() -> None:
     lived = life().live(14.9)
     vets = [one for one in lived.commands if isinstance(one, Vet)]
     assert [one.birth.number for one in vets] == list(range(15))
@@ -61,7 +61,7 @@ def test_founders_come_one_a_second_the_last_made_first() -> None:
     assert not lived.rows("deaths")
 
 
-def test_population_rows_stand_at_every_birth() -> None:
+def test_each_birth_has_population_rows() -> None:
     lived = life().live(46)
     alive: dict[int, list[int]] = {}
     for row in lived.rows("population"):
@@ -89,7 +89,7 @@ def test_an_arena_of_equals_fills_up_and_is_culled() -> None:
     assert len(at_270[0].changes.removals) == 21
 
 
-def test_the_unfit_die_by_the_mean_of_the_mature() -> None:
+def test_robots_below_a_share_of_the_mean_are_culled() -> None:
     """Of 0..14 the mean is 7, and 0..4 are below 0.7 x 7 = 4.9."""
     lived = life(world=World(lambda birth, _: birth.number / 100.0)).live(31)
     deaths = lived.rows("deaths")
@@ -97,7 +97,7 @@ def test_the_unfit_die_by_the_mean_of_the_mature() -> None:
     assert {(row["sim_time_s"], row["reason"]) for row in deaths} == {
         (30.0, "selection")
     }
-    # The child of that step came into the world that they had left.
+    # The child of that step is inserted after their removal.
     (changes,) = [one.changes for one in lived.advances if one.changes.removals]
     assert changes.removals == tuple(BirthId(0, number) for number in range(5))
     assert [each.birth.number for each in changes.insertions] == [15]
@@ -105,7 +105,7 @@ def test_the_unfit_die_by_the_mean_of_the_mature() -> None:
     assert alive == list(range(5, 16))
 
 
-def test_eight_always_stay_and_the_least_fit_go() -> None:
+def test_culling_keeps_the_fittest_eight() -> None:
     """14 of 15 are below the mean's share, but only 7 may go (trap B11)."""
 
     def fit(birth: BirthId, _step: int) -> float:
@@ -134,7 +134,7 @@ def test_every_living_robot_is_sampled_every_five_seconds() -> None:
     assert (at_45[15]["age_s"], at_45[15]["is_mature"]) == (15.0, True)
 
 
-def test_no_slot_before_five_are_mature() -> None:
+def test_no_birth_before_five_robots_are_mature() -> None:
     lived = life().live(15)
     before = len(lived.commands)
     lived.live(29.9)
@@ -158,7 +158,7 @@ def test_only_the_mature_have_children() -> None:
         assert row["sim_time_s"] - times[row["birth"]] >= 15.0
 
 
-def test_a_couple_gives_up_after_five_attempts_and_its_slot_is_lost() -> None:
+def test_a_couple_has_five_attempts_and_then_loses_its_birth() -> None:
     def stubborn(vet: Vet) -> Vetted:
         is_child = vet.birth.number >= 15
         refused = is_child and vet.attempt < 7
@@ -175,7 +175,7 @@ def test_a_couple_gives_up_after_five_attempts_and_its_slot_is_lost() -> None:
     assert [one.attempt for one in vets if one.attempt < 5]
 
 
-def test_the_end_is_the_slot_that_finds_all_births_done() -> None:
+def test_an_arena_ends_at_the_birth_interval_after_the_last_birth() -> None:
     lived = life(16).live()
     assert lived.arena.births == 16
     assert lived.arena.step == 9000
@@ -192,7 +192,7 @@ def test_snapshots_are_wanted_every_hundred_seconds() -> None:
     assert wanted == [20000, 40000, 60000]
 
 
-def test_a_fallen_robot_is_a_death_with_its_reason() -> None:
+def test_a_diverged_robot_is_a_death_with_its_reason() -> None:
     def diverges(birth: BirthId, step: int) -> bool:
         return birth.number == 3 and step == 4000
 
@@ -210,7 +210,7 @@ def test_a_fallen_robot_is_a_death_with_its_reason() -> None:
     assert len(at_20) == 14
 
 
-def test_an_arena_in_which_too_few_are_left_to_mate_is_done() -> None:
+def test_an_arena_with_too_few_robots_to_mate_is_extinct() -> None:
     def diverges(birth: BirthId, step: int) -> bool:
         return birth.number >= 4 and step == 4000
 
@@ -221,7 +221,7 @@ def test_an_arena_in_which_too_few_are_left_to_mate_is_done() -> None:
     assert len(lived.arena.population) == 4
 
 
-def test_touches_and_poses_go_through() -> None:
+def test_touches_and_poses_are_recorded() -> None:
     lived = life().live(15)
     assert {append.table for append in lived.bulk} == {"poses"}
     assert [append.rows for append in lived.bulk] == [*range(1, 16)]
@@ -248,8 +248,8 @@ def advanced(step: int, number: int) -> Advanced:
 
 def test_an_old_advance_is_ignored() -> None:
     lived = life().live(20)
-    told = [one for one in lived.events if isinstance(one, Advanced)]
-    for event in told:
+    advances = [one for one in lived.events if isinstance(one, Advanced)]
+    for event in advances:
         assert lived.arena.handle(event) == []
 
 
@@ -292,19 +292,19 @@ def test_a_wrong_advance_raises_and_changes_nothing(change: dict[str, Any]) -> N
         advanced(200, 0),
     ],
 )
-def test_what_was_never_asked_raises(event: ArenaEvent) -> None:
+def test_an_answer_that_was_never_requested_raises(event: ArenaEvent) -> None:
     lived = life()
     lived.tell(Started())
     with pytest.raises(UnexpectedEvent):
         lived.arena.handle(event)
 
 
-def test_nothing_comes_before_the_start() -> None:
+def test_an_event_before_the_start_raises() -> None:
     with pytest.raises(UnexpectedEvent, match="has not started"):
         life().arena.handle(viable(Vet(BirthId(0, 0), 0, None)))  # type: ignore[arg-type]
 
 
-def test_verdicts_that_come_twice_are_ignored() -> None:
+def test_duplicate_reports_are_ignored() -> None:
     lived = ArenaRun(Arena(experiment(20), 1, 0), verdict=reject_some).live()
     verdicts = [one for one in lived.events if isinstance(one, Vetted | VettingFailed)]
     assert len(verdicts) > 20
@@ -325,5 +325,5 @@ def without_reproduction() -> Experiment:
 def test_children_may_be_random_robots() -> None:
     lived = ArenaRun(Arena(without_reproduction(), 1, 0), World(equal_fitness)).live()
     assert all(row["parents"] == [] for row in lived.rows("births"))
-    # Nobody needs to be mature for it: the first comes at 15 s.
+    # No mature parents are needed: the first birth is at 15 s.
     assert lived.rows("births")[15]["sim_time_s"] == 15.0 == 3000 * DT

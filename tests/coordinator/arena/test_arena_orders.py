@@ -1,4 +1,4 @@
-"""What an operator orders: when it takes effect, and what comes of it."""
+"""Orders of operators: when they take effect, and their effect."""
 
 from dataclasses import replace
 
@@ -58,7 +58,7 @@ def test_an_order_takes_effect_at_the_next_decision() -> None:
     assert lived.advances[-1].changes.removals == (BirthId(0, 3),)
 
 
-def test_a_paused_arena_stands_still_until_it_resumes() -> None:
+def test_a_paused_arena_stops_until_it_is_resumed() -> None:
     lived = life().live(20)
     order(lived, Pause())
     lived.turn()
@@ -95,7 +95,7 @@ def test_a_robot_that_is_inserted_is_a_birth_without_parents() -> None:
     assert 15 in parents or 16 in parents
 
 
-def test_a_full_arena_lets_guests_wait() -> None:
+def test_inserted_robots_await_room_in_a_full_arena() -> None:
     lived = ArenaRun(
         Arena(experiment(population_limit=16), 1, 0), World(equal_fitness)
     ).live(20)
@@ -112,7 +112,7 @@ def numbers_of(lived: ArenaRun) -> list[int]:
     return [one.birth.number for one in lived.arena.population]
 
 
-def test_guests_wait_for_the_founders() -> None:
+def test_inserted_robots_await_the_founders() -> None:
     lived = life().live(3)
     order(lived, Insert(lived.arena.population[0].genome))
     lived.live(16)
@@ -120,7 +120,7 @@ def test_guests_wait_for_the_founders() -> None:
     assert times == [float(second) for second in range(15)] + [14.0]
 
 
-def test_a_brain_is_replaced_and_not_handed_down() -> None:
+def test_a_replaced_brain_is_not_inherited() -> None:
     lived = life().live(20)
     brain = brain_of(lived, 4)
     rewired = replace(brain, connections=())
@@ -138,7 +138,7 @@ def brain_of(lived: ArenaRun, number: int) -> Brain:
     return found.robot.brain
 
 
-def test_a_robot_can_be_rewired_and_removed_before_it_has_lived() -> None:
+def test_a_robot_can_be_changed_and_removed_before_its_first_advance() -> None:
     lived = life().live(20)
     order(lived, Pause())
     order(lived, Insert(genome(lived)))
@@ -157,7 +157,7 @@ def test_a_robot_can_be_rewired_and_removed_before_it_has_lived() -> None:
     assert lived.live().is_done
 
 
-def test_orders_about_the_dead_come_to_nothing() -> None:
+def test_orders_on_dead_robots_are_ignored() -> None:
     lived = life().live(20)
     undisturbed = life().live()
     order(lived, Remove(BirthId(0, 99)))
@@ -167,7 +167,7 @@ def test_orders_about_the_dead_come_to_nothing() -> None:
     assert lived.live().commands == undisturbed.commands
 
 
-def test_an_order_that_comes_twice_is_carried_out_once() -> None:
+def test_a_repeated_order_is_carried_out_once() -> None:
     lived = life().live(20)
     order(lived, Insert(genome(lived)), "one")
     order(lived, Insert(genome(lived)), "one")
@@ -177,7 +177,7 @@ def test_an_order_that_comes_twice_is_carried_out_once() -> None:
 
 
 @pytest.mark.parametrize(("island", "off"), [(1, 0), (0, 1), (0, -1000)])
-def test_an_order_for_another_time_or_place_raises(island: int, off: int) -> None:
+def test_an_order_for_another_step_or_island_raises(island: int, off: int) -> None:
     lived = life().live(20)
     step = lived.arena.next_step + off
     with pytest.raises(UnexpectedEvent, match="orders take effect at 5000"):
@@ -192,14 +192,14 @@ def test_an_order_for_another_time_or_place_raises(island: int, off: int) -> Non
         Insert(Node("Core", -1, 0, ()), (float("nan"), 0.0)),
     ],
 )
-def test_a_robot_that_cannot_be_is_refused(wanted: Insert) -> None:
+def test_an_invalid_robot_is_rejected(wanted: Insert) -> None:
     lived = life().live(20)
     with pytest.raises(InvalidRobot):
         order(lived, wanted)
     assert lived.live().commands == life().live().commands
 
 
-def test_a_finished_arena_takes_no_orders() -> None:
+def test_a_finished_arena_ignores_orders() -> None:
     lived = ArenaRun(Arena(experiment(15), 1, 0), World(equal_fitness)).live()
     assert lived.arena.step * DT == 15.0
     assert order(lived, Pause()) == []

@@ -1,4 +1,4 @@
-"""What holds of every arena, whatever its world does."""
+"""Properties of every arena in any world."""
 
 import random
 from collections.abc import Iterator
@@ -41,14 +41,14 @@ def shuffled(seed: int) -> Iterator[int]:
         yield rng.randrange(10)
 
 
-def said(commands: list[ArenaCommand]) -> list[ArenaCommand]:
-    """Return what was decided; questions about bodies may come in any order."""
+def decisions(commands: list[ArenaCommand]) -> list[ArenaCommand]:
+    """Return the commands apart from vettings, whose order may differ."""
     return [one for one in commands if isinstance(one, AdvanceShard | Record | Append)]
 
 
 @given(seed=st.integers(0, 2**32))
 @fixed
-def test_the_order_of_verdicts_does_not_matter(seed: int) -> None:
+def test_the_order_of_reports_changes_no_command(seed: int) -> None:
     one = ArenaRun(
         Arena(experiment(40), 7, 0), World(distinct_fitness), reject_some
     ).live()
@@ -58,7 +58,7 @@ def test_the_order_of_verdicts_does_not_matter(seed: int) -> None:
         reject_some,
         order=shuffled(seed),
     ).live()
-    assert said(one.commands) == said(other.commands)
+    assert decisions(one.commands) == decisions(other.commands)
 
 
 @given(

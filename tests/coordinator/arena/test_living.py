@@ -25,7 +25,7 @@ def test_places_are_uniform_in_radius_and_angle() -> None:
     assert angles.mean() == pytest.approx(0.0, abs=0.1)
 
 
-def test_a_place_keeps_its_distance_if_five_tries_allow_it() -> None:
+def test_places_keep_their_distance_if_five_tries_allow_it() -> None:
     others = [(0.1 * number, 0.0) for number in range(-10, 11)]
     kept = 0
     for seed in range(200):
@@ -34,7 +34,7 @@ def test_a_place_keeps_its_distance_if_five_tries_allow_it() -> None:
     assert kept >= 195
 
 
-def test_the_last_of_five_tries_is_taken_where_none_is_free() -> None:
+def test_the_last_try_is_taken_if_no_place_is_free() -> None:
     source, reference = draws(3), draws(3)
     everywhere = [(0.2 * x, 0.2 * y) for x in range(-10, 11) for y in range(-10, 11)]
     place = draw_place(source, everywhere, Arena())

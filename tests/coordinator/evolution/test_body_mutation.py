@@ -80,11 +80,11 @@ CHAIN = node(
 )
 
 
-def test_the_short_form_that_the_other_tests_read() -> None:
+def test_the_text_form_of_a_genome() -> None:
     assert shape(CHAIN) == "C(1F(1H(1A)) 2T)"
 
 
-def test_deleting_takes_any_subtree_that_leaves_enough() -> None:
+def test_deletion_keeps_the_least_number_of_parts() -> None:
     setting = experiment({"min_parts": 3}, p_delete_subtree=1.0)
     found: Counter[str] = Counter()
     for seed in range(N):
@@ -239,7 +239,7 @@ def test_how_many_parts_are_added(option: str, most: int) -> None:
     assert min(found) == (0 if option == "loop" else 1)
 
 
-def test_no_part_is_added_beyond_the_limit_or_for_nothing() -> None:
+def test_no_part_is_added_beyond_the_limit_or_without_deletion() -> None:
     greedy = experiment(
         {"min_parts": 1, "max_parts": 6}, p_delete_subtree=1.0, p_duplicate_subtree=0.0
     )

@@ -112,7 +112,9 @@ def wiring(genome: Genome) -> Counter[tuple[object, ...]]:
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0.05, 0.9))
-def test_deleting_hidden_neurons_rewires_nothing(seed: int, probability: float) -> None:
+def test_deleting_hidden_neurons_keeps_other_connections(
+    seed: int, probability: float
+) -> None:
     """An oracle that works on the robot: drop the lost neurons' edges, no more."""
     genome = generate(np.random.default_rng(seed), experiment())
     root = to_mutable(genome, TYPES)
@@ -130,7 +132,7 @@ def test_deleting_hidden_neurons_rewires_nothing(seed: int, probability: float) 
 
 
 @pytest.mark.parametrize("probability", [0.0, 0.05, 0.5, 1.0])
-def test_neurons_and_connections_go_with_their_probabilities(
+def test_neurons_and_connections_are_deleted_with_their_probabilities(
     probability: float,
 ) -> None:
     neurons = edges = 0
@@ -243,7 +245,7 @@ def test_added_connections_join_any_neuron_with_any_output_or_hidden() -> None:
     assert all(abs(n - N / 16) < 5 * (N / 16) ** 0.5 for n in found.values())
 
 
-def test_nothing_is_added_where_there_is_no_target() -> None:
+def test_no_connection_is_added_without_a_target() -> None:
     lone = Node("Core", -1, 0, GREY, children=((0, Node("Hinge", 0, 0, GREY)),))
     root = to_mutable(lone, TYPES)
     add_connections(draws(), preorder(root), 40, experiment())

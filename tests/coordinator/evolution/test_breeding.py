@@ -1,4 +1,4 @@
-"""How a birth's candidates come about, attempt by attempt."""
+"""Candidates of a birth, attempt by attempt, and survivors."""
 
 from dataclasses import replace
 from typing import Any
@@ -35,7 +35,7 @@ def founders(count: int = 10) -> list[Individual]:
     return individuals([genome for genome in genomes if genome])
 
 
-def test_founders_have_no_parents_and_every_attempt_is_another_robot() -> None:
+def test_founders_have_no_parents_and_each_attempt_gives_another_robot() -> None:
     attempts = [breeder().conceive(CHILD, attempt, (), None) for attempt in range(9)]
     assert all(couple is None and genome for couple, genome in attempts)
     assert len({genome for _, genome in attempts}) == 9
@@ -47,7 +47,7 @@ def test_without_reproduction_children_are_random_as_well() -> None:
     assert made == breeder().conceive(CHILD, 3, (), None)
 
 
-def test_a_couple_stays_for_its_attempts_and_then_makes_room_for_another() -> None:
+def test_a_couple_is_replaced_after_max_mating_attempts() -> None:
     population = founders()
     couple = None
     seen = []
@@ -62,7 +62,7 @@ def test_a_couple_stays_for_its_attempts_and_then_makes_room_for_another() -> No
     assert len(set.union(*blocks)) == 3
 
 
-def test_every_attempt_of_a_couple_draws_anew() -> None:
+def test_each_attempt_of_a_couple_has_its_own_stream() -> None:
     population = founders()
     couple = None
     children = []
@@ -91,7 +91,7 @@ def test_parents_that_cannot_mate_give_no_genome() -> None:
         ("tournament", True, 100, "generation.max_tries"),
     ],
 )
-def test_patience_ends_in_one_clear_error(
+def test_too_many_failed_attempts_raise_an_error(
     *, parents: str, is_founder: bool, limit: int, what: str
 ) -> None:
     population = [] if is_founder else founders(5)

@@ -1,4 +1,4 @@
-"""Random robots: what they may be, and how often they are what."""
+"""Random robots: validity and distributions."""
 
 from collections import Counter
 from typing import Any
@@ -55,7 +55,7 @@ def test_no_bar_sits_on_a_bar() -> None:
     assert min(pairs[bar, "Hinge"], pairs["Hinge", bar]) > 20
 
 
-def test_the_parts_of_a_robot_share_a_colour_and_no_identity() -> None:
+def test_the_parts_of_a_robot_share_a_colour_but_no_identity() -> None:
     colours = set()
     genes = []
     for robot in robots(100):
@@ -72,7 +72,7 @@ def test_the_drawn_size_is_truncated_and_clamped() -> None:
         assert {len(robot.parts) for robot in made} == {size}
 
 
-def test_types_turns_and_slots_are_uniform_where_nothing_forbids() -> None:
+def test_orientations_and_slots_are_uniform() -> None:
     # Of the first part on a core all five types are possible; a robot of this
     # size is hardly ever thrown away for lack of a motor.
     made = [robot.parts for robot in robots(2000, shaped(parts_mean=25.0))]
@@ -96,7 +96,7 @@ def test_hidden_neurons_are_uniform_in_number_and_type() -> None:
 
 
 @pytest.mark.parametrize("option", ["any", "wired"])
-def test_where_hidden_neurons_may_live(option: str) -> None:
+def test_parts_that_may_hold_hidden_neurons(option: str) -> None:
     experiment = shaped(hidden_on=option)
     types = body_space(experiment.space)
     on_plain = on_wired = 0
@@ -151,7 +151,7 @@ def test_the_least_number_of_parts_is_kept_not_only_aimed_at() -> None:
     assert min(len(robot.parts) for robot in robots(100, experiment)) == 9
 
 
-def test_restrictions_that_no_robot_meets_end_in_one_clear_error() -> None:
+def test_impossible_restrictions_raise_an_error() -> None:
     space = Space(
         part_types=("schema.parts:CORE", "schema.parts:ACTIVE_HINGE"),
         min_parts=13,

@@ -38,7 +38,7 @@ def assert_near(found: float, published: str, what: str) -> None:
 
 
 @pytest.mark.slow
-def test_random_robots_are_those_of_the_independent_oracle() -> None:
+def test_random_robots_match_the_independent_oracle() -> None:
     experiment = Experiment(name="oracle")
     space = body_space(experiment.space)
     tables = np.zeros((ROBOTS, len(COLUMNS)))

@@ -65,7 +65,7 @@ TREE = node(
 
 
 @given(SEEDS)
-def test_thawing_and_freezing_gives_the_genome_back(seed: int) -> None:
+def test_conversion_to_a_mutable_tree_and_back_keeps_the_genome(seed: int) -> None:
     genome = random_genome(seed)
     root = to_mutable(genome, TYPES)
     assert to_genome(preorder(root)) == genome
@@ -73,14 +73,14 @@ def test_thawing_and_freezing_gives_the_genome_back(seed: int) -> None:
 
 
 @given(SEEDS)
-def test_branches_stand_in_the_order_of_the_genome(seed: int) -> None:
+def test_branches_are_in_the_order_of_the_genome(seed: int) -> None:
     genome = random_genome(seed)
     found = [(b.kind.name, b.parent_slot) for b in preorder(to_mutable(genome, TYPES))]
     assert found == [(one.kind, slot) for one, _, slot in walk(genome)]
 
 
 @given(SEEDS)
-def test_a_path_leads_where_it_was_made_for(seed: int) -> None:
+def test_a_path_leads_from_its_source_to_its_target(seed: int) -> None:
     branches = preorder(to_mutable(random_genome(seed), TYPES))
     for source in branches:
         for target in branches:
@@ -111,7 +111,7 @@ def test_sizes_of_all_subtrees() -> None:
     ]
 
 
-def test_free_places_are_those_that_nothing_sits_on() -> None:
+def test_free_places_are_the_unoccupied_slots() -> None:
     found = [
         (b.kind.name, slot)
         for b, slot in free_places(preorder(to_mutable(TREE, TYPES)))
@@ -120,7 +120,7 @@ def test_free_places_are_those_that_nothing_sits_on() -> None:
     assert found == [*core, ("FixedBrick", 1), ("Hinge", 1)]
 
 
-def test_a_cut_branch_hangs_nowhere_and_leaves_its_slot_free() -> None:
+def test_cutting_detaches_a_branch_and_frees_its_slot() -> None:
     root = to_mutable(TREE, TYPES)
     brick = preorder(root)[3]
     brick.cut()
@@ -144,7 +144,7 @@ def test_levelling_undoes_all_turns_before_a_brick() -> None:
 
 
 @given(SEEDS)
-def test_every_slot_of_a_levelled_robot_looks_sideways(seed: int) -> None:
+def test_all_slots_of_a_levelled_robot_point_sideways(seed: int) -> None:
     robot = develop(random_genome(seed), TYPES)
     rotations, _ = place_parts(robot, shapes_of(robot, TYPES))
     for part, rotation in zip(robot.parts, rotations, strict=True):
@@ -163,7 +163,7 @@ def test_without_planarity_some_robots_leave_the_plane() -> None:
     assert turned > 25
 
 
-def test_gene_identities_of_different_births_never_meet() -> None:
+def test_gene_identities_of_different_births_differ() -> None:
     births = [BirthId(i, n) for i in (0, 1, 300) for n in (0, 1, 2999, 2**32 - 1)]
     genes = [g for birth in births for g in islice(gene_ids(birth), 100)]
     assert len(set(genes)) == len(genes)

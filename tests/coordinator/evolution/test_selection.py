@@ -1,4 +1,4 @@
-"""Who mates and who lives on."""
+"""Selection of parents and survivors, and culling."""
 
 from collections import Counter
 from typing import Any
@@ -45,7 +45,7 @@ def test_of_equals_the_elder_comes_first() -> None:
     assert numbers(fittest_first(individuals(1.0, 3.0, 2.0, 3.0))) == [1, 3, 2, 0]
 
 
-def test_a_tournament_of_the_whole_rest_is_won_by_the_best_of_it() -> None:
+def test_the_best_wins_a_tournament_of_all_candidates() -> None:
     population = individuals(0.1, 0.5, 0.3, 0.2, 0.4)
     found = Counter(map(tuple, couples(population)))
     # The first tournament leaves one of five out: the best with chance 1/5. The
@@ -54,7 +54,7 @@ def test_a_tournament_of_the_whole_rest_is_won_by_the_best_of_it() -> None:
     assert found[4, 1] == pytest.approx(N / 5, abs=5 * (N * 0.16) ** 0.5)
 
 
-def test_tournament_wins_fall_off_as_combinatorics_say() -> None:
+def test_tournament_wins_follow_combinatorics() -> None:
     population = individuals(*(k / 15 for k in range(15)))
     found = Counter(first for first, _ in couples(population))
     # The k-th of 15 wins if it and three less fit are drawn: C(k, 3) / C(15, 4).
@@ -69,7 +69,7 @@ def test_ties_in_a_tournament_break_on_the_birth() -> None:
 
 
 @pytest.mark.parametrize("parents", ["tournament", "random"])
-def test_nobody_mates_with_itself(parents: str) -> None:
+def test_no_individual_mates_with_itself(parents: str) -> None:
     found = couples(individuals(*range(6)), parents=parents)
     assert all(first != second for first, second in found)
 
@@ -95,11 +95,11 @@ OLD = individuals(0.5, 0.1, 0.3)
 NEW = individuals(0.4, 0.0, 0.3, first=3)
 
 
-def test_the_best_of_parents_and_children_live_on_in_birth_order() -> None:
+def test_the_best_of_parents_and_children_survive_in_birth_order() -> None:
     assert survivors(OLD, NEW, population=3) == [0, 2, 3]
 
 
-def test_where_parents_are_not_kept_only_children_live_on() -> None:
+def test_only_children_survive_without_keep_parents() -> None:
     more = individuals(0.4, 0.0, 0.3, 0.2, first=3)
     assert survivors(OLD, more, population=3, keep_parents=False) == [3, 5, 6]
 
@@ -118,7 +118,7 @@ def test_random_survivors_are_uniform_among_all() -> None:
     assert all(abs(n - N / 2) < 5 * (N / 4) ** 0.5 for n in found.values())
 
 
-def test_founders_all_live_on() -> None:
+def test_all_founders_survive() -> None:
     assert survivors([], OLD, population=3) == [0, 1, 2]
     assert survivors([], OLD, population=3, survivors="random") == [0, 1, 2]
 
@@ -129,27 +129,27 @@ def culled(fitness: list[float], **rules: float) -> tuple[str, list[int]]:
     return reason, [one.birth.number for one in found]
 
 
-def test_exactly_the_share_of_the_mean_lives() -> None:
+def test_fitness_equal_to_the_share_of_the_mean_survives() -> None:
     # Mean 1.0, limit 0.5: one half is enough, a little less is not.
     fitness = [0.5, 0.499, 1.501, 1.5, *([1.0] * 8)]
     assert culled(fitness, survive_share_of_mean=0.5) == ("selection", [1])
 
 
-def test_the_weakest_go_first_and_eight_stay() -> None:
+def test_the_weakest_are_culled_down_to_the_floor() -> None:
     fitness = [0.03, 0.01, 0.02, *([1.0] * 7)]
     assert culled(fitness) == ("selection", [1, 2])
 
 
-def test_of_equals_the_younger_goes() -> None:
+def test_the_younger_of_equals_is_culled() -> None:
     assert culled([0.0, 0.0, 0.0, *([1.0] * 7)]) == ("selection", [2, 1])
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 8])
-def test_up_to_the_floor_nobody_dies(count: int) -> None:
+def test_no_robot_is_culled_at_or_below_the_floor(count: int) -> None:
     assert culled([0.0, *([1.0] * 7)][:count])[1] == []
 
 
-def test_a_full_arena_of_equals_loses_seven_tenths() -> None:
+def test_seven_tenths_of_a_full_arena_of_equals_are_culled() -> None:
     assert culled([1.0] * 29) == ("selection", [])
     reason, found = culled([1.0] * 30)
     assert (reason, len(found)) == ("cull", 21)

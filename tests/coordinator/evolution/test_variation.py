@@ -91,7 +91,7 @@ MOTHER = node(
 FATHER = node("Core", (2, node("ActiveHinge", (0, node("TouchSensor")), slot=1)))
 
 
-def test_crossover_puts_any_subtree_in_the_place_of_any_but_never_a_root() -> None:
+def test_crossover_replaces_any_subtree_by_any_other_but_never_a_root() -> None:
     motor = FATHER.children[0][1]
     sensor = motor.children[0][1]
     hinge, other = MOTHER.children
@@ -132,7 +132,7 @@ def test_crossover_fails_where_nothing_fits() -> None:
 
 
 @pytest.mark.parametrize("is_checked", [True, False])
-def test_a_child_with_too_few_parts_is_a_failure_where_that_is_checked(
+def test_crossover_fails_on_too_few_parts_if_check_min_parts_is_set(
     *, is_checked: bool
 ) -> None:
     setting = experiment({"min_parts": 5}, check_min_parts=is_checked)
@@ -146,7 +146,7 @@ def test_a_child_with_too_few_parts_is_a_failure_where_that_is_checked(
     assert set(sizes) == ({None, 5} if is_checked else {3, 4, 5})
 
 
-def test_crossover_keeps_the_giver_s_slot_turn_colour_and_identity() -> None:
+def test_crossover_keeps_the_donated_subtree_unchanged() -> None:
     first, second = founder(1), founder(2)
     child = next(c for seed in range(9) if (c := crossed(seed, first, second)))
     given = {one.gene: one for one, _, _ in walk(second)}
@@ -235,7 +235,7 @@ def test_a_lineage_stays_within_all_restrictions() -> None:
             assert size.fits(size_limits(DEFAULT.space)), generation
 
 
-def test_a_child_without_a_motor_is_refused() -> None:
+def test_a_child_without_a_motor_is_rejected() -> None:
     motor = node("Core", (0, node("ActiveHinge")), (1, node("Hinge")))
     plain = node("Core", (0, node("Hinge")), (1, node("FixedBrick")))
     setting = experiment(**STILL)
@@ -248,7 +248,7 @@ def test_a_child_without_a_motor_is_refused() -> None:
     assert all("ActiveHinge" in kinds(child) for child in found if child)
 
 
-def test_mating_is_a_function_of_its_stream_and_leaves_its_parents() -> None:
+def test_mating_depends_on_its_stream_and_keeps_the_parents() -> None:
     first, second = founder(1), founder(2)
     pair = first, second
     one, two, other = (

@@ -1,4 +1,4 @@
-"""Islands between off-line and on-line: whole lives, events in, commands out."""
+"""Whole runs of off-line islands with re-evaluation and culling."""
 
 from collections import Counter, deque
 from collections.abc import Iterator
@@ -70,7 +70,7 @@ def live(
 ) -> list[IslandCommand]:
     """Run an island to its end, answering in some order, each question once or twice.
 
-    Nobody is asked about before all that went before is known.
+    The island must not be finished while requests are open.
     """
     island = Island(experiment, 7, 0)
     commands = island.handle(Started())
@@ -78,10 +78,10 @@ def live(
     while waiting:
         assert not island.is_finished
         waiting.rotate(-next(order) if order else 0)
-        told = answer(waiting.popleft())
-        found = island.handle(told)
+        event = answer(waiting.popleft())
+        found = island.handle(event)
         if twice:
-            assert island.handle(told) == []
+            assert island.handle(event) == []
         commands += found
         waiting.extend(one for one in found if isinstance(one, Vet | Evaluate))
     assert island.is_finished
@@ -94,7 +94,7 @@ def rows(commands: list[IslandCommand], table: str) -> list[Any]:
     ]
 
 
-def test_the_tables_of_a_life_are_complete() -> None:
+def test_the_tables_of_a_run_are_complete() -> None:
     commands = live(BRIDGE)
     assert commands[-1] == Finish(0)
     assert [row["birth"] for row in rows(commands, "births")] == list(range(40))
@@ -111,7 +111,7 @@ def test_the_tables_of_a_life_are_complete() -> None:
         )
 
 
-def test_everybody_lives_as_long_as_was_asked_and_no_two_alike() -> None:
+def test_durations_are_in_range_and_differ() -> None:
     asked = [one for one in live(BRIDGE) if isinstance(one, Evaluate)]
     steps = [one.steps for one in asked]
     assert all(2400 <= each <= 6000 for each in steps)
@@ -119,7 +119,7 @@ def test_everybody_lives_as_long_as_was_asked_and_no_two_alike() -> None:
 
 
 @pytest.mark.parametrize(("share", "sizes"), [(0.7, 3), (0.1, 5)])
-def test_the_population_rows_are_those_who_passed_the_rule(
+def test_population_rows_are_the_survivors_of_the_culling_rule(
     share: float, sizes: int
 ) -> None:
     """An oracle of its own: the rule worked out from the tables alone."""
@@ -152,7 +152,7 @@ def test_the_population_rows_are_those_who_passed_the_rule(
 def survivors(
     alive: set[int], fitness: dict[int, float], share: float, births: int
 ) -> set[int]:
-    """Return who lives on at a number of births: 6 founders, then a cull a brood."""
+    """Return the survivors at a number of births: 6 founders, then a cull a brood."""
     if births == 6:
         return alive
     limit = share * sum(fitness[one] for one in alive) / len(alive)
@@ -162,7 +162,7 @@ def survivors(
     return set(ranked[: max(min(5, len(alive)), len(alive) - gone)])
 
 
-def test_the_clocks_of_births_are_kept() -> None:
+def test_re_evaluations_begin_at_their_numbers_of_births() -> None:
     commands = live(replace(BRIDGE, births=38))
     born, when = 0, []
     for one in commands:
@@ -176,7 +176,7 @@ def test_the_clocks_of_births_are_kept() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(st.data())
-def test_whatever_order_answers_come_in_the_records_are_the_same(
+def test_the_order_of_answers_changes_no_record(
     data: st.DataObject,
 ) -> None:
     numbers = data.draw(st.lists(st.integers(0, 12), min_size=60, max_size=60))
@@ -187,7 +187,7 @@ def test_whatever_order_answers_come_in_the_records_are_the_same(
     ]
 
 
-def test_judging_anew_waits_for_everybody() -> None:
+def test_a_brood_waits_for_all_re_evaluations() -> None:
     selection = replace(BRIDGE.selection, culling=None, children=1)
     island = Island(replace(BRIDGE, selection=selection), 7, 0)
     waiting = deque(island.handle(Started()))
@@ -236,7 +236,7 @@ def test_robots_are_evaluated_once_without_re_evaluation() -> None:
     assert [(one.trial, one.steps) for one in asked] == [(0, 0)] * 40
 
 
-def test_the_shipped_bridge_has_all_three() -> None:
+def test_the_shipped_bridge_has_durations_re_evaluation_and_culling() -> None:
     bridge = read_experiment("bridge")
     assert bridge.name == "bridge"
     assert (bridge.births, bridge.arena) == (3000, None)

@@ -107,7 +107,7 @@ def rows(commands: list[IslandCommand], table: str) -> list[Any]:
     return [one.row for one in records(commands) if one.table == table]
 
 
-def test_founders_are_all_asked_for_at_once() -> None:
+def test_all_founders_are_vetted_at_once() -> None:
     commands = Island(small(), 1, 0).handle(Started())
     assert all(isinstance(one, Vet) for one in commands)
     assert [one.birth for one in requests(commands)] == [
@@ -146,7 +146,7 @@ def test_births_are_committed_in_birth_order() -> None:
     assert island.births == 2
 
 
-def test_a_whole_life_is_recorded_as_the_tables_want_it() -> None:
+def test_a_whole_run_has_the_rows_and_columns_of_the_tables() -> None:
     island = Island(small(), 7, 2, number=3)
     commands = live(island)
     assert island.is_finished
@@ -183,7 +183,7 @@ def test_births_name_their_parents_ranks_and_broods() -> None:
         assert row["rank"] == 1 + max(born[parent]["rank"] for parent in parents)
 
 
-def test_rows_tell_the_robot_that_was_judged() -> None:
+def test_births_rows_describe_the_evaluated_robot() -> None:
     experiment = small()
     island = Island(experiment, 7, 0)
     judged = {}
@@ -205,7 +205,7 @@ def test_rows_tell_the_robot_that_was_judged() -> None:
     assert max(attempts) > 2
 
 
-def test_a_failed_evaluation_is_a_result_without_numbers_and_counts_as_zero() -> None:
+def test_a_failed_evaluation_has_no_measures_and_counts_as_zero() -> None:
     island = Island(small(survivors="random"), 7, 0)
     commands = live(island)
     found = {row["birth"]: row for row in rows(commands, "evaluations")}
@@ -225,7 +225,7 @@ def test_a_failed_evaluation_is_a_result_without_numbers_and_counts_as_zero() ->
     assert {*island.judged, *failed} == set(island.population)
 
 
-def test_the_best_that_ever_lived_are_alive() -> None:
+def test_the_best_of_all_births_are_alive() -> None:
     island = Island(small(), 7, 0)
     live(island, well)
     best = sorted(range(18), key=lambda n: -fitness_of(BirthId(0, n)))[:6]
@@ -247,7 +247,7 @@ def test_the_last_brood_is_cut_where_the_births_end() -> None:
     assert len(island.population) == 6
 
 
-def test_founders_alone_may_be_all() -> None:
+def test_a_run_may_consist_of_founders_only() -> None:
     island = Island(msgspec.structs.replace(small(), births=6), 7, 0)
     assert live(island)[-1] == Finish(0)
     assert island.births == len(island.population) == 6
@@ -310,7 +310,7 @@ def test_without_selection_fitness_decides_nothing() -> None:
     assert lives[0] == lives[1]
 
 
-def test_new_parents_come_after_so_many_attempts() -> None:
+def test_new_parents_are_selected_after_max_mating_attempts() -> None:
     island = Island(small(max_mating_attempts=3, population=9), 7, 0)
     waiting = deque(requests(island.handle(Started())))
     couples = []
@@ -333,7 +333,7 @@ def test_new_parents_come_after_so_many_attempts() -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(st.data())
-def test_whatever_order_answers_come_in_the_records_are_the_same(
+def test_the_order_of_answers_changes_no_record(
     data: st.DataObject,
 ) -> None:
     numbers = data.draw(st.lists(st.integers(0, 30), min_size=200, max_size=200))
@@ -360,7 +360,7 @@ def test_duplicates_change_nothing(data: st.DataObject) -> None:
 
 
 @pytest.mark.parametrize(("seed", "run"), [(12, 0), (11, 1)])
-def test_another_seed_or_run_is_another_life(seed: int, run: int) -> None:
+def test_another_seed_or_run_gives_other_genomes(seed: int, run: int) -> None:
     one = rows(live(Island(small(), 11, 0)), "births")
     other = rows(live(Island(small(), seed, run)), "births")
     assert all(a["genome"] != b["genome"] for a, b in zip(one, other, strict=True))
@@ -381,7 +381,7 @@ EVALUATED = Evaluated(BirthId(0, 0), Evaluation(0.1, 0.1, 0.1, 12.0), PROVENANCE
         (Vetted(BirthId(1, 0), 0, VIABLE), "births 0..5 have begun"),
     ],
 )
-def test_what_cannot_come_is_refused_and_changes_nothing(event: Any, why: str) -> None:  # noqa: ANN401 - any event
+def test_an_impossible_event_raises_and_changes_nothing(event: Any, why: str) -> None:  # noqa: ANN401 - any event
     island = Island(small(), 11, 0)
     commands = island.handle(Started())
     with pytest.raises(UnexpectedEvent, match=why):
@@ -394,12 +394,12 @@ def test_what_cannot_come_is_refused_and_changes_nothing(event: Any, why: str) -
     assert records(commands) == records(live(Island(small(), 11, 0)))
 
 
-def test_nothing_comes_before_the_start() -> None:
+def test_an_event_before_the_start_raises() -> None:
     with pytest.raises(UnexpectedEvent, match="0 of 18 born"):
         Island(small(), 11, 0).handle(EVALUATED)
 
 
-def test_a_fitness_that_is_no_number_is_refused() -> None:
+def test_a_fitness_that_is_not_finite_raises() -> None:
     island = Island(small(), 11, 0)
     island.handle(Started())
     island.handle(Vetted(BirthId(0, 0), 0, VIABLE))
@@ -414,12 +414,12 @@ def never(command: Vet | Evaluate) -> Answered:
     return Vetted(command.birth, command.attempt, CROWDED)
 
 
-def test_where_no_founder_is_ever_viable_there_is_one_clear_error() -> None:
+def test_an_error_is_raised_if_no_founder_is_ever_viable() -> None:
     with pytest.raises(ExperimentError, match=r"max_tries = 100 .* parts 1 and 2"):
         live(Island(small(), 11, 0), never)
 
 
-def test_where_no_child_is_ever_viable_there_is_one_clear_error() -> None:
+def test_an_error_is_raised_if_no_child_is_ever_viable() -> None:
     def barren(command: Vet | Evaluate) -> Answered:
         return well(command) if command.birth.number < 6 else never(command)
 

@@ -38,11 +38,11 @@ def arenas(
 
 
 def inserted(lived: ArchipelagoRun, island: int) -> dict[BirthId, tuple[float, float]]:
-    """Return who was put into an arena, and where."""
+    """Return the robots that were inserted into an arena, and their places."""
     return dict(lived.worlds[island].places)
 
 
-def test_a_moved_robot_dies_here_and_lives_there() -> None:
+def test_a_moved_robot_dies_at_its_source_and_lives_at_its_target() -> None:
     lived = arenas(9, 9, handling="evict", replaced="none").live()
     first = lived.rows("migrations")[0]
     name = BirthId(first["birth_island"], first["birth"])
@@ -69,7 +69,7 @@ def test_an_immigrant_is_no_birth_and_must_mature_again() -> None:
     assert at_first["age_s"] <= 5.0
 
 
-def test_copies_live_on_both_arenas_and_the_worst_makes_room() -> None:
+def test_copies_live_in_both_arenas_and_replace_the_worst() -> None:
     lived = arenas(9, 9).live()
     first = lived.rows("migrations")[0]
     name = BirthId(0, first["birth"])
@@ -87,7 +87,7 @@ def test_copies_live_on_both_arenas_and_the_worst_makes_room() -> None:
     assert replaced[-1]["birth"] == worst["birth"]
 
 
-def test_immigrants_are_dropped_at_places_of_chance_away_from_others() -> None:
+def test_immigrants_are_inserted_at_random_places() -> None:
     lived = arenas(9, 9).live()
     name = BirthId(0, lived.rows("migrations")[0]["birth"])
     there, here = inserted(lived, 1)[name], inserted(lived, 0)[name]
@@ -101,7 +101,7 @@ def test_seconds_may_end_an_epoch_before_births_do() -> None:
     assert times[:3] == [30.0, 60.0, 90.0]
 
 
-def test_a_full_arena_lets_immigrants_wait_for_room() -> None:
+def test_immigrants_of_a_full_arena_await_room() -> None:
     full = {"population_limit": 5, "population_floor": 3, "full_cull_share": 0.4}
     lived = arenas(8, 8, rules=full, epoch=6, replaced="none").live()
     arena = lived.islands[1]
@@ -111,9 +111,9 @@ def test_a_full_arena_lets_immigrants_wait_for_room() -> None:
         for at in {row["sim_time_s"] for row in lived.rows("fitness")}
     )
     assert most <= 10
-    came = [one for one in inserted(lived, 1) if one.island == 0]
+    arrived = [one for one in inserted(lived, 1) if one.island == 0]
     sent = [row for row in lived.rows("migrations") if row["to"] == 1]
-    assert len(came) <= len(sent)
+    assert len(arrived) <= len(sent)
     assert all(island.is_finished for island in lived.islands.values())
     for number, world in lived.worlds.items():
         assert len(world.born) <= 5, number
@@ -128,7 +128,7 @@ def falling(lived: ArchipelagoRun, island: int, step: int) -> None:
     lived.worlds[island] = world
 
 
-def test_an_arena_of_too_few_is_saved_by_its_neighbours() -> None:
+def test_immigrants_save_an_arena_with_too_few_robots() -> None:
     lived = arenas(20, 20, migrants=3, replaced="none")
     falling(lived, 0, 4000)
     lived.live()
@@ -139,7 +139,7 @@ def test_an_arena_of_too_few_is_saved_by_its_neighbours() -> None:
     assert len([one for one in inserted(lived, 0) if one.island == 1]) >= 3
 
 
-def test_where_nobody_comes_too_few_are_the_end() -> None:
+def test_an_arena_with_too_few_robots_is_extinct_without_immigrants() -> None:
     lived = arenas(20, 20, replaced="none")
     falling(lived, 0, 4000)
     falling(lived, 1, 4000)
@@ -169,22 +169,22 @@ def mixed(**migration: Any) -> ArchipelagoRun:  # noqa: ANN401 - any setting
     return ArchipelagoRun(document)
 
 
-def test_between_off_line_and_on_line_all_are_judged_anew() -> None:
+def test_immigrants_from_arenas_are_re_evaluated_off_line() -> None:
     lived = mixed().live()
-    anew = [
+    reevaluations = [
         one
         for one in lived.commands[0]
         if isinstance(one, Evaluate) and one.requester is not None
     ]
-    assert anew
-    assert {one.birth.island for one in anew} == {1}
+    assert reevaluations
+    assert {one.birth.island for one in reevaluations} == {1}
     rows = [row for row in lived.rows("evaluations") if row["birth_island"] == 1]
-    assert len(rows) == len(anew)
+    assert len(rows) == len(reevaluations)
     first = next(row for row in lived.rows("fitness") if row["birth_island"] == 0)
     assert (first["island"], first["is_mature"]) == (1, False)
 
 
-def test_a_casualty_abroad_is_a_death_there() -> None:
+def test_a_diverged_immigrant_is_a_death_of_the_target() -> None:
     lived = arenas(12, 12)
     lived.worlds[1] = World(
         fit=lived.worlds[1].fit, diverges=lambda birth, _: birth.island == 0

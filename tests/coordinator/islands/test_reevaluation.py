@@ -1,4 +1,4 @@
-"""Evaluations of drawn duration, and who is judged anew when, and with what effect."""
+"""Random durations of evaluation; re-evaluation, its robots and its effect."""
 
 from typing import Any
 
@@ -65,7 +65,7 @@ def names(asked: list[Evaluate]) -> list[tuple[int, int]]:
 def repeat(
     found: Reevaluations, births: int, numbers: list[int]
 ) -> list[tuple[int, int]]:
-    """Judge anew whom it is time for; return who that was."""
+    """Do the re-evaluations that are due; return their births and trials."""
     population = tuple(one(number) for number in numbers)
     asked = found.start(births, population)
     for command in asked:
@@ -92,30 +92,30 @@ def test_both_ends_of_the_range_may_be_equal() -> None:
     assert steps(0, range_s=(20.0, 20.0)) == 4000
 
 
-def test_every_five_births_after_the_founders_it_is_time() -> None:
+def test_re_evaluations_are_due_every_five_births_after_the_founders() -> None:
     found = reevaluations(share=0.01)
     when = [births for births in range(4, 26) if repeat(found, births, [0, 1, 2])]
     assert when == [9, 14, 19, 24]
 
 
-def test_a_brood_that_passes_several_times_asks_once() -> None:
+def test_a_brood_that_ends_several_intervals_is_re_evaluated_once() -> None:
     found = reevaluations(share=0.01)
     when = [births for births in range(4, 60, 13) if repeat(found, births, [0, 1])]
     assert when == [17, 30, 43, 56]
 
 
-def test_who_was_judged_longest_ago_comes_first() -> None:
+def test_the_robots_evaluated_longest_ago_are_chosen() -> None:
     found = reevaluations()
-    everybody = [0, 1, 2, 3]
-    assert repeat(found, 9, everybody) == [(0, 1), (1, 1)]
+    numbers = [0, 1, 2, 3]
+    assert repeat(found, 9, numbers) == [(0, 1), (1, 1)]
     # 0 and 1 were judged when 9 had been born, 2 and 3 at their birth.
-    assert repeat(found, 14, everybody) == [(2, 1), (3, 1)]
+    assert repeat(found, 14, numbers) == [(2, 1), (3, 1)]
     # Of equals the elder; 11 was judged when 12 had been born, after 0 and 1.
     assert repeat(found, 19, [0, 1, 3, 11]) == [(0, 2), (1, 2)]
     assert repeat(found, 24, [0, 1, 3, 11]) == [(3, 2), (11, 1)]
 
 
-def test_a_share_is_rounded_and_somebody_always_is_judged() -> None:
+def test_a_share_is_rounded_and_at_least_one_robot_is_chosen() -> None:
     counts = [
         len(repeat(reevaluations(share=share), 9, list(range(10))))
         for share in (0.01, 0.24, 0.26, 1.0)
@@ -123,7 +123,7 @@ def test_a_share_is_rounded_and_somebody_always_is_judged() -> None:
     assert counts == [1, 2, 3, 10]
 
 
-def test_immigrants_are_left_alone() -> None:
+def test_immigrants_are_not_re_evaluated() -> None:
     found = reevaluations(share=1.0)
     asked = found.start(9, (one(3), one(1, island=1)))
     assert names(asked) == [(3, 1)]
@@ -155,7 +155,7 @@ def test_the_new_fitness_replaces_the_old_or_joins_the_mean(
 @pytest.mark.parametrize(
     ("rule", "value", "has_failed"), [("replace", 0.0, True), ("mean", 0.25, False)]
 )
-def test_a_failed_trial_counts_as_nothing(
+def test_a_failed_trial_counts_as_zero(
     rule: str, value: float, *, has_failed: bool
 ) -> None:
     found = reevaluations(fitness=rule)
@@ -169,7 +169,7 @@ def test_a_failed_trial_counts_as_nothing(
     assert (record.row["reason"], record.row["trial"]) == ("diverged", 1)
 
 
-def test_who_failed_at_birth_may_yet_succeed() -> None:
+def test_a_robot_that_failed_at_birth_may_succeed_later() -> None:
     found = reevaluations(fitness="mean")
     population = (failed(one(0, 0.0)),)
     found.start(9, population)
@@ -182,7 +182,7 @@ def failed(individual: Individual) -> Individual:
     return Individual(individual.birth, individual.genome, 0.0, 1, 0, has_failed=True)
 
 
-def test_answers_count_once_and_come_only_to_what_was_asked() -> None:
+def test_duplicate_outcomes_are_ignored_and_unrequested_ones_raise() -> None:
     found = reevaluations(share=1.0)
     population = (one(0), one(1))
     found.start(9, population)
@@ -200,7 +200,7 @@ def test_answers_count_once_and_come_only_to_what_was_asked() -> None:
     found.take(judged(1, 1, 0.1))
 
 
-def test_rows_come_in_birth_order_whatever_the_answers_order() -> None:
+def test_rows_are_in_birth_order_in_any_order_of_answers() -> None:
     found = reevaluations(share=1.0)
     population = tuple(one(number) for number in range(4))
     found.start(9, population)

@@ -1,4 +1,4 @@
-"""Who neighbours whom."""
+"""Topologies: the edges of each kind of graph."""
 
 from typing import Any
 
@@ -24,7 +24,7 @@ def edges(
     return connections(migration, islands, seed, 0)
 
 
-def test_nobody_is_connected_with_nobody() -> None:
+def test_unconnected_islands_have_no_edges() -> None:
     assert edges("unconnected", 4) == ()
 
 
@@ -36,7 +36,7 @@ def test_a_ring_of_two_is_one_connection() -> None:
     assert edges("ring", 2) == both((0, 1))
 
 
-def test_all_with_all() -> None:
+def test_fully_connected_islands() -> None:
     assert edges("fully-connected", 3) == both((0, 1), (0, 2), (1, 2))
 
 
@@ -61,7 +61,7 @@ def test_the_user_s_edges_go_one_way() -> None:
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_of_a_random_regular_graph_all_have_the_same_degree(seed: int) -> None:
+def test_all_islands_of_a_random_regular_graph_have_the_same_degree(seed: int) -> None:
     found = edges("random-regular", 10, seed, degree=3)
     graph: nx.DiGraph[int] = nx.DiGraph(found)
     assert {graph.out_degree(island) for island in range(10)} == {3}
@@ -76,6 +76,6 @@ def test_a_small_world_is_connected_and_as_dense_as_its_ring(seed: int) -> None:
     assert graph.number_of_edges() == 24
 
 
-def test_chance_comes_from_the_seed_alone() -> None:
+def test_random_topologies_depend_on_the_seed_alone() -> None:
     drawn = [edges("random-regular", 10, seed, degree=3) for seed in (1, 1, 2)]
     assert drawn[0] == drawn[1] != drawn[2]
