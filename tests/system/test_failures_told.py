@@ -271,7 +271,7 @@ def test_an_arena_without_any_fitness_reports_the_reason(stage: Stage) -> None:
     text = ARENA.format(fitness="judge:none")
     (stage.folder / "arena.toml").write_text(text)
     said = _run(stage, "arena.toml", "--out", "a", code=1)
-    assert "too few are left to mate" in said
+    assert "too few robots are left to mate" in said
     assert "deaths were failures, all: " in said
     assert "nobody looked" in said
     assert "already finished" in stage.run("resume", "a", "--in-process", code=1)
