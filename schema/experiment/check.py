@@ -7,6 +7,7 @@ from urllib.parse import quote
 from schema.errors import ExperimentError
 from schema.experiment.check_migration import migration_problem
 from schema.experiment.document import (
+    Culling,
     Experiment,
     Selection,
     body_space,
@@ -214,7 +215,7 @@ def _culling_problem(experiment: Experiment) -> str:
             f"{where}: survival depends on fitness; selection.survivors must be "
             '"best" and selection.keep_parents true'
         )
-    if problem := _floor_problem(selection):
+    if problem := _floor_problem(selection, rules):
         return f"{where}.{problem}"
     if round(rules.full_cull_share * rules.population_limit) < 1:
         return (
@@ -225,10 +226,7 @@ def _culling_problem(experiment: Experiment) -> str:
     return ""
 
 
-def _floor_problem(selection: Selection) -> str:
-    rules = selection.culling
-    if rules is None:
-        return ""
+def _floor_problem(selection: Selection, rules: Culling) -> str:
     needed = selection.parents_needed
     if rules.population_floor < needed:
         return (

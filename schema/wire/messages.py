@@ -16,7 +16,15 @@ from schema.robot.brain import (
     Neuron,
     check_brain,
 )
-from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, walk
+from schema.robot.genome import (
+    ConnectionGene,
+    Genes,
+    Genome,
+    NeuronGene,
+    Node,
+    assemble,
+    walk,
+)
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot, check_tree
 from schema.wire import revolve_pb2 as pb
@@ -147,25 +155,15 @@ def genome_from_message(message: pb.Genome) -> Genome:
     """
     parts = [_part_from_message(item.part) for item in message.nodes]
     check_tree(parts)
-    children: list[list[tuple[int, Node]]] = [[] for _ in parts]
-    # Backwards: children are made before their parent.
-    for index in range(len(parts) - 1, -1, -1):
-        part, item = parts[index], message.nodes[index]
-        node = Node(
-            kind=part.kind,
-            slot=part.slot,
-            orientation=part.orientation,
-            parameters=part.parameters,
-            gene=part.gene,
-            outputs=tuple(map(_neuron_gene, item.outputs)),
-            hidden=tuple(map(_neuron_gene, item.hidden)),
-            connections=tuple(map(_connection_gene, item.connections)),
-            children=tuple(reversed(children[index])),
-        )
-        if index == 0:
-            return node
-        children[part.parent].append((part.parent_slot, node))
-    raise MalformedMessage("genome: must have at least one node")
+    return assemble(parts, lambda index: _genes(message.nodes[index]))
+
+
+def _genes(message: pb.Node) -> Genes:
+    return (
+        tuple(map(_neuron_gene, message.outputs)),
+        tuple(map(_neuron_gene, message.hidden)),
+        tuple(map(_connection_gene, message.connections)),
+    )
 
 
 def birth_to_message(birth: BirthId) -> pb.BirthName:

@@ -55,7 +55,7 @@ def test_a_body_is_judged_whatever_brain_goes_with_it(brain: Brain) -> None:
 
 
 def test_a_brain_without_a_body_is_malformed() -> None:
-    with pytest.raises(MalformedMessage, match="at least its core"):
+    with pytest.raises(MalformedMessage, match="at least the core"):
         answer(request_for(Robot((), ROBOT.brain)))
 
 

@@ -179,7 +179,7 @@ def test_damaged_bytes_decode_or_are_malformed(
     "decode", [decode_robot, decode_body, decode_genome, decode_request]
 )
 def test_nothing_is_no_robot(decode: Callable[[bytes], object]) -> None:
-    with pytest.raises(MalformedMessage, match="at least its core"):
+    with pytest.raises(MalformedMessage, match="at least the core"):
         decode(b"")
 
 
