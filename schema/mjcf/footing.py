@@ -89,7 +89,7 @@ def standing_height(
         obstacles = _Obstacles(environment.scenery, simulation)
         columns = zip(spots, turns, boxes.halves, bottoms.tolist(), strict=True)
         for spot, turn, half, bottom in columns:
-            obstacles.stand(spot, turn, half[:2])
+            obstacles.move(spot, turn, half[:2])
             height = obstacles.cleared(bottom, height)
     return height
 
@@ -161,7 +161,7 @@ class _Obstacles:
         is_solid = (model.geom_contype | model.geom_conaffinity) & _ROBOTS
         self._solid = is_solid[: self._column].nonzero()[0]
 
-    def stand(self, spot: Floats, turn: float, half: Floats) -> None:
+    def move(self, spot: Floats, turn: float, half: Floats) -> None:
         """Move the column.
 
         Args:
