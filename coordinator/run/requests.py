@@ -23,7 +23,7 @@ from coordinator.islands.events import (
 from coordinator.run.cross_checks import CrossChecks
 from schema.errors import JobRefused, MalformedMessage
 from schema.experiment.document import Experiment, island_count, island_experiment
-from schema.experiment.identity import NOBODY, Identity, Origin
+from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.experiment.plugin_source import plugins_of
 from schema.experiment.settings import (
     arena_settings,
@@ -119,7 +119,7 @@ class Requests:
         if isinstance(command, Vet):
             robot = self._body(command)
             attempt, steps, settings = command.attempt, 0, asks.vetting
-            identity = NOBODY
+            identity = NO_IDENTITY
         else:
             attempt, steps = command.trial, command.steps
             requester = requester_of(command)

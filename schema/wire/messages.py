@@ -189,7 +189,7 @@ def identity_to_message(identity: Identity) -> pb.Identity:
 
 
 def identity_from_message(message: pb.Identity) -> Identity:
-    """Return the identity of a message; an empty one gives ``NOBODY``."""
+    """Return the identity of a message; an empty one gives ``NO_IDENTITY``."""
     return Identity(
         Origin(seed=message.seed, run=message.run, island=message.island),
         birth_from_message(message.birth),

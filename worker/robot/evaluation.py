@@ -14,7 +14,7 @@ import numpy as np
 from schema.errors import FitnessUndefined, SimulationDiverged, one_line
 from schema.experiment.document import Fitness, Simulation, Space, body_space
 from schema.experiment.environment import Environment
-from schema.experiment.identity import NOBODY, Identity
+from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings, fitness_function
 from schema.mjcf.model import solo_model
 from schema.robot.results import Evaluation, Track
@@ -27,7 +27,7 @@ from worker.robot.solo import Solo
 
 
 def evaluate(
-    robot: Robot, settings: EvaluationSettings, identity: Identity = NOBODY
+    robot: Robot, settings: EvaluationSettings, identity: Identity = NO_IDENTITY
 ) -> Evaluation:
     """Return how a robot does: a pure function of the arguments.
 
@@ -87,7 +87,7 @@ def simulate(
     environment: Environment,
     *,
     watch: Callable[[mujoco.MjData], None] | None = None,
-    identity: Identity = NOBODY,
+    identity: Identity = NO_IDENTITY,
 ) -> Track:
     """Return where a robot goes, alone, standing at the origin at first.
 

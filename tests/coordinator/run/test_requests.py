@@ -26,7 +26,7 @@ from coordinator.islands.events import (
 )
 from coordinator.run.requests import QUARANTINED, REMEMBERED, Requests, RunContext
 from schema.errors import JobRefused
-from schema.experiment.identity import NOBODY, Identity, Origin
+from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
@@ -156,7 +156,7 @@ def test_noise_is_drawn_by_who_is_judged_for_whom_and_how_often(desk: Desk) -> N
         decode_request(payload, decode_body).identity for _, _, payload in desk.sent
     ]
     there = replace(ORIGIN, island=2)
-    assert found == [Identity(ORIGIN, BIRTH, 0), Identity(there, guest, 4), NOBODY]
+    assert found == [Identity(ORIGIN, BIRTH, 0), Identity(there, guest, 4), NO_IDENTITY]
 
 
 def test_the_two_of_an_audit_draw_the_same_noise() -> None:
