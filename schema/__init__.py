@@ -1,7 +1,7 @@
-"""What two processes, or a process and a file, must agree on.
+"""Definitions that processes and files share.
 
-Robots, brains, genomes, experiments, messages, tables and the one translation
-of a robot to MuJoCo; and how an agent lives on the network, which workers and
-analyzers share. Nothing here decides or simulates, only `service` opens a socket,
-and nothing here imports another room.
+Robots, genomes, experiments, messages, tables, robot files and the translation of
+robots into MuJoCo; and the runtime of workers and analyzers. This package makes no
+decisions and simulates nothing. Only its `service` opens sockets, and it imports no
+other package of the project.
 """

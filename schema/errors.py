@@ -1,6 +1,6 @@
-"""Every error that one part of Revolve reports to another.
+"""Exceptions that one part of Revolve reports to another.
 
-Whose fault an error is decides its class, and the class decides what is done.
+The class of an exception names the source of the fault, which decides its handling.
 """
 
 from difflib import get_close_matches
@@ -8,19 +8,19 @@ from typing import Any
 
 
 class RevolveError(Exception):
-    """Base of all errors that a user may see as one line."""
+    """Base of all errors, which commands print as one line."""
 
 
 class ExperimentError(RevolveError):
-    """The user's document is wrong: says where, what came, what is allowed."""
+    """Invalid experiment; the message says where, what was given, what is allowed."""
 
 
 class UnknownPlugin(ExperimentError):  # noqa: N818 - reads as what it says
-    """A ``module:attribute`` or a name that nothing answers to."""
+    """A ``module:attribute`` or a name that does not exist."""
 
 
 class PluginDiffers(RevolveError):  # noqa: N818 - reads as what it says
-    """A machine without a plug-in of the run, or with another of its name."""
+    """A plug-in of the run is missing on a machine, or its source differs."""
 
 
 class InvalidRobot(RevolveError):  # noqa: N818 - reads as what it says
@@ -36,39 +36,39 @@ class NetworkError(RevolveError):
 
 
 class MalformedMessage(RevolveError):  # noqa: N818 - reads as what it says
-    """Bytes of a peer that do not decode: count them, drop them, go on."""
+    """Bytes of a peer that do not decode; they are counted and dropped."""
 
 
 class UnexpectedEvent(RevolveError):  # noqa: N818 - reads as what it says
-    """An event that the machine's state does not allow: our own fault, stop."""
+    """An event that the state does not allow: a bug, so the run stops."""
 
 
 class FitnessUndefined(RevolveError):  # noqa: N818 - reads as what it says
-    """The fitness function raised, or gave no finite number: a result, too."""
+    """The fitness function raised or returned no finite number: a failed result."""
 
 
 class JobRefused(RevolveError):  # noqa: N818 - reads as what it says
-    """Several agents cannot do a job: the machines' fault, never a result."""
+    """Several agents cannot do a job: a fault of machines, not a result."""
 
 
 class RunPaused(RevolveError):  # noqa: N818 - reads as what it says
-    """A run stops for its user to look at something; ``revolve resume`` goes on."""
+    """A run stops and waits for its user; ``revolve resume`` continues it."""
 
 
 class SimulationDiverged(RevolveError):  # noqa: N818 - reads as what it says
-    """The physics left the realm of numbers: nobody's fault, a result."""
+    """The simulation diverged: a failed result."""
 
 
 class StateDiffers(RevolveError):  # noqa: N818 - reads as what it says
-    """A rebuilt arena is not what it was: this machine computes otherwise."""
+    """A rebuilt arena has another state: this machine computes differently."""
 
 
 def one_line(error: Exception) -> str:
-    """Return what an error says, in a line: an engine takes several."""
+    """Return the message of an error as one line."""
     return " ".join(str(error).split())
 
 
 def nearest(word: Any, words: Any) -> str:  # noqa: ANN401 - any iterable of str
-    """Return ``; did you mean 'x'?`` for the nearest word, or nothing."""
+    """Return ``; did you mean 'x'?`` for the nearest word, or an empty text."""
     found = get_close_matches(str(word), list(words), n=1, cutoff=0.5)
     return f"; did you mean {found[0]!r}?" if found else ""

@@ -1,10 +1,10 @@
-"""Part types as data: the RoboGen body space as Revolve changed it.
+"""Part types as data: the RoboGen body space as changed by Revolve.
 
-All lengths are metres, masses kilograms, angles radians. Each part has a frame
-of its own whose origin is the centre of its root box.
+Lengths are in metres, masses in kilograms, angles in radians. The frame of a part has
+its origin at the centre of its root box.
 
-Source: Hupkes, *Revolve*, 2016, table 5.1, and its published code; where the two
-differ the code is followed, because it produced the results.
+Source: Hupkes, *Revolve*, 2016, table 5.1, and its published code. Where they differ,
+these types follow the code, which produced the results.
 """
 
 import math
@@ -23,14 +23,14 @@ BAR_KG_PER_M = 0.02
 
 
 class Box(Struct, frozen=True):
-    """One box of a part, of uniform density; it collides and it weighs.
+    """Box of a part, of uniform density; it collides.
 
     Attributes:
         name: unique within the part.
         size: full lengths along its own x, y, z [m].
         position: centre in the part frame [m].
         mass: [kg].
-        segment: 0 on slot 0's side of the joint, 1 beyond it.
+        segment: 0 on the side of slot 0, 1 beyond the joint.
         rotation: box frame to part frame, rows first.
     """
 
@@ -43,7 +43,7 @@ class Box(Struct, frozen=True):
 
 
 class Slot(Struct, frozen=True, cache_hash=True):
-    """A place where two parts meet: position [m], outward normal, tangent."""
+    """Attachment place of a part: position [m], outward normal, tangent."""
 
     position: Vector
     normal: Vector
@@ -52,12 +52,12 @@ class Slot(Struct, frozen=True, cache_hash=True):
 
 
 class Joint(Struct, frozen=True):
-    """A revolute joint between a part's two segments.
+    """Revolute joint between the two segments of a part.
 
     Attributes:
         anchor: a point of the axis in the part frame [m].
-        axis: a positive angle turns segment 1 about it relative to segment 0.
-        limit: the angle stays within +-limit [rad].
+        axis: a positive angle rotates segment 1 about it relative to segment 0.
+        limit: greatest absolute angle [rad].
     """
 
     anchor: Vector
@@ -67,7 +67,7 @@ class Joint(Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Motor:
-    """A position servo that commands a velocity and holds it between ticks.
+    """Position servo that commands a velocity and holds it between brain ticks.
 
     Commanded velocity = gain * (target - angle) [rad/s], where target runs over
     the joint's range as the network output runs over [0, 1].
@@ -80,11 +80,11 @@ class Motor:
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """A sensor: ``imu`` gives 6 inputs, ``touch`` and ``light`` one each.
+    """Sensor: ``imu`` gives 6 inputs, ``touch`` and ``light`` one each.
 
     Attributes:
         kind: what it measures.
-        box: name of the box that it sits in (imu, light) or feels with (touch).
+        box: name of the box that holds it (imu, light) or that it senses (touch).
     """
 
     kind: Literal["imu", "touch", "light"]
@@ -92,15 +92,15 @@ class Sensor:
 
     @property
     def inputs(self) -> int:
-        """Number of network inputs that it feeds."""
+        """Number of network inputs."""
         return 6 if self.kind == "imu" else 1
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A number that a part carries, drawn uniformly from [low, high].
+    """Parameter of a part or neuron, drawn uniformly from [low, high].
 
-    ``is_mutable`` false keeps it as inherited (colours).
+    Parameters that are not mutable (colours) keep their inherited value.
     """
 
     name: str
@@ -126,21 +126,21 @@ COLOURS = tuple(
 
 @dataclass(frozen=True, slots=True)
 class PartType:
-    """A kind of part.
+    """Type of parts.
 
     Attributes:
-        name: as it stands in genomes, files and tables.
+        name: used in genomes, files and tables.
         arity: number of slots.
-        shape: parameter values, in the order of ``parameters``, to geometry.
-        own_parameters: those before the three colours.
-        sensors: in the order of the inputs that they feed.
-        motor: the drive of the joint; one network output; None if there is none.
-        is_root: it is a core: always and only the root of a tree.
-        is_levelled: planarity turns it back to the plane of the core.
-        not_on: names of part types that it is never put on at random.
-        parameters: all of them, in the order in which they are written.
-        inputs: number of network inputs that its sensors feed.
-        outputs: number of network outputs that drive it.
+        shape: maps parameter values, in the order of ``parameters``, to geometry.
+        own_parameters: parameters before the three colours.
+        sensors: in the order of their inputs.
+        motor: drives the joint by one network output; None for no motor.
+        is_root: it is a core, which is always and only the root of a tree.
+        is_levelled: in planar bodies it is rotated into the plane of the core.
+        not_on: names of part types that random growth never attaches it to.
+        parameters: all parameters, colours last.
+        inputs: number of network inputs of its sensors.
+        outputs: number of network outputs of its motor.
     """
 
     name: str
@@ -158,7 +158,7 @@ class PartType:
     outputs: int = field(init=False)
 
     def __post_init__(self) -> None:
-        """Derive, once, what is asked for at every birth."""
+        """Derive the attributes that each birth uses."""
         derived = {
             "parameters": self.own_parameters + COLOURS,
             "inputs": sum(sensor.inputs for sensor in self.sensors),
@@ -169,27 +169,27 @@ class PartType:
 
 
 BodySpace = Mapping[str, PartType]
-"""The part types that an experiment allows, by name, in a fixed order."""
+"""Allowed part types by name, in a fixed order."""
 
-_PLATE: Vector = (0.0015, 0.034, 0.034)
-_X: Vector = (1.0, 0.0, 0.0)
-_Y: Vector = (0.0, 1.0, 0.0)
-_Z: Vector = (0.0, 0.0, 1.0)
-_MINUS_X: Vector = (-1.0, 0.0, 0.0)
-_MINUS_Y: Vector = (0.0, -1.0, 0.0)
-_BASE_SLOT_Y = Slot((-0.00075, 0.0, 0.0), _MINUS_X, _Y)
+PLATE: Vector = (0.0015, 0.034, 0.034)
+X: Vector = (1.0, 0.0, 0.0)
+Y: Vector = (0.0, 1.0, 0.0)
+Z: Vector = (0.0, 0.0, 1.0)
+MINUS_X: Vector = (-1.0, 0.0, 0.0)
+MINUS_Y: Vector = (0.0, -1.0, 0.0)
+BASE_SLOT_Y = Slot((-0.00075, 0.0, 0.0), MINUS_X, Y)
 
 SERVO = Motor(gain=0.9, max_torque=0.17658, max_velocity=5.236)
-"""1.8 kg cm, 50 rpm; the gain is the thesis's, far slower than RoboGen's."""
+"""1.8 kg cm, 50 rpm; the gain is that of the thesis, much lower than RoboGen's."""
 
 
 def _side_slots(reach: float) -> tuple[Slot, ...]:
     """Return the four slots (front, back, right, left) of a box-shaped part."""
     return (
-        Slot((0.0, -reach, 0.0), _MINUS_Y, _Z),
-        Slot((0.0, reach, 0.0), _Y, _Z),
-        Slot((reach, 0.0, 0.0), _X, _Z),
-        Slot((-reach, 0.0, 0.0), _MINUS_X, _Z),
+        Slot((0.0, -reach, 0.0), MINUS_Y, Z),
+        Slot((0.0, reach, 0.0), Y, Z),
+        Slot((reach, 0.0, 0.0), X, Z),
+        Slot((-reach, 0.0, 0.0), MINUS_X, Z),
     )
 
 
@@ -203,47 +203,47 @@ _BRICK = Shape(
 )
 _ACTIVE_HINGE = Shape(
     boxes=(
-        Box("root", _PLATE, (0.0, 0.0, 0.0), 0.007),
+        Box("root", PLATE, (0.0, 0.0, 0.0), 0.007),
         Box("frame", (0.018, 0.034, 0.01), (0.00985, 0.0, 0.0), 0.0012),
         Box("servo", (0.0245, 0.034, 0.01), (0.0231, 0.0, 0.0), 0.009, 1),
-        Box("tail", _PLATE, (0.0362, 0.0, 0.0), 0.007, 1),
+        Box("tail", PLATE, (0.0362, 0.0, 0.0), 0.007, 1),
     ),
     slots=(
-        Slot((-0.00075, 0.0, 0.0), _MINUS_X, _Z),
-        Slot((0.03695, 0.0, 0.0), _X, _Z, 1),
+        Slot((-0.00075, 0.0, 0.0), MINUS_X, Z),
+        Slot((0.03695, 0.0, 0.0), X, Z, 1),
     ),
-    joint=Joint((0.01485, 0.0, 0.0), _MINUS_Y, math.radians(45)),
+    joint=Joint((0.01485, 0.0, 0.0), MINUS_Y, math.radians(45)),
 )
 _HINGE = Shape(
     boxes=(
-        Box("root", _PLATE, (0.0, 0.0, 0.0), 0.002),
+        Box("root", PLATE, (0.0, 0.0, 0.0), 0.002),
         Box("conn_a", (0.0205, 0.002, 0.02), (0.0111, 0.0, 0.0), 0.001),
         Box("conn_b", (0.0205, 0.002, 0.02), (0.0276, 0.0, 0.0), 0.001, 1),
-        Box("tail", _PLATE, (0.0387, 0.0, 0.0), 0.002, 1),
+        Box("tail", PLATE, (0.0387, 0.0, 0.0), 0.002, 1),
     ),
     slots=(
-        Slot((-0.00075, 0.0, 0.0), _MINUS_X, _Z),
-        Slot((0.03945, 0.0, 0.0), _X, _Z, 1),
+        Slot((-0.00075, 0.0, 0.0), MINUS_X, Z),
+        Slot((0.03945, 0.0, 0.0), X, Z, 1),
     ),
-    joint=Joint((0.01935, 0.0, 0.0), _Z, math.radians(60)),
+    joint=Joint((0.01935, 0.0, 0.0), Z, math.radians(60)),
 )
 _TOUCH = Shape(
     boxes=(
-        Box("base", _PLATE, (0.0, 0.0, 0.0), 0.003),
+        Box("base", PLATE, (0.0, 0.0, 0.0), 0.003),
         Box("left", (0.009, 0.0185, 0.016), (0.00525, -0.01025, 0.0), 0.003),
         Box("right", (0.009, 0.0185, 0.016), (0.00525, 0.01025, 0.0), 0.003),
     ),
-    slots=(_BASE_SLOT_Y,),
+    slots=(BASE_SLOT_Y,),
 )
 _LIGHT = Shape(
-    boxes=(Box("base", _PLATE, (0.0, 0.0, 0.0), 0.002),), slots=(_BASE_SLOT_Y,)
+    boxes=(Box("base", PLATE, (0.0, 0.0, 0.0), 0.002),), slots=(BASE_SLOT_Y,)
 )
 
 
 def _bar(values: tuple[float, ...]) -> Shape:
     """Return a bar: a plate, a strip and a tail plate tilted by alpha, beta.
 
-    The length is carried in millimetres, as the genome of the original does.
+    The length is in millimetres, as in the genome of the original.
     """
     length, alpha, beta = values[0] / 1000.0, values[1], values[2]
     sa, ca, sb, cb = math.sin(alpha), math.cos(alpha), math.sin(beta), math.cos(beta)
@@ -254,30 +254,30 @@ def _bar(values: tuple[float, ...]) -> Shape:
     end = (tail + 0.00075 * ca, 0.0, -0.00075 * sa)
     return Shape(
         boxes=(
-            Box("root", _PLATE, (0.0, 0.0, 0.0), 0.001),
+            Box("root", PLATE, (0.0, 0.0, 0.0), 0.001),
             Box(
                 "bar",
                 (length, 0.02, 0.002),
                 (0.00075 + length / 2, 0.0, 0.0),
                 BAR_KG_PER_M * length,
             ),
-            Box("tail", _PLATE, (tail, 0.0, 0.0), 0.001, 0, tilt),
+            Box("tail", PLATE, (tail, 0.0, 0.0), 0.001, 0, tilt),
         ),
-        slots=(_BASE_SLOT_Y, Slot(end, normal, tangent)),
+        slots=(BASE_SLOT_Y, Slot(end, normal, tangent)),
     )
 
 
-def _constant(shape: Shape) -> Callable[[tuple[float, ...]], Shape]:
-    """Return a function that gives the same shape for any parameters."""
+def constant_shape(shape: Shape) -> Callable[[tuple[float, ...]], Shape]:
+    """Return a function that returns a shape for any parameters."""
     return lambda _values: shape
 
 
 CORE = PartType(
-    "Core", 4, _constant(_CORE), sensors=(Sensor("imu", "body"),), is_root=True
+    "Core", 4, constant_shape(_CORE), sensors=(Sensor("imu", "body"),), is_root=True
 )
-FIXED_BRICK = PartType("FixedBrick", 4, _constant(_BRICK), is_levelled=True)
-ACTIVE_HINGE = PartType("ActiveHinge", 2, _constant(_ACTIVE_HINGE), motor=SERVO)
-HINGE = PartType("Hinge", 2, _constant(_HINGE))
+FIXED_BRICK = PartType("FixedBrick", 4, constant_shape(_BRICK), is_levelled=True)
+ACTIVE_HINGE = PartType("ActiveHinge", 2, constant_shape(_ACTIVE_HINGE), motor=SERVO)
+HINGE = PartType("Hinge", 2, constant_shape(_HINGE))
 PARAMETRIC_BAR_JOINT = PartType(
     "ParametricBarJoint",
     2,
@@ -285,7 +285,7 @@ PARAMETRIC_BAR_JOINT = PartType(
     own_parameters=(
         Parameter("connection_length", 20.0, 100.0, 50.0),
         Parameter("alpha", -math.pi / 2, math.pi / 2, 0.0),
-        # The original forces beta to 0 while bodies are planar, as all are.
+        # Planar bodies, the default, have beta 0.
         Parameter("beta", 0.0, 0.0, 0.0),
     ),
     is_levelled=True,
@@ -294,11 +294,11 @@ PARAMETRIC_BAR_JOINT = PartType(
 TOUCH_SENSOR = PartType(
     "TouchSensor",
     1,
-    _constant(_TOUCH),
+    constant_shape(_TOUCH),
     sensors=(Sensor("touch", "left"), Sensor("touch", "right")),
 )
 LIGHT_SENSOR = PartType(
-    "LightSensor", 1, _constant(_LIGHT), sensors=(Sensor("light", "base"),)
+    "LightSensor", 1, constant_shape(_LIGHT), sensors=(Sensor("light", "base"),)
 )
 
 BUILT_IN: BodySpace = {

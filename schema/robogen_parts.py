@@ -1,19 +1,18 @@
-"""The part set with RoboGen's own dimensions, as its sources had them in 2016.
+"""Part types with RoboGen's own dimensions, from its sources of 2016.
 
-Names, slots, their order and their tangents are those of ``schema.parts``, so that a
-robot fits both sets; boxes and masses are RoboGen's. The tilting bar's cylinder is
-here the box around it; servos and the range of the passive hinge are the thesis's. An
-experiment takes the set by the names of its types::
+Names, slots, their order and their tangents are those of ``schema.parts``, so that
+robots fit both sets; boxes and masses are RoboGen's. The cylinder of the tilting bar
+is replaced by its bounding box; servos and the range of the passive hinge are those of
+the thesis. An experiment names the types::
 
     [space]
     part_types = ["schema.robogen_parts:CORE", "schema.robogen_parts:FIXED_BRICK"]
 
-Source: facts of the original, section 1.5, and RoboGen's published sources for what
-stands between the boxes.
+Source: facts of the original, section 1.5, and RoboGen's published sources for the
+gaps between boxes.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 from schema import parts
@@ -22,52 +21,46 @@ from schema.parts import BodySpace, Box, Joint, Matrix, Shape, Slot, Vector
 BAR_KG_PER_M = 0.137
 """Mass of a bar per metre: 1.37 g/cm."""
 
-_PLATE: Vector = (0.0015, 0.034, 0.034)
-_X: Vector = (1.0, 0.0, 0.0)
-_Y: Vector = (0.0, 1.0, 0.0)
-_Z: Vector = (0.0, 0.0, 1.0)
-_MINUS_X: Vector = (-1.0, 0.0, 0.0)
 _BRICK: Vector = (0.041, 0.041, 0.0355)
-_BASE_SLOT_Y = Slot((-0.00075, 0.0, 0.0), _MINUS_X, _Y)
-_BASE_SLOT_Z = Slot((-0.00075, 0.0, 0.0), _MINUS_X, _Z)
+_BASE_SLOT_Z = Slot((-0.00075, 0.0, 0.0), parts.MINUS_X, parts.Z)
 
 
 def _block(mass: float) -> Shape:
-    """Return a brick, or the core: they differ in mass only."""
+    """Return the shape of a brick or core, which differ in mass only."""
     brick = parts.FIXED_BRICK.shape(())
     return Shape((Box("body", _BRICK, (0.0, 0.0, 0.0), mass),), brick.slots)
 
 
 _ACTIVE_HINGE = Shape(
     boxes=(
-        Box("root", _PLATE, (0.0, 0.0, 0.0), 0.002),
+        Box("root", parts.PLATE, (0.0, 0.0, 0.0), 0.002),
         Box("frame", (0.0205, 0.036, 0.013), (0.011, 0.0005, 0.0), 0.001),
         Box("servo", (0.0275, 0.0365, 0.01625), (0.0225, 0.0005, 0.0), 0.013, 1),
-        Box("tail", _PLATE, (0.037, 0.0, 0.0), 0.002, 1),
+        Box("tail", parts.PLATE, (0.037, 0.0, 0.0), 0.002, 1),
     ),
-    slots=(_BASE_SLOT_Z, Slot((0.03775, 0.0, 0.0), _X, _Z, 1)),
+    slots=(_BASE_SLOT_Z, Slot((0.03775, 0.0, 0.0), parts.X, parts.Z, 1)),
     joint=Joint((0.01475, 0.0, 0.0), (0.0, -1.0, 0.0), math.radians(45)),
 )
 _HINGE = Shape(
     boxes=(
-        Box("root", _PLATE, (0.0, 0.0, 0.0), 0.002),
+        Box("root", parts.PLATE, (0.0, 0.0, 0.0), 0.002),
         Box("conn_a", (0.0205, 0.002, 0.02), (0.011, 0.0, 0.0), 0.001),
         Box("conn_b", (0.0205, 0.002, 0.02), (0.0275, 0.0, 0.0), 0.001, 1),
-        Box("tail", _PLATE, (0.0385, 0.0, 0.0), 0.002, 1),
+        Box("tail", parts.PLATE, (0.0385, 0.0, 0.0), 0.002, 1),
     ),
-    slots=(_BASE_SLOT_Z, Slot((0.03925, 0.0, 0.0), _X, _Z, 1)),
-    joint=Joint((0.01925, 0.0, 0.0), _Z, math.radians(60)),
+    slots=(_BASE_SLOT_Z, Slot((0.03925, 0.0, 0.0), parts.X, parts.Z, 1)),
+    joint=Joint((0.01925, 0.0, 0.0), parts.Z, math.radians(60)),
 )
 _TOUCH = Shape(
     boxes=(
-        Box("base", _PLATE, (0.0, 0.0, 0.0), 0.001),
+        Box("base", parts.PLATE, (0.0, 0.0, 0.0), 0.001),
         Box("left", (0.0085, 0.016, 0.016), (0.005, -0.0085, 0.0), 0.001),
         Box("right", (0.0085, 0.016, 0.016), (0.005, 0.0085, 0.0), 0.001),
     ),
-    slots=(_BASE_SLOT_Y,),
+    slots=(parts.BASE_SLOT_Y,),
 )
 _STUB_M, _CYLINDER_M = 0.006, 0.005
-"""Length of a bar's fixed piece, and radius of what it tilts about."""
+"""Length of the fixed piece of a bar, and radius of the cylinder it tilts about."""
 
 
 def _bar(values: tuple[float, ...]) -> Shape:
@@ -85,14 +78,14 @@ def _bar(values: tuple[float, ...]) -> Shape:
     round_off = (2 * _CYLINDER_M, 0.02, 2 * _CYLINDER_M)
     return Shape(
         boxes=(
-            Box("root", _PLATE, (0.0, 0.0, 0.0), 0.001),
+            Box("root", parts.PLATE, (0.0, 0.0, 0.0), 0.001),
             Box(
                 "stub",
                 (_STUB_M, 0.02, 0.01),
                 (0.00075 + _STUB_M / 2, 0.0, 0.0),
                 BAR_KG_PER_M * _STUB_M,
             ),
-            # Half of it lies in the stub: its mass is that of the other half.
+            # Half of it is inside the stub: its mass is that of the other half.
             Box("cylinder", round_off, (pivot, 0.0, 0.0), BAR_KG_PER_M * _CYLINDER_M),
             Box(
                 "bar",
@@ -102,26 +95,21 @@ def _bar(values: tuple[float, ...]) -> Shape:
                 0,
                 tilt,
             ),
-            Box("tail", _PLATE, along(length + 0.00075), 0.001, 0, turned),
+            Box("tail", parts.PLATE, along(length + 0.00075), 0.001, 0, turned),
         ),
         slots=(
-            _BASE_SLOT_Y,
+            parts.BASE_SLOT_Y,
             Slot(along(length + 0.0015), (ca, 0.0, -sa), (sa * sb, cb, ca * sb)),
         ),
     )
 
 
-def _always(shape: Shape) -> Callable[[tuple[float, ...]], Shape]:
-    """Return a function that gives the same shape for any parameters."""
-    return lambda _values: shape
-
-
-CORE = replace(parts.CORE, shape=_always(_block(0.0445)))
-FIXED_BRICK = replace(parts.FIXED_BRICK, shape=_always(_block(0.0102)))
-ACTIVE_HINGE = replace(parts.ACTIVE_HINGE, shape=_always(_ACTIVE_HINGE))
-HINGE = replace(parts.HINGE, shape=_always(_HINGE))
+CORE = replace(parts.CORE, shape=parts.constant_shape(_block(0.0445)))
+FIXED_BRICK = replace(parts.FIXED_BRICK, shape=parts.constant_shape(_block(0.0102)))
+ACTIVE_HINGE = replace(parts.ACTIVE_HINGE, shape=parts.constant_shape(_ACTIVE_HINGE))
+HINGE = replace(parts.HINGE, shape=parts.constant_shape(_HINGE))
 PARAMETRIC_BAR_JOINT = replace(parts.PARAMETRIC_BAR_JOINT, shape=_bar)
-TOUCH_SENSOR = replace(parts.TOUCH_SENSOR, shape=_always(_TOUCH))
+TOUCH_SENSOR = replace(parts.TOUCH_SENSOR, shape=parts.constant_shape(_TOUCH))
 LIGHT_SENSOR = parts.LIGHT_SENSOR
 
 ROBOGEN_2016: BodySpace = {
@@ -136,4 +124,4 @@ ROBOGEN_2016: BodySpace = {
         LIGHT_SENSOR,
     )
 }
-"""All of them, by name."""
+"""All of these types by name."""

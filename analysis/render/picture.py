@@ -18,7 +18,7 @@ from PIL import Image
 from schema.errors import RevolveError
 from schema.experiment.document import Simulation, Space
 from schema.experiment.environment import Environment
-from schema.experiment.identity import NOBODY, Identity
+from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.parts import BodySpace
 from schema.robot.results import Floats, Track
 from schema.robot.robot import Robot
@@ -268,7 +268,7 @@ class Simulate(Protocol):
         simulation: Simulation,
         environment: Environment,
         *,
-        identity: Identity = NOBODY,
+        identity: Identity = NO_IDENTITY,
         watch: Callable[[Any], None],
     ) -> Track:
         """Return the robot's track; each tick calls ``watch`` with ``MjData``."""

@@ -19,7 +19,7 @@ from coordinator.islands.events import (
 from coordinator.run.cross_checks import CrossChecks
 from coordinator.run.run_context import RunContext
 from schema.errors import JobRefused
-from schema.experiment.identity import NOBODY, Identity
+from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.plugin_source import plugins_of
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
@@ -60,7 +60,7 @@ class Requests:
         context = self._context
         if isinstance(command, Vet):
             kind: JobKind = "vet"
-            steps, settings, identity = 0, context.vetting, NOBODY
+            steps, settings, identity = 0, context.vetting, NO_IDENTITY
             robot = self._body(command)
         else:
             kind = "evaluate"

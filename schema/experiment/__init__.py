@@ -1,1 +1,1 @@
-"""The experiment document: its sections, how it is read and what is checked."""
+"""The experiment document: its sections, reading and checks."""

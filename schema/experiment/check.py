@@ -7,6 +7,8 @@ from urllib.parse import quote
 from schema.errors import ExperimentError
 from schema.experiment.check_migration import migration_problem
 from schema.experiment.document import (
+    Arena,
+    Culling,
     Experiment,
     Selection,
     body_space,
@@ -156,12 +158,8 @@ def _arena_problem(experiment: Experiment) -> str:
             "selection: survival in an arena depends on fitness; "
             'survivors must be "best" and keep_parents true'
         )
-    needed = selection.parents_needed
-    if arena.population_floor < needed:
-        return (
-            f"arena.population_floor: must be >= {needed}, so that there are always "
-            f"two parents to choose, got {arena.population_floor}"
-        )
+    if problem := _floor_problem(selection, arena):
+        return f"arena.{problem}"
     lowest = max(arena.population_floor, selection.population)
     if arena.population_limit < lowest:
         return (
@@ -214,7 +212,14 @@ def _culling_problem(experiment: Experiment) -> str:
             f"{where}: survival depends on fitness; selection.survivors must be "
             '"best" and selection.keep_parents true'
         )
-    if problem := _floor_problem(selection):
+    problem = _floor_problem(selection, rules)
+    lowest = max(rules.population_floor + 1, selection.population)
+    if not problem and rules.population_limit < lowest:
+        problem = (
+            "population_limit: must be > population_floor and >= "
+            f"selection.population, {lowest}, got {rules.population_limit}"
+        )
+    if problem:
         return f"{where}.{problem}"
     if round(rules.full_cull_share * rules.population_limit) < 1:
         return (
@@ -225,21 +230,12 @@ def _culling_problem(experiment: Experiment) -> str:
     return ""
 
 
-def _floor_problem(selection: Selection) -> str:
-    rules = selection.culling
-    if rules is None:
-        return ""
+def _floor_problem(selection: Selection, rules: Arena | Culling) -> str:
     needed = selection.parents_needed
     if rules.population_floor < needed:
         return (
             f"population_floor: must be >= {needed}, so that there are always two "
             f"parents to choose, got {rules.population_floor}"
-        )
-    lowest = max(rules.population_floor + 1, selection.population)
-    if rules.population_limit < lowest:
-        return (
-            "population_limit: must be > population_floor and >= "
-            f"selection.population, {lowest}, got {rules.population_limit}"
         )
     return ""
 

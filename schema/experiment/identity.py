@@ -35,5 +35,5 @@ class Identity:
     trial: int
 
 
-NOBODY = Identity(Origin(), BirthId(0, 0), 0)
+NO_IDENTITY = Identity(Origin(), BirthId(0, 0), 0)
 """Identity outside of a run: of a robot file or a benchmark."""

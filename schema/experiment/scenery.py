@@ -117,7 +117,7 @@ def scenery_model(scenery: str, simulation: Simulation) -> mujoco.MjModel:
     try:
         root = ET.fromstring(scenery)  # noqa: S314 - of the user's own document
     except ET.ParseError as error:
-        raise ExperimentError(f"environment.scenery: not valid XML: {error}") from None
+        raise _invalid(f"not valid XML: {error}") from None
     _check_elements(root)
     # First, so that the user's own defaults override it.
     general = ET.Element("default")
@@ -133,35 +133,31 @@ def scenery_model(scenery: str, simulation: Simulation) -> mujoco.MjModel:
         text = ET.tostring(root, encoding="unicode")
         model = mujoco.MjSpec.from_string(text).compile()
     except ValueError as error:
-        raise ExperimentError(
-            f"environment.scenery: not valid MJCF: {one_line(error)}"
-        ) from None
+        raise _invalid(f"not valid MJCF: {one_line(error)}") from None
     _check_shapes(model)
     return model
 
 
+def _invalid(message: str) -> ExperimentError:
+    return ExperimentError(f"environment.scenery: {message}")
+
+
 def _check_elements(root: ET.Element) -> None:
     if root.tag != "mujoco":
-        raise ExperimentError(
-            f"environment.scenery: must be <mujoco>, got <{root.tag}>"
-        )
+        raise _invalid(f"must be <mujoco>, got <{root.tag}>")
     for element in root.iter():
         if element.tag not in _ALLOWED:
-            raise ExperimentError(
-                f"environment.scenery: <{element.tag}> is not allowed, because scenery "
+            raise _invalid(
+                f"<{element.tag}> is not allowed, because scenery "
                 f"does not move; allowed: {', '.join(_ALLOWED)}"
             )
         for key, value in element.items():
             if key not in _WORDS and not all(map(_is_finite, value.split())):
-                raise ExperimentError(
-                    f"environment.scenery: <{element.tag} {key}={value!r}> must be "
-                    "finite"
-                )
+                raise _invalid(f"<{element.tag} {key}={value!r}> must be finite")
         if element.get("mocap", "false") != "false":
             name = element.get("name", "")
-            raise ExperimentError(
-                f"environment.scenery: <body name={name!r}> must not be mocap, because "
-                "scenery does not move"
+            raise _invalid(
+                f"<body name={name!r}> must not be mocap, because scenery does not move"
             )
 
 
@@ -175,11 +171,11 @@ def _is_finite(word: str) -> bool:
 
 def _check_shapes(model: mujoco.MjModel) -> None:
     if not model.ngeom:
-        raise ExperimentError("environment.scenery: must have a <geom>, got none")
+        raise _invalid("must have a <geom>, got none")
     for index, kind in enumerate(model.geom_type.tolist()):
         if kind not in _SHAPES:
             shape = mujoco.mjtGeom(kind).name.removeprefix("mjGEOM_").lower()
-            raise ExperimentError(
-                f"environment.scenery: geom {index} {model.geom(index).name!r} must be "
+            raise _invalid(
+                f"geom {index} {model.geom(index).name!r} must be "
                 f"one of {', '.join(_SHAPES.values())}, got {shape}"
             )

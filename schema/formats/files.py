@@ -38,18 +38,15 @@ def robot_from_yaml(text: str, file: str, space: BodySpace) -> Robot:
     return reader(space, file).read(document)
 
 
-YAML_ENDINGS = (".yaml", ".yml")
-PROTOBUF_ENDINGS = (".pb",)
 MJCF_ENDING = ".xml"
-URDF_ENDING = ".urdf"
 _TEXTS = {
     ".yaml": robot_from_yaml,
     ".yml": robot_from_yaml,
     ".txt": robot_from_robogen_text,
     ".json": robot_from_robogen_json,
 }
-_READ = (*_TEXTS, *PROTOBUF_ENDINGS, MJCF_ENDING)
-_WRITTEN = (*YAML_ENDINGS, *PROTOBUF_ENDINGS, MJCF_ENDING, URDF_ENDING)
+_READ = (*_TEXTS, ".pb", MJCF_ENDING)
+_WRITTEN = (".yaml", ".yml", ".pb", MJCF_ENDING, ".urdf")
 _ANY_BUILT_IN = Space(part_types=(*Space().part_types, "schema.parts:LIGHT_SENSOR"))
 
 
@@ -123,9 +120,9 @@ def write_robot(
     """
     ending = _ending(path, _WRITTEN)
     settings = settings or settings_of(None)
-    if ending in YAML_ENDINGS:
+    if ending in (".yaml", ".yml"):
         data = robot_to_yaml(robot, space).encode()
-    elif ending in PROTOBUF_ENDINGS:
+    elif ending == ".pb":
         check_robot(robot, space)
         data = encode_robot(robot)
     elif ending == MJCF_ENDING:

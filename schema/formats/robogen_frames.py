@@ -38,10 +38,9 @@ def our_orientation(parent: str, slot: int, child: str, quarter: int) -> int:
     # RoboGen turns the child about its own normal, we turn the tangent: opposite.
     turn = (-90 * quarter) % 360
     wanted, _ = attach(_their_slot(parent, slot), _their_slot(child, 0), turn)
-    parent_slot = _OUR_SLOTS[slot] if parent in SQUARE else slot
     ours = (
-        _our_slot(parent, parent_slot),
-        _our_slot(child, _OUR_SLOTS[0] if child in SQUARE else 0),
+        _our_slot(parent, our_slot(parent, slot)),
+        _our_slot(child, our_slot(child, 0)),
     )
     for orientation in ORIENTATIONS:
         rotation, _ = attach(*ours, orientation)

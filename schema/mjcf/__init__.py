@@ -1,1 +1,1 @@
-"""The one translation of a robot into MuJoCo."""
+"""Translation of robots and their world into MuJoCo models."""

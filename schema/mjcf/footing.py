@@ -1,9 +1,8 @@
-"""How high a robot stands where the ground is not even.
+"""Height at which a robot stands on rough ground and scenery.
 
-Each box of a robot is seen as a column that goes up from its lowest point: lifted
-until no column has anything of the ground in it, the robot is above all that stands
-below it, and inside of nothing. So whoever is born where an obstacle is, is born on
-top of that.
+Each box of a robot is replaced by a column that extends upwards from its lowest
+point. The robot is lifted until no column intersects ground or scenery, so a robot
+that is born at an obstacle stands on top of it.
 """
 
 import copy
@@ -20,25 +19,25 @@ from schema.experiment.scenery import add_scenery
 from schema.robot.results import Floats
 
 _FINE_M = 1e-5
-"""A robot stands less than twice this above an obstacle [m]."""
+"""A robot stands less than twice this distance above an obstacle [m]."""
 _TOUCH_M = 1e-6
-"""What is no deeper in a column only touches it [m]."""
+"""Penetration depth that counts as touching [m]."""
 _ROBOTS = 1
-"""The bit by which robots collide."""
+"""Collision bit of robots."""
 _LEVEL = 0.9
-"""Rise per length of an axis that is taken for upright."""
+"""z component from which a unit axis counts as upright."""
 _ABOVE_M = 0.1
-"""So far beyond an obstacle columns go."""
+"""Height by which columns extend beyond an obstacle [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """The boxes of a robot at neutral pose, in the core's frame, as upright columns.
+    """Boxes of a robot at neutral pose as upright columns, in the core's frame.
 
     Attributes:
         centres: (N, 3) [m].
-        turns: (N,) of the columns about z [rad].
-        halves: (N, 3) half of the boxes' extents along the columns' axes [m].
+        turns: (N,) rotations of the columns about z [rad].
+        halves: (N, 3) half extents of the boxes along the axes of the columns [m].
     """
 
     centres: Floats
@@ -47,13 +46,13 @@ class Footprint:
 
 
 def footprint(model: mujoco.MjModel) -> Footprint:
-    """Return the boxes of the one robot of a model; static geoms do not count."""
+    """Return the boxes of the only robot of a model, without static geoms."""
     data = mujoco.MjData(model)
     data.qpos[:7] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
     mujoco.mj_kinematics(model, data)
     own = model.geom_bodyid > 0
     axes = data.geom_xmat[own].reshape(-1, 3, 3)
-    # Along an axis of the box that is not upright: what lies level fits exactly.
+    # Along a box axis that is not upright, so that the column of a level box is exact.
     is_level = np.abs(axes[:, 2, 0]) < _LEVEL
     along = np.where(is_level[:, None], axes[:, :, 0], axes[:, :, 1])
     turns = np.arctan2(along[:, 1], along[:, 0])
@@ -69,14 +68,14 @@ def standing_height(
     place: tuple[float, float],
     heading: float,
 ) -> float:
-    """Return how high a robot's core is when it stands on what is below it [m].
+    """Return the height of the core of a robot that stands at a place [m].
 
     Args:
-        boxes: the robot's.
-        simulation: the world's numbers.
-        environment: what it stands in.
-        place: of the core's centre in the ground plane, world frame [m].
-        heading: turn about z [rad].
+        boxes: of the robot.
+        simulation: parameters of the world.
+        environment: ground and scenery.
+        place: centre of the core in the ground plane, world frame [m].
+        heading: rotation about z [rad].
     """
     around = np.full(len(boxes.turns), heading)
     spots = place + _turned(boxes.centres[:, :, None], around)[:, :2, 0]
@@ -90,13 +89,13 @@ def standing_height(
         obstacles = _Obstacles(environment.scenery, simulation)
         columns = zip(spots, turns, boxes.halves, bottoms.tolist(), strict=True)
         for spot, turn, half, bottom in columns:
-            obstacles.stand(spot, turn, half[:2])
+            obstacles.move(spot, turn, half[:2])
             height = obstacles.cleared(bottom, height)
     return height
 
 
 def _turned(vectors: Floats, angles: Floats) -> Floats:
-    """Return (N, 3, K) vectors turned about z, by (N,) angles."""
+    """Return (N, 3, K) vectors rotated about z by (N,) angles."""
     turned = vectors.copy()
     c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
     turned[:, 0] = c * vectors[:, 0] - s * vectors[:, 1]
@@ -107,16 +106,16 @@ def _turned(vectors: Floats, angles: Floats) -> Floats:
 def _highest(
     environment: Environment, spots: Floats, turns: Floats, halves: Floats
 ) -> Floats:
-    """Return the highest of rough ground below rectangles, (N,) [m].
+    """Return the greatest height of rough ground below rectangles, (N,) [m].
 
-    Patches are flat triangles between their nodes, so it is a node's height: of all
-    patches that a rectangle touches.
+    Patches are flat triangles between nodes, so this is the height of a node of a
+    patch that the rectangle touches.
 
     Args:
         environment: with roughness.
-        spots: (N, 2) middles of the rectangles [m].
-        turns: (N,) of them [rad].
-        halves: (N, 2) of their lengths [m].
+        spots: (N, 2) centres of the rectangles [m].
+        turns: (N,) their rotations [rad].
+        halves: (N, 2) their half lengths [m].
     """
     c, s = np.abs(np.cos(turns))[:, None], np.abs(np.sin(turns))[:, None]
     reaches = c * halves + s * halves[:, ::-1]
@@ -125,7 +124,7 @@ def _highest(
     tops = np.zeros(len(spots))
     lows = np.floor((spots - reaches + extent) / patch).astype(int)
     highs = np.ceil((spots + reaches + extent) / patch).astype(int)
-    # Beyond the rim it is as low as at the rim.
+    # Beyond the rim the height is that of the rim.
     lows, highs = np.clip(lows, 0, rim), np.clip(highs, 0, rim) + 1
     for number, ((west, south), (east, north)) in enumerate(
         zip(lows.tolist(), highs.tolist(), strict=True)
@@ -136,7 +135,7 @@ def _highest(
 
 @lru_cache(maxsize=16)
 def _probe(scenery: str, simulation: Simulation) -> mujoco.MjModel:
-    """Return scenery and, as its last geom, a box for a column; not to be changed."""
+    """Return scenery with a box for a column as last geom; do not change it."""
     spec = mujoco.MjSpec()
     add_scenery(spec, scenery, simulation)
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(1.0, 1.0, 1.0))
@@ -144,16 +143,16 @@ def _probe(scenery: str, simulation: Simulation) -> mujoco.MjModel:
 
 
 class _Obstacles:
-    """Scenery, and a column that is tried against it."""
+    """Scenery, with a column to test for intersection."""
 
     def __init__(self, scenery: str, simulation: Simulation) -> None:
-        """Set scenery up.
+        """Initialise the model of the scenery.
 
         Args:
             scenery: MJCF.
-            simulation: the world's numbers.
+            simulation: parameters of the world.
         """
-        # Of its own: the column changes.
+        # A copy, because the column changes.
         self._model = copy.copy(_probe(scenery, simulation))
         self._data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, self._data)
@@ -162,13 +161,13 @@ class _Obstacles:
         is_solid = (model.geom_contype | model.geom_conaffinity) & _ROBOTS
         self._solid = is_solid[: self._column].nonzero()[0]
 
-    def stand(self, spot: Floats, turn: float, half: Floats) -> None:
-        """Put the column somewhere.
+    def move(self, spot: Floats, turn: float, half: Floats) -> None:
+        """Move the column.
 
         Args:
-            spot: (2,) where its middle is [m].
-            turn: about z [rad].
-            half: (2,) of its lengths [m].
+            spot: (2,) its centre [m].
+            turn: rotation about z [rad].
+            half: (2,) its half lengths [m].
         """
         column, c, s = self._column, cos(turn), sin(turn)
         self._data.geom_xpos[column, :2] = spot
@@ -176,11 +175,11 @@ class _Obstacles:
         self._model.geom_size[column, :2] = half
 
     def cleared(self, bottom: float, height: float) -> float:
-        """Return the least height at which the column has no scenery in it [m].
+        """Return the least height of the core at which the column is clear [m].
 
         Args:
-            bottom: of the column, above the core [m].
-            height: of the core, from which on [m].
+            bottom: of the column, relative to the core [m].
+            height: least height of the core [m].
         """
         places, radii = self._data.geom_xpos, self._model.geom_rbound
         apart = places[self._solid, :2] - places[self._column, :2]
@@ -201,7 +200,7 @@ class _Obstacles:
         return height
 
     def _is_clear(self, obstacle: int, bottom: float, top: float) -> bool:
-        """Return whether the column, from there up, keeps off an obstacle."""
+        """Return whether the column above ``bottom`` does not intersect an obstacle."""
         model, data, column = self._model, self._data, self._column
         top += _ABOVE_M
         data.geom_xpos[column, 2] = 0.5 * (bottom + top)

@@ -1,16 +1,15 @@
-"""The one translation of a robot into MuJoCo.
+"""Translation of a robot into a MuJoCo model.
 
-One body per rigid segment, so a robot with k joints has k + 1 bodies. At neutral
-pose all body frames are parallel to the core's; the root body's origin is the
-centre of the core, every other origin is its joint's anchor. The free joint's
-position is therefore the position that the thesis tracks, and its velocity that of
-the core's centre.
+There is one body per rigid segment, so a robot with k joints has k + 1 bodies. At
+neutral pose all body frames are parallel to the core's. The origin of the root body
+is the centre of the core; that of every other body is the anchor of its joint. The
+position of the free joint is therefore the position that the thesis tracks.
 
-A robot's spec has no ground and can be attached to any number of worlds, each time
-with a prefix of its own. Its elements are found by name, p being the index of the
-part: bodies ``root`` and ``body{p}``, joints and actuators ``joint{p}``, the free
-joint ``free``, geoms ``{p}/{box}``, imu sites ``{p}/imu``. What MuJoCo needs beyond
-the original's numbers stands, with its measured effect, in docs/physics.md.
+The spec of a robot has no ground and can be attached to any number of worlds, each
+time with another prefix. Names of its elements, where p is the index of the part:
+bodies ``root`` and ``body{p}``, joints and actuators ``joint{p}``, free joint
+``free``, geoms ``{p}/{box}``, imu sites ``{p}/imu``. docs/physics.md lists the
+parameters that MuJoCo needs beyond those of the original, with their measured effect.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,22 +28,22 @@ from schema.robot.results import Floats
 from schema.robot.robot import Robot
 
 MEMORY_BYTES = 1 << 20
-"""Arena of a single robot's data.
+"""Size of the memory arena of one robot's MjData.
 
 A pile of 30 parts needs about 120 KB, on rough ground of 5 mm patches 270 KB.
 """
 
 _Segment = tuple[mujoco.MjsBody, list[float]]
-"""A body and its origin in the core's frame [m]."""
+"""Body, and its origin in the frame of the core [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class RobotSpec:
-    """A robot as MuJoCo's own description.
+    """MjSpec of a robot.
 
     Attributes:
         spec: root body with a free joint, no ground; attachable.
-        height: of the core's centre when the lowest point touches z = 0 [m].
+        height: of the centre of the core if the lowest point is at z = 0 [m].
     """
 
     spec: mujoco.MjSpec
@@ -52,12 +51,12 @@ class RobotSpec:
 
 
 def robot_spec(robot: Robot, space: BodySpace, simulation: Simulation) -> RobotSpec:
-    """Return a robot's description, its core's centre at the origin.
+    """Return the spec of a robot with the centre of its core at the origin.
 
     Args:
         robot: a checked robot.
         space: its part types.
-        simulation: numbers of contacts, joints and servos.
+        simulation: parameters of contacts, joints and servos.
     """
     builder = _Builder(robot, space, simulation)
     for index in range(len(robot.parts)):
@@ -66,7 +65,7 @@ def robot_spec(robot: Robot, space: BodySpace, simulation: Simulation) -> RobotS
 
 
 Furnish = Callable[[mujoco.MjSpec], None]
-"""Adds what stands in a world, beside what its environment has."""
+"""Adds further objects to a world."""
 
 
 def solo_spec(
@@ -77,19 +76,19 @@ def solo_spec(
     *,
     furnish: Furnish | None = None,
 ) -> mujoco.MjSpec:
-    """Return the description of one robot alone, at the origin.
+    """Return the spec of one robot in a world, at the origin.
 
-    Its lowest point is on the ground, or the robot stands on what rises below it.
+    The robot touches the ground, or stands on the rough ground or scenery below it.
 
     Args:
         robot: a checked robot.
         space: its part types.
-        simulation: the world's numbers; ``drop_m`` lifts the robot.
-        environment: what it stands in.
-        furnish: adds what else stands there.
+        simulation: parameters of the world; ``drop_m`` lifts the robot.
+        environment: ground and scenery.
+        furnish: adds further objects.
 
     Raises:
-        ExperimentError: an environment with scenery that is none.
+        ExperimentError: invalid scenery.
     """
     built = robot_spec(robot, space, simulation)
     spec, height = built.spec, built.height
@@ -128,18 +127,18 @@ def shared_model(
     """Return the model of several robots on one ground.
 
     Args:
-        robots: prefix of the names, and ``robot_spec``'s spec, of each; the specs
-            stay as they are and may be used again.
-        simulation: the world's numbers.
-        environment: what they stand in.
-        furnish: adds what else stands there.
+        robots: prefix of the names, and spec from ``robot_spec``, of each; specs are
+            not changed and can be reused.
+        simulation: parameters of the world.
+        environment: ground and scenery.
+        furnish: adds further objects.
     """
     spec = mujoco.MjSpec()
     set_options(spec, simulation, environment, is_single=False)
     add_ground(spec, simulation, environment)
     if furnish is not None:
         furnish(spec)
-    # Contacts grow with neighbours: a pile needs more than its robots alone.
+    # A pile has more contacts than its robots have alone.
     spec.memory = 2 * MEMORY_BYTES * len(robots)
     for prefix, child in robots:
         spec.attach(child, frame=spec.worldbody.add_frame(), prefix=prefix)
@@ -147,7 +146,7 @@ def shared_model(
 
 
 class _Builder:
-    """Builds one robot, part by part in the robot's own order."""
+    """Builds the spec of one robot, part by part in order."""
 
     def __init__(self, robot: Robot, space: BodySpace, simulation: Simulation) -> None:
         self.robot = robot
@@ -159,9 +158,9 @@ class _Builder:
         self.spec = mujoco.MjSpec()
         self._set_defaults()
         root = self.spec.worldbody.add_body(name="root")
-        # Never aligned: the joint's position must stay the core's centre.
+        # No alignment: the position of the joint must be the centre of the core.
         root.add_freejoint(name="free", align=0)
-        # Of each part: (body, its origin in the core's frame) of both segments.
+        # Both segments of each part.
         self.segments: list[list[_Segment]] = []
         self.root: _Segment = (root, [0.0, 0.0, 0.0])
 
@@ -180,7 +179,7 @@ class _Builder:
         joint.damping[0] = simulation.damping
 
     def add_part(self, index: int) -> None:
-        """Add a part's boxes, and its joint if it has one."""
+        """Add the boxes of a part, and its joint if it has one."""
         part, shape = self.robot.parts[index], self.shapes[index]
         near = self.root
         own = 0
@@ -197,14 +196,14 @@ class _Builder:
     def _add_joint(
         self, index: int, joint: Joint, near: _Segment, own: int
     ) -> _Segment:
-        """Return the segment beyond a joint; ``own`` is the one on the near side."""
+        """Return the segment beyond a joint; ``own`` is the near segment's number."""
         rotation = self.rotations[index]
         anchor = self.positions[index] + rotation @ joint.anchor
-        # Here and below set one by one: half of the time that keywords take.
+        # Here and below, assignments are twice as fast as keywords.
         body = near[0].add_body()
         body.name, body.pos = f"body{index}", anchor - near[1]
-        # The angle is that of segment 1 against segment 0, also where segment 1
-        # is the one that carries segment 0.
+        # The angle is that of segment 1 relative to segment 0, even if segment 1 is
+        # nearer to the core.
         axis = rotation @ joint.axis
         made = body.add_joint()
         made.name, made.axis = f"joint{index}", axis if own == 0 else -axis
@@ -221,16 +220,15 @@ class _Builder:
         return body, anchor.tolist()
 
     def _add_boxes(self, index: int, pair: list[_Segment]) -> None:
-        """Add a part's boxes to its segments, and its imus to their boxes."""
+        """Add the boxes of a part to its segments, and imu sites to their boxes."""
         boxes, rotation = self.shapes[index].boxes, self.rotations[index]
         imus = {s.box for s in self.types[index].sensors if s.kind == "imu"}
-        # Arrays where more than one box takes them: half of a tuple's time; and
-        # colours as the engine keeps them.
+        # Arrays, shared by the boxes, are faster than tuples; colours are float32.
         colour = np.array((*self.robot.parts[index].parameters[-3:], 1.0), np.float32)
         upright = _quaternion(rotation)
         ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = rotation.tolist()
         px, py, pz = self.positions[index].tolist()
-        # Plain floats: at a few boxes a part they are faster than arrays.
+        # Plain floats: faster than arrays for a few boxes per part.
         for box in boxes:
             x, y, z = box.position
             centre = (

@@ -1,6 +1,6 @@
-"""What robots stand in, as MuJoCo has it: gravity, ground, walls, scenery.
+"""The world of robots in MuJoCo: options, gravity, ground, walls, scenery.
 
-The world's frame lies in the ground: z is its normal, and x points uphill.
+The world frame lies in the ground: z is its normal, and x points uphill.
 """
 
 from math import pi, tan
@@ -13,7 +13,7 @@ from schema.experiment.environment import Environment, relief
 from schema.experiment.scenery import add_scenery
 
 _BELOW_M = 0.1
-"""Thickness of rough ground below z = 0: nothing comes out at its bottom."""
+"""Thickness of rough ground below z = 0 [m]."""
 
 
 def set_options(
@@ -23,13 +23,13 @@ def set_options(
     *,
     is_single: bool,
 ) -> None:
-    """Set a world's integrator, solver and clock.
+    """Set the integrator, solver, gravity and time step of a world.
 
     Args:
-        spec: the world's MjSpec.
+        spec: of the world.
         simulation: time step and strength of gravity.
         environment: its slope.
-        is_single: one robot only: no contact islands to look for.
+        is_single: the world has one robot, so contact islands are not needed.
     """
     option = spec.option
     option.timestep = simulation.timestep_s
@@ -39,14 +39,14 @@ def set_options(
     option.solver = mujoco.mjtSolver.mjSOL_NEWTON
     option.tolerance = 1e-6
     option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
-    # Without warm start a step is a pure function of (qpos, qvel, ctrl). Without
-    # automatic reset a diverged robot stays diverged, and can be told.
+    # Without warm start, a step is a pure function of (qpos, qvel, ctrl). Without
+    # automatic reset, divergence can be detected.
     disabled = mujoco.mjtDisableBit.mjDSBL_WARMSTART
     disabled |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if is_single:
         disabled |= mujoco.mjtDisableBit.mjDSBL_ISLAND
     else:
-        # So that one robot's spec may be attached to many worlds.
+        # One spec of a robot can be attached to many worlds.
         spec.copy_during_attach = True
     option.disableflags |= int(disabled)
 
@@ -54,15 +54,15 @@ def set_options(
 def add_ground(
     spec: mujoco.MjSpec, simulation: Simulation, environment: Environment
 ) -> None:
-    """Add the endless plane z = 0, named ``ground``, and what rises above it.
+    """Add the infinite plane z = 0, named ``ground``, rough ground and scenery.
 
     Args:
-        spec: the world's MjSpec.
+        spec: of the world.
         simulation: friction and contact.
         environment: rough ground becomes the geom ``rough``, scenery ``scenery/{k}``.
 
     Raises:
-        ExperimentError: scenery that is none.
+        ExperimentError: invalid scenery.
     """
     spec.worldbody.add_geom(
         name="ground",

@@ -1,1 +1,1 @@
-"""A robot and its genome as data."""
+"""Robots and genomes as data."""

@@ -1,4 +1,4 @@
-"""Recurrent networks as data: neuron types, neurons, connections.
+"""Recurrent neural networks as data: neuron types, neurons, connections.
 
 Formulas (a = weighted sum of inputs and of the previous states; facts of the
 original, section 3.1):
@@ -36,16 +36,16 @@ NEURON_TYPES: dict[str, tuple[Parameter, ...]] = {
         Parameter("amplitude", 0.0, 2.0, 1.0),
     ),
 }
-"""Types that outputs and hidden neurons may have, with their parameters."""
+"""Types of output and hidden neurons, with their parameters."""
 
 INPUT = "Input"
-"""Type of every input neuron; it has no parameters."""
+"""Type of all input neurons; it has no parameters."""
 _SHORT: dict[Layer, str] = {"input": "in", "output": "out", "hidden": "hidden"}
 _INPUT_TYPES: dict[str, tuple[Parameter, ...]] = {INPUT: ()}
 
 
 class Neuron(Struct, frozen=True, gc=False):
-    """A neuron: ``part`` is the index of the part that owns it."""
+    """Neuron; ``part`` is the index of its part."""
 
     layer: Layer
     kind: str
@@ -54,7 +54,7 @@ class Neuron(Struct, frozen=True, gc=False):
 
 
 class Connection(Struct, frozen=True, gc=False):
-    """A weighted edge between two neurons, by their indices in the brain."""
+    """Weighted edge between two neurons, given by their indices in the brain."""
 
     source: int
     target: int
@@ -63,7 +63,7 @@ class Connection(Struct, frozen=True, gc=False):
 
 @dataclass(frozen=True, slots=True)
 class Brain:
-    """A network: inputs first, then outputs, then hidden, each in part order.
+    """Network: inputs, then outputs, then hidden neurons, each in part order.
 
     Attributes:
         neurons: in the order above; within a part in the order of its sensors.
@@ -79,24 +79,24 @@ class Brain:
 
 
 def check_brain(brain: Brain, part_count: int) -> None:
-    """Raise unless a brain keeps the rules that every reader relies on.
+    """Raise unless a brain keeps the rules that do not depend on part types.
 
     Args:
         brain: the brain.
         part_count: number of parts of its robot.
 
     Raises:
-        InvalidRobot: neurons out of layer or part order, of unknown type, with a wrong
-            number of parameters or not finite ones, on a part that does not
-            exist; a connection to an input, to or from nowhere, or twice.
+        InvalidRobot: neurons out of order, of unknown type, on a part that does not
+            exist, with a wrong number of parameters or one that is not finite; a
+            connection to an input, to or from a missing neuron, or given twice.
     """
     order = [(LAYERS.index(neuron.layer), neuron.part) for neuron in brain.neurons]
     if order != sorted(order):
         raise InvalidRobot(
-            "brain.neurons: must be inputs, outputs, hidden in turn, "
+            "brain.neurons: must be inputs, then outputs, then hidden neurons, "
             "each by ascending part"
         )
-    # Texts only where they are needed: this runs in every process, every birth.
+    # Build messages only on errors: this runs for each birth in each process.
     for index, neuron in enumerate(brain.neurons):
         if problem := _neuron_problem(neuron, part_count):
             raise InvalidRobot(f"brain.neurons[{index}]{problem}")
@@ -113,7 +113,7 @@ def check_brain(brain: Brain, part_count: int) -> None:
 
 
 def _neuron_problem(neuron: Neuron, part_count: int) -> str:
-    """Return what is wrong with a neuron by itself, nothing if it is sound."""
+    """Return what is wrong with a neuron, or nothing."""
     if not 0 <= neuron.part < part_count:
         return f".part: must be 0..{part_count - 1}, got {neuron.part}"
     types = _INPUT_TYPES if neuron.layer == "input" else NEURON_TYPES
@@ -142,14 +142,14 @@ def neuron_names(brain: Brain, part_ids: list[str]) -> list[str]:
 
 
 def _connection_problem(edge: Connection, brain: Brain) -> str:
-    """Return what is wrong with a connection by itself, nothing if it is sound."""
+    """Return what is wrong with a connection, or nothing."""
     count = len(brain.neurons)
     if not 0 <= edge.source < count:
         return f".source: must be 0..{count - 1}, got {edge.source}"
     if not 0 <= edge.target < count:
         return f".target: must be 0..{count - 1}, got {edge.target}"
     if brain.neurons[edge.target].layer == "input":
-        return f".target: neuron {edge.target} is an input"
+        return f".target: must not be an input, got neuron {edge.target}"
     if not math.isfinite(edge.weight):
         return f".weight: must be finite, got {edge.weight}"
     return ""

@@ -1,11 +1,13 @@
-"""The genome that evolution varies, and its development into a robot.
+"""Genomes, and their development into robots.
 
 A genome is a tree of nodes. Each node owns the neurons of its part and the
-connections that leave them. A connection names its target by a path: the slots
-to follow from the source node, towards parent or child alike. Subtrees can
-therefore move between genomes and keep their wiring; a path that leads nowhere
-in the new place is kept, and ignored in the robot.
+connections that leave them. A connection gives its target by a path: the slots to
+follow from the source node, to parents or children. Subtrees can therefore move
+between genomes and keep their wiring. A path that cannot be followed is kept in the
+genome and ignored in the robot.
 """
+
+from collections.abc import Callable, Sequence
 
 from msgspec import Struct
 
@@ -15,20 +17,20 @@ from schema.robot.robot import Part, Robot
 
 
 class NeuronGene(Struct, frozen=True, gc=False):
-    """An output or hidden neuron: its type and that type's parameters."""
+    """Output or hidden neuron: its type and parameters."""
 
     kind: str
     parameters: tuple[float, ...]
 
 
 class ConnectionGene(Struct, frozen=True, gc=False):
-    """A connection that leaves a neuron of the node that owns it.
+    """Connection from a neuron of the node that owns it.
 
     Attributes:
         source: layer and offset within the owning node.
-        path: slots to follow from the owning node; empty is the node itself.
+        path: slots to follow from the owning node; empty for the node itself.
         target: layer and offset within the node at the path's end.
-        weight: factor of the source's state.
+        weight: of the state of the source.
     """
 
     source: tuple[Layer, int]
@@ -38,17 +40,17 @@ class ConnectionGene(Struct, frozen=True, gc=False):
 
 
 class Node(Struct, frozen=True, gc=False):
-    """One gene of a genome: a part with its share of the brain.
+    """Node of a genome: a part with its neurons and connections.
 
     Attributes:
         kind: name of the part type.
-        slot: own slot that joins it to its parent; -1 for the root.
-        orientation: turn about its own slot's normal [degrees].
+        slot: own slot by which it is attached; -1 for the root.
+        orientation: rotation about the normal of its own slot [degrees].
         parameters: values in the order of the part type's ``parameters``.
-        gene: identity that outlives variation; equal genes share an origin.
+        gene: identity that variation keeps; equal genes have a common origin.
         outputs: one neuron for each motor of the part.
-        hidden: hidden neurons that live on this part.
-        connections: those whose source is a neuron of this node.
+        hidden: hidden neurons of the part.
+        connections: from neurons of this node.
         children: (slot of this node, child), by ascending slot.
     """
 
@@ -70,8 +72,8 @@ Genome = Node
 def walk(genome: Genome) -> list[tuple[Node, int, int]]:
     """Return (node, index of its parent, slot of its parent), depth first.
 
-    The core comes first, with (-1, -1); children by ascending slot, as the parts
-    of a robot stand.
+    The core is first, with (-1, -1); children are by ascending slot, as are the parts
+    of a robot.
     """
     entries: list[tuple[Node, int, int]] = []
     stack: list[tuple[Node, int, int]] = [(genome, -1, -1)]
@@ -86,11 +88,42 @@ def walk(genome: Genome) -> list[tuple[Node, int, int]]:
     return entries
 
 
+Genes = tuple[
+    tuple[NeuronGene, ...], tuple[NeuronGene, ...], tuple[ConnectionGene, ...]
+]
+"""Outputs, hidden neurons and connections of a node."""
+
+
+def assemble(parts: Sequence[Part], genes: Callable[[int], Genes]) -> Genome:
+    """Return the genome of a tree of parts.
+
+    Args:
+        parts: in depth-first order.
+        genes: the genes of a part, by its index.
+    """
+    children: list[list[tuple[int, Node]]] = [[] for _ in parts]
+    # Backwards: children are made before their parent.
+    for index in range(len(parts) - 1, -1, -1):
+        part = parts[index]
+        node = Node(
+            part.kind,
+            part.slot,
+            part.orientation,
+            part.parameters,
+            part.gene,
+            *genes(index),
+            tuple(reversed(children[index])),
+        )
+        if index:
+            children[part.parent].append((part.parent_slot, node))
+    return node
+
+
 def develop(genome: Genome, space: BodySpace) -> Robot:
     """Return the robot that a genome describes.
 
-    Paths that cannot be followed or that end at a missing neuron are left out,
-    and so is every connection after the first between the same two neurons.
+    Connections are left out if their path cannot be followed, if it ends at a missing
+    neuron, or if an earlier connection has the same two neurons.
 
     Args:
         genome: a well-formed genome of this body space.
@@ -134,15 +167,15 @@ def develop(genome: Genome, space: BodySpace) -> Robot:
 def _edges(
     entries: list[tuple[Node, int, int]], starts: list[tuple[int, int, int]]
 ) -> tuple[Connection, ...]:
-    """Return the connections of a genome that lead from a neuron to a neuron.
+    """Return the connections of a genome whose neurons exist.
 
     Args:
-        entries: its nodes, as ``walk`` gives them.
-        starts: how many inputs, outputs and hidden neurons stand before those of
-            each node; how many there are, at the end.
+        entries: its nodes, from ``walk``.
+        starts: numbers of inputs, outputs and hidden neurons before those of each
+            node; the last entry has the totals.
     """
     inputs, outputs, _ = starts[-1]
-    # Of each layer: its place in ``starts``, and where it begins in the brain.
+    # Of each layer: its position in ``starts``, and its first index in the brain.
     layers: dict[Layer, tuple[int, int]] = {
         "input": (0, 0),
         "output": (1, inputs),
@@ -164,19 +197,19 @@ def _edges(
             target = starts[end][layer] + offset
             if target >= starts[end + 1][layer]:
                 continue
-            ends = begin + target
+            target_index = begin + target
             kind, offset = gene.source
             layer, begin = layers[kind]
             source = starts[index][layer] + offset
             if source < starts[index + 1][layer]:
-                key = (begin + source, ends)
+                key = (begin + source, target_index)
                 if key not in edges:
                     edges[key] = Connection(*key, gene.weight)
     return tuple(edges.values())
 
 
 def _neighbours(entries: list[tuple[Node, int, int]]) -> list[dict[int, int]]:
-    """Return, for each node, the node that each of its used slots leads to."""
+    """Return, for each node, the index of the neighbour at each used slot."""
     neighbours: list[dict[int, int]] = [{} for _ in entries]
     for index, (node, parent, parent_slot) in enumerate(entries):
         if parent >= 0:

@@ -1,7 +1,7 @@
-"""A genome for a robot that has none: the inverse of development."""
+"""Genome of a given robot: the inverse of development."""
 
 from schema.robot.brain import Brain, Connection, Layer
-from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node
+from schema.robot.genome import ConnectionGene, Genome, NeuronGene, assemble
 from schema.robot.robot import Part, Robot
 
 
@@ -12,7 +12,7 @@ def genome_of(robot: Robot) -> Genome:
         robot: well formed in its body space.
 
     Returns:
-        The genome. Its robot has the same parts and neurons; connections stand in
+        The genome. It develops into the same parts and neurons; connections are in
         the order of the parts that they leave.
     """
     neurons, places = _shares(robot.brain)
@@ -20,33 +20,24 @@ def genome_of(robot: Robot) -> Genome:
     for edge in robot.brain.connections:
         owner, gene = _connection(edge, places, robot.parts)
         connections.setdefault(owner, []).append(gene)
-    # Children stand behind their parents: the last part has none.
-    children: dict[int, list[tuple[int, Node]]] = {}
-    for index in reversed(range(len(robot.parts))):
-        part = robot.parts[index]
-        node = Node(
-            part.kind,
-            part.slot,
-            part.orientation,
-            part.parameters,
-            part.gene,
+    return assemble(
+        robot.parts,
+        lambda index: (
             tuple(neurons.get((index, "output"), ())),
             tuple(neurons.get((index, "hidden"), ())),
             tuple(connections.get(index, ())),
-            tuple(reversed(children.get(index, []))),
-        )
-        children.setdefault(part.parent, []).append((part.parent_slot, node))
-    return children[-1][0][1]
+        ),
+    )
 
 
 Place = tuple[int, Layer, int]
-"""Where a neuron is: part, layer, offset among those of this part and layer."""
+"""Position of a neuron: part, layer, offset within part and layer."""
 
 
 def _shares(
     brain: Brain,
 ) -> tuple[dict[tuple[int, Layer], list[NeuronGene]], list[Place]]:
-    """Return each part's neurons, and where each neuron is."""
+    """Return the neurons of each part and layer, and the position of each neuron."""
     shares: dict[tuple[int, Layer], list[NeuronGene]] = {}
     places: list[Place] = []
     for neuron in brain.neurons:
@@ -59,7 +50,7 @@ def _shares(
 def _connection(
     edge: Connection, places: list[Place], parts: tuple[Part, ...]
 ) -> tuple[int, ConnectionGene]:
-    """Return the part that a connection leaves, and its gene."""
+    """Return the source part of a connection, and its gene."""
     part, layer, offset = places[edge.source]
     end, end_layer, end_offset = places[edge.target]
     path = _path(part, end, parts)

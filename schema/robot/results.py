@@ -1,4 +1,4 @@
-"""What vetting and evaluating a robot come to."""
+"""Results of vetting and evaluating a robot."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Where a robot's core went: what every fitness function is given.
+    """Trajectory of a robot's core, the argument of fitness functions.
 
     Attributes:
         interval_s: time between two samples [s].
@@ -26,7 +26,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """One simulation's outcome.
+    """Result of one simulation.
 
     Attributes:
         fitness: always maximised, finite.
@@ -43,7 +43,7 @@ class Evaluation:
 
 @dataclass(frozen=True, slots=True)
 class Provenance:
-    """Who found an answer and how long it took; never decides anything."""
+    """Agent, platform and duration [s] of an answer; information only."""
 
     agent: str = ""
     platform: str = ""
@@ -52,10 +52,10 @@ class Provenance:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What the analyzer says of a body in its neutral pose.
+    """Report of the analyzer on a body in its neutral pose.
 
     Attributes:
-        is_viable: it may live.
+        is_viable: the body can be built and simulated.
         reason: why not; empty if viable.
         intersections: index pairs of parts that intersect, ascending.
         lower, upper: corners of the axis-aligned bounding box, core frame [m].

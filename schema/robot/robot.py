@@ -1,7 +1,7 @@
-"""A robot: a tree of parts and a brain, the phenotype that is built and judged.
+"""Robots: a tree of parts and a brain, the phenotype that is simulated.
 
-Parts stand in a flat tuple in depth-first order (children by ascending slot of
-their parent), each naming its parent, so that index 0 is always the core.
+Parts are in a flat tuple in depth-first order (children by ascending slot of their
+parent). Each part has the index of its parent; index 0 is the core.
 """
 
 import math
@@ -16,21 +16,21 @@ from schema.robot.brain import Brain, Layer, check_brain
 
 ORIENTATIONS = (0, 90, 180, 270)
 GENES = 2**64
-"""How many identities there are."""
+"""Number of possible identities."""
 NO_BRAIN = Brain()
 
 
 class Part(Struct, frozen=True, gc=False):
-    """One part of a body.
+    """Part of a body.
 
     Attributes:
         kind: name of its part type.
         parent: index of its parent; -1 for the core.
-        parent_slot: slot of the parent that it sits on; -1 for the core.
-        slot: own slot that it sits with; -1 for the core.
-        orientation: turn about its own slot's normal [degrees].
+        parent_slot: slot of the parent that holds it; -1 for the core.
+        slot: own slot by which it is attached; -1 for the core.
+        orientation: rotation about the normal of its own slot [degrees].
         parameters: values in the order of its type's ``parameters``.
-        gene: identity that the part inherits along its line of descent.
+        gene: identity that the part inherits from its ancestors.
     """
 
     kind: str
@@ -44,29 +44,28 @@ class Part(Struct, frozen=True, gc=False):
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """A body and the brain that drives it."""
+    """A body and its brain."""
 
     parts: tuple[Part, ...]
     brain: Brain = NO_BRAIN
 
 
 def check_tree(parts: Sequence[Part]) -> None:
-    """Raise unless parts form a tree, whatever their types are.
+    """Raise unless parts form a tree; types are not checked.
 
     Args:
         parts: the parts of a body.
 
     Raises:
-        InvalidRobot: no part at all; a parent that does not stand before its child;
-            a slot below 0 or taken twice; parts out of depth-first order; an
-            orientation that is no quarter turn; a number that is not finite; a gene
-            that is no 64-bit number.
+        InvalidRobot: no parts; a parent after its child; a slot below 0 or used
+            twice; parts out of depth-first order; an orientation that is not a
+            quarter turn; a number that is not finite; a gene outside 64 bits.
     """
     if not parts:
-        raise InvalidRobot("body: a robot needs at least its core")
+        raise InvalidRobot("body: must have at least the core")
     taken: set[tuple[int, int]] = set()
     for index, part in enumerate(parts):
-        # Texts only where they are needed: this runs in every process, every birth.
+        # Build messages only on errors: this runs for each birth in each process.
         if problem := _place_problem(part, index) or _value_problem(part):
             raise InvalidRobot(f"body.parts[{index}]{problem}")
         if index == 0:
@@ -81,7 +80,7 @@ def check_tree(parts: Sequence[Part]) -> None:
 
 
 def _place_problem(part: Part, index: int) -> str:
-    """Return what is wrong with where a part sits; nothing if it may sit there."""
+    """Return what is wrong with the position of a part in the tree, or nothing."""
     if index == 0:
         if (part.parent, part.parent_slot, part.slot) == (-1, -1, -1):
             return ""
@@ -97,7 +96,7 @@ def _place_problem(part: Part, index: int) -> str:
 
 
 def _value_problem(part: Part) -> str:
-    """Return what is wrong with a part's numbers whatever its type is."""
+    """Return what is wrong with the numbers of a part of any type, or nothing."""
     if part.orientation not in ORIENTATIONS:
         return f".orientation: must be one of {ORIENTATIONS}, got {part.orientation}"
     if not all(map(math.isfinite, part.parameters)):
@@ -110,17 +109,17 @@ def _value_problem(part: Part) -> str:
 def check_robot(robot: Robot, space: BodySpace) -> None:
     """Raise unless a robot is well formed in a body space.
 
-    Whether its parts intersect is the analyzer's question, not this one's.
+    The analyzer checks intersections of parts.
 
     Args:
         robot: the robot.
-        space: the part types that it may use.
+        space: the allowed part types.
 
     Raises:
-        InvalidRobot: no tree of parts (``check_tree``), no core or more than one, an
-            unknown part type, a slot that a type does not have, a wrong number of
-            parameters or one out of its range, a brain that breaks its rules or
-            does not fit the sensors and motors of the body.
+        InvalidRobot: parts that are not a tree (``check_tree``); no core or several;
+            an unknown part type; a slot that the type does not have; a wrong number
+            of parameters or one out of range; a brain that breaks its rules or does
+            not fit the sensors and motors of the body.
     """
     check_tree(robot.parts)
     check_brain(robot.brain, len(robot.parts))
@@ -128,28 +127,28 @@ def check_robot(robot: Robot, space: BodySpace) -> None:
 
 
 def check_types(robot: Robot, space: BodySpace) -> None:
-    """Raise unless a robot keeps the rules of a body space.
+    """Raise unless a robot fits a body space.
 
     Args:
-        robot: a tree of parts and a sound brain, as every decoded robot is.
-        space: the part types that it may use.
+        robot: a tree of parts with a valid brain, as decoding gives it.
+        space: the allowed part types.
 
     Raises:
-        InvalidRobot: as ``check_robot``, as far as part types decide about it.
+        InvalidRobot: the causes of ``check_robot`` that depend on part types.
     """
     check_body(robot.parts, space)
     _check_wiring(robot, space)
 
 
 def check_body(parts: Sequence[Part], space: BodySpace) -> None:
-    """Raise unless a body keeps the rules of a body space, whatever drives it.
+    """Raise unless a body fits a body space; its brain is not checked.
 
     Args:
-        parts: a tree of parts, as every decoded body is.
-        space: the part types that it may use.
+        parts: a tree of parts, as decoding gives it.
+        space: the allowed part types.
 
     Raises:
-        InvalidRobot: as ``check_types``, but for the brain.
+        InvalidRobot: the causes of ``check_types`` that concern the body.
     """
     for index, part in enumerate(parts):
         _check_part(part, index, space)
@@ -195,7 +194,7 @@ def part_type(name: str, space: BodySpace, where: str) -> PartType:
     """Return the part type of a name.
 
     Raises:
-        InvalidRobot: the body space has none of that name.
+        InvalidRobot: the body space has no such type.
     """
     if name not in space:
         raise InvalidRobot(
@@ -205,7 +204,7 @@ def part_type(name: str, space: BodySpace, where: str) -> PartType:
 
 
 def _check_order(parts: Sequence[Part]) -> None:
-    """Raise unless parts stand depth first, children by ascending slot."""
+    """Raise unless parts are in depth-first order, children by ascending slot."""
     path: list[int] = []
     last_slot: dict[int, int] = {}
     for index, part in enumerate(parts):
@@ -224,7 +223,7 @@ def _check_order(parts: Sequence[Part]) -> None:
 
 
 def _check_wiring(robot: Robot, space: BodySpace) -> None:
-    """Raise unless inputs and outputs are those of the sensors and motors."""
+    """Raise unless inputs and outputs match the sensors and motors."""
     kinds = [space[part.kind] for part in robot.parts]
     _check_owners(robot, "input", [kind.inputs for kind in kinds])
     _check_owners(robot, "output", [kind.outputs for kind in kinds])

@@ -1,1 +1,1 @@
-"""Arrow tables of a run: their columns, and where their files lie."""
+"""Arrow tables of a run: columns and files."""

@@ -1,1 +1,1 @@
-"""Protobuf messages that two processes exchange, and their codecs."""
+"""Messages between processes: Protobuf, and MessagePack for operators and viewers."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 
 from schema.errors import MalformedMessage
-from schema.experiment.identity import NOBODY, Identity
+from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.robot.genome import Genome
 from schema.robot.results import Evaluation, Report
 from schema.robot.robot import Robot
@@ -40,7 +40,7 @@ class Request:
         settings: JSON of ``VettingSettings`` or ``EvaluationSettings``.
         robot: the robot; for an analyzer, its body alone.
         steps: physics steps to simulate; 0 takes those of the settings.
-        identity: of the evaluation; ``NOBODY`` for an analyzer.
+        identity: of the evaluation; ``NO_IDENTITY`` for an analyzer.
     """
 
     run: str
@@ -49,7 +49,7 @@ class Request:
     settings: bytes
     robot: Robot
     steps: int = 0
-    identity: Identity = NOBODY
+    identity: Identity = NO_IDENTITY
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +132,7 @@ def encode_request(
     settings: bytes,
     robot: bytes,
     steps: int = 0,
-    identity: Identity = NOBODY,
+    identity: Identity = NO_IDENTITY,
     plugins: str = "",
 ) -> bytes:
     """Return the bytes of a request.
@@ -149,7 +149,7 @@ def encode_request(
         steps=steps,
         plugins=plugins,
     )
-    if identity is not NOBODY:
+    if identity is not NO_IDENTITY:
         message.identity.CopyFrom(identity_to_message(identity))
     return message.SerializeToString(deterministic=True)
 
@@ -175,7 +175,9 @@ def decode_request(
         settings=message.settings,
         robot=read(message.robot),
         steps=message.steps,
-        identity=identity_from_message(message.identity) if has_identity else NOBODY,
+        identity=identity_from_message(message.identity)
+        if has_identity
+        else NO_IDENTITY,
     )
 
 

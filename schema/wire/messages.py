@@ -20,7 +20,15 @@ from schema.robot.brain import (
     Neuron,
     check_brain,
 )
-from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, walk
+from schema.robot.genome import (
+    ConnectionGene,
+    Genes,
+    Genome,
+    NeuronGene,
+    Node,
+    assemble,
+    walk,
+)
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot, check_tree
 from schema.wire import revolve_pb2 as pb
@@ -168,25 +176,15 @@ def genome_from_message(message: pb.Genome) -> Genome:
     """
     parts = tuple(_part_from_message(item.part) for item in message.nodes)
     _require_tree(parts, "Genome")
-    children: list[list[tuple[int, Node]]] = [[] for _ in parts]
-    # Backwards: children are made before their parent.
-    for index in range(len(parts) - 1, -1, -1):
-        part, item = parts[index], message.nodes[index]
-        node = Node(
-            kind=part.kind,
-            slot=part.slot,
-            orientation=part.orientation,
-            parameters=part.parameters,
-            gene=part.gene,
-            outputs=tuple(map(_neuron_gene, item.outputs)),
-            hidden=tuple(map(_neuron_gene, item.hidden)),
-            connections=tuple(map(_connection_gene, item.connections)),
-            children=tuple(reversed(children[index])),
-        )
-        if index == 0:
-            return node
-        children[part.parent].append((part.parent_slot, node))
-    raise MalformedMessage("genome: must have at least one node")
+    return assemble(parts, lambda index: _genes(message.nodes[index]))
+
+
+def _genes(message: pb.Node) -> Genes:
+    return (
+        tuple(map(_neuron_gene, message.outputs)),
+        tuple(map(_neuron_gene, message.hidden)),
+        tuple(map(_connection_gene, message.connections)),
+    )
 
 
 def birth_to_message(birth: BirthId) -> pb.BirthName:
@@ -212,7 +210,7 @@ def identity_to_message(identity: Identity) -> pb.Identity:
 
 
 def identity_from_message(message: pb.Identity) -> Identity:
-    """Return the identity of a message; an empty one gives ``NOBODY``."""
+    """Return the identity of a message; an empty one gives ``NO_IDENTITY``."""
     return Identity(
         Origin(seed=message.seed, run=message.run, island=message.island),
         birth_from_message(message.birth),

@@ -34,6 +34,5 @@ def unpack(decoder: Decoder[T], data: bytes) -> T:
         return decoder.decode(data)
     except ValueError as error:  # of msgspec, or text that is not UTF-8
         raise MalformedMessage(
-            "not a message of this version of Revolve Islands "
-            f"(is the other process of the same version?): {error}"
+            f"damaged, or of another version of Revolve Islands: {error}"
         ) from None

@@ -7,6 +7,7 @@ the tables, through the functions of this file, so that a viewer shows both alik
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from math import fsum
+from operator import itemgetter
 from typing import Any
 
 from msgspec.msgpack import Decoder, encode
@@ -133,6 +134,10 @@ class Update(Message, frozen=True):
 
 
 _UPDATE = Decoder(Update)
+_MIGRANT = itemgetter("island", "to", "epoch", "births", "sim_time_s")
+_PART = itemgetter(
+    "kind", "parent", "parent_slot", "child_slot", "rot", "params", "gene"
+)
 
 
 def encode_update(news: Update) -> bytes:
@@ -179,13 +184,8 @@ def individual(row: Mapping[str, Any]) -> BirthId:
 
 def read_death(row: Mapping[str, Any]) -> Death:
     """Return the death of a row of the deaths table."""
-    return Death(
-        row["island"],
-        individual(row),
-        row["births"],
-        row["sim_time_s"],
-        row["reason"],
-    )
+    time_s, reason = row["sim_time_s"], row["reason"]
+    return Death(row["island"], individual(row), row["births"], time_s, reason)
 
 
 def read_levels(rows: Iterable[Mapping[str, Any]]) -> list[Level]:
@@ -213,23 +213,9 @@ def _level(island: int, births: int, rows: Sequence[Mapping[str, Any]]) -> Level
 
 def read_migrant(row: Mapping[str, Any]) -> Migrant:
     """Return the migration of a row of the migrations table."""
-    return Migrant(
-        individual(row),
-        row["island"],
-        row["to"],
-        row["epoch"],
-        row["births"],
-        row["sim_time_s"],
-    )
+    return Migrant(individual(row), *_MIGRANT(row))
 
 
 def _part(row: Mapping[str, Any]) -> Part:
-    return Part(
-        row["kind"],
-        row["parent"],
-        row["parent_slot"],
-        row["child_slot"],
-        row["rot"],
-        tuple(row["params"]),
-        row["gene"],
-    )
+    kind, parent, parent_slot, slot, orientation, parameters, gene = _PART(row)
+    return Part(kind, parent, parent_slot, slot, orientation, tuple(parameters), gene)

@@ -54,7 +54,7 @@ def test_the_brain_of_a_request_is_ignored(brain: Brain) -> None:
 
 
 def test_a_brain_without_a_body_is_malformed() -> None:
-    with pytest.raises(MalformedMessage, match="at least its core"):
+    with pytest.raises(MalformedMessage, match="at least the core"):
         answer(request_for(Robot((), ROBOT.brain)))
 
 

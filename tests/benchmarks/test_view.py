@@ -19,7 +19,7 @@ from analysis.viewer.show import Show
 from analysis.viewer.watch import LiveView
 from schema.experiment.document import Arena, Experiment
 from schema.experiment.file import read_experiment
-from schema.experiment.identity import NOBODY
+from schema.experiment.identity import NO_IDENTITY
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance
@@ -57,7 +57,7 @@ def crowd() -> tuple[Update, list[pa.Table]]:
         fitness=experiment.fitness,
     )
     robot = spider()
-    _, motion = alone(robot, settings, NOBODY)
+    _, motion = alone(robot, settings, NO_IDENTITY)
     rng = np.random.default_rng(1)
     starts = rng.integers(0, motion.num_rows, ROBOTS)
     places = rng.uniform(-2.0, 2.0, (ROBOTS, 2)).astype(np.float32)

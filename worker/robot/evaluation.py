@@ -13,7 +13,7 @@ import numpy as np
 from schema.errors import SimulationDiverged, one_line
 from schema.experiment.document import Simulation, Space, body_space
 from schema.experiment.environment import Environment
-from schema.experiment.identity import NOBODY, Identity
+from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.mjcf.model import solo_model
 from schema.robot.results import Evaluation, Track
@@ -28,7 +28,7 @@ Watch = Callable[[mujoco.MjData], None]
 
 
 def evaluate(
-    robot: Robot, settings: EvaluationSettings, identity: Identity = NOBODY
+    robot: Robot, settings: EvaluationSettings, identity: Identity = NO_IDENTITY
 ) -> Evaluation:
     """Return the evaluation of a robot: a pure function of the arguments.
 
@@ -61,7 +61,7 @@ def simulate(
     environment: Environment,
     *,
     watch: Watch | None = None,
-    identity: Identity = NOBODY,
+    identity: Identity = NO_IDENTITY,
 ) -> Track:
     """Return the track of a robot that starts at the origin, alone.
 

@@ -12,7 +12,7 @@ from analysis.figures.robot_pictures import robot_picture
 from coordinator.evolution.generation import generate
 from schema.errors import SimulationDiverged
 from schema.experiment.document import Experiment, Islands
-from schema.experiment.identity import NOBODY, Identity, Origin
+from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.robot.ids import BirthId
 from schema.wire.codec import encode_genome
 from tests.analysis.bodies import part
@@ -24,7 +24,9 @@ EXPERIMENT = Experiment(name="x", islands=(Islands(count=3),))
 def test_gait_uses_noise_of_the_robots_run_and_island() -> None:
     asked: list[Identity] = []
 
-    def simulate(*_: object, identity: Identity = NOBODY, **__: object) -> NoReturn:
+    def simulate(
+        *_: object, identity: Identity = NO_IDENTITY, **__: object
+    ) -> NoReturn:
         asked.append(identity)
         raise SimulationDiverged("not simulated here")
 

@@ -29,7 +29,7 @@ from coordinator.islands.events import (
 from coordinator.run.requests import QUARANTINED, REMEMBERED, Requests
 from coordinator.run.run_context import RunContext
 from schema.errors import JobRefused
-from schema.experiment.identity import NOBODY, Identity, Origin
+from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
@@ -163,7 +163,7 @@ def test_noise_depends_on_robot_island_and_trial(desk: Desk) -> None:
         decode_request(payload, decode_body).identity for _, _, payload in desk.sent
     ]
     there = replace(ORIGIN, island=2)
-    assert found == [Identity(ORIGIN, BIRTH, 0), Identity(there, guest, 4), NOBODY]
+    assert found == [Identity(ORIGIN, BIRTH, 0), Identity(there, guest, 4), NO_IDENTITY]
 
 
 def test_both_jobs_of_a_cross_check_have_the_same_noise() -> None:

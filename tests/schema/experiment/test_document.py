@@ -218,7 +218,7 @@ def test_a_users_part_type_stands_beside_ours() -> None:
     ("name", "message"),
     [
         ("NOT_A_PART", "is not a PartType"),
-        ("FLIPER", "did you mean 'flippers:FLIPPER'"),
+        ("FLIPER", "did you mean 'FLIPPER'"),
         ('FLIPPER", "flippers:SECOND_FLIPPER', "two part types are named 'Flipper'"),
     ],
 )

@@ -123,7 +123,7 @@ def test_a_body_without_a_brain() -> None:
         ("Oscillator", "Oscilator", 21, "type: .*did you mean 'Oscillator'"),
         ("id: out", "id: trunk-in-0", 21, "duplicate neuron name 'trunk-in-0'"),
         ("bias", "period", 20, "period: no such key.*; allowed: bias, gain"),
-        ("target: out", "target: trunk-in-1", 23, "target: neuron 1 is an input"),
+        ("target: out", "target: trunk-in-1", 23, "target: must not be an input"),
         ("target: out", "target: oat", 23, "target: must be one of .*mean 'out'"),
         (", weight: .5", "", 24, r"connections\[1\].weight: is missing"),
         ("  neurons:", "  nurons:", 19, "brain.nurons: .*'neurons'"),

@@ -89,7 +89,7 @@ def test_broken_body(
 
 
 def test_no_part_at_all() -> None:
-    with pytest.raises(InvalidRobot, match="needs at least its core"):
+    with pytest.raises(InvalidRobot, match="must have at least the core"):
         check_robot(Robot(()), BUILT_IN)
 
 
@@ -128,7 +128,7 @@ def test_space_decides_about_types(robot: Robot) -> None:
     ("index", "changes", "message"),
     [
         (9, {"part": 9}, r"neurons\[9\].part: must be 0..4, got 9"),
-        (0, {"layer": "hidden", "kind": "Simple"}, "inputs, outputs, hidden in turn"),
+        (0, {"layer": "hidden", "kind": "Simple"}, "inputs, then outputs, then hidden"),
         (0, {"part": 4}, "each by ascending part"),
         (0, {"kind": "Simple"}, r"kind: must be one of Input, got 'Simple'"),
         (9, {"kind": "Input"}, "must be one of Simple, Sigmoid, Oscillator"),
@@ -160,7 +160,7 @@ def test_missing_neuron(robot: Robot, missing: int) -> None:
         (Connection(10, 8, 0.5), r"connections\[0\].source: must be 0..9, got 10"),
         (Connection(-1, 8, 0.5), "source: must be 0..9, got -1"),
         (Connection(0, 10, 0.5), "target: must be 0..9, got 10"),
-        (Connection(8, 7, 0.5), "target: neuron 7 is an input"),
+        (Connection(8, 7, 0.5), "target: must not be an input"),
         (Connection(8, 9, math.nan), "weight: must be finite, got nan"),
     ],
 )

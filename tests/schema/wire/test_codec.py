@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
 from schema.errors import MalformedMessage
-from schema.experiment.identity import NOBODY, Identity, Origin
+from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.parts import BUILT_IN
 from schema.robot.genome import Genome, Node, develop
 from schema.robot.ids import BirthId
@@ -45,7 +45,7 @@ DECODERS: list[Callable[[bytes], object]] = [
 ]
 U64 = st.integers(0, 2**64 - 1)
 U32 = st.integers(0, 2**32 - 1)
-IDENTITIES = st.just(NOBODY) | st.builds(
+IDENTITIES = st.just(NO_IDENTITY) | st.builds(
     Identity,
     st.builds(Origin, seed=U64, run=U32, island=U32),
     st.builds(BirthId, U32, U64),
@@ -179,7 +179,7 @@ def test_damaged_bytes_decode_or_are_malformed(
     "decode", [decode_robot, decode_body, decode_genome, decode_request]
 )
 def test_nothing_is_no_robot(decode: Callable[[bytes], object]) -> None:
-    with pytest.raises(MalformedMessage, match="at least its core"):
+    with pytest.raises(MalformedMessage, match="at least the core"):
         decode(b"")
 
 

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from schema.errors import MalformedMessage
 from schema.experiment.document import Fitness, Simulation, Space
 from schema.experiment.environment import FLAT
-from schema.experiment.identity import NOBODY, Identity, Origin
+from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.ids import BirthId
@@ -162,7 +162,7 @@ def test_without_noise_the_identity_has_no_effect(robot_of: Robots) -> None:
         patch.setattr(np.random, "Philox", None)
         found = {
             bits(simulate(robot_of(3), Space(), silent, FLAT, identity=identity))
-            for identity in (NOBODY, IDENTITY, *OTHERS)
+            for identity in (NO_IDENTITY, IDENTITY, *OTHERS)
         }
     assert len(found) == 1
 
