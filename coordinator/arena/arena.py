@@ -70,6 +70,7 @@ class Arena:
         self._rules = rules
         self._clock = ArenaClock(rules, experiment.simulation)
         self._space = body_space(experiment.space)
+        self._parents_needed = experiment.selection.parents_needed
         self._number = number
         self._vetting_queue = VettingQueue(experiment, seed, run, number)
         self._living = LivingRobots(rules, seed=seed, run=run)
@@ -185,7 +186,7 @@ class Arena:
             commands += sample_records(self._living, self._moment)
         if self.step % self._clock.birth == 0:
             self.is_extinct = not self._orders.insertions and (
-                len(self._living) < self._experiment.selection.parents_needed
+                len(self._living) < self._parents_needed
             )
             migration = self._migration
             if migration is not None:
@@ -205,7 +206,7 @@ class Arena:
     def _mate(self) -> list[Vet]:
         """Begin a birth if there is room and there are parents (trap B12)."""
         mature = self._living.mature()
-        needed = self._experiment.selection.parents_needed
+        needed = self._parents_needed
         if not self._living.has_room or len(mature) < needed:
             return []
         return self._vetting_queue.begin_child(mature)

@@ -27,12 +27,16 @@ from coordinator.islands.events import (
     Vet,
     Vetted,
     VettingFailed,
-    fitness_of,
 )
 from coordinator.islands.island_migration import IslandMigration
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.reevaluation import Reevaluations, with_durations
-from coordinator.islands.rows import birth_record, evaluation_record, population_records
+from coordinator.islands.rows import (
+    birth_record,
+    evaluation_record,
+    fitness_of,
+    population_records,
+)
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
 from schema.robot.ids import BirthId
@@ -95,6 +99,7 @@ class Island:
         self._begun = 0
         # Founders have no parents: all of them are in flight together.
         self._window = self._brood_end = selection.population
+        self._brood_window = experiment.window
         self._in_flight: dict[int, _Birth] = {}
         self._brood: list[Individual] = []
 
@@ -293,6 +298,6 @@ class Island:
             room = selection.culling.population_limit - len(self.population)
             children = min(children, max(1, room))
         self._generation += 1
-        self._window = self._experiment.window
+        self._window = self._brood_window
         self._brood_end = min(self.births + children, self._experiment.births)
         return commands

@@ -10,10 +10,9 @@ from coordinator.islands.events import (
     EvaluationFailed,
     MigrationEvent,
     Record,
-    fitness_of,
 )
 from coordinator.islands.migration import MigrationEpochs
-from coordinator.islands.rows import evaluation_record, migration_records
+from coordinator.islands.rows import evaluation_record, fitness_of, migration_records
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
 from schema.robot.genome import develop
