@@ -50,10 +50,14 @@ class Candidate:
     genome: Genome
     robot: Robot
 
-    def individual(self, generation: int | None) -> Individual:
-        """Return the individual that the candidate becomes, before its evaluation."""
+    def individual(
+        self, generation: int | None, fitness: float | None = 0.0
+    ) -> Individual:
+        """Return the individual; its fitness is None if its evaluation failed."""
         rank = 1 + max((parent.rank for parent in self.couple or ()), default=0)
-        return Individual(self.birth, self.genome, 0.0, rank, generation)
+        has_failed = fitness is None
+        value = 0.0 if fitness is None else fitness
+        return Individual(self.birth, self.genome, value, rank, generation, has_failed)
 
 
 class Breeder:

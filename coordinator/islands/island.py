@@ -235,8 +235,9 @@ class Island:
     ) -> list[IslandCommand]:
         """Add an evaluated candidate to the brood; return its rows."""
         del self._in_flight[self.births]
-        individual = candidate.individual(self._generation)
-        self._brood.append(individual.evaluated(fitness_of(outcome)))
+        fitness = outcome.evaluation.fitness if isinstance(outcome, Evaluated) else None
+        individual = candidate.individual(self._generation, fitness)
+        self._brood.append(individual)
         self.births += 1
         return [
             birth_record(candidate, individual, self._space),
@@ -285,7 +286,10 @@ class Island:
     def _open_brood(self) -> list[IslandCommand]:
         """Record the population and open the next brood, or finish."""
         commands: list[IslandCommand] = []
-        fitness = [(one.birth, one.known_fitness) for one in self.population]
+        fitness = [
+            (one.birth, None if one.has_failed else one.fitness)
+            for one in self.population
+        ]
         commands += population_records(self._number, self.births, fitness)
         if self.is_finished:
             migration = self._migration
