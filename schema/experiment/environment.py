@@ -1,6 +1,6 @@
 """The section ``[environment]``: how the ground lies, and what stands on it."""
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import cos, isclose, radians, sin
 from typing import Annotated
 
@@ -17,7 +17,7 @@ TAPER = 0.2
 """Share of the extent over which rough ground comes down to the plane."""
 
 
-class Environment(Section, frozen=True):
+class Environment(Section, frozen=True, dict=True):
     """What robots are put into, off-line and in arenas.
 
     ``slope_deg`` [degrees] is how steeply the ground rises along x. World frames lie
@@ -39,7 +39,7 @@ class Environment(Section, frozen=True):
     ground_seed: Count = 1
     scenery: str = ""
 
-    @property
+    @cached_property
     def is_even(self) -> bool:
         """Whether there is nothing but a plane."""
         return not (self.roughness_m or self.scenery)
@@ -49,11 +49,17 @@ class Environment(Section, frozen=True):
         """Patches of rough ground from the origin to the rim."""
         return round(self.extent_m / self.patch_m)
 
-    def gravity_vector(self, gravity: float) -> Vector:
-        """Return gravity of some strength in the ground's frame, x uphill [m/s2]."""
+    @cached_property
+    def down(self) -> Vector:
+        """Unit vector of gravity in the ground's frame, x uphill."""
         slope = radians(self.slope_deg)
         # From 0, so that a plane has no negative zero: it would change readings.
-        return 0.0 - gravity * sin(slope), 0.0, -gravity * cos(slope)
+        return 0.0 - sin(slope), 0.0, -cos(slope)
+
+    def gravity_vector(self, gravity: float) -> Vector:
+        """Return gravity of some strength in the ground's frame, x uphill [m/s2]."""
+        x, y, z = self.down
+        return 0.0 + gravity * x, gravity * y, gravity * z
 
 
 FLAT = Environment()

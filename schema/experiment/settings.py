@@ -151,6 +151,7 @@ def lasting(settings: EvaluationSettings, steps: int) -> EvaluationSettings:
     return msgspec.structs.replace(settings, simulation=simulation)
 
 
+@lru_cache(maxsize=64)
 def fitness_function(fitness: Fitness) -> Callable[..., float]:
     """Return the function that a document names.
 
