@@ -34,7 +34,6 @@ from coordinator.islands.reevaluation import Reevaluations, with_durations
 from coordinator.islands.rows import (
     birth_record,
     evaluation_record,
-    fitness_of,
     population_records,
 )
 from schema.errors import UnexpectedEvent

@@ -34,22 +34,22 @@ from coordinator.islands.events import (
     Record,
     Started,
     Vet,
-    Vetted,
-    VettingFailed,
 )
 from coordinator.islands.island import Island
 from coordinator.run.cross_checks import NO_CHECKS, Checks, audit_records, describe
-from coordinator.run.requests import Requests, is_quarantined, requester_of
+from coordinator.run.requests import (
+    Key,
+    Requests,
+    is_quarantined,
+    island_of,
+    key_of,
+)
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import Reached, ShardRequests, SnapshotStore
 from coordinator.run.throttle import RealTimeThrottle
 from schema.errors import RunPaused, UnexpectedEvent
-from schema.robot.ids import BirthId
 
 _LOG = logging.getLogger(__name__)
-
-Key = tuple[str, int, BirthId, int]
-"""Identifies an open request: kind, requester, birth, attempt or trial."""
 
 Request = Vet | Evaluate | AdvanceShard
 """Commands of islands and arenas that agents carry out."""
@@ -151,7 +151,7 @@ class Loop:
                 if isinstance(request, AdvanceShard):
                     self.shard_requests.note(request)
                 else:
-                    unanswered[_key(request)] = request
+                    unanswered[key_of(request)] = request
 
         for number in sorted(self.islands):
             note(self._tell(number, Started()))
@@ -160,8 +160,8 @@ class Loop:
                 self._note_audit(event)
                 continue
             if not isinstance(event, Advanced | Commanded):
-                unanswered.pop(_key(event), None)
-            note(self._tell(_island(event), event))
+                unanswered.pop(key_of(event), None)
+            note(self._tell(island_of(event), event))
         for request in unanswered.values():
             self._requests.send(request)
         self.shard_requests.send_noted()
@@ -229,7 +229,7 @@ class Loop:
             if isinstance(event, Audited):
                 self._note_audit(event)
                 continue
-            for request in self._tell(_island(event), event):
+            for request in self._tell(island_of(event), event):
                 if isinstance(request, AdvanceShard):
                     self._advance(request)
                 else:
@@ -315,19 +315,3 @@ class Loop:
         elif machine is not None and not isinstance(event, Advanced | Commanded):
             return machine.handle(event)
         raise UnexpectedEvent(f"no island here takes {event}")
-
-
-def _island(event: ExternalEvent) -> int:
-    """Return the number of the island that an event is for."""
-    if isinstance(event, Advanced | Commanded):
-        return event.island
-    return requester_of(event)
-
-
-def _key(
-    about: Vet | Evaluate | Vetted | VettingFailed | Evaluated | EvaluationFailed,
-) -> Key:
-    """Return what a request and its answer have in common."""
-    if isinstance(about, Vet | Vetted | VettingFailed):
-        return ("vet", about.birth.island, about.birth, about.attempt)
-    return ("evaluate", requester_of(about), about.birth, about.trial)

@@ -7,11 +7,14 @@ from msgspec import structs
 from coordinator.dispatch.events import Deliver, Job, JobKind
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import (
+    Advanced,
     Answered,
     Audited,
+    Commanded,
     Evaluate,
     Evaluated,
     EvaluationFailed,
+    Heard,
     Vet,
     Vetted,
     VettingFailed,
@@ -37,6 +40,9 @@ QUARANTINED = "quarantined: "
 """Prefix of the reason why a robot that crashes its processes has no evaluation."""
 REMEMBERED = 256
 """Number of vetted bodies whose bytes are kept for the robot's evaluation."""
+
+Key = tuple[str, int, BirthId, int]
+"""Identifies an open request: kind, requester, birth, attempt or trial."""
 
 
 class Requests:
@@ -129,6 +135,22 @@ def requester_of(about: Vet | Evaluate | Answered) -> int:
     if isinstance(about, Vet | Vetted | VettingFailed) or about.requester is None:
         return about.birth.island
     return about.requester
+
+
+def island_of(event: Heard) -> int:
+    """Return the number of the island that an event is for."""
+    if isinstance(event, Advanced | Commanded):
+        return event.island
+    return requester_of(event)
+
+
+def key_of(
+    about: Vet | Evaluate | Vetted | VettingFailed | Evaluated | EvaluationFailed,
+) -> Key:
+    """Return what a request and its answer have in common."""
+    if isinstance(about, Vet | Vetted | VettingFailed):
+        return ("vet", about.birth.island, about.birth, about.attempt)
+    return ("evaluate", requester_of(about), about.birth, about.trial)
 
 
 def is_quarantined(event: EvaluationFailed) -> bool:

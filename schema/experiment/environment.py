@@ -1,6 +1,6 @@
 """The section ``[environment]``: slope, rough ground and scenery."""
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import cos, isclose, radians, sin
 from typing import Annotated
 
@@ -17,7 +17,7 @@ TAPER = 0.2
 """Share of the extent over which rough ground descends to the plane."""
 
 
-class Environment(Section, frozen=True):
+class Environment(Section, frozen=True, dict=True):
     """Ground and scenery, off-line and in arenas.
 
     World frames lie in the ground. On a slope gravity is tilted, and heights, walls,
@@ -41,7 +41,7 @@ class Environment(Section, frozen=True):
     ground_seed: Count = 1
     scenery: str = ""
 
-    @property
+    @cached_property
     def is_even(self) -> bool:
         """Whether the ground is a plane without scenery."""
         return not (self.roughness_m or self.scenery)
@@ -51,11 +51,17 @@ class Environment(Section, frozen=True):
         """Number of patches from the origin to the rim."""
         return round(self.extent_m / self.patch_m)
 
-    def gravity_vector(self, gravity: float) -> Vector:
-        """Return the gravity vector in the ground's frame, x uphill [m/s2]."""
+    @cached_property
+    def down(self) -> Vector:
+        """Unit vector of gravity in the ground's frame, x uphill."""
         slope = radians(self.slope_deg)
         # 0.0 minus: avoids -0.0, which would change sensor readings.
-        return 0.0 - gravity * sin(slope), 0.0, -gravity * cos(slope)
+        return 0.0 - sin(slope), 0.0, -cos(slope)
+
+    def gravity_vector(self, gravity: float) -> Vector:
+        """Return the gravity vector in the ground's frame, x uphill [m/s2]."""
+        x, y, z = self.down
+        return 0.0 + gravity * x, gravity * y, gravity * z
 
 
 FLAT = Environment()

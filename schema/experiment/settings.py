@@ -1,7 +1,7 @@
 """Settings in requests: the sections of an experiment that an answer depends on."""
 
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import TypeVar, cast
 
 import msgspec
@@ -158,7 +158,7 @@ def lasting(settings: EvaluationSettings, steps: int) -> EvaluationSettings:
     return msgspec.structs.replace(settings, simulation=simulation)
 
 
-@cache
+@lru_cache(maxsize=64)
 def fitness_function(fitness: Fitness) -> Callable[..., float]:
     """Return the fitness function that an experiment names.
 

@@ -33,7 +33,9 @@ def set_options(
     """
     option = spec.option
     option.timestep = simulation.timestep_s
-    option.gravity = environment.gravity_vector(simulation.gravity)
+    gravity, (x, y, z) = simulation.gravity, environment.down
+    # As in ``gravity_vector``: no negative zero.
+    option.gravity = 0.0 + gravity * x, gravity * y, gravity * z
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.solver = mujoco.mjtSolver.mjSOL_NEWTON
