@@ -28,7 +28,10 @@ def main(arguments: list[str]) -> int:
         MissingExtra: a library is not installed.
     """
     if arguments[0] == "robot render":
-        return _render(arguments)
+        simulate = _simulation()
+        from analysis.render.command import main as render
+
+        return render(arguments, simulate)
     if arguments[0] == "view":
         return _view(arguments)
     options = _flags().parse_args(arguments[1:])
@@ -75,14 +78,6 @@ def _flags() -> Flags:
     return flags
 
 
-def _render(arguments: list[str]) -> int:
-    """Render a robot, with the worker's simulation."""
-    simulate = _simulation()
-    from analysis.render.command import main as render
-
-    return render(arguments, simulate)
-
-
 def _simulation() -> Callable[..., Any]:
     """Return the worker's simulation, after choosing the renderer's backend.
 
@@ -104,7 +99,7 @@ def _simulation() -> Callable[..., Any]:
 
 
 def _view(arguments: list[str]) -> int:
-    """Show a run, with the simulations of the worker and the coordinator's journal."""
+    """Show a run; robots are re-simulated by the worker from the run's journal."""
     try:
         from analysis.viewer.command import main as view
     except ImportError as error:

@@ -63,7 +63,7 @@ def analyze(
     except OSError as error:
         why = f"cannot be written: {error.strerror}"
         raise RunFolderError(f"{options.out}: {why}") from None
-    with bars(f"measuring {len(runs)} runs", *columns, TimeRemainingColumn()) as bar:
+    with bars(f"measuring runs: {len(runs)}", *columns, TimeRemainingColumn()) as bar:
         tables, left_out = _measured(runs, options, bar)
         drawn, undrawn = draw_figures(
             {**tables, "benchmark": benchmark},

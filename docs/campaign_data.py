@@ -323,7 +323,7 @@ class KeptOutcomes:
         return max(set.intersection(*reached.values()), default=0)
 
     def values(self, experiment: str, measure: str, births: int) -> Numbers:
-        """Return the runs' numbers of one measure, without those that have none."""
+        """Return the runs' values of a measure; runs without a value are skipped."""
         is_of = pc.field("experiment") == experiment
         rows = self._rows.filter(is_of & (pc.field("births") == births))
         return np.asarray(rows[measure].drop_null(), np.float64)

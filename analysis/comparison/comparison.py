@@ -41,10 +41,10 @@ class RunOutcomes(Protocol):
         """Experiments with finished runs, by name."""
 
     def births(self, *experiments: str) -> int:
-        """Return the greatest births that all runs of some experiments reach."""
+        """Return the most births that all runs of some experiments reach."""
 
     def values(self, experiment: str, measure: str, births: int) -> Numbers:
-        """Return the runs' numbers of one measure, without those that have none."""
+        """Return the runs' values of a measure; runs without a value are skipped."""
 
 
 class Outcomes:
@@ -59,11 +59,11 @@ class Outcomes:
 
     @property
     def experiments(self) -> list[str]:
-        """Those that have finished runs, by name."""
+        """Experiments with finished runs, by name."""
         return sorted(self._runs)
 
     def births(self, *experiments: str) -> int:
-        """Return the greatest births that all runs of some experiments reach."""
+        """Return the most births that all runs of some experiments reach."""
         return min(reach(one) for name in experiments for one in self._runs[name])
 
     def at(self, experiment: str, births: int) -> list[dict[str, float]]:
@@ -76,7 +76,7 @@ class Outcomes:
         return self._known[key]
 
     def values(self, experiment: str, measure: str, births: int) -> Numbers:
-        """Return the runs' numbers of one measure, without those that have none."""
+        """Return the runs' values of a measure; runs without a value are skipped."""
         found = np.array(
             [run.get(measure, math.nan) for run in self.at(experiment, births)]
         )

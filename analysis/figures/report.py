@@ -157,13 +157,8 @@ def _findings(rows: Sequence[Mapping[str, object]]) -> str:
         counted = [
             str(row[key]) for key in ("runs_a", "runs_b") if row[key] is not None
         ]
-        cells = [
-            row["figure"],
-            row["claim"],
-            row["expected"],
-            " / ".join(counted) or "–",
-        ]
-        cells += [row[name] for name in numbers]
+        cells = [row[name] for name in ("figure", "claim", "expected")]
+        cells += [" / ".join(counted) or "–", *(row[name] for name in numbers)]
         lines.append([*map(_cell, cells), f"<td>{badge}</td>", _cell(row["why"])])
     heads = ("figure", "finding", "expected", "runs", "mean a", "mean b", "effect",
              "low", "high", "q", "verdict", "why")  # fmt: skip

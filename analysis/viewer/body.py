@@ -78,23 +78,19 @@ def place(model: BoxModel, roots: Floats, angles: Floats) -> tuple[Float32s, Flo
     Returns:
         Centres (T, B, 3) [m] and attitudes (T, B, 4) x, y, z, w, world frame.
     """
-    turns = [roots[:, [4, 5, 6, 3]]]
+    attitudes = [roots[:, [4, 5, 6, 3]]]
     places = [roots[:, :3]]
     for joint, parent in enumerate(model.parents[1:]):
         half = 0.5 * angles[:, joint : joint + 1]
-        turn = np.hstack([np.sin(half) * model.axes[joint + 1], np.cos(half)])
-        offset = rotated(turns[parent], model.anchors[joint + 1])
+        rotation = np.hstack([np.sin(half) * model.axes[joint + 1], np.cos(half)])
+        offset = rotated(attitudes[parent], model.anchors[joint + 1])
         places.append(places[parent] + offset)
-        turns.append(product(turns[parent], turn))
-    turned, placed = np.stack(turns, axis=1), np.stack(places, axis=1)
-    centres = placed[:, model.segments] + rotated(
-        turned[:, model.segments], model.centres
-    )
-    attitudes = product(turned[:, model.carried_by], model.attitudes)
-    return (
-        centres.astype(np.float32),
-        attitudes[:, model.attitude_of].astype(np.float32),
-    )
+        attitudes.append(product(attitudes[parent], rotation))
+    turned, placed = np.stack(attitudes, axis=1), np.stack(places, axis=1)
+    offsets = rotated(turned[:, model.segments], model.centres)
+    centres = placed[:, model.segments] + offsets
+    found = product(turned[:, model.carried_by], model.attitudes)[:, model.attitude_of]
+    return centres.astype(np.float32), found.astype(np.float32)
 
 
 def place_rows(model: BoxModel, rows: pa.Table) -> tuple[Float32s, Float32s]:
@@ -257,8 +253,8 @@ def product(first: Floats, second: Floats) -> Floats:
     )
 
 
-def rotated(turns: Floats, points: Floats) -> Floats:
+def rotated(rotations: Floats, points: Floats) -> Floats:
     """Return points rotated by quaternions x, y, z, w, broadcast."""
-    vector, scalar = turns[..., :3], turns[..., 3:]
+    vector, scalar = rotations[..., :3], rotations[..., 3:]
     across = 2.0 * np.cross(vector, points)
     return points + scalar * across + np.cross(vector, across)

@@ -125,7 +125,7 @@ def _motions(options: argparse.Namespace, simulators: Simulators) -> list[Motion
     births = selected_robots(folder, _wanted(options), has_ancestry=options.ancestry)
     if not births:
         return []
-    with bars(f"re-simulating {len(births)} robots") as bar:
+    with bars(f"re-simulating robots: {len(births)}") as bar:
         task = bar.add_task("re-simulating", total=1.0)
         motions = resimulate(
             folder,

@@ -28,7 +28,7 @@ class PoseBatch:
 
 
 @dataclass(frozen=True, slots=True)
-class FamilyTree:
+class AncestryNode:
     """An individual in the ancestry graph: column, row (its rank) and parents."""
 
     birth: BirthId

@@ -54,7 +54,7 @@ class Gallery:
         spots = self._spots.setdefault(level.island, {})
         when = TimePoint(None, level.births)
         for birth in sorted(set(spots).difference(level.members)):
-            self._recording.died(robot_path(level.island, birth), when)
+            self._recording.remove(robot_path(level.island, birth), when)
             del spots[birth]
         taken = set(spots.values())
         free = (spot for spot in count() if spot not in taken)
@@ -63,8 +63,8 @@ class Gallery:
                 continue
             spots[birth] = next(free)
             path = robot_path(level.island, birth)
-            self._recording.born(path, models[birth], when)
-            self._recording.stands(
+            self._recording.log_boxes(path, models[birth], when)
+            self._recording.log_place(
                 path, *neutral_pose(models[birth], spot_place(spots[birth]))
             )
 

@@ -3,7 +3,7 @@
 from collections import OrderedDict
 from dataclasses import dataclass
 
-from analysis.viewer.entities import FamilyTree, TimePoint
+from analysis.viewer.entities import AncestryNode, TimePoint
 from analysis.viewer.recording import Recording
 from schema.robot.ids import BirthId
 from schema.wire.updates import Birth, Death, Level
@@ -66,7 +66,7 @@ class Lineage:
         first = next(iter(self._entries.values())).order
         self._recording.ancestry(
             [
-                FamilyTree(
+                AncestryNode(
                     birth,
                     entry.order - first,
                     entry.birth.rank,

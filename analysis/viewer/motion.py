@@ -106,6 +106,6 @@ def show_motion(
     if lane is not None:
         row, column = divmod(lane, LANES)
         centres[..., :2] += LANE_M * np.array([column, row], dtype=np.float32)
-    recording.born(path, model, TimePoint(float(times[0])))
-    recording.moved(path, PoseBatch(times, None, centres, attitudes))
+    recording.log_boxes(path, model, TimePoint(float(times[0])))
+    recording.log_poses(path, PoseBatch(times, None, centres, attitudes))
     recording.log_line(motion.verdict, TimePoint(float(times[0])), "INFO")

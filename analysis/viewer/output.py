@@ -44,10 +44,9 @@ class Output:
             raise ViewerError(f"--save {save}: must end in {_ENDING}")
         if save is not None and not save.absolute().parent.is_dir():
             raise ViewerError(f"--save {save}: no such folder: {save.parent}")
-        if serve is not None:
-            return cls(save, _address(serve), has_window=False)
-        if save is not None:
-            return cls(save, None, has_window=False)
+        if serve is not None or save is not None:
+            address = None if serve is None else _address(serve)
+            return cls(save, address, has_window=False)
         return cls(None, (HOST, _free_port()), has_window=True)
 
     @property

@@ -15,7 +15,7 @@ import rerun as rr
 
 from analysis.viewer.body import BoxModel, Float32s
 from analysis.viewer.entities import (
-    FamilyTree,
+    AncestryNode,
     PoseBatch,
     TimePoint,
     island_path,
@@ -161,7 +161,7 @@ class Recording:
             )
             self._stream.log(f"{path}/ground/{number}", mesh, static=True)
 
-    def born(self, path: str, model: BoxModel, when: TimePoint) -> None:
+    def log_boxes(self, path: str, model: BoxModel, when: TimePoint) -> None:
         """Log the boxes of a robot, from a time on."""
         self._at(when)
         boxes = rr.Boxes3D.from_fields(
@@ -169,7 +169,7 @@ class Recording:
         )
         self._stream.log(path, boxes)
 
-    def moved(self, path: str, moves: PoseBatch) -> None:
+    def log_poses(self, path: str, moves: PoseBatch) -> None:
         """Log poses of a robot in one batch."""
         rows, count, _ = moves.centres.shape
         index = [rr.TimeColumn(SIMULATED, duration=_nanoseconds(moves.sim_time_s))]
@@ -181,12 +181,12 @@ class Recording:
         )
         self._stream.send_columns(path, index, columns.partition([count] * rows))
 
-    def stands(self, path: str, centres: Float32s, attitudes: Float32s) -> None:
+    def log_place(self, path: str, centres: Float32s, attitudes: Float32s) -> None:
         """Log the place of a robot that does not move, at the time logged last."""
         boxes = rr.Boxes3D.from_fields(centers=centres[0], quaternions=attitudes[0])
         self._stream.log(path, boxes)
 
-    def died(self, path: str, when: TimePoint) -> None:
+    def remove(self, path: str, when: TimePoint) -> None:
         """Remove a robot from the view."""
         self._at(when)
         self._stream.log(path, rr.Clear(recursive=True))
@@ -219,7 +219,7 @@ class Recording:
         self._at(when)
         self._stream.log("log", rr.TextLog(text, level=level))
 
-    def ancestry(self, entries: Sequence[FamilyTree], when: TimePoint) -> None:
+    def ancestry(self, entries: Sequence[AncestryNode], when: TimePoint) -> None:
         """Log the whole ancestry graph."""
         self._at(when)
         shown = {each.birth for each in entries}

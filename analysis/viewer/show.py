@@ -132,7 +132,7 @@ class Show:
             moves = PoseBatch(
                 times, births, _coarse(centres, _PER_M), _coarse(attitudes, _PER_TURN)
             )
-            self._recording.moved(path, moves)
+            self._recording.log_poses(path, moves)
         if has_all:
             self._remove_absent(arena, shown)
         return pa.concat_tables(unknown) if unknown else None
@@ -154,7 +154,7 @@ class Show:
         robot = self._shown.get(key)
         if robot is None or first_s - robot.drawn_s >= _REPEAT_S:
             when = self._at(arena, first_s)
-            self._recording.born(path, self._models[birth], when)
+            self._recording.log_boxes(path, self._models[birth], when)
             was_gone = robot is not None and robot.is_gone
             self._shown[key] = _ShownRobot(path, first_s, last_s, was_gone)
         self._shown[key].seen_s = last_s
@@ -170,7 +170,7 @@ class Show:
                 robot = self._shown.pop(key)
                 births = self._at(arena, robot.seen_s).births
                 when = TimePoint(robot.seen_s + _BLINK_S, births)
-                self._recording.died(robot.path, when)
+                self._recording.remove(robot.path, when)
             if key in self._shown and key[1] not in shown:
                 del self._shown[key]
 
@@ -181,7 +181,7 @@ class Show:
             robot.is_gone = True
             # A robot that is born at the same time counts as born before the death.
             when = self._at(gone.island, gone.sim_time_s)
-            self._recording.died(robot.path, when)
+            self._recording.remove(robot.path, when)
 
     def _born(self, one: Birth) -> None:
         if one.body is not None:

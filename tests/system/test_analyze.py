@@ -89,7 +89,7 @@ def test_figures_are_written_or_left_out_with_a_reason(
     table = pq.read_table(report / "measures" / "left_out.parquet").to_pylist()
     why = {row["what"]: row["why"] for row in table if not row["folder"]}
     assert "revolve bench arena" in why["figure 6.1"]
-    assert why["figure 6.19"] == "no robot of scenario2 was judged"
+    assert why["figure 6.19"] == "no robot of scenario2 was evaluated"
     assert "left out: figure B: no run has several islands" in output
     everything = {f"figure-{one.number}" for one in FIGURES}
     assert everything == (everything & drawn) | {

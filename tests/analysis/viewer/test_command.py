@@ -105,8 +105,12 @@ def test_living_robots_keep_their_spot_and_dead_robots_free_it() -> None:
         models.add(name, CORE)
     gallery.show(Level(0, 3, 3, 3, 0.0, 0.0, tuple(names[:3])), models)
     gallery.show(Level(0, 4, 3, 3, 0.0, 0.0, (names[0], names[2], names[3])), models)
-    kinds = [calls[0] for calls in recorded.calls]
-    assert kinds == ["born", "stands"] * 3 + ["died", "born", "stands"]
+    kinds = [call[0] for call in recorded.calls]
+    assert kinds == ["log_boxes", "log_place"] * 3 + [
+        "remove",
+        "log_boxes",
+        "log_place",
+    ]
     assert recorded.calls[6][1] == "islands/0/robots/0-1"
     centres = recorded.calls[8][2]
     assert isinstance(centres, np.ndarray)
@@ -143,11 +147,11 @@ def test_a_death_has_as_many_births_as_the_last_pose() -> None:
         for n in range(2)
     ]  # fmt: skip
     show.move(0, pa.Table.from_pylist(rows, TABLES["poses"]))
-    (moves,) = [calls[2] for calls in recorded.calls if calls[0] == "moved"]
+    (moves,) = [call[2] for call in recorded.calls if call[0] == "log_poses"]
     assert isinstance(moves, PoseBatch)
     assert moves.births is not None
     assert moves.births.tolist() == [1, 2]
-    (gone,) = [calls[2] for calls in recorded.calls if calls[0] == "died"]
+    (gone,) = [call[2] for call in recorded.calls if call[0] == "remove"]
     assert gone == TimePoint(10.0, 2)
 
 
