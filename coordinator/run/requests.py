@@ -14,7 +14,7 @@ from coordinator.islands.events import (
     Evaluate,
     Evaluated,
     EvaluationFailed,
-    Heard,
+    ExternalEvent,
     Vet,
     Vetted,
     VettingFailed,
@@ -137,7 +137,7 @@ def requester_of(about: Vet | Evaluate | Answered) -> int:
     return about.requester
 
 
-def island_of(event: Heard) -> int:
+def island_of(event: ExternalEvent) -> int:
     """Return the number of the island that an event is for."""
     if isinstance(event, Advanced | Commanded):
         return event.island
