@@ -49,7 +49,7 @@ def gaits(robot_pictures: Sequence[RobotPicture]) -> Figure:
             axis.set_title(f"{time_s:.1f} s", fontsize=7, color=_FAINT, pad=2)
         text = f"{label(one.best.experiment)}, {one.best.fitness:.3f} m/s"
         row[0].set_title("")
-        row[0].set_title(text, loc="left", fontsize=8, color=_INK, pad=2)
+        row[0].set_title(text, loc="left", fontsize=8, color=_INK, pad=6)
     return figure
 
 
