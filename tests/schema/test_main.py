@@ -32,13 +32,13 @@ def test_check(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "well formed; 3 parts, 6 inputs, 1 outputs" in capsys.readouterr().out
 
 
-def test_check_of_what_is_wrong(path: Path) -> None:
+def test_check_of_a_wrong_file(path: Path) -> None:
     path.write_text(TEXT.replace("leg,", "leg, leg: 1,"))
     with pytest.raises(InvalidRobot, match=r"robot\.yaml:4: body\.children\.1\.leg"):
         main(["robot", "check", str(path)])
 
 
-def test_convert_there_and_back(path: Path) -> None:
+def test_convert_round_trip(path: Path) -> None:
     there, back = path.with_suffix(".pb"), path.with_suffix(".yml")
     assert main(["robot", "convert", str(path), str(there)]) == 0
     assert main(["robot", "convert", str(there), str(back)]) == 0

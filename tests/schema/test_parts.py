@@ -1,4 +1,4 @@
-"""The parts' numbers: facts of the original, tables 1.1 and 1.3."""
+"""Numbers of the part types: facts of the original, tables 1.1 and 1.3."""
 
 import math
 
@@ -225,7 +225,7 @@ def test_frames_of_a_bar_are_right_handed(alpha: float, beta: float) -> None:
     assert close(figure.slots[1].tangent, tuple(turn @ Y))
 
 
-def test_sensors_sit_in_boxes_that_are_there() -> None:
+def test_boxes_of_sensors_exist() -> None:
     for name, kind in BUILT_IN.items():
         boxes = {box.name for box in shape(name).boxes}
         assert {sensor.box for sensor in kind.sensors} <= boxes
@@ -234,7 +234,7 @@ def test_sensors_sit_in_boxes_that_are_there() -> None:
 
 
 @pytest.mark.parametrize("kind", BUILT_IN.values(), ids=list(BUILT_IN))
-def test_which_types_are_cores_level_or_choosy(kind: PartType) -> None:
+def test_flags_of_part_types(kind: PartType) -> None:
     assert kind.is_root == (kind.name == "Core")
     assert kind.is_levelled == (kind.name in {"FixedBrick", "ParametricBarJoint"})
     choosy = kind.name == "ParametricBarJoint"

@@ -1,4 +1,4 @@
-"""Settings between off-line and on-line: what is taken, and what cannot be."""
+"""Settings between off-line and on-line: accepted and refused values."""
 
 import pytest
 
@@ -11,14 +11,14 @@ def parse(text: str) -> Experiment:
     return parse_experiment(f'name = "test"\n{text}', "test.toml")
 
 
-def test_none_of_it_is_the_default() -> None:
+def test_sections_are_off_by_default() -> None:
     experiment = parse("")
     assert experiment.selection.culling is None
     assert experiment.selection.reevaluation is None
     assert experiment.simulation.evaluation_s is None
 
 
-def test_a_table_alone_means_the_values_of_an_arena() -> None:
+def test_empty_culling_table_has_the_values_of_an_arena() -> None:
     culling = parse("[selection.culling]").selection.culling
     assert culling is not None
     assert (culling.population_limit, culling.population_floor) == (30, 8)
@@ -37,7 +37,7 @@ def test_a_table_alone_means_the_values_of_an_arena() -> None:
         "[simulation]\nwarmup_steps = 600\nevaluation_s = [15, 20]",
     ],
 )
-def test_the_edge_of_what_is_possible_is_taken(text: str) -> None:
+def test_limits_of_the_allowed_values_are_accepted(text: str) -> None:
     parse(text)
 
 
@@ -81,14 +81,14 @@ def test_the_edge_of_what_is_possible_is_taken(text: str) -> None:
         ),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_line(text: str, message: str) -> None:
+def test_inconsistent_sections_are_refused_in_one_line(text: str, message: str) -> None:
     with pytest.raises(ExperimentError, match=message) as raised:
         parse(text)
     assert str(raised.value).startswith("test.toml: ")
     assert "\n" not in str(raised.value)
 
 
-def test_immigrants_may_come_on_top_where_a_population_varies() -> None:
+def test_replaced_none_needs_a_population_of_varying_size() -> None:
     migration = '[[islands]]\ncount = 2\n[migration]\ntopology = "ring"\n'
     migration += 'replaced = "none"\n'
     parse(f"[selection.culling]\n{migration}")

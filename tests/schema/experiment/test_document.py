@@ -1,4 +1,4 @@
-"""The experiment document: what is taken, and how wrong ones are refused."""
+"""The experiment document: accepted documents and errors of wrong ones."""
 
 import math
 from pathlib import Path
@@ -30,7 +30,7 @@ NAME = 'name = "test"\n'
 
 @pytest.fixture
 def users_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a user has: a package of their own on the path."""
+    """Put a user's package on the import path."""
     monkeypatch.syspath_prepend(PLUGINS)
 
 
@@ -62,7 +62,7 @@ def test_defaults_are_the_thesis() -> None:
     assert (fitness.path_weight, fitness.straight_weight, fitness.limit) == (1, 5, 1)
 
 
-def test_window_may_be_narrower_than_a_brood() -> None:
+def test_window_may_be_smaller_than_a_generation() -> None:
     assert parse("[selection]\nwindow = 1").window == 1
 
 
@@ -155,17 +155,17 @@ def test_impossible_experiment(text: str, message: str) -> None:
         ("ä" * 34, "name: must be <= 200 bytes .*, got 204"),
     ],
 )
-def test_a_name_that_no_folder_can_have(name: str, message: str) -> None:
+def test_names_that_no_folder_can_have_are_refused(name: str, message: str) -> None:
     with pytest.raises(ExperimentError, match=message):
         parse_experiment(f'name = "{name}"', "test.toml")
 
 
 @pytest.mark.parametrize("name", ["a" * 200, "ä" * 33, "a/b c"])
-def test_a_name_that_a_folder_can_have(name: str) -> None:
+def test_names_that_a_folder_can_have_are_accepted(name: str) -> None:
     assert parse_experiment(f'name = "{name}"', "test.toml").name == name
 
 
-def test_a_name_is_needed() -> None:
+def test_name_is_required() -> None:
     with pytest.raises(ExperimentError, match="name"):
         parse_experiment("", "test.toml")
 
@@ -195,13 +195,13 @@ def test_unknown_plug_in(types: str, message: str) -> None:
         ('"schema.parts:SERVO"', "'schema.parts:SERVO' is not a PartType"),
     ],
 )
-def test_part_types_that_do_not_fit(types: str, message: str) -> None:
+def test_part_types_without_core_or_motor_are_refused(types: str, message: str) -> None:
     with pytest.raises(ExperimentError, match=message):
         parse(f"[space]\npart_types = [{types}]")
 
 
 @pytest.mark.usefixtures("users_package")
-def test_a_users_part_type_stands_beside_ours() -> None:
+def test_part_types_of_users_and_built_in_ones_mix() -> None:
     experiment = parse(
         "[space]\npart_types = "
         '["schema.parts:CORE", "flippers:FLIPPER", "schema.parts:ACTIVE_HINGE"]'
@@ -222,12 +222,12 @@ def test_a_users_part_type_stands_beside_ours() -> None:
         ('FLIPPER", "flippers:SECOND_FLIPPER', "two part types are named 'Flipper'"),
     ],
 )
-def test_a_users_mistake_is_told(name: str, message: str) -> None:
+def test_mistakes_in_names_of_part_types_are_reported(name: str, message: str) -> None:
     with pytest.raises(ExperimentError, match=message):
         parse(f'[space]\npart_types = ["schema.parts:CORE", "flippers:{name}"]')
 
 
-def test_only_planar_bodies_hold_bars_flat() -> None:
+def test_beta_of_bars_is_zero_in_planar_bodies_only() -> None:
     planar, free = body_space(Space()), body_space(Space(planar=False))
     bar = "ParametricBarJoint"
     assert planar[bar] is BUILT_IN[bar]
@@ -243,7 +243,7 @@ def test_text_round_trip() -> None:
         experiment_from_text("{}")
 
 
-def test_settings_hold_what_an_answer_depends_on() -> None:
+def test_settings_hold_the_sections_that_an_answer_depends_on() -> None:
     experiment = parse("births = 40\n[fitness]\nlimit = 2.0")
     settings = read_evaluation_settings(evaluation_settings(experiment))
     assert settings == EvaluationSettings(
@@ -275,7 +275,7 @@ def test_document_in_a_file(tmp_path: Path) -> None:
         read_experiment(str(tmp_path / "none.toml"))
 
 
-def test_no_such_experiment() -> None:
+def test_unknown_experiment_is_refused() -> None:
     with pytest.raises(ExperimentError, match="scenario99: no such experiment"):
         read_experiment("scenario99")
 

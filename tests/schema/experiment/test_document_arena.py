@@ -1,4 +1,4 @@
-"""The section of an arena: what is taken, and how wrong ones are refused."""
+"""The section of an arena: accepted documents and errors of wrong ones."""
 
 import pytest
 
@@ -87,7 +87,7 @@ def test_wrong_arena(text: str, message: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_an_arena_without_tournaments_needs_fewer() -> None:
+def test_arena_without_tournaments_needs_a_smaller_floor() -> None:
     rules = '[arena]\npopulation_floor = 2\n[selection]\nparents = "random"'
     assert parse(rules).selection.parents_needed == 2
     assert parse('[arena]\n[selection]\nparents = "none"').arena is not None

@@ -1,4 +1,4 @@
-"""Ground and scenery as documents tell of them."""
+"""Ground and scenery in experiment documents."""
 
 import math
 from pathlib import Path
@@ -28,14 +28,14 @@ WALL = '<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>'
 
 
 def refused(text: str) -> str:
-    """Return the one line that a document is refused with."""
-    with pytest.raises(ExperimentError) as told:
+    """Return the error of a document, one line."""
+    with pytest.raises(ExperimentError) as error:
         parse_experiment(HEAD + text, "mine.toml")
-    (line,) = str(told.value).splitlines()
+    (line,) = str(error.value).splitlines()
     return line
 
 
-def test_the_ground_is_flat_unless_a_document_says_otherwise() -> None:
+def test_ground_is_flat_by_default() -> None:
     assert parse_experiment(HEAD, "it").environment == FLAT
     assert FLAT.is_even
     # Not -0.0: it would change the sign of zeros in what robots feel.
@@ -51,7 +51,7 @@ def test_gravity_pulls_downhill() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "error"),
     [
         ("slope_deg = 45.0", "slope_deg: Expected `float` < 45.0, got 45.0"),
         ("slope_deg = -1.0", "slope_deg: Expected `float` >= 0.0, got -1.0"),
@@ -69,24 +69,24 @@ def test_gravity_pulls_downhill() -> None:
         ),
     ],
 )
-def test_what_is_refused(text: str, told: str) -> None:
+def test_wrong_environments_are_refused(text: str, error: str) -> None:
     line = refused(f"[environment]\n{text}")
     assert line.startswith("mine.toml: environment.")
-    assert told in line
+    assert error in line
 
 
 @pytest.mark.parametrize("text", ["", " \n\t", "\ufeff"])
-def test_an_empty_file_is_no_scenery(tmp_path: Path, text: str) -> None:
+def test_empty_scenery_file_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "empty.xml").write_text(text, encoding="utf-8")
     document = 'name = "a"\n[environment]\nscenery = "empty.xml"\n'
     with pytest.raises(ExperimentError, match=r"scenery: empty\.xml: is empty$"):
         parse_experiment(document, str(tmp_path / "a.toml"))
 
 
-def test_scenery_is_read_from_beside_the_document_and_goes_along(
+def test_scenery_file_is_read_relative_to_the_document_and_stored(
     tmp_path: Path,
 ) -> None:
-    """On any island; whoever reads the record of a run needs no file."""
+    """On any island; the stored experiment needs no file."""
     (tmp_path / "worlds").mkdir()
     (tmp_path / "worlds" / "wall.xml").write_text(WALL, encoding="utf-8-sig")
     text = (
@@ -107,7 +107,7 @@ def test_scenery_is_read_from_beside_the_document_and_goes_along(
     assert together.environment == there.environment
 
 
-def test_rough_ground_is_as_high_as_it_says_and_comes_down_to_the_plane() -> None:
+def test_rough_ground_has_the_given_height_and_descends_to_the_plane() -> None:
     environment = Environment(roughness_m=0.1, patch_m=0.1, extent_m=1.0)
     shares = relief(environment)
     assert shares.shape == (21, 21)
@@ -119,7 +119,7 @@ def test_rough_ground_is_as_high_as_it_says_and_comes_down_to_the_plane() -> Non
     assert (shares[2:-2, 2:-2] > 0.0).all()
 
 
-def test_the_seed_of_the_ground_is_all_that_draws_it() -> None:
+def test_rough_ground_depends_on_the_ground_seed_only() -> None:
     one = Environment(roughness_m=0.1, ground_seed=1)
     again = Environment(roughness_m=0.1, ground_seed=1, slope_deg=3.0)
     other = Environment(roughness_m=0.1, ground_seed=2)

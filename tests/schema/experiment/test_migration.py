@@ -1,4 +1,4 @@
-"""Sections on islands and migration: what they mean, and what can never happen."""
+"""Sections on islands and migration: meaning, and errors."""
 
 import pytest
 
@@ -63,18 +63,18 @@ def test_islands_change_the_keys_that_they_name() -> None:
     assert first.islands == last.islands == ()
 
 
-def test_an_archipelago_is_kept_as_text() -> None:
+def test_archipelago_text_round_trip() -> None:
     experiment = parse()
     assert experiment_from_text(experiment_text(experiment)) == experiment
 
 
-def test_an_island_that_is_not_there_is_refused() -> None:
+def test_island_number_out_of_range_is_refused() -> None:
     for number in (-1, 5):
         with pytest.raises(ValueError, match=r"0\.\.4"):
             island_experiment(parse(), number)
 
 
-def test_births_of_a_command_count_on_each_island() -> None:
+def test_births_of_a_flag_apply_to_each_island() -> None:
     experiment = with_births(parse(), 70)
     assert {island_experiment(experiment, each).births for each in range(5)} == {70}
 
@@ -105,7 +105,9 @@ def test_births_of_a_command_count_on_each_island() -> None:
         ("[islands.arena]", "[islands.space]", r"islands\[1\]\.space: no such key"),
     ],
 )
-def test_what_cannot_be_is_one_clear_line(old: str, new: str, why: str) -> None:
+def test_inconsistent_migration_is_refused_in_one_line(
+    old: str, new: str, why: str
+) -> None:
     with pytest.raises(ExperimentError, match=why) as error:
         parse(old=old, new=new)
     assert "\n" not in str(error.value)
@@ -133,12 +135,12 @@ def test_what_cannot_be_is_one_clear_line(old: str, new: str, why: str) -> None:
         ),
     ],
 )
-def test_a_migration_that_never_happens_is_an_error(text: str, why: str) -> None:
+def test_migration_that_never_happens_is_refused(text: str, why: str) -> None:
     with pytest.raises(ExperimentError, match=why):
         parse(f'name = "x"\n{text}')
 
 
-def test_unconnected_islands_are_fine_if_nothing_else_is_said() -> None:
+def test_unconnected_topology_without_other_keys_is_accepted() -> None:
     text = '[[islands]]\ncount = 2\n[migration]\ntopology = "unconnected"'
     assert island_count(parse(f'name = "x"\n{text}')) == 2
 
@@ -147,5 +149,5 @@ def test_unconnected_islands_are_fine_if_nothing_else_is_said() -> None:
     ("migrants", "population", "count"),
     [(1, 15, 1), (3, 2, 2), (0.2, 15, 3), (0.1, 14, 1), (1.0, 15, 15), (0.03, 15, 0)],
 )
-def test_how_many_leave(migrants: float, population: int, count: int) -> None:
+def test_number_of_migrants(migrants: float, population: int, count: int) -> None:
     assert migrant_count(Migration(migrants=migrants), population) == count

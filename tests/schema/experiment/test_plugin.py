@@ -1,4 +1,4 @@
-"""Code named by data."""
+"""Loading of plug-ins by name."""
 
 from pathlib import Path
 
@@ -9,17 +9,17 @@ from schema.experiment.plugin import load
 from schema.parts import BUILT_IN
 
 
-def test_built_ins_go_the_same_way_as_a_users() -> None:
+def test_built_ins_are_loaded_like_plug_ins() -> None:
     assert load("schema.parts:HINGE", "space.part_types") is BUILT_IN["Hinge"]
 
 
 @pytest.mark.parametrize("path", ["", "schema.parts", ":HINGE", "schema.parts:", "a b"])
-def test_not_a_path(path: str) -> None:
+def test_name_that_is_not_a_path_is_refused(path: str) -> None:
     with pytest.raises(UnknownPlugin, match="key: must be 'module:attribute', got"):
         load(path, "key")
 
 
-def test_no_such_module() -> None:
+def test_missing_module_is_refused() -> None:
     with pytest.raises(UnknownPlugin, match=r"key: 'schema\.nothing:X': No module"):
         load("schema.nothing:X", "key")
 
@@ -27,23 +27,23 @@ def test_no_such_module() -> None:
 @pytest.mark.parametrize(
     "module", ["", ".", "..parts", ".parts", "schema..parts", "a\0b"]
 )
-def test_no_module_can_be_called_that(module: str) -> None:
+def test_impossible_module_name_is_refused(module: str) -> None:
     with pytest.raises(UnknownPlugin, match="key: "):
         load(f"{module}:X", "key")
 
 
-def test_nearest_name_is_told() -> None:
+def test_error_names_the_nearest_attribute() -> None:
     with pytest.raises(UnknownPlugin, match=r"did you mean 'HINGE'"):
         load("schema.parts:HINGEE", "key")
 
 
-def test_nothing_near() -> None:
+def test_error_without_a_near_attribute() -> None:
     with pytest.raises(UnknownPlugin, match=r"has no 'zzzzzz'$"):
         load("schema.parts:zzzzzz", "key")
 
 
 @pytest.mark.parametrize("text", ["1 +", "1 / 0"])
-def test_a_module_that_breaks_is_the_users_fault(
+def test_module_that_raises_on_import_is_an_experiment_error(
     text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     name = f"broken_{len(text)}"

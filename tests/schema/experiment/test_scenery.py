@@ -1,4 +1,4 @@
-"""What a user's MJCF becomes, and what of it is refused."""
+"""Scenery from a user's MJCF: geoms, and errors."""
 
 import mujoco
 import pytest
@@ -33,7 +33,7 @@ def scene(inside: str, outside: str = "") -> str:
     return f"<mujoco>{outside}<worldbody>{inside}</worldbody></mujoco>"
 
 
-def test_scenery_is_geoms_of_the_world_and_nothing_else() -> None:
+def test_scenery_adds_only_geoms_to_the_world() -> None:
     simulation = Simulation(friction=0.7, contact_time_s=0.02)
     empty = solo_model(CORE, BUILT_IN, simulation, Environment())
     model = solo_model(CORE, BUILT_IN, simulation, Environment(scenery=YARD))
@@ -56,7 +56,7 @@ def test_scenery_is_geoms_of_the_world_and_nothing_else() -> None:
     assert [ball.pos[1] for ball in balls] == pytest.approx([3.0, 3.5, 4.0])
 
 
-def test_a_turned_geom_stays_turned() -> None:
+def test_rotated_geoms_keep_their_rotation() -> None:
     environment = Environment(
         scenery=scene('<body euler="0 0 30"><geom type="box" size="1 .1 .1" '
                       'pos="5 0 1" euler="0 0 15"/></body>')
@@ -72,7 +72,7 @@ BOX = '<geom type="box" size="1 1 1"/>'
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "error"),
     [
         ("<mujoco><worldbody>", "not valid XML: "),
         ("<sdf/>", "must be <mujoco>, got <sdf>"),
@@ -91,10 +91,10 @@ BOX = '<geom type="box" size="1 1 1"/>'
         (scene('<geom type="box" sise="1 1 1"/>'), "not valid MJCF: "),
     ],
 )  # fmt: skip
-def test_what_is_refused_at_the_start(text: str, told: str) -> None:
+def test_wrong_scenery_is_refused(text: str, error: str) -> None:
     document = f'name = "mine"\n[environment]\nscenery = """{text}"""\n'
-    with pytest.raises(ExperimentError) as error:
+    with pytest.raises(ExperimentError) as raised:
         parse_experiment(document, "mine.toml")
-    (line,) = str(error.value).splitlines()
+    (line,) = str(raised.value).splitlines()
     assert line.startswith("mine.toml: environment.scenery: ")
-    assert told in line
+    assert error in line

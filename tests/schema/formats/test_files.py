@@ -1,4 +1,4 @@
-"""Robots in files: nothing is lost, and what is wrong is said in one line."""
+"""Robot files: round trips, and errors in one line."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -53,7 +53,7 @@ def read(text: str) -> Robot:
 
 
 @given(data=st.data())
-def test_yaml_loses_nothing(robots: SearchStrategy[Robot], data: DataObject) -> None:
+def test_yaml_round_trip(robots: SearchStrategy[Robot], data: DataObject) -> None:
     robot = data.draw(robots)
     text = robot_to_yaml(robot, BUILT_IN)
     again = read(text)
@@ -62,7 +62,7 @@ def test_yaml_loses_nothing(robots: SearchStrategy[Robot], data: DataObject) -> 
     assert robot_to_yaml(again, BUILT_IN) == text
 
 
-def test_what_a_person_writes() -> None:
+def test_defaults_of_omitted_keys() -> None:
     robot = read(TEXT)
     check_robot(robot, BUILT_IN)
     assert [part.kind for part in robot.parts] == [
@@ -86,7 +86,7 @@ def test_what_a_person_writes() -> None:
     assert robot.brain.connections == (Connection(2, 8, 0.25), Connection(7, 9, 0.5))
 
 
-def test_a_body_without_a_brain() -> None:
+def test_body_without_a_brain() -> None:
     assert len(read("body: {type: Core}").brain.neurons) == 6
 
 
@@ -132,7 +132,7 @@ def test_a_body_without_a_brain() -> None:
         ("body:\n", "revolve_robot: 2\nbody:\n", 1, "must be 1, got 2"),
     ],
 )
-def test_what_is_wrong_is_said_with_file_line_and_field(
+def test_errors_name_file_line_and_field(
     old: str, new: str, line: int, message: str
 ) -> None:
     assert old in TEXT
@@ -166,7 +166,7 @@ def test_what_is_wrong_is_said_with_file_line_and_field(
         "{? [a]: b}",
     ],
 )
-def test_what_is_no_robot_is_refused_in_one_line(text: str) -> None:
+def test_other_documents_are_refused_in_one_line(text: str) -> None:
     with pytest.raises(InvalidRobot, match=r"^mine\.yaml:?") as error:
         read(text)
     assert "\n" not in str(error.value)
@@ -218,7 +218,7 @@ def test_files_that_cannot_be_read_or_written(tmp_path: Path) -> None:
         write_robot(read(TEXT), path)
 
 
-def test_broken_bytes(tmp_path: Path) -> None:
+def test_damaged_protobuf_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "robot.pb"
     path.write_bytes(encode_robot(read(TEXT))[:-3])
     with pytest.raises(MalformedMessage, match=r"robot\.pb: not the bytes of a Robot"):
@@ -229,7 +229,7 @@ def test_broken_bytes(tmp_path: Path) -> None:
         read_robot(path)
 
 
-def test_bytes_of_a_robot_that_this_space_does_not_have(tmp_path: Path) -> None:
+def test_robot_of_another_body_space_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "robot.pb"
     path.write_bytes(encode_robot(read(TEXT)))
     space = {name: kind for name, kind in BUILT_IN.items() if name != "TouchSensor"}
@@ -237,7 +237,7 @@ def test_bytes_of_a_robot_that_this_space_does_not_have(tmp_path: Path) -> None:
         read_robot(path, space)
 
 
-def test_a_robot_that_is_none_is_not_written(node: NodeMaker, tmp_path: Path) -> None:
+def test_malformed_robot_is_not_written(node: NodeMaker, tmp_path: Path) -> None:
     robot = develop(node("Core"), BUILT_IN)
     broken = replace(robot, brain=replace(robot.brain, neurons=()))
     for ending in (".yaml", ".pb"):

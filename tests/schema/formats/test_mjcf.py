@@ -1,4 +1,4 @@
-"""MJCF with a brain inside: the same robot, the same result, no edited bodies."""
+"""MJCF files with a brain: round trips, and refusal of edited bodies."""
 
 import re
 from pathlib import Path
@@ -31,14 +31,14 @@ ARM = Robot(
 
 @settings(max_examples=25, deadline=None)
 @given(data=st.data())
-def test_nothing_is_lost(robots: SearchStrategy[Robot], data: DataObject) -> None:
+def test_mjcf_round_trip(robots: SearchStrategy[Robot], data: DataObject) -> None:
     robot = data.draw(robots)
     text = robot_to_mjcf(robot, SETTINGS)
     # A repr tells -0.0 from 0.0 and every bit of a float.
     assert repr(robot_from_mjcf(text, "it")) == repr((robot, SETTINGS))
 
 
-def test_it_is_a_model_of_its_own() -> None:
+def test_mjcf_simulates_like_the_robot() -> None:
     model = mujoco.MjModel.from_xml_string(robot_to_mjcf(ARM, SETTINGS))
     # Core 90 g, hinge 6 g, brick 10.2 g: table of the parts.
     assert model.body_subtreemass[0] == pytest.approx(0.1062, rel=1e-6)
@@ -46,8 +46,8 @@ def test_it_is_a_model_of_its_own() -> None:
     assert model.opt.timestep == 0.005
 
 
-def test_its_environment_goes_along() -> None:
-    """Lean of gravity, relief and scenery: in the model, and in what is read back."""
+def test_mjcf_holds_the_environment() -> None:
+    """Tilt of gravity, rough ground and scenery, in the model and after reading."""
     box = '<geom type="box" size="0.1 0.1 0.1" pos="0.5 0 0.1"/>'
     environment = Environment(
         slope_deg=30.0,
@@ -66,7 +66,7 @@ def test_its_environment_goes_along() -> None:
     assert model.geom("scenery/0").pos.tolist() == [0.5, 0.0, 0.1]
 
 
-def test_an_edited_body_is_refused() -> None:
+def test_edited_body_is_refused() -> None:
     text = robot_to_mjcf(ARM, SETTINGS)
     heavier = text.replace('mass="0.0102"', 'mass="0.0104"')
     assert heavier != text
@@ -93,12 +93,12 @@ def test_an_edited_body_is_refused() -> None:
         ),
     ],
 )
-def test_what_holds_no_robot(text: str, message: str) -> None:
+def test_mjcf_without_a_robot_is_refused(text: str, message: str) -> None:
     with pytest.raises(InvalidRobot, match=message):
         robot_from_mjcf(text, "it")
 
 
-def test_files(tmp_path: Path) -> None:
+def test_mjcf_files(tmp_path: Path) -> None:
     path = tmp_path / "arm.xml"
     write_robot(ARM, path)
     assert read_robot(path) == ARM

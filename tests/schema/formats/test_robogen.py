@@ -1,4 +1,4 @@
-"""RoboGen's robots: places worked out from its frames, names and errors."""
+"""RoboGen's robots: poses derived from its frames, names and errors."""
 
 import json
 from pathlib import Path
@@ -54,7 +54,7 @@ def axes(robot: Robot, part: int) -> tuple[list[float], list[float]]:
     return rotations[part][:, 1].round(9).tolist(), rotations[part][:, 2].tolist()
 
 
-def test_parts_go_where_robogen_has_them() -> None:
+def test_parts_have_the_poses_of_robogen() -> None:
     robot = read(STARFISH)
     kinds = [part.kind for part in robot.parts]
     assert kinds.count("ActiveHinge") == 4
@@ -68,7 +68,7 @@ def test_parts_go_where_robogen_has_them() -> None:
     ]  # fmt: skip
 
 
-def test_quarter_turns_turn_the_axis_of_a_hinge() -> None:
+def test_quarter_turns_rotate_the_axis_of_a_hinge() -> None:
     robot = read(STARFISH)
     # By hand from its tangents: without a turn the axis (own y) is upright in front
     # and level at the sides; 1 and 3 quarter turns raise it at the sides.
@@ -84,7 +84,7 @@ def test_quarter_turns_turn_the_axis_of_a_hinge() -> None:
     assert abs(axes(level, 2)[0][2]) < 1e-9
 
 
-def test_bricks_are_level_whatever_their_turn() -> None:
+def test_bricks_are_level_for_any_orientation() -> None:
     for turn in range(4):
         for slot in range(4):
             text = (
@@ -95,7 +95,7 @@ def test_bricks_are_level_whatever_their_turn() -> None:
                 assert axes(robot, part)[1] == pytest.approx([0, 0, 1], abs=1e-9)
 
 
-def test_neurons_find_their_places() -> None:
+def test_neurons_and_connections() -> None:
     robot = read(STARFISH)
     named = {(n.layer, n.part, n.kind): n for n in robot.brain.neurons}
     assert len(robot.brain.neurons) == 6 + 2 + 4 + 2
@@ -105,12 +105,12 @@ def test_neurons_find_their_places() -> None:
         (2.0, -0.25, 0.9),
     ]  # fmt: skip
     assert ("hidden", 0, "Sigmoid") in named
-    # The oscillator at the knee listens to nobody.
+    # The oscillator at the knee has no inputs.
     weights = sorted(edge.weight for edge in robot.brain.connections)
     assert weights == [-1.25, 0.125, 0.5]
 
 
-def test_a_bar_in_our_units() -> None:
+def test_bar_parameters_are_converted() -> None:
     robot = read("0 E C 0\n\t0 ParametricJoint bar 2 0.05 -60 0\n")
     length, alpha, beta = robot.parts[1].parameters[:3]
     assert (length, beta) == (50.0, 0.0)
@@ -142,7 +142,7 @@ def test_a_bar_in_our_units() -> None:
         ("0 E C 0\n\n\n\n\nC", "it.txt:6: a fifth section"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_with_its_line(text: str, message: str) -> None:
+def test_errors_name_the_line(text: str, message: str) -> None:
     with pytest.raises(InvalidRobot, match=message):
         read(text)
 
@@ -170,7 +170,7 @@ def document() -> dict[str, object]:
     }  # fmt: skip
 
 
-def test_json_says_what_the_text_says() -> None:
+def test_json_and_text_give_the_same_robot() -> None:
     robot = robot_from_robogen_json(json.dumps(document()), "it.json", BUILT_IN)
     text = "0 E C 0\n\t0 I H 1\n\n\nC 0 H 0 2\n\nH 0 0.25\n"
     assert robot.parts == read(text).parts
@@ -197,7 +197,7 @@ def test_json_says_what_the_text_says() -> None:
         (("body", "part"), 3, "it: body.part must be a list"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_with_its_path(
+def test_errors_name_the_path(
     path: tuple[str | int, ...], value: object, message: str
 ) -> None:
     changed = document()
@@ -209,7 +209,7 @@ def test_what_is_wrong_is_said_with_its_path(
         robot_from_robogen_json(json.dumps(changed), "it", BUILT_IN)
 
 
-def test_text_that_is_no_json() -> None:
+def test_invalid_json_is_refused() -> None:
     for text, message in (
         ("{\n]", "it:2: not valid JSON"),
         ('{"a": NaN}', "NaN is not allowed"),
@@ -218,7 +218,7 @@ def test_text_that_is_no_json() -> None:
             robot_from_robogen_json(text, "it", BUILT_IN)
 
 
-def test_files_by_their_endings(tmp_path: Path) -> None:
+def test_ending_selects_the_format(tmp_path: Path) -> None:
     (tmp_path / "star.txt").write_text(STARFISH)
     (tmp_path / "arm.json").write_text(json.dumps(document()))
     assert read_robot(tmp_path / "star.txt") == read(STARFISH)
@@ -244,7 +244,7 @@ def test_dimensions_of_2016() -> None:
     assert reach == pytest.approx(0.0015 + 0.006 + 0.05 + 0.0015)
 
 
-def test_both_sets_take_the_same_robots() -> None:
+def test_both_part_sets_accept_the_same_robots() -> None:
     names = tuple(
         f"schema.robogen_parts:{name}"
         for name in (

@@ -1,4 +1,4 @@
-"""URDF: MuJoCo's own reader of it finds the same masses in the same places."""
+"""URDF: MuJoCo reads it with the same masses and poses."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ SIMULATION = Simulation()
 
 @settings(max_examples=25, deadline=None)
 @given(data=st.data())
-def test_it_moves_as_the_robot_does(
+def test_urdf_moves_like_the_robot(
     robots: SearchStrategy[Robot], data: DataObject
 ) -> None:
     robot = data.draw(robots)
@@ -58,7 +58,7 @@ def test_it_moves_as_the_robot_does(
             assert inertia == pytest.approx(expected, rel=1e-6)
 
 
-def test_a_motor_and_a_free_hinge() -> None:
+def test_limits_of_driven_and_free_hinges() -> None:
     robot = Robot(
         (
             Part("Core", -1, -1, -1, 0, GREY),
@@ -75,7 +75,7 @@ def test_a_motor_and_a_free_hinge() -> None:
     assert 'effort="0.0"' in text
 
 
-def test_it_is_written_only(tmp_path: Path) -> None:
+def test_urdf_is_not_read(tmp_path: Path) -> None:
     path = tmp_path / "core.urdf"
     write_robot(Robot((Part("Core", -1, -1, -1, 0, GREY),), Brain(SENSES)), path)
     assert path.read_text().startswith("<?xml")

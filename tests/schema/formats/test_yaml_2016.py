@@ -1,4 +1,4 @@
-"""Robots that Revolve's own files describe: its published walker, by its numbers."""
+"""Robots in the YAML form of 2016: the published walker."""
 
 import pytest
 
@@ -76,7 +76,7 @@ brain:
 """
 
 
-def test_outputs_without_saying_and_hidden_neurons_by_name() -> None:
+def test_default_outputs_and_hidden_neurons_by_name() -> None:
     brain = read(HAND).brain
     assert brain.neurons[6:] == (
         Neuron("output", "Simple", 1, (0.0, 0.5)),
@@ -100,7 +100,7 @@ def test_outputs_without_saying_and_hidden_neurons_by_name() -> None:
         ("part_id: h, gain", "part_id: x, gain", r"its\.yaml:4: .*part_id"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_with_its_line(old: str, new: str, message: str) -> None:
+def test_errors_name_the_line(old: str, new: str, message: str) -> None:
     assert old in HAND
     with pytest.raises(InvalidRobot, match=message):
         read(HAND.replace(old, new, 1))

@@ -1,4 +1,4 @@
-"""Where a robot begins when the ground is not even, against the engine's contacts."""
+"""Heights of robots on rough ground and scenery, compared with MuJoCo's contacts."""
 
 import math
 from collections.abc import Iterator
@@ -52,7 +52,7 @@ def height(
 def depths(
     robot: Robot, environment: Environment, pose: tuple[float, float, float, float]
 ) -> Iterator[float]:
-    """Yield how deep a robot is in what stands there, at x, y, z, heading [m]."""
+    """Yield the penetration of a robot at x, y, z, heading [m]."""
     model = solo_model(robot, BUILT_IN, WORLD, environment)
     data = mujoco.MjData(model)
     x, y, z, heading = pose
@@ -80,7 +80,7 @@ def test_a_core_stands_on_a_block_and_beside_a_wall() -> None:
     assert height(CORE, scenes[1], (0.1, -0.1)) == pytest.approx(flat + 1.0, abs=3e-5)
 
 
-def test_what_cannot_be_touched_is_no_ground() -> None:
+def test_geoms_that_do_not_collide_are_ignored() -> None:
     ghost = '<geom type="box" size="1 1 1" contype="0" conaffinity="0"/>'
     scene = Environment(scenery=f"<mujoco><worldbody>{ghost}</worldbody></mujoco>")
     assert height(CORE, scene) == height(CORE, Environment())
@@ -100,7 +100,7 @@ def test_a_core_stands_on_the_highest_node_that_it_may_touch() -> None:
         assert height(CORE, environment, place) == flat
 
 
-def test_model_and_footing_know_the_same_relief() -> None:
+def test_model_and_footing_use_the_same_heights() -> None:
     model = solo_model(CORE, BUILT_IN, WORLD, ROUGH)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -115,7 +115,7 @@ def test_model_and_footing_know_the_same_relief() -> None:
 
 
 @pytest.mark.parametrize("environment", [ROUGH, OBSTACLES], ids=["rough", "scenery"])
-def test_nobody_begins_inside_of_anything(environment: Environment) -> None:
+def test_no_robot_starts_inside_of_ground_or_scenery(environment: Environment) -> None:
     """At random places and headings: free, and at scenery not a millimetre too high."""
     rng = np.random.default_rng(5)
     flat, lifted = height(LEGGED, Environment()), 0
@@ -132,7 +132,7 @@ def test_nobody_begins_inside_of_anything(environment: Environment) -> None:
     assert lifted > 15 or not environment.scenery
 
 
-def test_a_robot_alone_begins_standing_at_the_origin() -> None:
+def test_single_robot_starts_on_the_ground_at_the_origin() -> None:
     model = solo_model(LEGGED, BUILT_IN, Simulation(drop_m=0.5), ROUGH)
     assert model.qpos0[2] == pytest.approx(height(LEGGED, ROUGH) + 0.5, abs=1e-12)
     data = mujoco.MjData(model)

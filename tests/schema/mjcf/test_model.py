@@ -1,4 +1,4 @@
-"""A robot in MuJoCo weighs, reaches, bends and stands as the facts say."""
+"""MuJoCo models of robots: masses, sizes, joints and height, against the facts."""
 
 import math
 from collections.abc import Mapping
@@ -50,7 +50,7 @@ def body_mass(model: mujoco.MjModel, name: str) -> float:
         ("TouchSensor", 9.0),
     ],
 )
-def test_a_robot_weighs_what_its_parts_weigh(kind: str, grams: float) -> None:
+def test_mass_of_a_robot_is_the_sum_of_its_parts(kind: str, grams: float) -> None:
     model = model_of(on_core(kind))
     assert model.body_mass.sum() * 1000 == pytest.approx(90 + grams, abs=1e-9)
 
@@ -59,7 +59,7 @@ def test_a_robot_weighs_what_its_parts_weigh(kind: str, grams: float) -> None:
     ("kind", "slot", "near", "far"),
     [("ActiveHinge", 0, 8.2, 16.0), ("ActiveHinge", 1, 16.0, 8.2), ("Hinge", 0, 3, 3)],
 )
-def test_a_joint_parts_its_boxes_between_two_segments(
+def test_joint_divides_the_boxes_into_two_segments(
     kind: str, slot: int, near: float, far: float
 ) -> None:
     model = model_of(on_core(kind, slot))
@@ -86,7 +86,7 @@ def test_rigid_parts_become_one_body() -> None:
 
 
 @pytest.mark.parametrize(("kind", "degrees"), [("ActiveHinge", 45), ("Hinge", 60)])
-def test_joints_bend_as_far_as_the_original_ones(kind: str, degrees: float) -> None:
+def test_joint_ranges_are_those_of_the_original(kind: str, degrees: float) -> None:
     joint = model_of(on_core(kind)).joint("joint1")
     assert joint.range == pytest.approx(
         [-math.radians(degrees), math.radians(degrees)], abs=1e-12
@@ -131,7 +131,7 @@ def test_the_angle_is_that_of_segment_1_against_segment_0(
     assert turn == pytest.approx(matrix.reshape(3, 3), abs=1e-12)
 
 
-def test_parts_sit_where_the_original_put_them() -> None:
+def test_positions_of_parts_are_those_of_the_original() -> None:
     """Golden: a hinge on the core's -y face, plate at -45.75 mm, conn_a -56.85."""
     model = model_of(on_core("Hinge", parent_slot=0))
     data = mujoco.MjData(model)

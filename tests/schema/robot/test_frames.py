@@ -1,4 +1,4 @@
-"""Where parts sit: facts of the original, 1.1 (golden positions) and 2 (rule)."""
+"""Frames of parts: facts of the original, 1.1 (golden positions) and 2 (rule)."""
 
 import math
 from collections.abc import Callable
@@ -68,7 +68,7 @@ def test_golden_position_of_a_hinge_on_the_front(node: NodeMaker) -> None:
     assert centres["conn_a"] == pytest.approx((0.0, -0.05685, 0.0), abs=1e-12)
 
 
-def test_core_stays_where_it_is(node: NodeMaker) -> None:
+def test_core_is_at_the_origin(node: NodeMaker) -> None:
     robot = body(node("Core"))
     rotations, positions = place_parts(robot, shapes_of(robot, BUILT_IN))
     assert (rotations[0] == np.eye(3)).all()
@@ -143,7 +143,7 @@ def test_level_bodies_are_flat_and_stand_on_their_core(
     assert lowest == pytest.approx(-0.0225, abs=1e-12)
 
 
-def test_four_quarter_turns_are_none() -> None:
+def test_four_quarter_turns_are_the_identity() -> None:
     slot = BUILT_IN["Core"].shape(()).slots[1]
     child = BUILT_IN["FixedBrick"].shape(()).slots[3]
     quarter, _ = attach(slot, child, 90)

@@ -1,4 +1,4 @@
-"""Development, by hand: what each connection of a small genome comes to."""
+"""Development of a small genome, connection by connection."""
 
 from collections.abc import Callable
 
@@ -41,7 +41,7 @@ def gene(
 def limb(node: NodeMaker, **connections: tuple[ConnectionGene, ...]) -> Genome:
     """Core: hinge A on slot 0 with a touch sensor; on slot 2 a brick, hinge B on it.
 
-    The brick sits by its slot 3; B sits on the brick's slot 1, by its own slot 1.
+    The brick is attached by its slot 3; B is on its slot 1, by its own slot 1.
     """
     touch = node("TouchSensor", connections=connections.get("touch", ()))
     a = node(
@@ -64,7 +64,7 @@ def edges(genome: Genome) -> list[tuple[int, int, float]]:
     return [(edge.source, edge.target, edge.weight) for edge in connections]
 
 
-def test_parts_stand_depth_first_by_slot(node: NodeMaker) -> None:
+def test_parts_are_in_depth_first_order_by_slot(node: NodeMaker) -> None:
     robot = develop(limb(node), BUILT_IN)
     places = [(p.kind, p.parent, p.parent_slot, p.slot, p.gene) for p in robot.parts]
     assert places == [
@@ -76,7 +76,7 @@ def test_parts_stand_depth_first_by_slot(node: NodeMaker) -> None:
     ]
 
 
-def test_neurons_stand_by_layer_and_then_by_part(node: NodeMaker) -> None:
+def test_neurons_are_sorted_by_layer_then_part(node: NodeMaker) -> None:
     neurons = develop(limb(node), BUILT_IN).brain.neurons
     layers = [(neuron.layer, neuron.part) for neuron in neurons]
     inputs = [("input", 0)] * 6 + [("input", 2)] * 2
@@ -113,7 +113,7 @@ def test_neurons_stand_by_layer_and_then_by_part(node: NodeMaker) -> None:
         ("b", (("output", 0), (1, 1), ("output", 0), 0.6), (OUT_B, OUT_B, 0.6)),
     ],
 )
-def test_path_that_leads_somewhere(
+def test_connection_with_a_valid_path(
     node: NodeMaker,
     owner: str,
     connection: Edge,
@@ -142,7 +142,7 @@ def test_path_that_leads_somewhere(
         ("a", (("output", 0), (1,), ("input", 0), 0.1)),
     ],
 )
-def test_path_that_leads_nowhere_is_left_out(
+def test_connection_with_an_invalid_path_is_left_out(
     node: NodeMaker,
     owner: str,
     connection: Edge,
@@ -155,21 +155,21 @@ def test_path_that_leads_nowhere_is_left_out(
         assert edges(both) == [(OUT_B, OUT_B, 0.5)]
 
 
-def test_first_of_two_equal_pairs_wins(node: NodeMaker) -> None:
+def test_first_connection_of_a_pair_of_neurons_is_kept(node: NodeMaker) -> None:
     first = gene(("input", 0), (0,), ("output", 0), 0.1)
     detour = gene(("input", 0), (0, 0, 0), ("output", 0), 0.9)
     genome = limb(node, core=(first, detour))
     assert edges(genome) == [(IMU_X, OUT_A, 0.1)]
 
 
-def test_other_way_round_is_another_pair(node: NodeMaker) -> None:
+def test_reverse_connection_is_another_pair(node: NodeMaker) -> None:
     up = gene(("output", 0), (1, 3, 0), ("output", 0), 0.1)
     down = gene(("output", 0), (0, 2, 1), ("output", 0), 0.2)
     genome = limb(node, a=(down,), b=(up,))
     assert edges(genome) == [(OUT_A, OUT_B, 0.2), (OUT_B, OUT_A, 0.1)]
 
 
-def test_walk_tells_parents(node: NodeMaker) -> None:
+def test_walk_returns_parents(node: NodeMaker) -> None:
     visits = [(n.kind, parent, slot) for n, parent, slot in walk(limb(node))]
     assert visits == [
         ("Core", -1, -1),

@@ -1,4 +1,4 @@
-"""Genomes of robots that have none."""
+"""Genomes of given robots."""
 
 from dataclasses import replace
 
@@ -12,12 +12,12 @@ from schema.robot.robot import Robot
 
 
 def unordered(robot: Robot) -> Robot:
-    """Return a robot whose connections stand in one order, whatever theirs was."""
+    """Return a robot with sorted connections."""
     edges = sorted(robot.brain.connections, key=lambda edge: (edge.source, edge.target))
     return replace(robot, brain=replace(robot.brain, connections=tuple(edges)))
 
 
-def test_a_robot_comes_back(robots: SearchStrategy[Robot]) -> None:
+def test_development_inverts_genome_of(robots: SearchStrategy[Robot]) -> None:
     @given(robots)
     def check(robot: Robot) -> None:
         again = develop(genome_of(robot), BUILT_IN)

@@ -88,12 +88,12 @@ def test_broken_body(
         check_robot(with_part(robot, index, **changes), BUILT_IN)
 
 
-def test_no_part_at_all() -> None:
+def test_body_without_parts_is_refused() -> None:
     with pytest.raises(InvalidRobot, match="must have at least the core"):
         check_robot(Robot(()), BUILT_IN)
 
 
-def test_breadth_first_is_refused(robot: Robot) -> None:
+def test_breadth_first_order_is_refused(robot: Robot) -> None:
     core, hinge, brick, _, touch = robot.parts
     with pytest.raises(
         InvalidRobot, match=r"parts\[3\]: parts must be in depth-first order"
@@ -101,7 +101,7 @@ def test_breadth_first_is_refused(robot: Robot) -> None:
         check_tree((core, hinge, touch, brick))
 
 
-def test_a_tree_needs_no_types() -> None:
+def test_tree_check_ignores_types() -> None:
     colour = (0.5,)
     check_tree((Part("Hub", -1, -1, -1, 0, colour), Part("Fin", 0, 77, 5, 270, colour)))
 
@@ -118,7 +118,7 @@ def test_a_body_is_checked_without_a_brain(robot: Robot) -> None:
         check_body(bare.parts, core_only)
 
 
-def test_space_decides_about_types(robot: Robot) -> None:
+def test_unknown_types_are_refused(robot: Robot) -> None:
     space = {name: kind for name, kind in BUILT_IN.items() if name != "TouchSensor"}
     with pytest.raises(InvalidRobot, match="got 'TouchSensor'"):
         check_robot(robot, space)

@@ -1,4 +1,4 @@
-"""The columns of a run's tables, and the counts that fill them."""
+"""Columns of the tables of a run, and counts of the births table."""
 
 import io
 from collections.abc import Callable
@@ -46,7 +46,7 @@ def birth(genome: Genome, record: int) -> dict[str, object]:
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_every_table_says_what_it_holds(name: str) -> None:
+def test_every_column_has_unit_and_repeatable_metadata(name: str) -> None:
     schema = TABLES[name]
     assert schema.names[0] == "record"
     assert schema.metadata[b"revolve.schema"] == name.encode()
@@ -72,18 +72,18 @@ def test_every_table_says_what_it_holds(name: str) -> None:
         ("runs", {"versions", "platform", "cpu_flags", "start", "end"}),
     ],
 )
-def test_what_machines_and_clocks_decide_does_not_repeat(
+def test_columns_of_machines_and_clocks_are_not_repeatable(
     name: str, others: set[str]
 ) -> None:
     schema = TABLES[name]
     assert set(schema.names) - set(repeatable(schema)) == others
 
 
-def test_no_column_hides_behind_a_folder_name() -> None:
+def test_no_column_has_the_name_of_a_partition() -> None:
     assert all("experiment" not in schema.names for schema in TABLES.values())
 
 
-def test_sizes_by_hand(node: NodeMaker) -> None:
+def test_sizes_of_a_small_robot(node: NodeMaker) -> None:
     nowhere = ConnectionGene(("input", 0), (3, 3), ("output", 0), 1.0)
     loop = ConnectionGene(("output", 0), (), ("output", 0), 1.0)
     touch = node("TouchSensor", connections=(nowhere,))
@@ -115,7 +115,7 @@ def test_a_tree_with_one_leaf_has_one_extremity(node: NodeMaker, length: int) ->
 
 
 @given(data=st.data())
-def test_births_survive_stream_and_parquet(
+def test_births_round_trip_through_stream_and_parquet(
     genomes: SearchStrategy[Genome], data: DataObject
 ) -> None:
     genome = data.draw(genomes)

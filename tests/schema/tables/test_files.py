@@ -1,4 +1,4 @@
-"""Runs of before a table got its newest column are read as if it had been there."""
+"""Reading of tables that were written before they got their newest columns."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -49,7 +49,7 @@ def write_parquet(folder: Path, rows: pa.Table) -> None:
 
 
 @pytest.mark.parametrize("write", [write_segment, write_parquet])
-def test_an_older_run_s_evaluations_are_first_trials(
+def test_evaluations_of_older_runs_have_trial_0(
     tmp_path: Path, write: Callable[[Path, pa.Table], None]
 ) -> None:
     write(tmp_path, without("trial"))
@@ -59,7 +59,7 @@ def test_an_older_run_s_evaluations_are_first_trials(
 
 
 @pytest.mark.parametrize("write", [write_segment, write_parquet])
-def test_rows_of_now_are_read_as_they_are(
+def test_present_rows_are_read_unchanged(
     tmp_path: Path, write: Callable[[Path, pa.Table], None]
 ) -> None:
     write(tmp_path, without())
@@ -71,13 +71,13 @@ def test_a_nullable_column_is_null_in_older_rows(tmp_path: Path) -> None:
     assert read_table(tmp_path, "evaluations")["fitness"].to_pylist() == [None]
 
 
-def test_rows_that_lack_what_was_always_there_are_refused(tmp_path: Path) -> None:
+def test_rows_without_a_required_column_are_refused(tmp_path: Path) -> None:
     write_segment(tmp_path, without("status"))
     with pytest.raises(RunFolderError, match="another version of Revolve"):
         read_table(tmp_path, "evaluations")
 
 
-def test_a_file_that_lacks_what_was_always_there_is_refused(tmp_path: Path) -> None:
+def test_file_without_a_required_column_is_refused(tmp_path: Path) -> None:
     write_parquet(tmp_path, without("status"))
     with pytest.raises(RunFolderError, match="cannot be read"):
         read_table(tmp_path, "evaluations")

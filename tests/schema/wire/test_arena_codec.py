@@ -1,4 +1,4 @@
-"""What goes to a shard's holder and comes back: round trips, and any bytes."""
+"""Requests to advance shards and answers: round trips, and any bytes."""
 
 import math
 from contextlib import suppress
@@ -147,7 +147,7 @@ def test_damaged_bytes_decode_or_are_malformed(data: DataObject) -> None:
         replace(ADVANCE, touches=(Touch(ZERO, ZERO, -math.inf),)),
     ],
 )
-def test_an_advance_that_is_none_is_malformed(advance: Advance) -> None:
+def test_advance_that_breaks_a_rule_is_malformed(advance: Advance) -> None:
     with pytest.raises(MalformedMessage):
         decode_advance_answer(encode_advance_answer(AdvanceAnswer(1, 2, 0.5, advance)))
 
@@ -155,23 +155,23 @@ def test_an_advance_that_is_none_is_malformed(advance: Advance) -> None:
 @pytest.mark.parametrize(
     "message", [pb.AdvanceAnswer(epoch=1), pb.AdvanceAnswer(needs_state=False)]
 )
-def test_an_answer_holds_an_advance_or_asks(message: pb.AdvanceAnswer) -> None:
+def test_answer_without_advance_must_need_the_state(message: pb.AdvanceAnswer) -> None:
     with pytest.raises(MalformedMessage, match="must hold an advance"):
         decode_advance_answer(message.SerializeToString())
 
 
-def test_an_empty_past_is_still_a_rebuild() -> None:
+def test_rebuild_with_empty_history() -> None:
     request = replace(REQUEST, rebuild=Rebuild(b"", ()))
     assert decode_advance_request(encode_advance_request(request)) == request
     assert decode_advance_request(encode_advance_request(REQUEST)) == REQUEST
 
 
-def test_no_advance_goes_back() -> None:
+def test_end_before_start_is_malformed() -> None:
     with pytest.raises(MalformedMessage, match="until: must be >= from_step = 5"):
         decode_advance_request(encode_advance_request(replace(REQUEST, until=4)))
 
 
-def test_a_state_without_the_word_to_rebuild_is_malformed() -> None:
+def test_state_without_is_rebuild_is_malformed() -> None:
     message = pb.AdvanceRequest(snapshot=b"x")
     with pytest.raises(MalformedMessage, match="need is_rebuild"):
         decode_advance_request(message.SerializeToString())

@@ -1,4 +1,4 @@
-"""Round trips, and bytes of nobody knows what."""
+"""Robots, genomes, requests and answers: round trips, and any bytes."""
 
 import math
 from collections.abc import Callable
@@ -73,7 +73,7 @@ REPORT = Report(
 
 
 def exact(value: object) -> str:
-    """Return a text that tells -0.0 from 0.0, too."""
+    """Return a text that distinguishes -0.0 from 0.0."""
     return repr(value)
 
 
@@ -86,7 +86,7 @@ def test_robot_round_trip(robots: SearchStrategy[Robot], data: DataObject) -> No
 
 
 @given(data=st.data())
-def test_a_body_and_a_brain_add_up_to_a_robot(
+def test_bytes_of_body_and_brain_concatenate_to_a_robot(
     robots: SearchStrategy[Robot], data: DataObject
 ) -> None:
     robot = data.draw(robots)
@@ -98,7 +98,7 @@ def test_a_body_and_a_brain_add_up_to_a_robot(
     assert encode_robot(bare) == body
 
 
-def test_a_brain_is_not_looked_at_with_a_body(node: NodeMaker) -> None:
+def test_decode_body_ignores_the_brain(node: NodeMaker) -> None:
     message = pb.Robot.FromString(encode_body(develop(node("Core"), BUILT_IN)))
     message.neurons.add(kind="no such kind", part=7)
     data = message.SerializeToString()
@@ -178,17 +178,17 @@ def test_damaged_bytes_decode_or_are_malformed(
 @pytest.mark.parametrize(
     "decode", [decode_robot, decode_body, decode_genome, decode_request]
 )
-def test_nothing_is_no_robot(decode: Callable[[bytes], object]) -> None:
+def test_empty_bytes_are_not_a_robot(decode: Callable[[bytes], object]) -> None:
     with pytest.raises(MalformedMessage, match="at least the core"):
         decode(b"")
 
 
-def test_an_answer_holds_a_result() -> None:
+def test_answer_without_result_is_malformed() -> None:
     with pytest.raises(MalformedMessage, match="has no result"):
         decode_answer(pb.Answer(epoch=1, number=2).SerializeToString())
 
 
-def test_a_report_of_nothing_but_zeros_is_still_one() -> None:
+def test_report_of_zeros_round_trip() -> None:
     nowhere = (0.0, 0.0, 0.0)
     report = replace(REPORT, is_viable=False, lower=nowhere, upper=nowhere, mass=0.0)
     report = replace(report, motors=0)
@@ -196,7 +196,7 @@ def test_a_report_of_nothing_but_zeros_is_still_one() -> None:
     assert decode_answer(encode_answer(answer)) == answer
 
 
-def test_an_empty_reason_is_still_a_failure() -> None:
+def test_failure_with_empty_reason_round_trip() -> None:
     answer = Answer(1, 2, 0.0, "")
     assert decode_answer(encode_answer(answer)) == answer
 
@@ -213,7 +213,7 @@ def test_an_empty_reason_is_still_a_failure() -> None:
         replace(REPORT, reason="it is viable all the same"),
     ],
 )
-def test_a_result_that_is_none_is_malformed(result: Report | Evaluation) -> None:
+def test_result_that_breaks_a_rule_is_malformed(result: Report | Evaluation) -> None:
     with pytest.raises(MalformedMessage):
         decode_answer(encode_answer(Answer(1, 2, 0.5, result)))
 
@@ -257,7 +257,7 @@ def test_a_neuron_gene_has_its_parameters(
         decode_genome(message.SerializeToString())
 
 
-def test_a_newer_field_does_no_harm(node: NodeMaker) -> None:
+def test_unknown_fields_are_ignored(node: NodeMaker) -> None:
     robot = develop(node("Core"), BUILT_IN)
     # Field 99, a number.
     assert decode_robot(encode_robot(robot) + b"\x98\x06\x01") == robot
