@@ -6,7 +6,7 @@ not exist is refused with the nearest name that does. What may not change a birt
 """
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import pi
 from typing import Annotated, Literal
 
@@ -102,7 +102,7 @@ class Reevaluation(Section, frozen=True):
     fitness: Literal["replace", "mean"] = "replace"
 
 
-class Selection(Section, frozen=True):
+class Selection(Section, frozen=True, dict=True):
     """Who mates and who lives on (thesis section 5.3).
 
     With ``culling`` the population varies in size, and ``population`` is the number
@@ -120,7 +120,7 @@ class Selection(Section, frozen=True):
     culling: Culling | None = None
     reevaluation: Reevaluation | None = None
 
-    @property
+    @cached_property
     def parents_needed(self) -> int:
         """How many must be there to choose two parents from; 0 if none is chosen."""
         needs = {"tournament": self.tournament_size + 1, "random": 2, "none": 0}
@@ -233,7 +233,7 @@ class Islands(Section, frozen=True):
     migration: Migration | None = None
 
 
-class Experiment(Section, frozen=True):
+class Experiment(Section, frozen=True, dict=True):
     """One experiment; ``births`` counts the initial population.
 
     Without ``islands`` it is one island. With them they are numbered from 0, in the
@@ -254,7 +254,7 @@ class Experiment(Section, frozen=True):
     islands: tuple[Islands, ...] = ()
     migration: Migration | None = None
 
-    @property
+    @cached_property
     def window(self) -> int:
         """Births in flight at once: a whole brood unless the document says less."""
         return self.selection.window or self.selection.children
