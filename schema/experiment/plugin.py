@@ -3,10 +3,11 @@
 There is no registry; the process that runs the code resolves the name.
 """
 
+from difflib import get_close_matches
 from functools import lru_cache
 from importlib import import_module
 
-from schema.errors import ExperimentError, UnknownPlugin, nearest
+from schema.errors import ExperimentError, UnknownPlugin
 
 
 @lru_cache(maxsize=256)
@@ -35,6 +36,7 @@ def load(path: str, where: str) -> object:
         raise ExperimentError(f"{where}: {path!r}: {story}") from error
     if not hasattr(module, attribute):
         names = [name for name in vars(module) if not name.startswith("_")]
-        near = nearest(attribute, names)
-        raise UnknownPlugin(f"{where}: {module_name} has no {attribute!r}{near}")
+        near = get_close_matches(attribute, names, n=1)
+        hint = f"; did you mean '{module_name}:{near[0]}'?" if near else ""
+        raise UnknownPlugin(f"{where}: {module_name} has no {attribute!r}{hint}")
     return getattr(module, attribute)

@@ -218,7 +218,7 @@ def test_part_types_of_users_and_built_in_ones_mix() -> None:
     ("name", "message"),
     [
         ("NOT_A_PART", "is not a PartType"),
-        ("FLIPER", "did you mean 'FLIPPER'"),
+        ("FLIPER", "did you mean 'flippers:FLIPPER'"),
         ('FLIPPER", "flippers:SECOND_FLIPPER', "two part types are named 'Flipper'"),
     ],
 )

@@ -33,7 +33,7 @@ def test_impossible_module_name_is_refused(module: str) -> None:
 
 
 def test_error_names_the_nearest_attribute() -> None:
-    with pytest.raises(UnknownPlugin, match=r"did you mean 'HINGE'"):
+    with pytest.raises(UnknownPlugin, match=r"did you mean 'schema\.parts:HINGE'"):
         load("schema.parts:HINGEE", "key")
 
 
