@@ -65,7 +65,7 @@ class Ended:
     """Event: the coordinator has left the network."""
 
 
-Told = Update | Live | Ended
+LiveMessage = Update | Live | Ended
 
 
 class LiveSource:
@@ -128,7 +128,7 @@ class LiveSource:
         self._waiting.append(message)
         self._has_news.set()
 
-    def receive(self, timeout_s: float, now_s: float) -> list[Told]:
+    def receive(self, timeout_s: float, now_s: float) -> list[LiveMessage]:
         """Return the messages received, in order; request lost ones again.
 
         Args:
@@ -137,7 +137,7 @@ class LiveSource:
         """
         self._has_news.wait(timeout_s)
         self._has_news.clear()
-        told: list[Told] = []
+        messages: list[LiveMessage] = []
         while self._waiting:
             try:
                 each = self._understood(self._waiting.popleft())
@@ -147,13 +147,13 @@ class LiveSource:
                     tell_user(f"dropped a malformed message: {error}")
                 continue
             if each is not None:
-                told.append(each)
+                messages.append(each)
         if self._sequel.is_behind and now_s - self._asked_s >= _ASK_AGAIN_S:
             self._asked_s = now_s
             self._ask()
-        return told
+        return messages
 
-    def _understood(self, message: zenoh.Sample | zenoh.Reply) -> Told | None:
+    def _understood(self, message: zenoh.Sample | zenoh.Reply) -> LiveMessage | None:
         if isinstance(message, zenoh.Reply):
             if message.ok is None:
                 return None

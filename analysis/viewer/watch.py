@@ -8,7 +8,7 @@ import pyarrow as pa
 
 from analysis.progress import ProgressLine
 from analysis.viewer.blueprint import layout
-from analysis.viewer.live import Ended, LiveSource, Told
+from analysis.viewer.live import Ended, LiveMessage, LiveSource
 from analysis.viewer.output import Output, Window, keep_serving
 from analysis.viewer.recording import Recording
 from analysis.viewer.scene import scene_of
@@ -72,7 +72,7 @@ def watch(
 
 def _first(
     source: LiveSource, stop: threading.Event
-) -> tuple[Update | None, list[Told]]:
+) -> tuple[Update | None, list[LiveMessage]]:
     """Wait for the complete state of a run; return it and the messages after it."""
     since_s = time.monotonic()
     has_reported = False
@@ -109,7 +109,7 @@ class LiveView:
         """Number of births on all islands so far."""
         return sum(self._births.values())
 
-    def tell(self, messages: list[Told]) -> None:
+    def tell(self, messages: list[LiveMessage]) -> None:
         """Record messages: births before poses of their robots."""
         news = [each for each in messages if isinstance(each, Update)]
         for one in news:

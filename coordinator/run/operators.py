@@ -69,7 +69,7 @@ class RunOperator:
                 case ListRobots():
                     text = self._list(arena, request.island)
                 case SaveSnapshot():
-                    self._loop.shard_requests.wish_snapshot(request.island)
+                    self._loop.shard_requests.request_snapshot(request.island)
                     text = "the state is saved at the end of the next advance"
                 case action:
                     order = self._order(action, arena)

@@ -154,7 +154,7 @@ class ShardRequests:
             self._numbers[shard], self._islands[number] = number, shard
         self._fleet.advance(self._numbers[shard])
 
-    def wish_snapshot(self, shard: int) -> None:
+    def request_snapshot(self, shard: int) -> None:
         """Have the state stored at the end of the next advance that is assigned."""
         self._past(shard).wants_snapshot = True
 

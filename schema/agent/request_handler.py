@@ -83,7 +83,7 @@ class FairQueue(Generic[T]):
 
 
 @dataclass(slots=True)
-class Tally:
+class ReplyCounts:
     """Counts of an agent's replies.
 
     Attributes:
@@ -116,13 +116,13 @@ class Server:
             request is bad.
         agent: this agent.
         slot: its slot in a pool.
-        tally: counts of its replies.
+        counts: counts of its replies.
     """
 
     compute: Callable[[bytes], bytes]
     agent: Agent
     slot: ProcessSlot = field(default_factory=ProcessSlot)
-    tally: Tally = field(default_factory=Tally)
+    counts: ReplyCounts = field(default_factory=ReplyCounts)
     _epochs: dict[str, int] = field(default_factory=dict)
     _cancelled: dict[Task, None] = field(default_factory=dict)
 
@@ -157,7 +157,7 @@ class Server:
         try:
             task = self._task(pb.Request.FromString(data))
         except DecodeError:
-            self.tally.malformed += 1
+            self.counts.malformed += 1
             return
         self._cancelled[task] = None
         if len(self._cancelled) > _MOST_CANCELLED:
@@ -170,21 +170,21 @@ class Server:
             task = self._task(request)
             if task in self._cancelled:
                 del self._cancelled[task]
-                self.tally.skipped += 1
+                self.counts.skipped += 1
                 return Reply(reason="the job was cancelled")
             with self.slot.doing(task, self.agent.cpu_limit_s):
                 answer = self.compute(data)
         except (UnknownPlugin, PluginDiffers) as error:
-            self.tally.refused += 1
+            self.counts.refused += 1
             return Reply(reason=f"{UNFIT}{error}")
         except RevolveError as error:
-            self.tally.refused += 1
-            self.tally.malformed += isinstance(error, MalformedMessage)
+            self.counts.refused += 1
+            self.counts.malformed += isinstance(error, MalformedMessage)
             return Reply(reason=str(error))
         except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
-            self.tally.refused += 1
+            self.counts.refused += 1
             return Reply(reason=f"{type(error).__name__}: {error}")
-        self.tally.answered += 1
+        self.counts.answered += 1
         return Reply(answer)
 
     def _task(self, request: pb.Request) -> Task:

@@ -17,7 +17,7 @@ import zenoh
 
 from schema.agent.network import Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
-from schema.agent.request_handler import FairQueue, Server, Tally
+from schema.agent.request_handler import FairQueue, ReplyCounts, Server
 from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
@@ -82,7 +82,7 @@ def serve(
     *,
     outlet: Outlet | None = None,
     slot: ProcessSlot = UNSUPERVISED,
-) -> Tally:
+) -> ReplyCounts:
     """Do jobs until stopped; wait for the hub as long as needed.
 
     The current job is finished and the next one dropped: its coordinator gives it to
@@ -114,7 +114,7 @@ def serve(
             _serve_session(session, server, hub, stop)
             if outlet is not None:
                 outlet.lead_to(None)
-    return server.tally
+    return server.counts
 
 
 def own_agent(agent: Agent, index: int) -> Agent:
@@ -150,11 +150,11 @@ def serve_as_process(
     stop_with_parent(stop)
     own = agent if agent.version else own_agent(agent, slot.index)
     say = tell_user if slot.index == 0 else _keep_quiet
-    tally = serve(answer, own, stop, say, outlet=outlet, slot=slot)
-    if tally.refused:
+    counts = serve(answer, own, stop, say, outlet=outlet, slot=slot)
+    if counts.refused:
         tell_user(
-            f"{own.name} refused {tally.refused} requests, "
-            f"{tally.malformed} of them malformed"
+            f"{own.name} refused {counts.refused} requests, "
+            f"{counts.malformed} of them malformed"
         )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from analysis.viewer.live import Ended, Told
+from analysis.viewer.live import Ended, LiveMessage
 from analysis.viewer.output import Output
 from analysis.viewer.watch import LiveView, watch
 from schema.errors import NetworkError
@@ -36,17 +36,17 @@ WHOLE = replace(
 class Source:
     """Returns messages one by one, then stops the viewer."""
 
-    def __init__(self, stop: threading.Event, *messages: Told) -> None:
+    def __init__(self, stop: threading.Event, *messages: LiveMessage) -> None:
         self._messages = list(messages)
         self._stop = stop
 
-    def receive(self, *_: float) -> list[Told]:
+    def receive(self, *_: float) -> list[LiveMessage]:
         if not self._messages:
             self._stop.set()
         return [self._messages.pop(0)] if self._messages else []
 
 
-def seen(file: Path, *messages: Told) -> None:
+def seen(file: Path, *messages: LiveMessage) -> None:
     stop = threading.Event()
     source: Any = Source(stop, *messages)
     watch(source, Output(file, None, has_window=False), None, stop)

@@ -62,7 +62,7 @@ JUDGED = Evaluation(0.25, 0.0, 0.05, 12.0)
 VIABLE = Report(True, "", (), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.1, 1)
 
 
-class Desk:
+class SentRequests:
     """Questions whose jobs are caught, with two workers and an analyzer."""
 
     def __init__(self, evaluation: bytes = b"evaluation", audit: float = 0.0) -> None:
@@ -107,14 +107,16 @@ class Desk:
 
 
 @pytest.fixture
-def desk() -> Desk:
-    return Desk()
+def sent_requests() -> SentRequests:
+    return SentRequests()
 
 
-def test_a_request_carries_the_run_its_settings_and_the_robot(desk: Desk) -> None:
-    desk.requests.send(Vet(BIRTH, 2, ROBOT))
-    desk.requests.send(Evaluate(BIRTH, ROBOT))
-    (vet, judge, vetting), (_, worker, evaluation) = desk.sent
+def test_a_request_carries_the_run_its_settings_and_the_robot(
+    sent_requests: SentRequests,
+) -> None:
+    sent_requests.requests.send(Vet(BIRTH, 2, ROBOT))
+    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
+    (vet, judge, vetting), (_, worker, evaluation) = sent_requests.sent
     assert (judge, worker) == ("judge", "one")
     asked = decode_request(vetting, decode_body)
     assert (asked.run, asked.epoch, asked.number) == ("run", EPOCH, vet)
@@ -124,21 +126,22 @@ def test_a_request_carries_the_run_its_settings_and_the_robot(desk: Desk) -> Non
 
 
 def test_vetting_sends_the_body_and_evaluation_the_whole_robot(
-    desk: Desk,
+    sent_requests: SentRequests,
 ) -> None:
     other = Robot(ROBOT.parts, Brain(ROBOT.brain.neurons))
-    desk.requests.send(Vet(BIRTH, 0, ROBOT))
-    desk.requests.send(Evaluate(BIRTH, ROBOT))
-    desk.requests.send(Evaluate(BIRTH, ROBOT, trial=1))
-    desk.requests.send(Vet(BirthId(0, 8), 0, ROBOT))
+    sent_requests.requests.send(Vet(BIRTH, 0, ROBOT))
+    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
+    sent_requests.requests.send(Evaluate(BIRTH, ROBOT, trial=1))
+    sent_requests.requests.send(Vet(BirthId(0, 8), 0, ROBOT))
     # Of the same birth, and yet not the one that was vetted.
-    desk.requests.send(Evaluate(BirthId(0, 8), other))
-    for number, agent, _ in desk.sent[:2]:
+    sent_requests.requests.send(Evaluate(BirthId(0, 8), other))
+    for number, agent, _ in sent_requests.sent[:2]:
         result = VIABLE if agent == "judge" else JUDGED
         data = encode_answer(Answer(EPOCH, number, 0.5, result))
-        desk.tell(Returned(number, agent, "ok", data))
+        sent_requests.tell(Returned(number, agent, "ok", data))
     sent = {
-        number: pb.Request.FromString(payload).robot for number, _, payload in desk.sent
+        number: pb.Request.FromString(payload).robot
+        for number, _, payload in sent_requests.sent
     }
     body, whole = encode_body(ROBOT), encode_robot(ROBOT)
     assert [sent[number] for number in sorted(sent)] == [
@@ -151,32 +154,33 @@ def test_vetting_sends_the_body_and_evaluation_the_whole_robot(
     assert body != whole
 
 
-def test_noise_depends_on_robot_island_and_trial(desk: Desk) -> None:
+def test_noise_depends_on_robot_island_and_trial(sent_requests: SentRequests) -> None:
     guest = BirthId(3, 9)
     for context in (
         Evaluate(BIRTH, ROBOT),
         Evaluate(guest, ROBOT, trial=4, requester=2),
         Vet(BIRTH, 1, ROBOT),
     ):
-        desk.requests.send(context)
+        sent_requests.requests.send(context)
     found = [
-        decode_request(payload, decode_body).identity for _, _, payload in desk.sent
+        decode_request(payload, decode_body).identity
+        for _, _, payload in sent_requests.sent
     ]
     there = replace(ORIGIN, island=2)
     assert found == [Identity(ORIGIN, BIRTH, 0), Identity(there, guest, 4), NO_IDENTITY]
 
 
 def test_both_jobs_of_a_cross_check_have_the_same_noise() -> None:
-    desk = Desk(audit=1.0)
-    desk.requests.send(Evaluate(BIRTH, ROBOT, trial=1))
-    first, second = (decode_request(payload) for _, _, payload in desk.sent)
+    sent_requests = SentRequests(audit=1.0)
+    sent_requests.requests.send(Evaluate(BIRTH, ROBOT, trial=1))
+    first, second = (decode_request(payload) for _, _, payload in sent_requests.sent)
     assert first.number != second.number
     assert first.identity == second.identity == Identity(ORIGIN, BIRTH, 1)
 
 
-def test_evaluation_names_its_worker_and_platform(desk: Desk) -> None:
-    desk.requests.send(Evaluate(BIRTH, ROBOT))
-    (event,) = desk.tell(desk.reply(JUDGED))
+def test_evaluation_names_its_worker_and_platform(sent_requests: SentRequests) -> None:
+    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
+    (event,) = sent_requests.tell(sent_requests.reply(JUDGED))
     assert isinstance(event, Evaluated)
     assert (event.birth, event.evaluation) == (BIRTH, JUDGED)
     assert event.provenance.agent == "one"
@@ -184,35 +188,37 @@ def test_evaluation_names_its_worker_and_platform(desk: Desk) -> None:
     assert event.provenance.wall_s == 0.5
 
 
-def test_bodies_of_robots_that_are_never_evaluated_are_dropped(desk: Desk) -> None:
+def test_bodies_of_robots_that_are_never_evaluated_are_dropped(
+    sent_requests: SentRequests,
+) -> None:
     """An arena's robots are vetted, born and gone: 3000 of them in a run."""
     for number in range(REMEMBERED + 50):
-        desk.requests.send(Vet(BirthId(0, number), 0, ROBOT))
-        (event,) = desk.tell(desk.reply(VIABLE))
+        sent_requests.requests.send(Vet(BirthId(0, number), 0, ROBOT))
+        (event,) = sent_requests.tell(sent_requests.reply(VIABLE))
         assert isinstance(event, Vetted)
-    assert len(desk.requests._bodies) == REMEMBERED
+    assert len(sent_requests.requests._bodies) == REMEMBERED
 
 
 def test_request_names_its_plugins_with_their_digests() -> None:
-    desk = Desk(
+    sent_requests = SentRequests(
         b'{"fitness":{"function":"plugged:speed"},"space":["schema.parts:CORE"]}'
     )
-    desk.requests.send(Evaluate(BIRTH, ROBOT))
-    sent = pb.Request.FromString(desk.sent[0][2])
+    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
+    sent = pb.Request.FromString(sent_requests.sent[0][2])
     assert sent.plugins == "plugged="  # it is not here
 
 
 @pytest.mark.parametrize("kind", ["evaluate", "vet"])
 def test_robot_that_crashes_three_processes_is_quarantined(
-    desk: Desk, kind: str
+    sent_requests: SentRequests, kind: str
 ) -> None:
     ask = Vet(BIRTH, 2, ROBOT) if kind == "vet" else Evaluate(BIRTH, ROBOT)
-    desk.requests.send(ask)
-    (number, agent, _) = desk.sent[0]
+    sent_requests.requests.send(ask)
+    (number, agent, _) = sent_requests.sent[0]
     of_others = [Died("another", EPOCH, number, "x", "SIGBUS")]
     of_others += [Died("run", EPOCH - 1, number, "x", "SIGBUS")]
     own = [Died("run", EPOCH, number, each, "SIGSEGV") for each in ("a", "b", "c")]
-    told = [desk.tell(event) for event in (*of_others, *own)]
+    told = [sent_requests.tell(event) for event in (*of_others, *own)]
     assert told[:-1] == [[]] * 4
     ((event,),) = told[-1:]
     why = "ended its own process 3 times, by SIGSEGV"
@@ -221,70 +227,80 @@ def test_robot_that_crashes_three_processes_is_quarantined(
     else:
         signed = Provenance("c")
         assert event == EvaluationFailed(BIRTH, f"{QUARANTINED}{why}", signed)
-    assert desk.cancelled == [(number, agent)]
-    assert desk.tell(desk.reply(JUDGED)) == []
+    assert sent_requests.cancelled == [(number, agent)]
+    assert sent_requests.tell(sent_requests.reply(JUDGED)) == []
 
 
-def test_a_failed_simulation_is_a_result(desk: Desk) -> None:
-    desk.requests.send(Evaluate(BIRTH, ROBOT))
-    (event,) = desk.tell(desk.reply("diverged"))
+def test_a_failed_simulation_is_a_result(sent_requests: SentRequests) -> None:
+    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
+    (event,) = sent_requests.tell(sent_requests.reply("diverged"))
     assert isinstance(event, EvaluationFailed)
     assert event.reason == "diverged"
 
 
-def test_vetting_gives_a_report_or_a_failed_attempt(desk: Desk) -> None:
-    desk.requests.send(Vet(BIRTH, 4, ROBOT))
-    assert desk.tell(desk.reply(VIABLE)) == [Vetted(BIRTH, 4, VIABLE)]
-    desk.requests.send(Vet(BIRTH, 5, ROBOT))
+def test_vetting_gives_a_report_or_a_failed_attempt(
+    sent_requests: SentRequests,
+) -> None:
+    sent_requests.requests.send(Vet(BIRTH, 4, ROBOT))
+    assert sent_requests.tell(sent_requests.reply(VIABLE)) == [Vetted(BIRTH, 4, VIABLE)]
+    sent_requests.requests.send(Vet(BIRTH, 5, ROBOT))
     failed = VettingFailed(BIRTH, 5, "no box")
-    assert desk.tell(desk.reply("no box")) == [failed]
+    assert sent_requests.tell(sent_requests.reply("no box")) == [failed]
 
 
-def test_second_answers_and_unknown_answers_change_nothing(desk: Desk) -> None:
-    desk.requests.send(Evaluate(BIRTH, ROBOT))
-    reply = desk.reply(JUDGED)
-    assert len(desk.tell(reply)) == 1
-    assert desk.tell(reply) == []
-    assert desk.tell(Returned(99, "one", "ok", b"")) == []
+def test_second_answers_and_unknown_answers_change_nothing(
+    sent_requests: SentRequests,
+) -> None:
+    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
+    reply = sent_requests.reply(JUDGED)
+    assert len(sent_requests.tell(reply)) == 1
+    assert sent_requests.tell(reply) == []
+    assert sent_requests.tell(Returned(99, "one", "ok", b"")) == []
 
 
 @pytest.mark.parametrize(
     "spoil",
     [
-        lambda desk: desk.reply(JUDGED, epoch=EPOCH - 1),
-        lambda desk: desk.reply(JUDGED, number=41),
-        lambda desk: desk.reply(VIABLE),
-        lambda desk: Returned(desk.sent[-1][0], desk.sent[-1][1], "ok", b"\xff"),
+        lambda sent_requests: sent_requests.reply(JUDGED, epoch=EPOCH - 1),
+        lambda sent_requests: sent_requests.reply(JUDGED, number=41),
+        lambda sent_requests: sent_requests.reply(VIABLE),
+        lambda sent_requests: Returned(
+            sent_requests.sent[-1][0], sent_requests.sent[-1][1], "ok", b"\xff"
+        ),
     ],
     ids=["other epoch", "other job", "a verdict", "no message"],
 )
 def test_malformed_answer_is_counted_and_the_job_goes_to_another_agent(
-    desk: Desk, spoil: Callable[[Desk], Returned]
+    sent_requests: SentRequests, spoil: Callable[[SentRequests], Returned]
 ) -> None:
-    desk.requests.send(Evaluate(BIRTH, ROBOT))
-    assert desk.tell(spoil(desk)) == []
-    assert desk.fleet.dispatch.malformed == 1
-    assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
-    (event,) = desk.tell(desk.reply(JUDGED))
+    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
+    assert sent_requests.tell(spoil(sent_requests)) == []
+    assert sent_requests.fleet.dispatch.malformed == 1
+    assert [agent for _, agent, _ in sent_requests.sent] == ["one", "two"]
+    (event,) = sent_requests.tell(sent_requests.reply(JUDGED))
     assert isinstance(event, Evaluated)
 
 
-def test_lost_job_goes_to_another_agent(desk: Desk) -> None:
-    desk.requests.send(Evaluate(BIRTH, ROBOT))
-    assert desk.tell(Left("one")) == []
-    assert [agent for _, agent, _ in desk.sent] == ["one", "two"]
+def test_lost_job_goes_to_another_agent(sent_requests: SentRequests) -> None:
+    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
+    assert sent_requests.tell(Left("one")) == []
+    assert [agent for _, agent, _ in sent_requests.sent] == ["one", "two"]
 
 
 def test_job_that_several_agents_refuse_stops_the_run(
-    desk: Desk,
+    sent_requests: SentRequests,
 ) -> None:
-    desk.tell(Joined("three", "worker", 1, ""))
-    desk.requests.send(Evaluate(BIRTH, ROBOT))
+    sent_requests.tell(Joined("three", "worker", 1, ""))
+    sent_requests.requests.send(Evaluate(BIRTH, ROBOT))
     for _ in range(2):
-        number, agent, _ = desk.sent[-1]
+        number, agent, _ = sent_requests.sent[-1]
         refusal = Returned(number, agent, "error", reason="no such plug-in")
-        assert desk.tell(refusal) == []
-    number, agent, _ = desk.sent[-1]
+        assert sent_requests.tell(refusal) == []
+    number, agent, _ = sent_requests.sent[-1]
     with pytest.raises(JobRefused, match=r"birth 7.*cannot evaluate.*no such plug-in"):
-        desk.tell(Returned(number, agent, "error", reason="no such plug-in"))
-    assert sorted(agent for _, agent, _ in desk.sent) == ["one", "three", "two"]
+        sent_requests.tell(Returned(number, agent, "error", reason="no such plug-in"))
+    assert sorted(agent for _, agent, _ in sent_requests.sent) == [
+        "one",
+        "three",
+        "two",
+    ]

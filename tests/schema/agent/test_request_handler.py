@@ -26,7 +26,7 @@ def server(compute: Callable[[bytes], bytes] = lambda _: b"answer") -> Server:
 def test_request_gets_its_answer() -> None:
     made = server()
     assert made.reply(request()) == Reply(b"answer")
-    assert (made.tally.answered, made.tally.refused) == (1, 0)
+    assert (made.counts.answered, made.counts.refused) == (1, 0)
 
 
 def test_an_older_epoch_is_fenced() -> None:
@@ -44,7 +44,7 @@ def test_cancelled_job_is_skipped_once() -> None:
     assert made.reply(request(6)) == Reply(b"answer")
     assert made.reply(request(7)).reason == "the job was cancelled"
     assert made.reply(request(7)) == Reply(b"answer")
-    assert (made.tally.skipped, made.tally.malformed) == (1, 1)
+    assert (made.counts.skipped, made.counts.malformed) == (1, 1)
 
 
 def test_number_of_cancelled_jobs_is_limited() -> None:
@@ -73,7 +73,7 @@ def raising(error: Exception) -> Callable[[bytes], bytes]:
 def test_error_is_the_reason_of_the_reply(error: Exception, reason: str) -> None:
     made = server(raising(error))
     assert made.reply(request()) == Reply(reason=reason)
-    assert made.tally.refused == 1
+    assert made.counts.refused == 1
 
 
 def test_agent_without_a_plugin_is_unfit() -> None:
