@@ -18,14 +18,22 @@ pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 
 @pytest.fixture(scope="session")
-def analysed(once: Any, undisturbed: Path, calm: Path) -> tuple[Path, str]:  # noqa: ANN401 - the fixture
+def report_and_output(
+    once: Any,  # noqa: ANN401 - the fixture
+    undisturbed: Path,
+    crowded_arena_run: Path,
+) -> tuple[Path, str]:
     """Return the measures of two off-line runs, an arena and two broken runs.
 
     The off-line runs have one name, and one setting is different.
     """
 
     def make(stage: Stage) -> None:
-        for name, run in (("a", undisturbed), ("b", calm), ("c", undisturbed)):
+        for name, run in (
+            ("a", undisturbed),
+            ("b", crowded_arena_run),
+            ("c", undisturbed),
+        ):
             shutil.copytree(run, stage.folder / "runs" / name)
         shutil.copytree(undisturbed, stage.folder / "runs" / "e")
         details = stage.folder / "runs" / "e" / "run.json"
@@ -43,9 +51,9 @@ def analysed(once: Any, undisturbed: Path, calm: Path) -> tuple[Path, str]:  # n
 
 
 def test_runs_are_measured_and_left_out_runs_are_reported(
-    analysed: tuple[Path, str],
+    report_and_output: tuple[Path, str],
 ) -> None:
-    report, output = analysed
+    report, output = report_and_output
     measures = {path.stem: pq.read_table(path) for path in report.glob("*/*.parquet")}
     assert set(measures) == set(OUTPUTS) - {"between", "migrants"}
     for name, table in measures.items():
@@ -69,18 +77,18 @@ def test_runs_are_measured_and_left_out_runs_are_reported(
 
 
 def test_experiments_of_the_same_name_get_distinct_names(
-    analysed: tuple[Path, str],
+    report_and_output: tuple[Path, str],
 ) -> None:
-    report, output = analysed
+    report, output = report_and_output
     differs = "vetting.tolerance_m: 0.001 instead of 1e-06"
     assert f"scenario1~2: {differs}" in output
     assert differs in (report / "report.html").read_text("utf-8")
 
 
 def test_figures_are_written_or_left_out_with_a_reason(
-    analysed: tuple[Path, str],
+    report_and_output: tuple[Path, str],
 ) -> None:
-    report, output = analysed
+    report, output = report_and_output
     page = (report / "report.html").read_text("utf-8")
     drawn = {path.stem for path in (report / "figures").glob("*.png")}
     assert drawn == {path.stem for path in (report / "figures").glob("*.pdf")}
@@ -97,8 +105,10 @@ def test_figures_are_written_or_left_out_with_a_reason(
     }
 
 
-def test_three_libraries_read_the_same_tables(analysed: tuple[Path, str]) -> None:
-    report, _ = analysed
+def test_three_libraries_read_the_same_tables(
+    report_and_output: tuple[Path, str],
+) -> None:
+    report, _ = report_and_output
     for path in sorted(report.glob("measures/*.parquet")):
         arrow = pq.read_table(path)
         assert pl.read_parquet(path).rows() == [

@@ -16,9 +16,9 @@ Stage = Any
 
 
 def _refused(stage: Stage, *words: str) -> str:
-    said: str = stage.run(*words, code=2)
-    assert len(said.strip().splitlines()) == 1, said
-    return said
+    output: str = stage.run(*words, code=2)
+    assert len(output.strip().splitlines()) == 1, output
+    return output
 
 
 def _document(stage: Stage, text: str) -> str:
@@ -42,9 +42,9 @@ def _document(stage: Stage, text: str) -> str:
     ],
 )
 def test_broken_experiment(stage: Stage, text: str, told: str) -> None:
-    said = _refused(stage, "run", _document(stage, text), "--out", "x", "--quiet")
-    assert "mine.toml" in said or told in said
-    assert told in said
+    output = _refused(stage, "run", _document(stage, text), "--out", "x", "--quiet")
+    assert "mine.toml" in output or told in output
+    assert told in output
     assert not (stage.folder / "x").exists()
 
 
@@ -65,9 +65,9 @@ def test_a_seed_above_64_bits_is_refused(stage: Stage) -> None:
 def test_misspelt_command_and_experiment_get_the_nearest_name(stage: Stage) -> None:
     assert "'resume'" in _refused(stage, "resum", "x")
     assert "'scenario1'" in _refused(stage, "run", "senario1")
-    said = _refused(stage, "run", "thesys")
-    assert "; did you mean 'thesis'?" in said
-    assert "scenario3, thesis, or give a path" in said
+    output = _refused(stage, "run", "thesys")
+    assert "; did you mean 'thesis'?" in output
+    assert "scenario3, thesis, or give a path" in output
 
 
 @pytest.mark.parametrize(
@@ -130,9 +130,9 @@ def _fill_the_disk(stage: Stage, *words: str, kilobytes: int) -> None:
     if subprocess.run(mount, check=False).returncode:
         pytest.skip("a small disk cannot be mounted here")
     try:
-        said = stage.run("run", *words, "--quiet", "--out", "disk/run", code=2)
-        assert "full" in said
-        assert "Traceback" not in said
+        output = stage.run("run", *words, "--quiet", "--out", "disk/run", code=2)
+        assert "full" in output
+        assert "Traceback" not in output
         shutil.copytree(disk / "run", stage.folder / "moved")
     finally:
         subprocess.run(["umount", str(disk)], check=True)
@@ -146,20 +146,20 @@ def test_full_disk_loses_nothing(
     words = ("scenario1", "--seed", "5", "--births", str(births), *flags)
     _fill_the_disk(stage, *words, kilobytes=64)
     stage.run("resume", "moved", "--quiet", *flags)
-    said = stage.run("compare", "moved", str(undisturbed))
-    assert "equal" in said
+    output = stage.run("compare", "moved", str(undisturbed))
+    assert "equal" in output
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
 def test_full_disk_loses_nothing_of_an_arena(
-    hamlet_stage: Stage, quiet_hamlet: Path
+    small_arena_stage: Stage, small_arena_run: Path
 ) -> None:
     flags = ("--in-process", "--threads", "1")
     words = ("hamlet.toml", "--seed", "4", *flags)
-    _fill_the_disk(hamlet_stage, *words, kilobytes=120)
-    hamlet_stage.run("resume", "moved", "--quiet", *flags)
-    said = hamlet_stage.run("compare", "moved", str(quiet_hamlet))
-    assert "equal" in said
+    _fill_the_disk(small_arena_stage, *words, kilobytes=120)
+    small_arena_stage.run("resume", "moved", "--quiet", *flags)
+    output = small_arena_stage.run("compare", "moved", str(small_arena_run))
+    assert "equal" in output
 
 
 def test_a_reader_that_closes_the_pipe_is_no_error(stage: Stage) -> None:

@@ -39,8 +39,8 @@ def test_killed_bridge_resumes_to_the_tables_of_one_process(
     (stage.folder / "short.toml").write_text(SHORT)
     words = ("short.toml", "--seed", "3", "--quiet", "--out")
     stage.run("run", *words, "calm", "--in-process")
-    calm, killed = stage.folder / "calm", stage.folder / "killed"
-    rows = read_table(calm, "evaluations")
+    reference, killed = stage.folder / "calm", stage.folder / "killed"
+    rows = read_table(reference, "evaluations")
     assert rows.filter(pc.greater(rows["trial"], 0)).num_rows >= 6
     lasted = np.array(rows["simulated_s"].drop_null())
     assert lasted.min() >= 2.0
@@ -48,7 +48,7 @@ def test_killed_bridge_resumes_to_the_tables_of_one_process(
     assert len(np.unique(lasted)) > 0.9 * len(lasted)
 
     share = np.random.default_rng(5).uniform(0.5, 0.9)
-    journal, whole = killed / "journal.bin", (calm / "journal.bin").stat().st_size
+    journal, whole = killed / "journal.bin", (reference / "journal.bin").stat().st_size
     first = stage.start("run", *words, "killed", "--workers", "2")
     until(
         lambda: (
@@ -60,4 +60,4 @@ def test_killed_bridge_resumes_to_the_tables_of_one_process(
     first.send_signal(signal.SIGKILL)
     first.wait()
     stage.run("resume", "killed", "--workers", "2", "--quiet")
-    assert compare(calm, killed) == []
+    assert compare(reference, killed) == []

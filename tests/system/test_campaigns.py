@@ -95,10 +95,10 @@ def test_a_killed_campaign_resumes_and_adopts_existing_runs(
     first.send_signal(signal.SIGKILL)
     first.communicate()
     assert "stopped" in stage.run("status", "campaign")
-    said = stage.run("resume", "campaign", "--workers", "1", "--quiet")
-    assert "4 runs are finished" in said
+    output = stage.run("resume", "campaign", "--workers", "1", "--quiet")
+    assert "4 runs are finished" in output
     assert (
-        "keeps its own number of births" not in said
+        "keeps its own number of births" not in output
     )  # it has as many births as the others
     _check_equal(whole, campaign)
     assert taken.stat().st_mtime_ns == before
@@ -184,6 +184,6 @@ def test_status_of_all_coordinators_of_a_hub(stage: Stage, until: Until) -> None
 def test_errors_are_one_line(
     stage: Stage, words: tuple[str, ...], complaint: str
 ) -> None:
-    said = stage.run(*words, code=2)
-    assert complaint in said
-    assert len(said.strip().splitlines()) == 1
+    output = stage.run(*words, code=2)
+    assert complaint in output
+    assert len(output.strip().splitlines()) == 1

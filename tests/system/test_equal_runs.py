@@ -114,9 +114,9 @@ def test_second_coordinator_is_refused_with_the_holder(
         "coordinator", *_words(births, "held"), "--listen", "tcp/127.0.0.1:0"
     )
     until((folder / "address").exists, "the coordinator listens")
-    said = stage.run("resume", "held", "--quiet", code=2)
-    assert str(first.pid) in said
-    assert len(said.strip().splitlines()) == 1
+    output = stage.run("resume", "held", "--quiet", code=2)
+    assert str(first.pid) in output
+    assert len(output.strip().splitlines()) == 1
 
 
 def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(

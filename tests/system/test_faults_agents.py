@@ -30,7 +30,7 @@ pytestmark = [
 Stage = Any
 Fleets = Callable[..., Any]
 ROOT = Path(__file__).parents[2]
-ODD_AGENT = Path(__file__).with_name("odd_agent.py")
+MISBEHAVING_AGENT = Path(__file__).with_name("misbehaving_agent.py")
 
 
 def whole(folder: Path) -> int:
@@ -42,7 +42,7 @@ def singles(births: int) -> tuple[str, ...]:
     return ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
 
 
-HAMLET = ("hamlet.toml", "--seed", "4", "--speed", "10", "--quiet")
+SMALL_ARENA = ("hamlet.toml", "--seed", "4", "--speed", "10", "--quiet")
 
 
 def freeze_and_finish(fleet: Fleet, frozen: int, quiet: Path, seed: int) -> None:
@@ -68,14 +68,14 @@ def test_a_worker_is_frozen_and_comes_back(
 
 @pytest.mark.slow
 def test_the_holder_of_an_arena_is_frozen_and_comes_back(
-    hamlet_stage: Stage, quiet_hamlet: Path, fleet_of: Fleets
+    small_arena_stage: Stage, small_arena_run: Path, fleet_of: Fleets
 ) -> None:
-    fleet = fleet_of(hamlet_stage, *HAMLET)
+    fleet = fleet_of(small_arena_stage, *SMALL_ARENA)
     # The first by name is the holder.
     frozen = fleet.join("one")
     fleet.join("two")
     fleet.begin(workers=2)
-    freeze_and_finish(fleet, frozen, quiet_hamlet, seed=22)
+    freeze_and_finish(fleet, frozen, small_arena_run, seed=22)
     with Journal.open(fleet.folder) as journal:
         events = journal.replay()
     holders = {
@@ -134,18 +134,18 @@ def test_answers_come_twice_or_late(
 ) -> None:
     fleet = fleet_of(stage, *singles(births))
     fleet.join("one")
-    command = [sys.executable, str(ODD_AGENT), fleet.address, behaviour]
+    command = [sys.executable, str(MISBEHAVING_AGENT), fleet.address, behaviour]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, text=True
-    ) as odd:
+    ) as agent_process:
         try:
             fleet.begin(workers=2)
             fleet.finish()
         finally:
-            odd.terminate()
-        assert odd.stdout is not None
-        did = odd.stdout.read().split()
+            agent_process.terminate()
+        assert agent_process.stdout is not None
+        did = agent_process.stdout.read().split()
     assert did[0] == behaviour
     assert int(did[1]) > 0
     assert compare(undisturbed, fleet.folder) == []

@@ -30,7 +30,7 @@ Stage = Any
 Fleets = Callable[..., Any]
 PATIENCE_S = 120
 ROOT = Path(__file__).parents[2]
-MORTAL = Path(__file__).with_name("mortal.py")
+KILLABLE = Path(__file__).with_name("killable.py")
 
 SINGLES = """
 name = "singles"
@@ -46,13 +46,13 @@ window_steps = 400
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "kills", "seed"), [("off", 40, 41), ("on", 20, 42)])
 def test_killed_at_any_point(
-    tmp_path: Path, hamlet_document: str, kind: str, kills: int, seed: int
+    tmp_path: Path, small_arena_document: str, kind: str, kills: int, seed: int
 ) -> None:
     """Sixty instants in all, drawn over lives that last up to half a run."""
-    document = SINGLES if kind == "off" else hamlet_document
+    document = SINGLES if kind == "off" else small_arena_document
     (tmp_path / "mine.toml").write_text(document)
     done = subprocess.run(
-        [sys.executable, str(MORTAL), "mine.toml", str(kills), str(seed)],
+        [sys.executable, str(KILLABLE), "mine.toml", str(kills), str(seed)],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
@@ -87,9 +87,9 @@ def test_one_that_sleeps_still_holds_its_run(
     stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:
     fleet = frozen(stage, fleet_of, undisturbed, births)
-    said = stage.run("resume", "run", "--quiet", code=2)
-    assert f"in use by process {fleet.coordinator.pid} on " in said
-    assert len(said.strip().splitlines()) == 1
+    output = stage.run("resume", "run", "--quiet", code=2)
+    assert f"in use by process {fleet.coordinator.pid} on " in output
+    assert len(output.strip().splitlines()) == 1
     fleet.coordinator.send_signal(signal.SIGCONT)
     fleet.finish()
     assert compare(undisturbed, fleet.folder) == []
@@ -114,6 +114,6 @@ def test_one_that_wakes_up_replaced_stops_and_writes_nothing(
     assert fleet.coordinator.returncode == 2, err
     assert "coordinator 2 has taken it over" in err
     assert "Traceback" not in err
-    said = second.communicate(timeout=PATIENCE_S)
-    assert second.returncode == 0, said
+    output = second.communicate(timeout=PATIENCE_S)
+    assert second.returncode == 0, output
     assert compare(undisturbed, fleet.folder) == []

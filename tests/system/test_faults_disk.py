@@ -43,8 +43,8 @@ def test_a_journal_that_is_cut(stage: Stage, undisturbed: Path, half: Path) -> N
     size = half.stat().st_size
     with half.open("r+b") as file:
         file.truncate(size - int(np.random.default_rng(51).integers(1, 60)))
-    said = stage.run("resume", "run", "--in-process", "--quiet")
-    assert re.search(r"dropped a cut record of \d+ bytes", said)
+    output = stage.run("resume", "run", "--in-process", "--quiet")
+    assert re.search(r"dropped a cut record of \d+ bytes", output)
     assert compare(undisturbed, half.parent) == []
 
 
@@ -53,9 +53,9 @@ def test_a_journal_that_is_damaged(stage: Stage, undisturbed: Path, half: Path) 
     place = int(np.random.default_rng(52).integers(len(data) // 4, len(data) // 2))
     data[place] ^= 0xFF
     half.write_bytes(data)
-    said = stage.run("resume", "run", "--in-process", "--quiet", code=2)
-    assert "Traceback" not in said
-    told = re.search(r"damaged at byte (\d+) .*\('(truncate -s \1 [^']+)'\)", said)
+    output = stage.run("resume", "run", "--in-process", "--quiet", code=2)
+    assert "Traceback" not in output
+    told = re.search(r"damaged at byte (\d+) .*\('(truncate -s \1 [^']+)'\)", output)
     assert told is not None
     assert int(told[1]) <= place
     subprocess.run(shlex.split(told[2]), cwd=stage.folder, check=True)

@@ -81,14 +81,14 @@ def test_what_ends_its_process_three_times_is_quarantined(
 ) -> None:
     harm, cause = HARMS[kind]
     plug(stage, harm)
-    said = stage.run("run", *WORDS, "--workers", "2", "--out", "run")
+    output = stage.run("run", *WORDS, "--workers", "2", "--out", "run")
     failed = reasons(stage.folder / "run")
     assert 1 <= len(failed) <= 3
     assert set(failed.values()) == {f"{QUARANTINED}{cause}"}
     births = read_table(stage.folder / "run", "births")
     assert births.num_rows == 16
     for birth in failed:
-        assert f"birth {birth} of island 0: {QUARANTINED}{cause}" in said
+        assert f"birth {birth} of island 0: {QUARANTINED}{cause}" in output
 
 
 def test_deaths_by_others_hands_count_for_nothing(stage: Stage, until: Until) -> None:
@@ -115,11 +115,11 @@ def test_a_quarantine_pauses_a_run_that_wants_it_and_resume_goes_on(
     stage.run("run", *WORDS, "--workers", "2", "--out", "through")
     through = stage.folder / "through"
     words = (*WORDS[1:], "--on-quarantine", "pause")
-    said = stage.run(
+    output = stage.run(
         "run", "harm.toml", *words, "--workers", "2", "--out", "run", code=2
     )
-    assert "quarantined" in said
-    assert "resume to go on without it" in said
+    assert "quarantined" in output
+    assert "resume to go on without it" in output
     for _ in reasons(through):
         again = stage.start("resume", "run", "--workers", "2", *words[2:])
         if again.wait(120) == 0:

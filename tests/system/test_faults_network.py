@@ -133,11 +133,11 @@ def test_a_worker_is_cut_off_and_comes_back(
 
 
 def test_an_arena_moves_when_its_holder_is_cut_off(
-    hamlet_stage: Stage, quiet_hamlet: Path, distant: Distant
+    small_arena_stage: Stage, small_arena_run: Path, distant: Distant
 ) -> None:
     words = ("hamlet.toml", "--seed", "4", "--speed", "10", "--quiet")
-    fleet, flags = distant.fleet(hamlet_stage, *words)
-    whole = (quiet_hamlet / NAME).stat().st_size
+    fleet, flags = distant.fleet(small_arena_stage, *words)
+    whole = (small_arena_run / NAME).stat().st_size
     share = np.random.default_rng(32).uniform(0.1, 0.5)
     fleet.join("judge", "analyzer", *flags, inside=distant.cable.near)
     fleet.wait_for(share * whole)
@@ -146,7 +146,7 @@ def test_an_arena_moves_when_its_holder_is_cut_off(
     fleet.wait_for((share + 0.3) * whole)
     distant.cable.heal()
     fleet.finish()
-    assert compare(quiet_hamlet, fleet.folder) == []
+    assert compare(small_arena_run, fleet.folder) == []
     with Journal.open(fleet.folder) as journal:
         events = journal.replay()
     advances = [event for event in events if isinstance(event, Advanced)]

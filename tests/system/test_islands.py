@@ -92,7 +92,7 @@ class Play:
         self.stage, self.until, self.name = stage, until, name
         (stage.folder / f"{name}.toml").write_text(text, encoding="utf-8")
         stage.run("run", *words(name, "calm"), "--workers", "1")
-        self.calm = stage.folder / "calm"
+        self.reference = stage.folder / "calm"
 
     def resumed(self, out: str, share: float, *, workers: int) -> list[str]:
         """Kill a coordinator on its way; return what differs after its resume."""
@@ -100,13 +100,15 @@ class Play:
         count = "--workers", str(workers)
         first = self.stage.start("run", *words(self.name, out), *count)
         self.until(
-            lambda: size(folder) > share * size(self.calm) or first.poll() is not None,
+            lambda: (
+                size(folder) > share * size(self.reference) or first.poll() is not None
+            ),
             "the run is on its way",
         )
         first.kill()
         first.wait()
         self.stage.run("resume", out, "--quiet", "--workers", str(4 - workers))
-        return compare(self.calm, folder)
+        return compare(self.reference, folder)
 
     def bereft(self, out: str, shares: Iterator[float], *, workers: int) -> list[str]:
         """Kill all workers but one, one by one; return what differs at the end."""
@@ -123,7 +125,7 @@ class Play:
         for one, share in zip(process_pool[1:], shares, strict=False):
             self.until(
                 lambda share=share: (  # type: ignore[misc]
-                    size(folder) > share * size(self.calm)
+                    size(folder) > share * size(self.reference)
                     or coordinator.poll() is not None
                 ),
                 "the run is on its way",
@@ -135,7 +137,7 @@ class Play:
                 os.kill(int(pid), signal.SIGKILL)
         self.until(lambda: coordinator.poll() is not None, "the run ends")
         assert coordinator.returncode == 0, coordinator.communicate()
-        return compare(self.calm, folder)
+        return compare(self.reference, folder)
 
 
 def test_a_ring_of_eight_islands_gives_five_equal_runs(
@@ -143,13 +145,13 @@ def test_a_ring_of_eight_islands_gives_five_equal_runs(
 ) -> None:
     play = Play(stage, until, "ring", RING)
     draws = np.random.default_rng(7)
-    assert read_table(play.calm, "migrations").num_rows == 8 * 2 * 2
+    assert read_table(play.reference, "migrations").num_rows == 8 * 2 * 2
     assert play.resumed("two", draws.uniform(0.1, 0.5), workers=2) == []
     assert play.resumed("one", draws.uniform(0.5, 0.9), workers=1) == []
     shares = iter(sorted(draws.uniform(0.1, 0.9, 2)))
     assert play.bereft("three", shares, workers=3) == []
     stage.run("run", *words("ring", "three-calm"), "--workers", "3")
-    assert compare(play.calm, stage.folder / "three-calm") == []
+    assert compare(play.reference, stage.folder / "three-calm") == []
 
 
 def test_two_arenas_outlive_a_worker_and_a_coordinator(
@@ -157,11 +159,11 @@ def test_two_arenas_outlive_a_worker_and_a_coordinator(
 ) -> None:
     play = Play(stage, until, "arenas", ARENAS)
     draws = np.random.default_rng(8)
-    moved = read_table(play.calm, "migrations")
+    moved = read_table(play.reference, "migrations")
     assert moved.num_rows > 2
-    deaths = read_table(play.calm, "deaths")["reason"].to_pylist()
+    deaths = read_table(play.reference, "deaths")["reason"].to_pylist()
     assert deaths.count("migrated") == moved.num_rows
-    abroad = read_table(play.calm, "poses")["birth_island"].drop_null()
+    abroad = read_table(play.reference, "poses")["birth_island"].drop_null()
     assert len(abroad)
     assert play.bereft("bereft", iter([draws.uniform(0.2, 0.8)]), workers=2) == []
     assert play.resumed("resumed", draws.uniform(0.2, 0.8), workers=2) == []
@@ -169,9 +171,9 @@ def test_two_arenas_outlive_a_worker_and_a_coordinator(
 
 def test_an_off_line_island_and_an_arena(stage: Stage, until: Until) -> None:
     play = Play(stage, until, "mixed", MIXED)
-    judged = read_table(play.calm, "evaluations")["birth_island"].drop_null()
+    judged = read_table(play.reference, "evaluations")["birth_island"].drop_null()
     assert set(judged.to_pylist()) == {1}
-    lived = read_table(play.calm, "fitness")["birth_island"].drop_null()
+    lived = read_table(play.reference, "fitness")["birth_island"].drop_null()
     assert set(lived.to_pylist()) == {0}
     share = np.random.default_rng(9).uniform(0.3, 0.7)
     assert play.resumed("resumed", share, workers=2) == []

@@ -90,12 +90,12 @@ def platform(found: dict[str, pa.Table]) -> str:
 
 def births_said(status: str, name: str) -> int:
     """Return how many births ``revolve status`` counts in a run."""
-    (said,) = {
+    (output,) = {
         int(births)
         for births, wanted in re.findall(r"(\d+) of (\d+)", status)
         if int(wanted) == BIRTHS[name]
     }
-    return said
+    return output
 
 
 @pytest.fixture(scope="session")
@@ -223,8 +223,8 @@ def test_documents_run(stage: Stage, name: str) -> None:
 def test_a_robot_of_before_is_judged_by_the_function_that_its_file_names(
     stage: Stage,
 ) -> None:
-    said = stage.run("robot", "simulate", str(DOCUMENTS / "fitness.xml"))
-    assert "fitness:" in said
+    output = stage.run("robot", "simulate", str(DOCUMENTS / "fitness.xml"))
+    assert "fitness:" in output
 
 
 def test_documents_name_what_recorded_ones_may_name() -> None:

@@ -42,9 +42,9 @@ def test_ctrl_c_pressed_twice_while_processes_start(
     os.killpg(process.pid, signal.SIGINT)
     time.sleep(0.1)  # as a finger does; nothing is waited for
     os.killpg(process.pid, signal.SIGINT)
-    _, said = process.communicate(timeout=60)
-    assert "Traceback" not in said
-    assert f"stopped; to resume: revolve resume {run}" in said
+    _, output = process.communicate(timeout=60)
+    assert "Traceback" not in output
+    assert f"stopped; to resume: revolve resume {run}" in output
     assert process.returncode == 130
 
 

@@ -114,17 +114,17 @@ def check_curves(file: Path, folder: Path) -> None:
 
 
 @pytest.fixture(scope="session")
-def replayed(once: Any, quiet_hamlet: Path) -> Path:  # noqa: ANN401 - the fixture
+def replayed(once: Any, small_arena_run: Path) -> Path:  # noqa: ANN401 - the fixture
     """Return a recording of a run's tables."""
-    words = ("view", str(quiet_hamlet), "--save", "run.rrd")
+    words = ("view", str(small_arena_run), "--save", "run.rrd")
     folder: Path = once("replay", lambda stage: stage.run(*words))
     return folder / "run.rrd"
 
 
 def test_a_replay_has_each_pose_of_each_robot(
-    replayed: Path, quiet_hamlet: Path
+    replayed: Path, small_arena_run: Path
 ) -> None:
-    table = read_table(quiet_hamlet, "poses")
+    table = read_table(small_arena_run, "poses")
     for number in sorted(set(table["birth"].to_pylist())):
         rows = table.filter(pc.field("birth") == number)
         shown = poses(replayed, f"/islands/0/robots/0-{number}")
@@ -140,15 +140,15 @@ def test_a_replay_has_each_pose_of_each_robot(
 
 
 def test_dead_robots_are_cleared_at_their_death(
-    replayed: Path, quiet_hamlet: Path
+    replayed: Path, small_arena_run: Path
 ) -> None:
     deaths = {
         row["birth"]: nanoseconds(row["sim_time_s"])
-        for row in read_table(quiet_hamlet, "deaths").to_pylist()
+        for row in read_table(small_arena_run, "deaths").to_pylist()
     }
     assert deaths
     robots = [path for path in paths(replayed) if "/robots/" in path]
-    assert len(robots) == read_table(quiet_hamlet, "births").num_rows
+    assert len(robots) == read_table(small_arena_run, "births").num_rows
     for path in robots:
         number = int(path.rpartition("-")[2])
         if number in deaths:
@@ -174,30 +174,30 @@ def test_boxes_are_logged_with_the_first_pose(replayed: Path) -> None:
 
 
 def test_curves_of_a_replay_equal_the_tables(
-    replayed: Path, quiet_hamlet: Path
+    replayed: Path, small_arena_run: Path
 ) -> None:
-    check_curves(replayed, quiet_hamlet)
+    check_curves(replayed, small_arena_run)
 
 
 def test_the_log_contains_each_birth_and_death(
-    replayed: Path, quiet_hamlet: Path
+    replayed: Path, small_arena_run: Path
 ) -> None:
     lines = [
         line.as_py()[0]
         for batch, _ in batches(replayed, "/log")
         for line in batch["TextLog:text"]
     ]
-    births = read_table(quiet_hamlet, "births").num_rows
-    deaths = read_table(quiet_hamlet, "deaths").num_rows
+    births = read_table(small_arena_run, "births").num_rows
+    deaths = read_table(small_arena_run, "deaths").num_rows
     assert sum("is born" in line for line in lines) == births
     assert sum("is gone" in line for line in lines) == deaths
 
 
 def test_viewers_receive_everything_and_do_not_change_the_run(
-    hamlet_stage: Stage, quiet_hamlet: Path, fleet_of: Fleet, until: Until
+    small_arena_stage: Stage, small_arena_run: Path, fleet_of: Fleet, until: Until
 ) -> None:
     """One viewer sees all of a run; one is killed, one frozen while it lives."""
-    stage = hamlet_stage
+    stage = small_arena_stage
     fleet = fleet_of(stage, *WORDS, "--speed", "10")
     viewers = {}
     for name in ("whole", "killed", "frozen"):
@@ -207,12 +207,12 @@ def test_viewers_receive_everything_and_do_not_change_the_run(
         until(file.exists, f"the viewer {name} has received the run")
     fleet.join("w", "worker")
     fleet.begin(1)
-    fleet.wait_for(0.4 * (quiet_hamlet / NAME).stat().st_size)
+    fleet.wait_for(0.4 * (small_arena_run / NAME).stat().st_size)
     assert not fleet.is_over
     viewers["killed"].kill()
     viewers["frozen"].send_signal(signal.SIGSTOP)
     fleet.finish()
-    assert not compare(fleet.folder, quiet_hamlet)
+    assert not compare(fleet.folder, small_arena_run)
     out, err = viewers["whole"].communicate(timeout=60)
     assert viewers["whole"].returncode == 0, out + err
     assert "the run has ended" in err
@@ -225,13 +225,13 @@ def test_viewers_receive_everything_and_do_not_change_the_run(
 
 
 def test_a_resimulated_robot_of_an_arena_moves_as_recorded(
-    stage: Stage, quiet_hamlet: Path
+    stage: Stage, small_arena_run: Path
 ) -> None:
-    words = ("view", str(quiet_hamlet), "--robot", "0:3", "--robot", "best")
+    words = ("view", str(small_arena_run), "--robot", "0:3", "--robot", "best")
     out = stage.run(*words, "--save", "again.rrd")
     assert "0:3: moves as recorded, equal to the last bit" in out
     again = poses(stage.folder / "again.rrd", "/motion/0-3")
-    table = read_table(quiet_hamlet, "poses").filter(pc.field("birth") == 3)
+    table = read_table(small_arena_run, "poses").filter(pc.field("birth") == 3)
     # Brains tick more often than poses are recorded.
     assert len(again) > 1.5 * table.num_rows
 

@@ -114,24 +114,27 @@ def _hue(colour: Floats) -> Floats:
 
 
 def test_a_replay_shows_robots_where_they_were(
-    viewer: ViewerClient, stage: Stage, quiet_hamlet: Path
+    viewer: ViewerClient, stage: Stage, small_arena_run: Path
 ) -> None:
-    stage.run("view", str(quiet_hamlet), "--save", "run.rrd")
+    stage.run("view", str(small_arena_run), "--save", "run.rrd")
     picture = look(viewer, str(stage.folder / "run.rrd"))
-    check_robots(picture, quiet_hamlet)
+    check_robots(picture, small_arena_run)
     # Robots on the wrong side are noticed.
     with pytest.raises(AssertionError):
-        check_robots(picture[:, ::-1], quiet_hamlet)
+        check_robots(picture[:, ::-1], small_arena_run)
 
 
 def test_a_live_view_shows_robots_where_they_are(
-    viewer: ViewerClient, hamlet_stage: Stage, fleet_of: Fleet, until: Until
+    viewer: ViewerClient, small_arena_stage: Stage, fleet_of: Fleet, until: Until
 ) -> None:
-    fleet = fleet_of(hamlet_stage, "hamlet.toml", "--seed", "4", "--quiet")
+    fleet = fleet_of(small_arena_stage, "hamlet.toml", "--seed", "4", "--quiet")
     served = f"127.0.0.1:{free_port()}"
     words = ("--serve", served, "--save", "live.rrd")
-    hamlet_stage.start("view", "--connect", fleet.address, *words)
-    until((hamlet_stage.folder / "live.rrd").exists, "the viewer has received the run")
+    small_arena_stage.start("view", "--connect", fleet.address, *words)
+    until(
+        (small_arena_stage.folder / "live.rrd").exists,
+        "the viewer has received the run",
+    )
     fleet.join("w", "worker")
     fleet.begin(1)
     fleet.finish()
@@ -139,6 +142,6 @@ def test_a_live_view_shows_robots_where_they_are(
     check_robots(picture, fleet.folder)
 
 
-def test_a_wrong_picture_fails_the_check(quiet_hamlet: Path) -> None:
+def test_a_wrong_picture_fails_the_check(small_arena_run: Path) -> None:
     with pytest.raises(AssertionError):
-        check_robots(np.full((900, 1200, 3), 246.0), quiet_hamlet)
+        check_robots(np.full((900, 1200, 3), 246.0), small_arena_run)

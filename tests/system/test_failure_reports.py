@@ -72,29 +72,29 @@ def _write(stage: Stage, name: str, fitness: str) -> str:
 
 
 def _run(stage: Stage, *words: str, code: int = 0) -> str:
-    said: str = stage.run("run", *words, "--in-process", "--quiet", code=code)
-    return said
+    output: str = stage.run("run", *words, "--in-process", "--quiet", code=code)
+    return output
 
 
 def test_a_run_without_any_fitness_names_no_best_robot(stage: Stage) -> None:
     source = _write(stage, "blind", "judge:none")
-    said = _run(stage, source, "--out", "a b", code=1)
-    assert "12 births; no robot of the last population has a fitness" in said
-    assert "12 of 12 evaluations failed, all: " in said
-    assert "nobody looked" in said
-    assert "best robot" not in said
+    output = _run(stage, source, "--out", "a b", code=1)
+    assert "12 births; no robot of the last population has a fitness" in output
+    assert "12 of 12 evaluations failed, all: " in output
+    assert "nobody looked" in output
+    assert "best robot" not in output
     assert not (stage.folder / "a b" / "best.yaml").exists()
-    assert "revolve view 'a b'" in said
+    assert "revolve view 'a b'" in output
     assert "best -" in stage.run("status", "a b")
 
 
 def test_a_run_reports_failed_evaluations_and_the_reason(stage: Stage) -> None:
-    said = _run(stage, _write(stage, "dim", "judge:few"), "--out", "a")
-    failed = [line for line in said.splitlines() if "evaluations failed" in line]
+    output = _run(stage, _write(stage, "dim", "judge:few"), "--out", "a")
+    failed = [line for line in output.splitlines() if "evaluations failed" in line]
     assert len(failed) == 1
     assert "too fast to see" in failed[0]
     assert "of 12 evaluations failed, all: " in failed[0]
-    assert "best robot: birth " in said
+    assert "best robot: birth " in output
     assert (stage.folder / "a" / "best.yaml").exists()
 
 
@@ -103,10 +103,10 @@ def test_a_campaign_reports_runs_without_any_fitness(stage: Stage) -> None:
         _write(stage, "blind", "judge:none"),
         _write(stage, "seeing", "worker.fitness:thesis"),
     ]
-    said = _run(stage, *sources, "--out", "both", code=1)
-    assert "both/blind-0: 12 of 12 evaluations failed, all: " in said
-    assert "seeing-0" not in said
-    assert "2 runs are finished" in said
+    output = _run(stage, *sources, "--out", "both", code=1)
+    assert "both/blind-0: 12 of 12 evaluations failed, all: " in output
+    assert "seeing-0" not in output
+    assert "2 runs are finished" in output
     again = stage.run("resume", "both", "--in-process", "--quiet", code=1)
     assert "2 of 2 runs are already finished" in again
     # A campaign of one run has a reason to tell, too.
@@ -136,14 +136,14 @@ def test_a_damaged_run_does_not_hide_others(stage: Stage, made: Path) -> None:
     twice = stage.folder / "all" / "twice"
     told = "seeing-0/run.json: cannot be read: Object missing required field `name`"
     (twice / "seeing-0" / "run.json").write_text("{}")
-    said = stage.run("status", "all", code=1)
-    assert f"damaged: all/twice/{told}" in said
-    assert "1 of 2 runs finished" in said
-    assert "twice/seeing-0  damaged" in said
+    output = stage.run("status", "all", code=1)
+    assert f"damaged: all/twice/{told}" in output
+    assert "1 of 2 runs finished" in output
+    assert "twice/seeing-0  damaged" in output
     # The other one is begun anew: the damaged one keeps it from nothing.
     shutil.rmtree(twice / "seeing-1")
-    said = stage.run("resume", "all/twice", "--in-process", "--quiet", code=1)
-    assert f"seeing-0 failed: all/twice/{told}" in said
+    output = stage.run("resume", "all/twice", "--in-process", "--quiet", code=1)
+    assert f"seeing-0 failed: all/twice/{told}" in output
     assert read_state(twice / "seeing-1") == "finished"
     assert compare(twice / "seeing-1", made / "twice" / "seeing-1") == []
 
@@ -177,11 +177,11 @@ def test_a_narrow_terminal_does_not_cut_the_status(
 ) -> None:
     monkeypatch.setenv("COLUMNS", "40")
     assert status(["status", str(made)]) == 0
-    said = capsys.readouterr().out
-    assert "2 of 2 runs finished, 24 of 24 births" in said
-    assert "no coordinator is running" not in said
+    output = capsys.readouterr().out
+    assert "2 of 2 runs finished, 24 of 24 births" in output
+    assert "no coordinator is running" not in output
     for name in ("twice/seeing-0", "twice/seeing-1"):
-        (line,) = [line for line in said.splitlines() if name in line]
+        (line,) = [line for line in output.splitlines() if name in line]
         assert line.split()[1:6] == ["finished", "12", "of", "12", "best"]
 
 
@@ -191,9 +191,9 @@ def test_missing_tables_are_written_again(stage: Stage, made: Path) -> None:
     words = ("resume", "run", "--in-process", "--quiet")
     assert "already finished" in stage.run(*words)
     shutil.rmtree(run / "tables")
-    said = stage.run(*words)
-    assert "tables are missing; writing them again from the journal" in said
-    assert "12 births" in said
+    output = stage.run(*words)
+    assert "tables are missing; writing them again from the journal" in output
+    assert "12 births" in output
     assert compare(run, made / "twice" / "seeing-0") == []
 
 
@@ -228,11 +228,11 @@ def test_a_refusal_changes_nothing(stage: Stage, made: Path) -> None:
     journal = bytearray((run / "journal.bin").read_bytes())
     journal[40] ^= 1
     (run / "journal.bin").write_bytes(journal)
-    said = stage.run("resume", "run", "--in-process", "--quiet", code=2)
-    assert "journal.bin: damaged at byte" in said
+    output = stage.run("resume", "run", "--in-process", "--quiet", code=2)
+    assert "journal.bin: damaged at byte" in output
     (run / "journal.bin").unlink()
-    said = stage.run("resume", "run", "--in-process", "--quiet", code=2)
-    assert "journal.bin: is lost" in said
+    output = stage.run("resume", "run", "--in-process", "--quiet", code=2)
+    assert "journal.bin: is lost" in output
     assert [path.name for path in (run / "segments").iterdir()] == ["births-001.arrows"]
 
 
@@ -262,18 +262,18 @@ def test_status_follows_a_link_to_a_run(
     (tmp_path / "stranger" / "run.json").write_text('{"name": "not ours"}')
     (tmp_path / "again").symlink_to(tmp_path)
     assert status(["status", str(tmp_path)]) == 0
-    said = capsys.readouterr().out
-    assert "1 of 1 runs finished, 12 of 12 births" in said
+    output = capsys.readouterr().out
+    assert "1 of 1 runs finished, 12 of 12 births" in output
 
 
 def test_an_arena_without_any_fitness_reports_the_reason(stage: Stage) -> None:
     (stage.folder / "judge.py").write_text(FITNESS)
     text = ARENA.format(fitness="judge:none")
     (stage.folder / "arena.toml").write_text(text)
-    said = _run(stage, "arena.toml", "--out", "a", code=1)
-    assert "too few robots are left to mate" in said
-    assert "deaths were failures, all: " in said
-    assert "nobody looked" in said
+    output = _run(stage, "arena.toml", "--out", "a", code=1)
+    assert "too few robots are left to mate" in output
+    assert "deaths were failures, all: " in output
+    assert "nobody looked" in output
     assert "already finished" in stage.run("resume", "a", "--in-process", code=1)
 
 
@@ -283,8 +283,8 @@ def test_a_wrong_address_leaves_the_folder_usable(
 ) -> None:
     source = _write(stage, "seeing", "worker.fitness:thesis")
     words = ("run", source, *repeats, "--out", "new", "--quiet")
-    said = stage.run(*words, "--connect", "tcp/127.0.0.1:1", code=2)
-    assert "no hub at tcp/127.0.0.1:1" in said
+    output = stage.run(*words, "--connect", "tcp/127.0.0.1:1", code=2)
+    assert "no hub at tcp/127.0.0.1:1" in output
     stage.run(*words, "--in-process")
 
 
@@ -292,8 +292,8 @@ def test_a_folder_with_foreign_files_gets_no_lock(stage: Stage) -> None:
     (stage.folder / "mine").mkdir()
     (stage.folder / "mine" / "thesis.tex").write_text("years of work")
     source = _write(stage, "seeing", "worker.fitness:thesis")
-    said = stage.run("run", source, "--out", "mine", code=2)
-    assert "not empty (contains 'thesis.tex')" in said
+    output = stage.run("run", source, "--out", "mine", code=2)
+    assert "not empty (contains 'thesis.tex')" in output
     assert [path.name for path in (stage.folder / "mine").iterdir()] == ["thesis.tex"]
 
 
