@@ -1,4 +1,4 @@
-"""A user's errors are reported in one line, with an exit code other than 0."""
+"""Checks that user errors are reported in one line with a nonzero exit code."""
 
 import os
 import shutil
@@ -27,7 +27,7 @@ def _document(stage: Stage, text: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ('name = "a"\nbirth = 3', "'births'"),
         ('name = "a"\n[selection]\npopulaton = 3', "selection.populaton"),
@@ -41,14 +41,14 @@ def _document(stage: Stage, text: str) -> str:
         ("name = ", "not valid TOML"),
     ],
 )
-def test_broken_experiment(stage: Stage, text: str, told: str) -> None:
+def test_invalid_experiment_is_refused(stage: Stage, text: str, message: str) -> None:
     output = _refused(stage, "run", _document(stage, text), "--out", "x", "--quiet")
-    assert "mine.toml" in output or told in output
-    assert told in output
+    assert "mine.toml" in output or message in output
+    assert message in output
     assert not (stage.folder / "x").exists()
 
 
-def test_restriction_that_no_robot_meets_ends_the_run_with_its_reason(
+def test_restriction_that_no_robot_satisfies_ends_the_run_with_the_reason(
     stage: Stage,
 ) -> None:
     text = 'name = "a"\n[space]\npart_types = ["schema.parts:CORE", '
@@ -62,7 +62,7 @@ def test_a_seed_above_64_bits_is_refused(stage: Stage) -> None:
     assert "--seed: must be < 2^64" in _refused(stage, "run", *words)
 
 
-def test_misspelt_command_and_experiment_get_the_nearest_name(stage: Stage) -> None:
+def test_misspelt_names_are_reported_with_the_nearest_name(stage: Stage) -> None:
     assert "'resume'" in _refused(stage, "resum", "x")
     assert "'scenario1'" in _refused(stage, "run", "senario1")
     output = _refused(stage, "run", "thesys")
@@ -71,45 +71,47 @@ def test_misspelt_command_and_experiment_get_the_nearest_name(stage: Stage) -> N
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "told"),
+    ("name", "content", "message"),
     [
         ("robot.yaml", "body: {type: Cor, id: c}\n", "Core"),
         ("robot.yaml", "body: [\n", "robot.yaml"),
         ("robot.pb", "\x01\x02\x03", "robot.pb"),
     ],
 )
-def test_broken_robot_file(stage: Stage, name: str, content: str, told: str) -> None:
+def test_invalid_robot_file_is_refused(
+    stage: Stage, name: str, content: str, message: str
+) -> None:
     (stage.folder / name).write_text(content)
-    assert told in _refused(stage, "robot", "check", name)
+    assert message in _refused(stage, "robot", "check", name)
 
 
-def test_used_folder(stage: Stage) -> None:
+def test_folder_with_other_files_is_refused_and_unchanged(stage: Stage) -> None:
     (stage.folder / "used").mkdir()
     (stage.folder / "used" / "thesis.pdf").write_text("mine")
     assert "thesis.pdf" in _refused(stage, "run", "scenario1", "--out", "used")
     assert (stage.folder / "used" / "thesis.pdf").read_text() == "mine"
 
 
-def test_folder_without_a_run(stage: Stage) -> None:
+def test_folder_without_a_run_is_refused(stage: Stage) -> None:
     assert "nowhere" in _refused(stage, "resume", "nowhere")
     assert "nowhere" in _refused(stage, "compare", "nowhere", "nowhere")
 
 
-def test_port_in_use(stage: Stage) -> None:
+def test_port_in_use_is_refused(stage: Stage) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         address = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
         words = ("coordinator", "scenario1", "--out", "x", "--listen", address)
         assert "in use" in _refused(stage, *words)
 
 
-def test_nothing_listens_beyond_this_machine_without_certificates(
+def test_listening_on_the_network_needs_certificates(
     stage: Stage,
 ) -> None:
     words = ("coordinator", "scenario1", "--out", "x", "--listen", "tcp/0.0.0.0:0")
     assert "tls/" in _refused(stage, *words)
 
 
-def test_worker_without_a_coordinator_says_so_and_keeps_trying(
+def test_worker_without_a_coordinator_reports_it_and_retries(
     stage: Stage,
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
@@ -123,7 +125,7 @@ def test_worker_without_a_coordinator_says_so_and_keeps_trying(
 
 
 def _fill_the_disk(stage: Stage, *words: str, kilobytes: int) -> None:
-    """Run on a small disk until it is full; copy the folder to ``moved``."""
+    """Run on a small disk until it is full; copy the run folder to ``moved``."""
     disk = stage.folder / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(disk)]
@@ -140,7 +142,7 @@ def _fill_the_disk(stage: Stage, *words: str, kilobytes: int) -> None:
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
 @pytest.mark.parametrize("flags", [("--in-process",), ("--workers", "2")])
-def test_full_disk_loses_nothing(
+def test_run_resumes_after_a_full_disk(
     stage: Stage, undisturbed: Path, births: int, flags: tuple[str, ...]
 ) -> None:
     words = ("scenario1", "--seed", "5", "--births", str(births), *flags)
@@ -151,7 +153,7 @@ def test_full_disk_loses_nothing(
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
-def test_full_disk_loses_nothing_of_an_arena(
+def test_arena_resumes_after_a_full_disk(
     small_arena_stage: Stage, small_arena_run: Path
 ) -> None:
     flags = ("--in-process", "--threads", "1")
@@ -162,10 +164,10 @@ def test_full_disk_loses_nothing_of_an_arena(
     assert "equal" in output
 
 
-def test_a_reader_that_closes_the_pipe_is_no_error(stage: Stage) -> None:
+def test_closed_pipe_prints_no_error(stage: Stage) -> None:
     stage.run("robot", "random", "some.yaml")
     process = stage.start("robot", "show", "some.yaml")
     process.stdout.close()
     process.stdout = None
-    _, told = process.communicate(timeout=60)
-    assert (process.returncode, told) == (1, "")
+    _, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (1, "")

@@ -1,4 +1,4 @@
-"""The bridge between off-line and on-line comes to the same, whatever dies."""
+"""Repeatability of the bridge experiment: equal tables after a kill and a resume."""
 
 import signal
 from collections.abc import Callable
@@ -29,10 +29,10 @@ share = 0.4
 population_limit = 12
 population_floor = 6
 """
-"""Judged over 2 s; a quarter of its evaluations are of who lives already."""
+"""Evaluations of 2 s to 4 s; a quarter of them are re-evaluations."""
 
 
-def test_killed_bridge_resumes_to_the_tables_of_one_process(
+def test_killed_bridge_resumes_to_the_tables_of_a_single_process(
     stage: Any,  # noqa: ANN401 - the fixture
     until: Callable[[Callable[[], bool], str], None],
 ) -> None:
@@ -42,10 +42,10 @@ def test_killed_bridge_resumes_to_the_tables_of_one_process(
     reference, killed = stage.folder / "calm", stage.folder / "killed"
     rows = read_table(reference, "evaluations")
     assert rows.filter(pc.greater(rows["trial"], 0)).num_rows >= 6
-    lasted = np.array(rows["simulated_s"].drop_null())
-    assert lasted.min() >= 2.0
-    assert lasted.max() <= 4.0
-    assert len(np.unique(lasted)) > 0.9 * len(lasted)
+    durations_s = np.array(rows["simulated_s"].drop_null())
+    assert durations_s.min() >= 2.0
+    assert durations_s.max() <= 4.0
+    assert len(np.unique(durations_s)) > 0.9 * len(durations_s)
 
     share = np.random.default_rng(5).uniform(0.5, 0.9)
     journal, whole = killed / "journal.bin", (reference / "journal.bin").stat().st_size

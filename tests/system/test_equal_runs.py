@@ -1,4 +1,4 @@
-"""Promise 1: the same births, however many workers and whatever dies."""
+"""Repeatability: equal runs for any number of workers and after any kill."""
 
 import signal
 from collections.abc import Callable
@@ -38,14 +38,14 @@ def _size(folder: Path) -> int:
     return journal.stat().st_size if journal.exists() else 0
 
 
-def test_one_worker_gives_the_births_of_one_process(
+def test_one_worker_gives_the_same_births_as_a_single_process(
     stage: Stage, undisturbed: Path, births: int
 ) -> None:
     stage.run("run", *_words(births, "one"), "--workers", "1")
     assert compare(undisturbed, stage.folder / "one") == []
 
 
-def test_three_workers_of_which_one_is_killed(
+def test_killing_one_of_three_workers_gives_the_same_births(
     stage: Stage, undisturbed: Path, births: int, until: Until
 ) -> None:
     folder = stage.folder / "three"
@@ -73,7 +73,7 @@ def test_killed_coordinator_resumes_to_the_same_births(
 ) -> None:
     folder = stage.folder / "killed"
     whole = _size(undisturbed)
-    # One kill in each quarter of the run, the instant within it drawn.
+    # One kill at a random instant of each quarter of the run.
     share = (draw + np.random.default_rng(draw).random()) / 4
     first = stage.start("run", *_words(births, "killed"), "--workers", "2")
     until(
@@ -86,8 +86,8 @@ def test_killed_coordinator_resumes_to_the_same_births(
     assert compare(undisturbed, folder) == []
 
 
-def test_noise_is_the_same_whoever_draws_it(stage: Stage) -> None:
-    """In one process, by two workers with audits, and when it is looked at again."""
+def test_noise_is_the_same_in_every_process(stage: Stage) -> None:
+    """Compare a single process, two workers with audits, and a re-simulation."""
     (stage.folder / "noisy.toml").write_text(NOISY)
     words = ("run", "noisy.toml", "--seed", "5", "--births", "30", "--quiet")
     stage.run(*words, "--in-process", "--out", "one")
@@ -98,15 +98,15 @@ def test_noise_is_the_same_whoever_draws_it(stage: Stage) -> None:
     assert agrees
     assert all(agrees)
     reevaluations = read_table(one, "evaluations").to_pylist()
-    again = {row["birth"] for row in reevaluations if row["trial"]}
-    assert again
-    robots = ("--robot", "best", "--robot", f"0:{min(again)}")
+    repeated = {row["birth"] for row in reevaluations if row["trial"]}
+    assert repeated
+    robots = ("--robot", "best", "--robot", f"0:{min(repeated)}")
     out = stage.run("view", "one", *robots, "--save", "a.rrd")
     assert out.count("moves as recorded, equal to the last bit") == 2
     assert "DIFFERS" not in out
 
 
-def test_second_coordinator_is_refused_with_the_holder(
+def test_second_coordinator_is_refused_with_the_id_of_the_first(
     stage: Stage, births: int, until: Until
 ) -> None:
     folder = stage.folder / "held"
@@ -119,7 +119,7 @@ def test_second_coordinator_is_refused_with_the_holder(
     assert len(output.strip().splitlines()) == 1
 
 
-def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(
+def test_ctrl_c_stops_cleanly_and_shows_how_to_resume(
     stage: Stage, undisturbed: Path, births: int, until: Until
 ) -> None:
     folder = stage.folder / "stopped"

@@ -1,4 +1,4 @@
-"""Failures are reported by the summary, by status, and before a resume."""
+"""Tests of failure reports in the summary, in status and before a resume."""
 
 import json
 import shutil
@@ -76,7 +76,7 @@ def _run(stage: Stage, *words: str, code: int = 0) -> str:
     return output
 
 
-def test_a_run_without_any_fitness_names_no_best_robot(stage: Stage) -> None:
+def test_run_without_any_fitness_has_no_best_robot(stage: Stage) -> None:
     source = _write(stage, "blind", "judge:none")
     output = _run(stage, source, "--out", "a b", code=1)
     assert "12 births; no robot of the last population has a fitness" in output
@@ -88,7 +88,7 @@ def test_a_run_without_any_fitness_names_no_best_robot(stage: Stage) -> None:
     assert "best -" in stage.run("status", "a b")
 
 
-def test_a_run_reports_failed_evaluations_and_the_reason(stage: Stage) -> None:
+def test_run_reports_failed_evaluations_and_the_reason(stage: Stage) -> None:
     output = _run(stage, _write(stage, "dim", "judge:few"), "--out", "a")
     failed = [line for line in output.splitlines() if "evaluations failed" in line]
     assert len(failed) == 1
@@ -98,7 +98,7 @@ def test_a_run_reports_failed_evaluations_and_the_reason(stage: Stage) -> None:
     assert (stage.folder / "a" / "best.yaml").exists()
 
 
-def test_a_campaign_reports_runs_without_any_fitness(stage: Stage) -> None:
+def test_campaign_reports_runs_without_any_fitness(stage: Stage) -> None:
     sources = [
         _write(stage, "blind", "judge:none"),
         _write(stage, "seeing", "worker.fitness:thesis"),
@@ -109,7 +109,7 @@ def test_a_campaign_reports_runs_without_any_fitness(stage: Stage) -> None:
     assert "2 runs are finished" in output
     again = stage.run("resume", "both", "--in-process", "--quiet", code=1)
     assert "2 of 2 runs are already finished" in again
-    # A campaign of one run has a reason to tell, too.
+    # A campaign of one run reports the reason, too.
     (stage.folder / "both" / "blind-0" / "state").write_text("tired")
     shutil.rmtree(stage.folder / "both" / "seeing-0")
     text = (stage.folder / "both" / "campaign.toml").read_text()
@@ -120,7 +120,7 @@ def test_a_campaign_reports_runs_without_any_fitness(stage: Stage) -> None:
 
 
 @pytest.fixture(scope="module")
-def made(once: Any) -> Path:  # noqa: ANN401 - the fixture
+def campaign_folder(once: Any) -> Path:  # noqa: ANN401 - the fixture
     """Return a folder with a campaign of two finished runs."""
 
     def make(stage: Stage) -> None:
@@ -131,25 +131,27 @@ def made(once: Any) -> Path:  # noqa: ANN401 - the fixture
     return folder / "all"
 
 
-def test_a_damaged_run_does_not_hide_others(stage: Stage, made: Path) -> None:
-    shutil.copytree(made, stage.folder / "all")
+def test_damaged_run_does_not_hide_other_runs(
+    stage: Stage, campaign_folder: Path
+) -> None:
+    shutil.copytree(campaign_folder, stage.folder / "all")
     twice = stage.folder / "all" / "twice"
-    told = "seeing-0/run.json: cannot be read: Object missing required field `name`"
+    damage = "seeing-0/run.json: cannot be read: Object missing required field `name`"
     (twice / "seeing-0" / "run.json").write_text("{}")
     output = stage.run("status", "all", code=1)
-    assert f"damaged: all/twice/{told}" in output
+    assert f"damaged: all/twice/{damage}" in output
     assert "1 of 2 runs finished" in output
     assert "twice/seeing-0  damaged" in output
-    # The other one is begun anew: the damaged one keeps it from nothing.
+    # A damaged run does not prevent the other run from starting again.
     shutil.rmtree(twice / "seeing-1")
     output = stage.run("resume", "all/twice", "--in-process", "--quiet", code=1)
-    assert f"seeing-0 failed: all/twice/{told}" in output
+    assert f"seeing-0 failed: all/twice/{damage}" in output
     assert read_state(twice / "seeing-1") == "finished"
-    assert compare(twice / "seeing-1", made / "twice" / "seeing-1") == []
+    assert compare(twice / "seeing-1", campaign_folder / "twice" / "seeing-1") == []
 
 
 @pytest.mark.parametrize(
-    ("file", "content", "told"),
+    ("file", "content", "message"),
     [
         ("state", "", "must be one of running, stopped, finished, got ''"),
         ("births.parquet", "", "births.parquet: cannot be read"),
@@ -158,25 +160,27 @@ def test_a_damaged_run_does_not_hide_others(stage: Stage, made: Path) -> None:
     ids=["state", "births.parquet", "no tables"],
 )
 def test_damaged_and_missing_files_are_reported(
-    tmp_path: Path, made: Path, file: str, content: str | None, told: str
+    tmp_path: Path, campaign_folder: Path, file: str, content: str | None, message: str
 ) -> None:
     run = tmp_path / "run"
-    shutil.copytree(made / "twice" / "seeing-0", run)
+    shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
     assert folder_status(run).births == 12
     (path,) = run.glob(f"**/{file}")
     if content is None:
         path.unlink()
     else:
         path.write_text(content)
-    with pytest.raises(RunFolderError, match=told):
+    with pytest.raises(RunFolderError, match=message):
         folder_status(run)
 
 
-def test_a_narrow_terminal_does_not_cut_the_status(
-    made: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_narrow_terminal_does_not_truncate_the_status(
+    campaign_folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("COLUMNS", "40")
-    assert status(["status", str(made)]) == 0
+    assert status(["status", str(campaign_folder)]) == 0
     output = capsys.readouterr().out
     assert "2 of 2 runs finished, 24 of 24 births" in output
     assert "no coordinator is running" not in output
@@ -185,41 +189,43 @@ def test_a_narrow_terminal_does_not_cut_the_status(
         assert line.split()[1:6] == ["finished", "12", "of", "12", "best"]
 
 
-def test_missing_tables_are_written_again(stage: Stage, made: Path) -> None:
+def test_missing_tables_are_written_again(stage: Stage, campaign_folder: Path) -> None:
     run = stage.folder / "run"
-    shutil.copytree(made / "twice" / "seeing-0", run)
+    shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
     words = ("resume", "run", "--in-process", "--quiet")
     assert "already finished" in stage.run(*words)
     shutil.rmtree(run / "tables")
     output = stage.run(*words)
     assert "tables are missing; writing them again from the journal" in output
     assert "12 births" in output
-    assert compare(run, made / "twice" / "seeing-0") == []
+    assert compare(run, campaign_folder / "twice" / "seeing-0") == []
 
 
 @pytest.mark.parametrize("tables", ["tables", "no tables"])
-def test_a_run_without_its_journal_does_not_start_again(
-    stage: Stage, made: Path, tables: str
+def test_run_without_its_journal_does_not_restart(
+    stage: Stage, campaign_folder: Path, tables: str
 ) -> None:
     run = stage.folder / "run"
-    shutil.copytree(made / "twice" / "seeing-0", run)
+    shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
     (run / "journal.bin").unlink()
     words = ("resume", "run", "--in-process", "--quiet")
     if tables == "tables":
         (run / "state").unlink()
-        told = "journal.bin: is lost"
+        message = "journal.bin: is lost"
     else:
         shutil.rmtree(run / "tables")
-        told = "put a copy of the tables in their place"
-    assert told in stage.run(*words, code=2)
+        message = "put a copy of the tables in their place"
+    assert message in stage.run(*words, code=2)
     (run / "journal.bin").touch()
-    assert told in stage.run(*words, code=2)
+    assert message in stage.run(*words, code=2)
 
 
-def test_a_refusal_changes_nothing(stage: Stage, made: Path) -> None:
-    """Rows behind a gap are written again only from an intact journal."""
+def test_refused_resume_does_not_change_the_folder(
+    stage: Stage, campaign_folder: Path
+) -> None:
+    """Lost rows are rewritten only from an intact journal."""
     run = stage.folder / "run"
-    shutil.copytree(made / "twice" / "seeing-0", run)
+    shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
     shutil.rmtree(run / "tables")
     (run / "state").unlink()
     (run / "segments").mkdir()
@@ -255,9 +261,9 @@ def test_tables_of_an_arena_are_rewritable_only_with_its_poses(tmp_path: Path) -
 
 
 def test_status_follows_a_link_to_a_run(
-    tmp_path: Path, made: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, campaign_folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "here").symlink_to(made / "twice" / "seeing-0")
+    (tmp_path / "here").symlink_to(campaign_folder / "twice" / "seeing-0")
     (tmp_path / "stranger").mkdir()
     (tmp_path / "stranger" / "run.json").write_text('{"name": "not ours"}')
     (tmp_path / "again").symlink_to(tmp_path)
@@ -266,7 +272,7 @@ def test_status_follows_a_link_to_a_run(
     assert "1 of 1 runs finished, 12 of 12 births" in output
 
 
-def test_an_arena_without_any_fitness_reports_the_reason(stage: Stage) -> None:
+def test_arena_without_any_fitness_reports_the_reason(stage: Stage) -> None:
     (stage.folder / "judge.py").write_text(FITNESS)
     text = ARENA.format(fitness="judge:none")
     (stage.folder / "arena.toml").write_text(text)
@@ -278,7 +284,7 @@ def test_an_arena_without_any_fitness_reports_the_reason(stage: Stage) -> None:
 
 
 @pytest.mark.parametrize("repeats", [(), ("--repeats", "2")])
-def test_a_wrong_address_leaves_the_folder_usable(
+def test_wrong_address_leaves_the_folder_usable(
     stage: Stage, repeats: tuple[str, ...]
 ) -> None:
     source = _write(stage, "seeing", "worker.fitness:thesis")
@@ -288,7 +294,7 @@ def test_a_wrong_address_leaves_the_folder_usable(
     stage.run(*words, "--in-process")
 
 
-def test_a_folder_with_foreign_files_gets_no_lock(stage: Stage) -> None:
+def test_no_lock_is_created_in_a_folder_with_other_files(stage: Stage) -> None:
     (stage.folder / "mine").mkdir()
     (stage.folder / "mine" / "thesis.tex").write_text("years of work")
     source = _write(stage, "seeing", "worker.fitness:thesis")
@@ -297,11 +303,14 @@ def test_a_folder_with_foreign_files_gets_no_lock(stage: Stage) -> None:
     assert [path.name for path in (stage.folder / "mine").iterdir()] == ["thesis.tex"]
 
 
-def test_a_removed_folder_is_reported(stage: Stage, until: Until) -> None:
+def test_moved_folder_is_reported(stage: Stage, until: Until) -> None:
     words = ("scenario1", "--births", "3000", "--workers", "1", "--out", "gone")
     process = stage.start("run", *words, "--quiet")
     journal = stage.folder / "gone" / "journal.bin"
-    until(lambda: journal.exists() and journal.stat().st_size > 2000, "it lives")
+    until(
+        lambda: journal.exists() and journal.stat().st_size > 2000,
+        "the run is on its way",
+    )
     (stage.folder / "gone").rename(stage.folder / "elsewhere")
     _, err = process.communicate(timeout=60)
     assert process.returncode == 2

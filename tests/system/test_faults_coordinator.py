@@ -1,7 +1,7 @@
-"""The coordinator is killed anywhere, or sleeps while another takes its run.
+"""Faults of the coordinator: kills at random instants, and a replacement while stopped.
 
-Kills of a coordinator with a network of its own stand in test_equal_runs.py and
-test_arena_runs.py; here are many, at instants that nothing is known of.
+test_equal_runs.py and test_arena_runs.py kill coordinators that have a network. These
+tests kill many processes at instants that are independent of the journal.
 """
 
 import os
@@ -32,7 +32,7 @@ PATIENCE_S = 120
 ROOT = Path(__file__).parents[2]
 KILLABLE = Path(__file__).with_name("killable.py")
 
-SINGLES = """
+OFF_LINE = """
 name = "singles"
 births = 40
 [selection]
@@ -45,11 +45,11 @@ window_steps = 400
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "kills", "seed"), [("off", 40, 41), ("on", 20, 42)])
-def test_killed_at_any_point(
+def test_kills_at_random_instants_give_equal_runs(
     tmp_path: Path, small_arena_document: str, kind: str, kills: int, seed: int
 ) -> None:
-    """Sixty instants in all, drawn over lives that last up to half a run."""
-    document = SINGLES if kind == "off" else small_arena_document
+    """Sixty kills in total, each after up to half the time of a whole run."""
+    document = OFF_LINE if kind == "off" else small_arena_document
     (tmp_path / "mine.toml").write_text(document)
     done = subprocess.run(
         [sys.executable, str(KILLABLE), "mine.toml", str(kills), str(seed)],
@@ -71,8 +71,10 @@ def test_killed_at_any_point(
         assert compare(tmp_path / "whole", run) == []
 
 
-def frozen(stage: Stage, fleet_of: Fleets, undisturbed: Path, births: int) -> Any:  # noqa: ANN401 - a fleet
-    """Return a fleet whose coordinator sleeps, somewhere in its run."""
+def stopped_coordinator(
+    stage: Stage, fleet_of: Fleets, undisturbed: Path, births: int
+) -> Any:  # noqa: ANN401 - a fleet
+    """Return a fleet whose coordinator is stopped by SIGSTOP during its run."""
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
     fleet = fleet_of(stage, *words)
     fleet.join("judge", "analyzer")
@@ -83,10 +85,10 @@ def frozen(stage: Stage, fleet_of: Fleets, undisturbed: Path, births: int) -> An
     return fleet
 
 
-def test_one_that_sleeps_still_holds_its_run(
+def test_stopped_coordinator_keeps_the_lock_of_its_run(
     stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:
-    fleet = frozen(stage, fleet_of, undisturbed, births)
+    fleet = stopped_coordinator(stage, fleet_of, undisturbed, births)
     output = stage.run("resume", "run", "--quiet", code=2)
     assert f"in use by process {fleet.coordinator.pid} on " in output
     assert len(output.strip().splitlines()) == 1
@@ -96,11 +98,11 @@ def test_one_that_sleeps_still_holds_its_run(
 
 
 @pytest.mark.parametrize("when", ["meanwhile", "afterwards"])
-def test_one_that_wakes_up_replaced_stops_and_writes_nothing(
+def test_continued_coordinator_exits_and_writes_nothing_after_a_takeover(
     stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets, when: str
 ) -> None:
-    """Where locks do not reach (a file system that has none) the epoch tells."""
-    fleet = frozen(stage, fleet_of, undisturbed, births)
+    """The epoch detects a takeover on file systems without locks."""
+    fleet = stopped_coordinator(stage, fleet_of, undisturbed, births)
     (fleet.folder / LOCK).unlink()
     second = stage.start("resume", "run", "--workers", "1", "--quiet")
     whole = (undisturbed / NAME).stat().st_size

@@ -1,6 +1,6 @@
-"""Evaluations that end their own process, and workers that are not as they should be.
+"""Evaluations that crash their process, and workers with wrong code or results.
 
-The plug-ins do what no process may: their harm depends on the robot alone.
+A plug-in causes the crashes, which depend only on the robot.
 """
 
 import os
@@ -59,15 +59,15 @@ HARMS = {
 QUARANTINED = "quarantined: ended its own process 3 times, by "
 
 
-def plug(stage: Stage, harm: str = "pass", limit: float = 0.03) -> None:
-    """Put an experiment and its plug-in where the commands run."""
+def write_plug_in(stage: Stage, harm: str = "pass", limit: float = 0.03) -> None:
+    """Write an experiment and its plug-in to the folder of the stage."""
     (stage.folder / "harm.toml").write_text(DOCUMENT)
     text = PLUGGED.format(harm=harm, limit=limit)
     (stage.folder / "plugged.py").write_text(text)
 
 
 def reasons(folder: Path) -> dict[int, str]:
-    """Return the births that failed and why."""
+    """Return the failure reasons by birth."""
     rows = read_table(folder, "evaluations").to_pylist()
     return {row["birth"]: row["reason"] for row in rows if row["status"] == "failed"}
 
@@ -76,11 +76,11 @@ WORDS = ("harm.toml", "--seed", "1", "--cpu-limit", "0.7", "--quiet")
 
 
 @pytest.mark.parametrize("kind", sorted(HARMS))
-def test_what_ends_its_process_three_times_is_quarantined(
+def test_robot_that_crashes_three_processes_is_quarantined(
     stage: Stage, kind: str
 ) -> None:
     harm, cause = HARMS[kind]
-    plug(stage, harm)
+    write_plug_in(stage, harm)
     output = stage.run("run", *WORDS, "--workers", "2", "--out", "run")
     failed = reasons(stage.folder / "run")
     assert 1 <= len(failed) <= 3
@@ -91,46 +91,49 @@ def test_what_ends_its_process_three_times_is_quarantined(
         assert f"birth {birth} of island 0: {QUARANTINED}{cause}" in output
 
 
-def test_deaths_by_others_hands_count_for_nothing(stage: Stage, until: Until) -> None:
-    """A worker that is killed at the same robot again and again is only unlucky."""
-    plug(stage, "open('here', 'w').write(str(os.getpid())); signal.pause()")
-    here = stage.folder / "here"
+def test_external_kills_do_not_lead_to_quarantine(stage: Stage, until: Until) -> None:
+    """Kill the worker of the same robot repeatedly from outside."""
+    write_plug_in(stage, "open('here', 'w').write(str(os.getpid())); signal.pause()")
+    pid_file = stage.folder / "here"
     run = stage.start("run", *WORDS, "--workers", "1", "--out", "run")
     for _ in range(4):
-        until(lambda: here.exists() and here.read_text() != "", "a worker is at it")
-        victim = int(here.read_text())
-        here.unlink()
+        until(
+            lambda: pid_file.exists() and pid_file.read_text() != "",
+            "a worker is at it",
+        )
+        victim = int(pid_file.read_text())
+        pid_file.unlink()
         os.kill(victim, signal.SIGKILL)
-    until(lambda: here.exists() and here.read_text() != "", "a worker is at it")
+    until(lambda: pid_file.exists() and pid_file.read_text() != "", "a worker is at it")
     assert run.poll() is None
     assert reasons(stage.folder / "run") == {}
     run.kill()
-    os.kill(int(here.read_text()), signal.SIGKILL)
+    os.kill(int(pid_file.read_text()), signal.SIGKILL)
 
 
-def test_a_quarantine_pauses_a_run_that_wants_it_and_resume_goes_on(
+def test_quarantine_pauses_a_run_with_that_option_and_resume_continues_it(
     stage: Stage,
 ) -> None:
-    plug(stage, HARMS["segfault"][0])
+    write_plug_in(stage, HARMS["segfault"][0])
     stage.run("run", *WORDS, "--workers", "2", "--out", "through")
-    through = stage.folder / "through"
+    completed = stage.folder / "through"
     words = (*WORDS[1:], "--on-quarantine", "pause")
     output = stage.run(
         "run", "harm.toml", *words, "--workers", "2", "--out", "run", code=2
     )
     assert "quarantined" in output
     assert "resume to go on without it" in output
-    for _ in reasons(through):
+    for _ in reasons(completed):
         again = stage.start("resume", "run", "--workers", "2", *words[2:])
         if again.wait(120) == 0:
             break
-    assert compare(through, stage.folder / "run") == []
+    assert compare(completed, stage.folder / "run") == []
 
 
-def test_a_worker_without_the_plug_in_or_with_another_is_refused_and_others_go_on(
+def test_workers_with_a_missing_or_different_plug_in_are_refused(
     stage: Stage, fleet_of: Fleets
 ) -> None:
-    plug(stage)
+    write_plug_in(stage)
     stage.run("run", *WORDS, "--in-process", "--out", "calm")
     fleet = fleet_of(stage, *WORDS)
     elsewhere = stage.folder / "elsewhere"
@@ -139,22 +142,22 @@ def test_a_worker_without_the_plug_in_or_with_another_is_refused_and_others_go_o
     nowhere = stage.folder / "nowhere"
     nowhere.mkdir()
     fleet.join("judge", "analyzer")
-    heard: list[str] = []
+    lines: list[str] = []
     for name, folder in (("without", nowhere), ("another", elsewhere)):
         fleet.join(name, "worker", folder=folder)
-        heard.append("")
-        while "refused" not in heard[-1]:
-            heard.append(fleet.coordinator.stderr.readline())
-            assert heard[-1], heard
-        assert f"refused: {name}-0." in heard[-1]
-    assert "has no plug-in 'plugged'" in "".join(heard)
-    assert "its plug-in 'plugged' differs from the coordinator's" in heard[-1]
+        lines.append("")
+        while "refused" not in lines[-1]:
+            lines.append(fleet.coordinator.stderr.readline())
+            assert lines[-1], lines
+        assert f"refused: {name}-0." in lines[-1]
+    assert "has no plug-in 'plugged'" in "".join(lines)
+    assert "its plug-in 'plugged' differs from the coordinator's" in lines[-1]
     fleet.join("good")
     fleet.finish()
     assert compare(stage.folder / "calm", fleet.folder) == []
 
 
-def test_an_audit_changes_nothing_where_workers_agree(
+def test_audit_of_agreeing_workers_does_not_change_the_run(
     stage: Stage, fleet_of: Fleets, undisturbed: Path, births: int
 ) -> None:
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
@@ -173,11 +176,11 @@ def test_an_audit_changes_nothing_where_workers_agree(
         assert first["fitness"] == second["fitness"]
 
 
-def test_workers_that_do_not_agree_are_named_and_stop_the_run(
+def test_disagreeing_workers_are_reported_and_stop_the_run(
     stage: Stage, fleet_of: Fleets
 ) -> None:
-    """One machine adds the smallest of errors; without it the run goes on."""
-    plug(stage)
+    """One worker adds a rounding error; the run resumes without it."""
+    write_plug_in(stage)
     module = stage.folder / "plugged.py"
     drift = 'return value * (1 + 3e-16) if os.environ.get("DRIFT") else value'
     module.write_text(module.read_text().replace("return value", drift))
@@ -188,10 +191,10 @@ def test_workers_that_do_not_agree_are_named_and_stop_the_run(
     fleet.begin(workers=2)
     _, err = fleet.coordinator.communicate(timeout=60)
     assert fleet.coordinator.returncode == 2
-    told = err.strip().splitlines()[-1]
-    assert "sound-0." in told
-    assert "broken-0." in told
-    assert "'audits'" in told
+    message = err.strip().splitlines()[-1]
+    assert "sound-0." in message
+    assert "broken-0." in message
+    assert "'audits'" in message
     fleet.kill("broken")
     stage.run("resume", "run", "--workers", "2", "--quiet", "--audit", "1")
     rows = read_table(fleet.folder, "audits").to_pylist()
