@@ -58,7 +58,7 @@ def newest(folder: Path, table: str) -> int:
 
 
 class KillLog:
-    """Events that kills interrupted, from the same time of the undisturbed run."""
+    """Events that kills interrupted, according to the undisturbed run."""
 
     def __init__(self, crowded_arena_run: Path) -> None:
         self.steps = [event.advance.step for event in advances(crowded_arena_run)]

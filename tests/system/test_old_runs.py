@@ -1,7 +1,7 @@
-"""Runs and documents that commit 3063df1 wrote: today's code opens and resumes them.
+"""Checks that the current code reads and resumes runs and documents of commit 3063df1.
 
-``tests/data/runs-3063df1/README.md`` says how they were made. Tables are compared with
-pyarrow alone: column names, and which of them repeat, are those of the old files.
+``tests/data/runs-3063df1/README.md`` describes how they were made. Tables are compared
+with pyarrow only: the old files determine the columns and which of them are repeatable.
 """
 
 import os
@@ -39,23 +39,23 @@ FILLED = {
         "runs",
     },
 }
-"""Tables with rows, of each undisturbed run."""
+"""Tables that have rows in each undisturbed run."""
 
-# A drift is allowed and without effect where the platform is the recorded one. An arena
-# that drifts waits half a minute for a worker of its own platform first.
+# --allow-drift has no effect on the recorded platform. On another platform an arena
+# first waits half a minute for a worker of the recorded one.
 RESUME = ("--workers", "1", "--threads", "1", "--quiet", "--allow-drift")
 
 each_run = pytest.mark.parametrize("name", list(BIRTHS))
 
 
 def unpack(name: str, folder: Path) -> None:
-    """Write the folders ``killed`` and ``undisturbed`` of a run into a folder."""
+    """Extract the folders ``killed`` and ``undisturbed`` of a run into a folder."""
     with ZipFile(RUNS / f"{name}.zip") as archive:
         archive.extractall(folder)
 
 
 def tables(folder: Path) -> dict[str, pa.Table]:
-    """Return the tables of a finished run by name, as they are in its files."""
+    """Return the tables in the files of a finished run by name."""
     files = sorted((folder / "tables").glob("*/*/*.parquet"))
     return {file.stem: ParquetFile(file).read() for file in files}
 
@@ -69,10 +69,10 @@ def repeatable(schema: pa.Schema) -> list[str]:
 
 
 def differences(old: pa.Table, new: pa.Table) -> list[str]:
-    """Return the repeatable columns of an old table that a new one has otherwise.
+    """Return the repeatable columns of an old table that differ in a new one.
 
-    A difference is a missing column or another value. Floats are compared by their
-    text: to the last bit, and a NaN equals itself.
+    A difference is a missing column or another value. Floats are compared as text, that
+    is, exactly, and NaN equals NaN.
     """
     return [
         name
@@ -88,19 +88,19 @@ def platform(found: dict[str, pa.Table]) -> str:
     return str(tag)
 
 
-def births_said(status: str, name: str) -> int:
-    """Return how many births ``revolve status`` counts in a run."""
-    (output,) = {
+def births_in_status(status: str, name: str) -> int:
+    """Return the number of births of a run in the output of ``revolve status``."""
+    (count,) = {
         int(births)
         for births, wanted in re.findall(r"(\d+) of (\d+)", status)
         if int(wanted) == BIRTHS[name]
     }
-    return output
+    return count
 
 
 @pytest.fixture(scope="session")
 def resumed(once: Once) -> Callable[[str], Path]:
-    """Return what gives, by name, the folders of a run, the killed one resumed."""
+    """Return a function that resumes a killed run and returns the parent folder."""
 
     def make(name: str) -> Path:
         def build(stage: Stage) -> None:
@@ -113,7 +113,7 @@ def resumed(once: Once) -> Callable[[str], Path]:
 
 
 @each_run
-def test_a_killed_run_resumes_to_the_tables_of_the_undisturbed_one(
+def test_killed_run_resumes_to_the_tables_of_the_undisturbed_run(
     resumed: Callable[[str], Path], name: str
 ) -> None:
     folder = resumed(name)
@@ -130,7 +130,7 @@ def test_a_killed_run_resumes_to_the_tables_of_the_undisturbed_one(
 
 
 @each_run
-def test_the_comparison_sees_what_differs(
+def test_comparison_detects_differences(
     resumed: Callable[[str], Path], name: str
 ) -> None:
     births = tables(resumed(name) / "undisturbed")["births"]
@@ -145,18 +145,18 @@ def test_the_comparison_sees_what_differs(
 
 
 @each_run
-def test_commands_read_runs_as_they_were_left(stage: Stage, name: str) -> None:
+def test_commands_read_old_runs_without_a_resume(stage: Stage, name: str) -> None:
     unpack(name, stage.folder)
-    born = births_said(stage.run("status", "killed"), name)
-    assert 0 < born < BIRTHS[name]
-    assert births_said(stage.run("status", "undisturbed"), name) == BIRTHS[name]
-    assert f"births: {born} rows against {BIRTHS[name]}" in stage.run(
+    births = births_in_status(stage.run("status", "killed"), name)
+    assert 0 < births < BIRTHS[name]
+    assert births_in_status(stage.run("status", "undisturbed"), name) == BIRTHS[name]
+    assert f"births: {births} rows against {BIRTHS[name]}" in stage.run(
         "compare", "killed", "undisturbed", code=1
     )
     for kind in ("killed", "undisturbed"):
         stage.run("view", kind, "--save", f"{kind}.rrd")
         assert (stage.folder / f"{kind}.rrd").stat().st_size
-    # Finished is finished: nothing is begun again.
+    # Resuming a finished run does not change its tables.
     before = tables(stage.folder / "undisturbed")
     stage.run("resume", "undisturbed", *RESUME)
     after = tables(stage.folder / "undisturbed")
@@ -174,8 +174,10 @@ def test_compare_reads_a_resumed_run(
 
 
 @pytest.mark.slow
-def test_they_are_analysed(resumed: Callable[[str], Path], stage: Stage) -> None:
-    """The archipelago has islands of both kinds."""
+def test_resumed_archipelago_is_analysed(
+    resumed: Callable[[str], Path], stage: Stage
+) -> None:
+    """Analyze the archipelago, which has islands of both kinds."""
     folder = resumed("archipelago")
     report = ("--out", "report", "--processes", "1")
     stage.run("analyze", str(folder / "killed"), *report)
@@ -186,8 +188,8 @@ def test_they_are_analysed(resumed: Callable[[str], Path], stage: Stage) -> None
 
 
 @pytest.mark.slow
-def test_an_arena_resumes_on_another_platform(stage: Stage) -> None:
-    """Equality ends there: the run goes on, and the drift is recorded."""
+def test_arena_resumes_on_another_platform(stage: Stage) -> None:
+    """The run continues without bitwise equality and records the drift."""
     unpack("arena", stage.folder)
     (stage.folder / "sitecustomize.py").write_text(
         "import platform\nplatform.machine = lambda: 'another'\n"
@@ -203,37 +205,37 @@ def test_an_arena_resumes_on_another_platform(stage: Stage) -> None:
 
 
 @pytest.mark.parametrize("robot", ["parts.yaml", "robogen-parts.yaml", "fitness.xml"])
-def test_robot_files_load(stage: Stage, robot: str) -> None:
+def test_old_robot_files_load(stage: Stage, robot: str) -> None:
     experiment = DOCUMENTS / Path(robot).with_suffix(".toml")
     words = (str(DOCUMENTS / robot), "--experiment", str(experiment))
     assert "16 parts" in stage.run("robot", "check", *words)
 
 
 @pytest.mark.parametrize("name", ["parts", "robogen-parts", "fitness"])
-def test_documents_run(stage: Stage, name: str) -> None:
-    """Every name of a document is resolved by a run of a few births."""
+def test_old_documents_run(stage: Stage, name: str) -> None:
+    """Resolve all names of a document in a run of a few births."""
     document = str(DOCUMENTS / f"{name}.toml")
     stage.run("run", document, "--in-process", "--quiet", "--out", "run")
     found = tables(stage.folder / "run")
     (text,) = found["runs"]["document"].to_pylist()
-    for path in named(Path(document).read_text("utf-8")):
+    for path in import_paths(Path(document).read_text("utf-8")):
         assert f'"{path}"' in text
 
 
-def test_a_robot_of_before_is_judged_by_the_function_that_its_file_names(
+def test_old_robot_is_evaluated_with_the_function_of_its_file(
     stage: Stage,
 ) -> None:
     output = stage.run("robot", "simulate", str(DOCUMENTS / "fitness.xml"))
     assert "fitness:" in output
 
 
-def test_documents_name_what_recorded_ones_may_name() -> None:
-    """The import paths that must not move, each with all that it offers."""
+def test_old_documents_contain_all_permanent_import_paths() -> None:
+    """Check the set of import paths that must not change."""
     texts = [path.read_text("utf-8") for path in DOCUMENTS.glob("*.toml")]
-    found = {path.partition(":")[0] for text in texts for path in named(text)}
+    found = {path.partition(":")[0] for text in texts for path in import_paths(text)}
     assert found == {"schema.parts", "schema.robogen_parts", "worker.fitness"}
 
 
-def named(text: str) -> list[str]:
-    """Return the paths of code that a document names."""
+def import_paths(text: str) -> list[str]:
+    """Return the import paths in a document."""
     return [match[1] for match in re.finditer(r'"([\w.]+:\w+)"', text)]

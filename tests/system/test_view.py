@@ -1,4 +1,4 @@
-"""Tests of ``revolve view``: recordings equal the tables, viewers affect no run."""
+"""Tests of ``revolve view``: recordings equal tables, viewers do not affect runs."""
 
 import signal
 import subprocess
@@ -29,7 +29,7 @@ CENTRES, QUATERNIONS = "Boxes3D:centers", "Boxes3D:quaternions"
 
 
 def batches(file: Path, path: str) -> Iterator[tuple[pa.RecordBatch, bool]]:
-    """Return the data of an entity, and whether it is static."""
+    """Yield the record batches of an entity, and whether each is static."""
     for chunk in RrdReader(file).stream().filter(content=path):
         yield chunk.to_record_batch(), chunk.is_static
 
@@ -39,7 +39,7 @@ def paths(file: Path) -> set[str]:
 
 
 def poses(file: Path, path: str) -> dict[int, Any]:
-    """Return centres (B, 3) by time [ns] of a robot."""
+    """Return the centres (B, 3) of a robot's boxes by time [ns]."""
     found = {}
     for batch, _ in batches(file, path):
         if CENTRES not in batch.schema.names:
@@ -51,7 +51,7 @@ def poses(file: Path, path: str) -> dict[int, Any]:
 
 
 def clears(file: Path, path: str) -> dict[int, int]:
-    """Return when a robot was taken away [ns], and the births by then."""
+    """Return the number of births at each removal of a robot, by time [ns]."""
     return {
         time.value: births.as_py()
         for batch, _ in batches(file, path)
@@ -67,7 +67,7 @@ def clears(file: Path, path: str) -> dict[int, int]:
 
 
 def last_births(file: Path, path: str) -> int:
-    """Return the births by a robot's last pose."""
+    """Return the number of births at the last pose of a robot."""
     columns = [
         pa.chunked_array([batch["births"]])
         for batch, _ in batches(file, path)
@@ -77,7 +77,7 @@ def last_births(file: Path, path: str) -> int:
 
 
 def curves(file: Path, name: str) -> dict[int, tuple[float, ...]]:
-    """Return an island's curve by births."""
+    """Return a curve of island 0 by number of births."""
     return {
         births.as_py(): tuple(row.as_py())
         for batch, is_static in batches(file, f"/islands/0/{name}")
@@ -87,7 +87,7 @@ def curves(file: Path, name: str) -> dict[int, tuple[float, ...]]:
 
 
 def expected_curve(folder: Path) -> dict[int, tuple[float, ...]]:
-    """Return mean and best fitness by births, as the table engine finds them."""
+    """Return mean and best fitness by births, computed with pyarrow."""
     rows = read_table(folder, "population").filter(pc.field("fitness").is_valid())
     grouped = rows.group_by("births").aggregate(
         [("fitness", "mean"), ("fitness", "max")]
@@ -115,13 +115,13 @@ def check_curves(file: Path, folder: Path) -> None:
 
 @pytest.fixture(scope="session")
 def replayed(once: Any, small_arena_run: Path) -> Path:  # noqa: ANN401 - the fixture
-    """Return a recording of a run's tables."""
+    """Return the recording of a replay of the small arena."""
     words = ("view", str(small_arena_run), "--save", "run.rrd")
     folder: Path = once("replay", lambda stage: stage.run(*words))
     return folder / "run.rrd"
 
 
-def test_a_replay_has_each_pose_of_each_robot(
+def test_replay_contains_each_pose_of_each_robot(
     replayed: Path, small_arena_run: Path
 ) -> None:
     table = read_table(small_arena_run, "poses")
@@ -133,10 +133,10 @@ def test_a_replay_has_each_pose_of_each_robot(
             for row in rows.select(["sim_time_s", "x", "y", "z"]).to_pylist()
         }
         assert shown.keys() == recorded.keys()
-        for time, place in recorded.items():
-            # One of the boxes is the core, whose centre the table has.
-            apart = np.linalg.norm(shown[time] - np.array(place), axis=1)
-            assert apart.min() < 1e-3
+        for time, position in recorded.items():
+            # One of the boxes is the core, whose centre is in the table.
+            distances = np.linalg.norm(shown[time] - np.array(position), axis=1)
+            assert distances.min() < 1e-3
 
 
 def test_dead_robots_are_cleared_at_their_death(
@@ -154,7 +154,7 @@ def test_dead_robots_are_cleared_at_their_death(
         if number in deaths:
             cleared = clears(replayed, path)
             assert deaths[number] in cleared
-            # On the time line of births, too, no pose comes after it.
+            # On the timeline of births, too, no pose follows the removal.
             assert cleared[deaths[number]] >= last_births(replayed, path)
         assert not any(is_static for _, is_static in batches(replayed, path))
 
@@ -179,7 +179,7 @@ def test_curves_of_a_replay_equal_the_tables(
     check_curves(replayed, small_arena_run)
 
 
-def test_the_log_contains_each_birth_and_death(
+def test_log_contains_each_birth_and_death(
     replayed: Path, small_arena_run: Path
 ) -> None:
     lines = [
@@ -196,7 +196,7 @@ def test_the_log_contains_each_birth_and_death(
 def test_viewers_receive_everything_and_do_not_change_the_run(
     small_arena_stage: Stage, small_arena_run: Path, fleet_of: Fleet, until: Until
 ) -> None:
-    """One viewer sees all of a run; one is killed, one frozen while it lives."""
+    """Start three viewers; kill one and stop another during the run."""
     stage = small_arena_stage
     fleet = fleet_of(stage, *WORDS, "--speed", "10")
     viewers = {}
@@ -220,11 +220,11 @@ def test_viewers_receive_everything_and_do_not_change_the_run(
     check_curves(file, fleet.folder)
     table = read_table(fleet.folder, "poses")
     shown = sum(len(poses(file, path)) for path in paths(file) if "/robots/" in path)
-    # Best effort: but nothing is lost on a machine that keeps up.
+    # Delivery is best effort: a machine that is fast enough loses no poses.
     assert 0.9 * table.num_rows <= shown <= table.num_rows
 
 
-def test_a_resimulated_robot_of_an_arena_moves_as_recorded(
+def test_resimulated_robot_of_an_arena_moves_as_recorded(
     stage: Stage, small_arena_run: Path
 ) -> None:
     words = ("view", str(small_arena_run), "--robot", "0:3", "--robot", "best")
@@ -232,11 +232,11 @@ def test_a_resimulated_robot_of_an_arena_moves_as_recorded(
     assert "0:3: moves as recorded, equal to the last bit" in out
     again = poses(stage.folder / "again.rrd", "/motion/0-3")
     table = read_table(small_arena_run, "poses").filter(pc.field("birth") == 3)
-    # Brains tick more often than poses are recorded.
+    # Brain steps are more frequent than recorded poses.
     assert len(again) > 1.5 * table.num_rows
 
 
-def test_a_resimulated_off_line_robot_moves_as_recorded(
+def test_resimulated_off_line_robot_moves_as_recorded(
     stage: Stage, undisturbed: Path
 ) -> None:
     words = ("view", str(undisturbed), "--robot", "best", "--ancestry")
@@ -251,7 +251,7 @@ def test_a_resimulated_off_line_robot_moves_as_recorded(
     assert "DIFFERS" not in out
 
 
-def test_a_wrong_record_is_reported(stage: Stage, undisturbed: Path) -> None:
+def test_wrong_record_is_reported(stage: Stage, undisturbed: Path) -> None:
     folder = stage.folder / "forged"
     subprocess.run(["cp", "-r", str(undisturbed), str(folder)], check=True)
     (file,) = folder.glob("tables/*/*/evaluations.parquet")
