@@ -11,15 +11,15 @@ import pytest
 
 from schema.agent.network import Tls
 from tests.system.fleet import Fleet, make_certificate
-from tests.system.stage import Stage, wait_until
+from tests.system.workspace import Workspace, wait_until
 
 BIRTHS = 60
 
 
 @pytest.fixture
-def stage(tmp_path: Path) -> Iterator[Stage]:
+def workspace(tmp_path: Path) -> Iterator[Workspace]:
     with ExitStack() as stack:
-        made = Stage(tmp_path)
+        made = Workspace(tmp_path)
         stack.callback(made.clear)
         yield made
 
@@ -34,7 +34,7 @@ def births() -> int:
     return BIRTHS
 
 
-Once = Callable[[str, Callable[[Stage], object]], Path]
+Once = Callable[[str, Callable[[Workspace], object]], Path]
 
 
 @pytest.fixture(scope="session")
@@ -47,7 +47,7 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
     if "PYTEST_XDIST_WORKER" in os.environ:
         parent = parent.parent
 
-    def made(name: str, make: Callable[[Stage], object]) -> Path:
+    def made(name: str, make: Callable[[Workspace], object]) -> Path:
         folder = parent / f"once-{name}"
         with (parent / f"once-{name}.lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
@@ -55,7 +55,7 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
                 unfinished = folder.with_suffix(".begun")
                 shutil.rmtree(unfinished, ignore_errors=True)
                 unfinished.mkdir()
-                make(Stage(unfinished))
+                make(Workspace(unfinished))
                 unfinished.rename(folder)
         return folder
 
@@ -67,7 +67,9 @@ def undisturbed(once: Once) -> Path:
     """Return the folder of the reference run: undisturbed, in one process."""
     words = ("scenario1", "--seed", "5", "--births", str(BIRTHS), "--quiet")
     flags = ("--in-process", "--out", "run")
-    return once("single", lambda stage: stage.run("run", *words, *flags)) / "run"
+    return (
+        once("single", lambda workspace: workspace.run("run", *words, *flags)) / "run"
+    )
 
 
 @pytest.fixture
@@ -100,24 +102,25 @@ record_touches = true
 
 
 @pytest.fixture
-def crowded_arena_stage(stage: Stage) -> Stage:
-    """Return a stage whose folder contains ``crowd.toml``."""
-    (stage.folder / "crowd.toml").write_text(CROWDED_ARENA)
-    return stage
+def crowded_arena_workspace(workspace: Workspace) -> Workspace:
+    """Return a workspace whose folder contains ``crowd.toml``."""
+    (workspace.folder / "crowd.toml").write_text(CROWDED_ARENA)
+    return workspace
 
 
-def _arena(stage: Stage, file: str, document: str) -> None:
+def _arena(workspace: Workspace, file: str, document: str) -> None:
     """Run an arena undisturbed in one process."""
-    (stage.folder / file).write_text(document)
+    (workspace.folder / file).write_text(document)
     flags = ("--seed", "4", "--quiet", "--in-process", "--threads", "1")
-    stage.run("run", file, *flags, "--out", "run")
+    workspace.run("run", file, *flags, "--out", "run")
 
 
 @pytest.fixture(scope="session")
 def crowded_arena_run(once: Once) -> Path:
     """Return the folder of the undisturbed crowded arena, run in one process."""
     return (
-        once("crowd", lambda stage: _arena(stage, "crowd.toml", CROWDED_ARENA)) / "run"
+        once("crowd", lambda workspace: _arena(workspace, "crowd.toml", CROWDED_ARENA))
+        / "run"
     )
 
 
@@ -146,15 +149,16 @@ def small_arena_document() -> str:
 
 
 @pytest.fixture
-def small_arena_stage(stage: Stage) -> Stage:
-    """Return a stage whose folder contains ``hamlet.toml``, the small arena."""
-    (stage.folder / "hamlet.toml").write_text(SMALL_ARENA)
-    return stage
+def small_arena_workspace(workspace: Workspace) -> Workspace:
+    """Return a workspace whose folder contains ``hamlet.toml``, the small arena."""
+    (workspace.folder / "hamlet.toml").write_text(SMALL_ARENA)
+    return workspace
 
 
 @pytest.fixture(scope="session")
 def small_arena_run(once: Once) -> Path:
     """Return the folder of the undisturbed small arena, run in one process."""
     return (
-        once("hamlet", lambda stage: _arena(stage, "hamlet.toml", SMALL_ARENA)) / "run"
+        once("hamlet", lambda workspace: _arena(workspace, "hamlet.toml", SMALL_ARENA))
+        / "run"
     )

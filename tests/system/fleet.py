@@ -10,7 +10,7 @@ import zenoh
 
 from schema.agent.network import Tls, client_config
 from schema.agent.topics import agents_alive
-from tests.system.stage import Stage, wait_until
+from tests.system.workspace import Workspace, wait_until
 
 
 def size(folder: Path) -> int:
@@ -37,13 +37,13 @@ class Fleet:
     """A coordinator and agents that can be stopped, killed and disconnected."""
 
     def __init__(
-        self, stage: Stage, *words: str, listen: str = "", inside: str = ""
+        self, workspace: Workspace, *words: str, listen: str = "", inside: str = ""
     ) -> None:
-        self.stage = stage
-        self.folder = stage.folder / "run"
+        self.workspace = workspace
+        self.folder = workspace.folder / "run"
         self.address = listen or "tcp/127.0.0.1:0"
         all_words = (*words, "--out", "run", "--listen", self.address)
-        self.coordinator = stage.start("coordinator", *all_words, inside=inside)
+        self.coordinator = workspace.start("coordinator", *all_words, inside=inside)
         wait_until(
             lambda: (self.folder / "address").exists() or self.is_over,
             "the coordinator listens",
@@ -57,10 +57,10 @@ class Fleet:
         """Whether the coordinator has ended."""
         return self.coordinator.poll() is not None
 
-    def join(self, name: str, role: str = "worker", *more: str, **where: Any) -> int:  # noqa: ANN401 - as of Stage.start
+    def join(self, name: str, role: str = "worker", *more: str, **where: Any) -> int:  # noqa: ANN401 - as of Workspace.start
         """Start an agent with one process and return the id of that process."""
         words = (role, "--connect", self.address, "--name", name, "--processes", "1")
-        process = self.agents[name] = self.stage.start(*words, *more, **where)
+        process = self.agents[name] = self.workspace.start(*words, *more, **where)
         wait_until(lambda: agent_processes(process.pid) != [], f"{name} starts")
         return agent_processes(process.pid)[0]
 

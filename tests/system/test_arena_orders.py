@@ -17,22 +17,24 @@ from schema.wire.arena_codec import Live, decode_live
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Stage = Any
+Workspace = Any
 Until = Callable[[Callable[[], bool], str], None]
 
 
 def test_pause_list_insert_remove_snapshot_resume(
-    crowded_arena_stage: Stage, crowded_arena_run: Path, until: Until
+    crowded_arena_workspace: Workspace, crowded_arena_run: Path, until: Until
 ) -> None:
-    folder = crowded_arena_stage.folder / "run"
+    folder = crowded_arena_workspace.folder / "run"
     words = ("crowd.toml", "--seed", "4", "--quiet", "--out", "run")
     flags = ("--workers", "1", "--speed", "8", "--listen", "tcp/127.0.0.1:0")
-    coordinator = crowded_arena_stage.start("run", *words, *flags)
+    coordinator = crowded_arena_workspace.start("run", *words, *flags)
     until((folder / "address").exists, "the coordinator listens")
     address = (folder / "address").read_text().strip()
 
     def arena(*more: str, code: int = 0) -> str:
-        text = crowded_arena_stage.run("arena", *more, "--connect", address, code=code)
+        text = crowded_arena_workspace.run(
+            "arena", *more, "--connect", address, code=code
+        )
         return str(text)
 
     received: list[Live] = []
@@ -51,7 +53,7 @@ def test_pause_list_insert_remove_snapshot_resume(
         first = before.splitlines()[2].split()[0]
         assert "is not alive" in arena("remove", "999", code=1)
         arena("remove", first)
-        crowded_arena_stage.run(
+        crowded_arena_workspace.run(
             "robot", "convert", str(crowded_arena_run / "best.yaml"), "guest.pb"
         )
         arena("insert", "guest.pb", "--place", "0.1", "0.2")
@@ -74,6 +76,8 @@ def test_pause_list_insert_remove_snapshot_resume(
         assert read_columns("poses", live.advance.poses).num_rows == event.pose_rows
 
 
-def test_orders_without_a_coordinator_are_refused_in_one_line(stage: Stage) -> None:
-    output = stage.run("arena", "list", "--connect", "tcp/127.0.0.1:9", code=2)
+def test_orders_without_a_coordinator_are_refused_in_one_line(
+    workspace: Workspace,
+) -> None:
+    output = workspace.run("arena", "list", "--connect", "tcp/127.0.0.1:9", code=2)
     assert output.strip() == "revolve: no coordinator at tcp/127.0.0.1:9"

@@ -26,7 +26,7 @@ from schema.tables.files import read_table, segments_of
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 
-Stage = Any
+Workspace = Any
 Process = subprocess.Popen[str]
 Until = Callable[[Callable[[], bool], str], None]
 
@@ -88,11 +88,11 @@ class KillLog:
 
 @pytest.mark.parametrize("threads", [1, 2, 4])
 def test_number_of_threads_does_not_change_an_arena(
-    crowded_arena_stage: Stage, crowded_arena_run: Path, threads: int
+    crowded_arena_workspace: Workspace, crowded_arena_run: Path, threads: int
 ) -> None:
     flags = ("--workers", "1", "--threads", str(threads))
-    crowded_arena_stage.run("run", *words("run"), *flags)
-    assert compare(crowded_arena_run, crowded_arena_stage.folder / "run") == []
+    crowded_arena_workspace.run("run", *words("run"), *flags)
+    assert compare(crowded_arena_run, crowded_arena_workspace.folder / "run") == []
     filled = {name for name in TABLES if read_table(crowded_arena_run, name).num_rows}
     assert filled >= {"births", "fitness", "poses", "population", "touches", "deaths"}
 
@@ -100,20 +100,20 @@ def test_number_of_threads_does_not_change_an_arena(
 class Fleet:
     """A coordinator, an analyzer and workers that can be killed."""
 
-    def __init__(self, stage: Stage, until: Until) -> None:
-        self.stage = stage
-        self.folder = stage.folder / "run"
+    def __init__(self, workspace: Workspace, until: Until) -> None:
+        self.workspace = workspace
+        self.folder = workspace.folder / "run"
         listen = ("--listen", "tcp/127.0.0.1:0")
         paced = (*words("run"), "--speed", "20")
-        self.coordinator = stage.start("coordinator", *paced, *listen)
+        self.coordinator = workspace.start("coordinator", *paced, *listen)
         until((self.folder / "address").exists, "the coordinator listens")
         self.address = (self.folder / "address").read_text().strip()
-        self.analyzer = stage.start("analyzer", "--connect", self.address)
+        self.analyzer = workspace.start("analyzer", "--connect", self.address)
         self.workers: dict[str, Process] = {}
 
     def join(self, name: str) -> None:
         flags = ("--connect", self.address, "--processes", "1", "--name", name)
-        self.workers[name] = self.stage.start("worker", *flags)
+        self.workers[name] = self.workspace.start("worker", *flags)
 
     def has_reached(self, position: float) -> bool:
         """Return whether the journal exceeds a size [bytes]; check all processes."""
@@ -141,11 +141,11 @@ def children(pid: int) -> list[int]:
 
 @pytest.mark.parametrize("draw", range(3))
 def test_killing_the_holder_twice_with_a_spare_worker_gives_an_equal_arena(
-    crowded_arena_stage: Stage, crowded_arena_run: Path, until: Until, draw: int
+    crowded_arena_workspace: Workspace, crowded_arena_run: Path, until: Until, draw: int
 ) -> None:
     kill_log, whole = KillLog(crowded_arena_run), size(crowded_arena_run)
     shares = np.sort(np.random.default_rng(draw).uniform(0.05, 0.85, 2))
-    fleet = Fleet(crowded_arena_stage, until)
+    fleet = Fleet(crowded_arena_workspace, until)
     fleet.join("w0")
     for number, share in enumerate(shares, start=1):
         fleet.join(f"w{number}")
@@ -163,15 +163,15 @@ def test_killing_the_holder_twice_with_a_spare_worker_gives_an_equal_arena(
 
 
 def resume_until(
-    stage: Stage, until: Until, is_due: Callable[[], bool], what: str
+    workspace: Workspace, until: Until, is_due: Callable[[], bool], what: str
 ) -> None:
     """Start or resume a run and kill its coordinator when a condition holds."""
-    is_new = not (stage.folder / "run" / EPOCH).exists()
+    is_new = not (workspace.folder / "run" / EPOCH).exists()
     flags = ("--workers", "1", "--threads", "1")
     if is_new:
-        process = stage.start("run", *words("run"), *flags)
+        process = workspace.start("run", *words("run"), *flags)
     else:
-        process = stage.start("resume", "run", "--quiet", *flags)
+        process = workspace.start("resume", "run", "--quiet", *flags)
     until(lambda: is_due() or process.poll() is not None, what)
     process.send_signal(signal.SIGKILL)
     process.wait()
@@ -179,29 +179,29 @@ def resume_until(
 
 @pytest.mark.parametrize("draw", range(2))
 def test_killed_coordinator_resumes_the_same_arena(
-    crowded_arena_stage: Stage, crowded_arena_run: Path, until: Until, draw: int
+    crowded_arena_workspace: Workspace, crowded_arena_run: Path, until: Until, draw: int
 ) -> None:
     kill_log, whole = KillLog(crowded_arena_run), size(crowded_arena_run)
-    folder = crowded_arena_stage.folder / "run"
+    folder = crowded_arena_workspace.folder / "run"
     for share in np.sort(np.random.default_rng(10 + draw).random(4)):
         least = share * whole
         resume_until(
-            crowded_arena_stage,
+            crowded_arena_workspace,
             until,
             lambda: bool(size(folder) > least),  # noqa: B023
             "the run is on its way",
         )
         kill_log.note("coordinator", folder)
-    crowded_arena_stage.run("resume", "run", "--workers", "1", "--quiet")
+    crowded_arena_workspace.run("resume", "run", "--workers", "1", "--quiet")
     assert compare(crowded_arena_run, folder) == []
 
 
 def test_kills_in_a_cluster_a_snapshot_and_a_segment_change_give_an_equal_arena(
-    crowded_arena_stage: Stage, crowded_arena_run: Path, until: Until
+    crowded_arena_workspace: Workspace, crowded_arena_run: Path, until: Until
 ) -> None:
     """Aim kills at events that random kills may miss; repeat missed ones."""
     kill_log = KillLog(crowded_arena_run)
-    folder = crowded_arena_stage.folder / "run"
+    folder = crowded_arena_workspace.folder / "run"
 
     def reached(step: int) -> Callable[[], bool]:
         checked_size = 0
@@ -241,9 +241,9 @@ def test_kills_in_a_cluster_a_snapshot_and_a_segment_change_give_an_equal_arena(
         ("segment change", new_segment),
     ):
         for _ in range(MOST_KILLS):
-            resume_until(crowded_arena_stage, until, moment(), what)
+            resume_until(crowded_arena_workspace, until, moment(), what)
             if what in kill_log.note("coordinator", folder):
                 break
     assert {"merged cluster", "snapshot", "segment change"} <= set(kill_log.hits)
-    crowded_arena_stage.run("resume", "run", "--workers", "1", "--quiet")
+    crowded_arena_workspace.run("resume", "run", "--workers", "1", "--quiet")
     assert compare(crowded_arena_run, folder) == []

@@ -33,13 +33,13 @@ population_floor = 6
 
 
 def test_killed_bridge_resumes_to_the_tables_of_a_single_process(
-    stage: Any,  # noqa: ANN401 - the fixture
+    workspace: Any,  # noqa: ANN401 - the fixture
     until: Callable[[Callable[[], bool], str], None],
 ) -> None:
-    (stage.folder / "short.toml").write_text(SHORT)
+    (workspace.folder / "short.toml").write_text(SHORT)
     words = ("short.toml", "--seed", "3", "--quiet", "--out")
-    stage.run("run", *words, "calm", "--in-process")
-    reference, killed = stage.folder / "calm", stage.folder / "killed"
+    workspace.run("run", *words, "calm", "--in-process")
+    reference, killed = workspace.folder / "calm", workspace.folder / "killed"
     rows = read_table(reference, "evaluations")
     assert rows.filter(pc.greater(rows["trial"], 0)).num_rows >= 6
     durations_s = np.array(rows["simulated_s"].drop_null())
@@ -49,7 +49,7 @@ def test_killed_bridge_resumes_to_the_tables_of_a_single_process(
 
     share = np.random.default_rng(5).uniform(0.5, 0.9)
     journal, whole = killed / "journal.bin", (reference / "journal.bin").stat().st_size
-    first = stage.start("run", *words, "killed", "--workers", "2")
+    first = workspace.start("run", *words, "killed", "--workers", "2")
     until(
         lambda: (
             (journal.exists() and journal.stat().st_size > share * whole)
@@ -59,5 +59,5 @@ def test_killed_bridge_resumes_to_the_tables_of_a_single_process(
     )
     first.send_signal(signal.SIGKILL)
     first.wait()
-    stage.run("resume", "killed", "--workers", "2", "--quiet")
+    workspace.run("resume", "killed", "--workers", "2", "--quiet")
     assert compare(reference, killed) == []

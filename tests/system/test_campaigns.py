@@ -14,7 +14,7 @@ from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder, read_state
 from schema.agent.network import hub_config
 from schema.experiment.file import experiment_text, read_experiment
-from tests.system.stage import Stage
+from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -52,9 +52,9 @@ def _words(out: str, *more: str) -> tuple[str, ...]:
 def whole(once: Any) -> Path:  # noqa: ANN401 - the fixture
     """Return the folder of an undisturbed campaign, run in one process."""
 
-    def make(stage: Stage) -> None:
-        _write(stage.folder)
-        stage.run(*_words("all", "--in-process", "--quiet"))
+    def make(workspace: Workspace) -> None:
+        _write(workspace.folder)
+        workspace.run(*_words("all", "--in-process", "--quiet"))
 
     folder: Path = once("campaign", make)
     return folder / "all"
@@ -71,47 +71,47 @@ def _sizes(folder: Path) -> int:
     return sum(path.stat().st_size for path in folder.glob("*/journal.bin"))
 
 
-def _make_single_run(stage: Stage, path: Path, name: str, run: int) -> None:
+def _make_single_run(workspace: Workspace, path: Path, name: str, run: int) -> None:
     """Write a single run in the format of versions without environments."""
-    text = experiment_text(read_experiment(str(stage.folder / f"{name}.toml")))
+    text = experiment_text(read_experiment(str(workspace.folder / f"{name}.toml")))
     document = json.loads(text)
     del document["environment"]
     with RunFolder(path, RunDetails(name, run, 7, json.dumps(document))):
         pass
-    stage.run("resume", str(path), "--in-process", "--quiet")
+    workspace.run("resume", str(path), "--in-process", "--quiet")
 
 
 def test_killed_campaign_resumes_and_includes_existing_runs(
-    stage: Stage, whole: Path, until: Until
+    workspace: Workspace, whole: Path, until: Until
 ) -> None:
-    _write(stage.folder)
-    campaign = stage.folder / "campaign"
-    _make_single_run(stage, campaign / "steady-1", "steady", 1)
+    _write(workspace.folder)
+    campaign = workspace.folder / "campaign"
+    _make_single_run(workspace, campaign / "steady-1", "steady", 1)
     existing = campaign / "steady-1" / "journal.bin"
     before = existing.stat().st_mtime_ns
-    first = stage.start(*_words("campaign", "--workers", "2"))
+    first = workspace.start(*_words("campaign", "--workers", "2"))
     share = existing.stat().st_size + 0.4 * (_sizes(whole) - existing.stat().st_size)
     until(lambda: _sizes(campaign) > share, "the campaign is on its way")
     first.send_signal(signal.SIGKILL)
     first.communicate()
-    assert "stopped" in stage.run("status", "campaign")
-    output = stage.run("resume", "campaign", "--workers", "1", "--quiet")
+    assert "stopped" in workspace.run("status", "campaign")
+    output = workspace.run("resume", "campaign", "--workers", "1", "--quiet")
     assert "4 runs are finished" in output
     assert (
         "keeps its own number of births" not in output
     )  # it has as many births as the others
     _check_equal(whole, campaign)
     assert existing.stat().st_mtime_ns == before
-    again = stage.run("resume", "campaign", "--workers", "1", "--quiet")
+    again = workspace.run("resume", "campaign", "--workers", "1", "--quiet")
     assert "4 of 4 runs are already finished" in again
 
 
 def test_ctrl_c_stops_all_runs_and_shows_how_to_resume(
-    stage: Stage, whole: Path, until: Until
+    workspace: Workspace, whole: Path, until: Until
 ) -> None:
-    _write(stage.folder)
-    campaign = stage.folder / "campaign"
-    first = stage.start(*_words("campaign", "--workers", "2"))
+    _write(workspace.folder)
+    campaign = workspace.folder / "campaign"
+    first = workspace.start(*_words("campaign", "--workers", "2"))
     until(lambda: _sizes(campaign) > 0.3 * _sizes(whole), "the campaign is on its way")
     first.send_signal(signal.SIGINT)
     out, err = first.communicate(timeout=60)
@@ -120,44 +120,50 @@ def test_ctrl_c_stops_all_runs_and_shows_how_to_resume(
     assert "Traceback" not in err
     begun = [path.parent for path in campaign.glob("*/run.json")]
     assert {read_state(path) for path in begun} <= {"stopped", "finished"}
-    assert stage.run(*_words("campaign"), code=2).count("revolve resume campaign") == 1
-    stage.run("resume", "campaign", "--in-process", "--quiet")
+    assert (
+        workspace.run(*_words("campaign"), code=2).count("revolve resume campaign") == 1
+    )
+    workspace.run("resume", "campaign", "--in-process", "--quiet")
     _check_equal(whole, campaign)
 
 
-def test_two_coordinators_share_the_workers_of_a_hub(stage: Stage, whole: Path) -> None:
-    _write(stage.folder)
+def test_two_coordinators_share_the_workers_of_a_hub(
+    workspace: Workspace, whole: Path
+) -> None:
+    _write(workspace.folder)
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp/127.0.0.1:{server.getsockname()[1]}"
     with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))):
         commands = [
-            stage.start(
+            workspace.start(
                 "run", f"{name}.toml", "--seed", "7", "--repeats", str(REPEATS),
                 "--connect", address, "--out", name,
             )
             for name in NAMES
         ]  # fmt: skip
-        stage.start("analyzer", "--connect", address)
-        stage.start("worker", "--connect", address, "--processes", "2")
+        workspace.start("analyzer", "--connect", address)
+        workspace.start("worker", "--connect", address, "--processes", "2")
         for command in commands:
             out, err = command.communicate(timeout=200)
             assert command.returncode == 0, out + err
     for name in NAMES:
         for repeat in range(REPEATS):
             run = f"{name}-{repeat}"
-            assert compare(whole / run, stage.folder / name / run) == []
+            assert compare(whole / run, workspace.folder / name / run) == []
 
 
-def test_status_of_all_coordinators_of_a_hub(stage: Stage, until: Until) -> None:
-    _write(stage.folder)
-    first = stage.start("coordinator", *_words("one")[1:], "--listen", HUB)
-    until((stage.folder / "one" / "address").exists, "the first one listens")
-    address = (stage.folder / "one" / "address").read_text().strip()
-    stage.start("coordinator", "steady.toml", "--connect", address, "--out", "two")
-    until((stage.folder / "two" / "address").exists, "the second one is connected")
+def test_status_of_all_coordinators_of_a_hub(
+    workspace: Workspace, until: Until
+) -> None:
+    _write(workspace.folder)
+    first = workspace.start("coordinator", *_words("one")[1:], "--listen", HUB)
+    until((workspace.folder / "one" / "address").exists, "the first one listens")
+    address = (workspace.folder / "one" / "address").read_text().strip()
+    workspace.start("coordinator", "steady.toml", "--connect", address, "--out", "two")
+    until((workspace.folder / "two" / "address").exists, "the second one is connected")
 
     def status() -> str:
-        text = stage.run("status", "--connect", address)
+        text = workspace.run("status", "--connect", address)
         return str(text)
 
     until(
@@ -166,9 +172,11 @@ def test_status_of_all_coordinators_of_a_hub(stage: Stage, until: Until) -> None
     assert "0 workers" not in status()
     assert "0 of 4 runs finished, 0 of 80 births" in status()
     # The folder's own coordinator answers; a folder alone has no estimate of time left.
-    assert "left" not in stage.run("status", "one")
-    stage.start("worker", "--connect", address, "--processes", "1")
-    until(lambda: "1 workers, 0 analyzers" in stage.run("status", "one"), "it answers")
+    assert "left" not in workspace.run("status", "one")
+    workspace.start("worker", "--connect", address, "--processes", "1")
+    until(
+        lambda: "1 workers, 0 analyzers" in workspace.run("status", "one"), "it answers"
+    )
     assert first.poll() is None
 
 
@@ -184,8 +192,8 @@ def test_status_of_all_coordinators_of_a_hub(stage: Stage, until: Until) -> None
     ],
 )
 def test_errors_are_reported_in_one_line(
-    stage: Stage, words: tuple[str, ...], complaint: str
+    workspace: Workspace, words: tuple[str, ...], complaint: str
 ) -> None:
-    output = stage.run(*words, code=2)
+    output = workspace.run(*words, code=2)
     assert complaint in output
     assert len(output.strip().splitlines()) == 1

@@ -13,7 +13,7 @@ from schema.tables.files import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Stage = Any
+Workspace = Any
 Until = Callable[[Callable[[], bool], str], None]
 
 
@@ -39,23 +39,23 @@ def _size(folder: Path) -> int:
 
 
 def test_one_worker_gives_the_same_births_as_a_single_process(
-    stage: Stage, undisturbed: Path, births: int
+    workspace: Workspace, undisturbed: Path, births: int
 ) -> None:
-    stage.run("run", *_words(births, "one"), "--workers", "1")
-    assert compare(undisturbed, stage.folder / "one") == []
+    workspace.run("run", *_words(births, "one"), "--workers", "1")
+    assert compare(undisturbed, workspace.folder / "one") == []
 
 
 def test_killing_one_of_three_workers_gives_the_same_births(
-    stage: Stage, undisturbed: Path, births: int, until: Until
+    workspace: Workspace, undisturbed: Path, births: int, until: Until
 ) -> None:
-    folder = stage.folder / "three"
+    folder = workspace.folder / "three"
     words = _words(births, "three")
-    coordinator = stage.start("coordinator", *words, "--listen", "tcp/127.0.0.1:0")
+    coordinator = workspace.start("coordinator", *words, "--listen", "tcp/127.0.0.1:0")
     until((folder / "address").exists, "the coordinator listens")
     address = (folder / "address").read_text().strip()
-    stage.start("analyzer", "--connect", address)
+    workspace.start("analyzer", "--connect", address)
     workers = [
-        stage.start("worker", "--connect", address, "--processes", "1")
+        workspace.start("worker", "--connect", address, "--processes", "1")
         for _ in range(3)
     ]
     whole = _size(undisturbed)
@@ -69,30 +69,30 @@ def test_killing_one_of_three_workers_gives_the_same_births(
 
 @pytest.mark.parametrize("draw", range(4))
 def test_killed_coordinator_resumes_to_the_same_births(
-    stage: Stage, undisturbed: Path, births: int, until: Until, draw: int
+    workspace: Workspace, undisturbed: Path, births: int, until: Until, draw: int
 ) -> None:
-    folder = stage.folder / "killed"
+    folder = workspace.folder / "killed"
     whole = _size(undisturbed)
     # One kill at a random instant of each quarter of the run.
     share = (draw + np.random.default_rng(draw).random()) / 4
-    first = stage.start("run", *_words(births, "killed"), "--workers", "2")
+    first = workspace.start("run", *_words(births, "killed"), "--workers", "2")
     until(
         lambda: _size(folder) > share * whole or first.poll() is not None,
         "the run is on its way",
     )
     first.send_signal(signal.SIGKILL)
     first.wait()
-    stage.run("resume", "killed", "--workers", "2", "--quiet")
+    workspace.run("resume", "killed", "--workers", "2", "--quiet")
     assert compare(undisturbed, folder) == []
 
 
-def test_noise_is_the_same_in_every_process(stage: Stage) -> None:
+def test_noise_is_the_same_in_every_process(workspace: Workspace) -> None:
     """Compare a single process, two workers with audits, and a re-simulation."""
-    (stage.folder / "noisy.toml").write_text(NOISY)
+    (workspace.folder / "noisy.toml").write_text(NOISY)
     words = ("run", "noisy.toml", "--seed", "5", "--births", "30", "--quiet")
-    stage.run(*words, "--in-process", "--out", "one")
-    stage.run(*words, "--workers", "2", "--audit", "0.3", "--out", "two")
-    one, two = stage.folder / "one", stage.folder / "two"
+    workspace.run(*words, "--in-process", "--out", "one")
+    workspace.run(*words, "--workers", "2", "--audit", "0.3", "--out", "two")
+    one, two = workspace.folder / "one", workspace.folder / "two"
     assert compare(one, two) == []
     agrees = read_table(two, "audits")["agrees"].to_pylist()
     assert agrees
@@ -101,34 +101,34 @@ def test_noise_is_the_same_in_every_process(stage: Stage) -> None:
     repeated = {row["birth"] for row in reevaluations if row["trial"]}
     assert repeated
     robots = ("--robot", "best", "--robot", f"0:{min(repeated)}")
-    out = stage.run("view", "one", *robots, "--save", "a.rrd")
+    out = workspace.run("view", "one", *robots, "--save", "a.rrd")
     assert out.count("moves as recorded, equal to the last bit") == 2
     assert "DIFFERS" not in out
 
 
 def test_second_coordinator_is_refused_with_the_id_of_the_first(
-    stage: Stage, births: int, until: Until
+    workspace: Workspace, births: int, until: Until
 ) -> None:
-    folder = stage.folder / "held"
-    first = stage.start(
+    folder = workspace.folder / "held"
+    first = workspace.start(
         "coordinator", *_words(births, "held"), "--listen", "tcp/127.0.0.1:0"
     )
     until((folder / "address").exists, "the coordinator listens")
-    output = stage.run("resume", "held", "--quiet", code=2)
+    output = workspace.run("resume", "held", "--quiet", code=2)
     assert str(first.pid) in output
     assert len(output.strip().splitlines()) == 1
 
 
 def test_ctrl_c_stops_cleanly_and_shows_how_to_resume(
-    stage: Stage, undisturbed: Path, births: int, until: Until
+    workspace: Workspace, undisturbed: Path, births: int, until: Until
 ) -> None:
-    folder = stage.folder / "stopped"
-    first = stage.start("run", *_words(births, "stopped"), "--workers", "2")
+    folder = workspace.folder / "stopped"
+    first = workspace.start("run", *_words(births, "stopped"), "--workers", "2")
     until(lambda: _size(folder) > _size(undisturbed) // 3, "the run is on its way")
     first.send_signal(signal.SIGINT)
     out, err = first.communicate(timeout=60)
     assert first.returncode == 130, out + err
     assert "revolve resume stopped" in out + err
     assert "Traceback" not in err
-    stage.run("resume", "stopped", "--workers", "1", "--quiet")
+    workspace.run("resume", "stopped", "--workers", "1", "--quiet")
     assert compare(undisturbed, folder) == []

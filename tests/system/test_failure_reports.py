@@ -20,7 +20,7 @@ from schema.tables.files import parquet_path
 
 pytestmark = pytest.mark.system
 
-Stage = Any
+Workspace = Any
 Until = Callable[[Callable[[], bool], str], None]
 
 SHORT = """
@@ -64,58 +64,58 @@ def none(track, settings):
 """
 
 
-def _write(stage: Stage, name: str, fitness: str) -> str:
-    (stage.folder / "judge.py").write_text(FITNESS)
+def _write(workspace: Workspace, name: str, fitness: str) -> str:
+    (workspace.folder / "judge.py").write_text(FITNESS)
     text = SHORT.format(name=name, fitness=fitness)
-    (stage.folder / f"{name}.toml").write_text(text)
+    (workspace.folder / f"{name}.toml").write_text(text)
     return f"{name}.toml"
 
 
-def _run(stage: Stage, *words: str, code: int = 0) -> str:
-    output: str = stage.run("run", *words, "--in-process", "--quiet", code=code)
+def _run(workspace: Workspace, *words: str, code: int = 0) -> str:
+    output: str = workspace.run("run", *words, "--in-process", "--quiet", code=code)
     return output
 
 
-def test_run_without_any_fitness_has_no_best_robot(stage: Stage) -> None:
-    source = _write(stage, "blind", "judge:none")
-    output = _run(stage, source, "--out", "a b", code=1)
+def test_run_without_any_fitness_has_no_best_robot(workspace: Workspace) -> None:
+    source = _write(workspace, "blind", "judge:none")
+    output = _run(workspace, source, "--out", "a b", code=1)
     assert "12 births; no robot of the last population has a fitness" in output
     assert "12 of 12 evaluations failed, all: " in output
     assert "nobody looked" in output
     assert "best robot" not in output
-    assert not (stage.folder / "a b" / "best.yaml").exists()
+    assert not (workspace.folder / "a b" / "best.yaml").exists()
     assert "revolve view 'a b'" in output
-    assert "best -" in stage.run("status", "a b")
+    assert "best -" in workspace.run("status", "a b")
 
 
-def test_run_reports_failed_evaluations_and_the_reason(stage: Stage) -> None:
-    output = _run(stage, _write(stage, "dim", "judge:few"), "--out", "a")
+def test_run_reports_failed_evaluations_and_the_reason(workspace: Workspace) -> None:
+    output = _run(workspace, _write(workspace, "dim", "judge:few"), "--out", "a")
     failed = [line for line in output.splitlines() if "evaluations failed" in line]
     assert len(failed) == 1
     assert "too fast to see" in failed[0]
     assert "of 12 evaluations failed, all: " in failed[0]
     assert "best robot: birth " in output
-    assert (stage.folder / "a" / "best.yaml").exists()
+    assert (workspace.folder / "a" / "best.yaml").exists()
 
 
-def test_campaign_reports_runs_without_any_fitness(stage: Stage) -> None:
+def test_campaign_reports_runs_without_any_fitness(workspace: Workspace) -> None:
     sources = [
-        _write(stage, "blind", "judge:none"),
-        _write(stage, "seeing", "worker.fitness:thesis"),
+        _write(workspace, "blind", "judge:none"),
+        _write(workspace, "seeing", "worker.fitness:thesis"),
     ]
-    output = _run(stage, *sources, "--out", "both", code=1)
+    output = _run(workspace, *sources, "--out", "both", code=1)
     assert "both/blind-0: 12 of 12 evaluations failed, all: " in output
     assert "seeing-0" not in output
     assert "2 runs are finished" in output
-    again = stage.run("resume", "both", "--in-process", "--quiet", code=1)
+    again = workspace.run("resume", "both", "--in-process", "--quiet", code=1)
     assert "2 of 2 runs are already finished" in again
     # A campaign of one run reports the reason, too.
-    (stage.folder / "both" / "blind-0" / "state").write_text("tired")
-    shutil.rmtree(stage.folder / "both" / "seeing-0")
-    text = (stage.folder / "both" / "campaign.toml").read_text()
+    (workspace.folder / "both" / "blind-0" / "state").write_text("tired")
+    shutil.rmtree(workspace.folder / "both" / "seeing-0")
+    text = (workspace.folder / "both" / "campaign.toml").read_text()
     text = text[: text.rindex("[[experiments]]")]
-    (stage.folder / "both" / "campaign.toml").write_text(text)
-    alone = stage.run("resume", "both", "--in-process", "--quiet", code=1)
+    (workspace.folder / "both" / "campaign.toml").write_text(text)
+    alone = workspace.run("resume", "both", "--in-process", "--quiet", code=1)
     assert "blind-0 failed: both/blind-0/state: must be one of running" in alone
 
 
@@ -123,28 +123,28 @@ def test_campaign_reports_runs_without_any_fitness(stage: Stage) -> None:
 def campaign_folder(once: Any) -> Path:  # noqa: ANN401 - the fixture
     """Return a folder with a campaign of two finished runs."""
 
-    def make(stage: Stage) -> None:
+    def make(workspace: Workspace) -> None:
         words = ("--repeats", "2", "--out", "all/twice")
-        _run(stage, _write(stage, "seeing", "worker.fitness:thesis"), *words)
+        _run(workspace, _write(workspace, "seeing", "worker.fitness:thesis"), *words)
 
     folder: Path = once("failures-told", make)
     return folder / "all"
 
 
 def test_damaged_run_does_not_hide_other_runs(
-    stage: Stage, campaign_folder: Path
+    workspace: Workspace, campaign_folder: Path
 ) -> None:
-    shutil.copytree(campaign_folder, stage.folder / "all")
-    twice = stage.folder / "all" / "twice"
+    shutil.copytree(campaign_folder, workspace.folder / "all")
+    twice = workspace.folder / "all" / "twice"
     damage = "seeing-0/run.json: cannot be read: Object missing required field `name`"
     (twice / "seeing-0" / "run.json").write_text("{}")
-    output = stage.run("status", "all", code=1)
+    output = workspace.run("status", "all", code=1)
     assert f"damaged: all/twice/{damage}" in output
     assert "1 of 2 runs finished" in output
     assert "twice/seeing-0  damaged" in output
     # A damaged run does not prevent the other run from starting again.
     shutil.rmtree(twice / "seeing-1")
-    output = stage.run("resume", "all/twice", "--in-process", "--quiet", code=1)
+    output = workspace.run("resume", "all/twice", "--in-process", "--quiet", code=1)
     assert f"seeing-0 failed: all/twice/{damage}" in output
     assert read_state(twice / "seeing-1") == "finished"
     assert compare(twice / "seeing-1", campaign_folder / "twice" / "seeing-1") == []
@@ -189,13 +189,15 @@ def test_narrow_terminal_does_not_truncate_the_status(
         assert line.split()[1:6] == ["finished", "12", "of", "12", "best"]
 
 
-def test_missing_tables_are_written_again(stage: Stage, campaign_folder: Path) -> None:
-    run = stage.folder / "run"
+def test_missing_tables_are_written_again(
+    workspace: Workspace, campaign_folder: Path
+) -> None:
+    run = workspace.folder / "run"
     shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
     words = ("resume", "run", "--in-process", "--quiet")
-    assert "already finished" in stage.run(*words)
+    assert "already finished" in workspace.run(*words)
     shutil.rmtree(run / "tables")
-    output = stage.run(*words)
+    output = workspace.run(*words)
     assert "tables are missing; writing them again from the journal" in output
     assert "12 births" in output
     assert compare(run, campaign_folder / "twice" / "seeing-0") == []
@@ -203,9 +205,9 @@ def test_missing_tables_are_written_again(stage: Stage, campaign_folder: Path) -
 
 @pytest.mark.parametrize("tables", ["tables", "no tables"])
 def test_run_without_its_journal_does_not_restart(
-    stage: Stage, campaign_folder: Path, tables: str
+    workspace: Workspace, campaign_folder: Path, tables: str
 ) -> None:
-    run = stage.folder / "run"
+    run = workspace.folder / "run"
     shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
     (run / "journal.bin").unlink()
     words = ("resume", "run", "--in-process", "--quiet")
@@ -215,16 +217,16 @@ def test_run_without_its_journal_does_not_restart(
     else:
         shutil.rmtree(run / "tables")
         message = "put a copy of the tables in their place"
-    assert message in stage.run(*words, code=2)
+    assert message in workspace.run(*words, code=2)
     (run / "journal.bin").touch()
-    assert message in stage.run(*words, code=2)
+    assert message in workspace.run(*words, code=2)
 
 
 def test_refused_resume_does_not_change_the_folder(
-    stage: Stage, campaign_folder: Path
+    workspace: Workspace, campaign_folder: Path
 ) -> None:
     """Lost rows are rewritten only from an intact journal."""
-    run = stage.folder / "run"
+    run = workspace.folder / "run"
     shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
     shutil.rmtree(run / "tables")
     (run / "state").unlink()
@@ -234,10 +236,10 @@ def test_refused_resume_does_not_change_the_folder(
     journal = bytearray((run / "journal.bin").read_bytes())
     journal[40] ^= 1
     (run / "journal.bin").write_bytes(journal)
-    output = stage.run("resume", "run", "--in-process", "--quiet", code=2)
+    output = workspace.run("resume", "run", "--in-process", "--quiet", code=2)
     assert "journal.bin: damaged at byte" in output
     (run / "journal.bin").unlink()
-    output = stage.run("resume", "run", "--in-process", "--quiet", code=2)
+    output = workspace.run("resume", "run", "--in-process", "--quiet", code=2)
     assert "journal.bin: is lost" in output
     assert [path.name for path in (run / "segments").iterdir()] == ["births-001.arrows"]
 
@@ -272,48 +274,50 @@ def test_status_follows_a_link_to_a_run(
     assert "1 of 1 runs finished, 12 of 12 births" in output
 
 
-def test_arena_without_any_fitness_reports_the_reason(stage: Stage) -> None:
-    (stage.folder / "judge.py").write_text(FITNESS)
+def test_arena_without_any_fitness_reports_the_reason(workspace: Workspace) -> None:
+    (workspace.folder / "judge.py").write_text(FITNESS)
     text = ARENA.format(fitness="judge:none")
-    (stage.folder / "arena.toml").write_text(text)
-    output = _run(stage, "arena.toml", "--out", "a", code=1)
+    (workspace.folder / "arena.toml").write_text(text)
+    output = _run(workspace, "arena.toml", "--out", "a", code=1)
     assert "too few robots are left to mate" in output
     assert "deaths were failures, all: " in output
     assert "nobody looked" in output
-    assert "already finished" in stage.run("resume", "a", "--in-process", code=1)
+    assert "already finished" in workspace.run("resume", "a", "--in-process", code=1)
 
 
 @pytest.mark.parametrize("repeats", [(), ("--repeats", "2")])
 def test_wrong_address_leaves_the_folder_usable(
-    stage: Stage, repeats: tuple[str, ...]
+    workspace: Workspace, repeats: tuple[str, ...]
 ) -> None:
-    source = _write(stage, "seeing", "worker.fitness:thesis")
+    source = _write(workspace, "seeing", "worker.fitness:thesis")
     words = ("run", source, *repeats, "--out", "new", "--quiet")
-    output = stage.run(*words, "--connect", "tcp/127.0.0.1:1", code=2)
+    output = workspace.run(*words, "--connect", "tcp/127.0.0.1:1", code=2)
     assert "no hub at tcp/127.0.0.1:1" in output
-    stage.run(*words, "--in-process")
+    workspace.run(*words, "--in-process")
 
 
-def test_no_lock_is_created_in_a_folder_with_other_files(stage: Stage) -> None:
-    (stage.folder / "mine").mkdir()
-    (stage.folder / "mine" / "thesis.tex").write_text("years of work")
-    source = _write(stage, "seeing", "worker.fitness:thesis")
-    output = stage.run("run", source, "--out", "mine", code=2)
+def test_no_lock_is_created_in_a_folder_with_other_files(workspace: Workspace) -> None:
+    (workspace.folder / "mine").mkdir()
+    (workspace.folder / "mine" / "thesis.tex").write_text("years of work")
+    source = _write(workspace, "seeing", "worker.fitness:thesis")
+    output = workspace.run("run", source, "--out", "mine", code=2)
     assert "not empty (contains 'thesis.tex')" in output
-    assert [path.name for path in (stage.folder / "mine").iterdir()] == ["thesis.tex"]
+    assert [path.name for path in (workspace.folder / "mine").iterdir()] == [
+        "thesis.tex"
+    ]
 
 
-def test_moved_folder_is_reported(stage: Stage, until: Until) -> None:
+def test_moved_folder_is_reported(workspace: Workspace, until: Until) -> None:
     words = ("scenario1", "--births", "3000", "--workers", "1", "--out", "gone")
-    process = stage.start("run", *words, "--quiet")
-    journal = stage.folder / "gone" / "journal.bin"
+    process = workspace.start("run", *words, "--quiet")
+    journal = workspace.folder / "gone" / "journal.bin"
     until(
         lambda: journal.exists() and journal.stat().st_size > 2000,
         "the run is on its way",
     )
-    (stage.folder / "gone").rename(stage.folder / "elsewhere")
+    (workspace.folder / "gone").rename(workspace.folder / "elsewhere")
     _, err = process.communicate(timeout=60)
     assert process.returncode == 2
     assert "was moved or removed" in err
-    details = json.loads((stage.folder / "elsewhere" / "run.json").read_text())
+    details = json.loads((workspace.folder / "elsewhere" / "run.json").read_text())
     assert details["name"] == "scenario1"

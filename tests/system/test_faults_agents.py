@@ -19,7 +19,7 @@ from coordinator.islands.events import Advanced
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import NAME, Journal
 from tests.system.fleet import Fleet, agent_processes, size
-from tests.system.stage import wait_until
+from tests.system.workspace import wait_until
 
 pytestmark = [
     pytest.mark.system,
@@ -27,7 +27,7 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
 ]
 
-Stage = Any
+Workspace = Any
 Fleets = Callable[..., Any]
 ROOT = Path(__file__).parents[2]
 MISBEHAVING_AGENT = Path(__file__).with_name("misbehaving_agent.py")
@@ -59,9 +59,9 @@ def stop_continue_and_finish(
 
 
 def test_stopping_and_continuing_a_worker_gives_an_equal_run(
-    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
+    workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:
-    fleet = fleet_of(stage, *scenario1_words(births))
+    fleet = fleet_of(workspace, *scenario1_words(births))
     stopped = fleet.join("one")
     fleet.join("two")
     fleet.begin(workers=2)
@@ -70,9 +70,9 @@ def test_stopping_and_continuing_a_worker_gives_an_equal_run(
 
 @pytest.mark.slow
 def test_stopping_and_continuing_the_holder_of_an_arena_gives_an_equal_run(
-    small_arena_stage: Stage, small_arena_run: Path, fleet_of: Fleets
+    small_arena_workspace: Workspace, small_arena_run: Path, fleet_of: Fleets
 ) -> None:
-    fleet = fleet_of(small_arena_stage, *SMALL_ARENA)
+    fleet = fleet_of(small_arena_workspace, *SMALL_ARENA)
     # The first by name is the holder.
     stopped = fleet.join("one")
     fleet.join("two")
@@ -87,9 +87,9 @@ def test_stopping_and_continuing_the_holder_of_an_arena_gives_an_equal_run(
 
 
 def test_losing_one_of_two_analyzers_gives_an_equal_run(
-    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
+    workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:
-    fleet = fleet_of(stage, *scenario1_words(births))
+    fleet = fleet_of(workspace, *scenario1_words(births))
     fleet.join("judge", "analyzer")
     fleet.join("another", "analyzer")
     fleet.join("one")
@@ -101,9 +101,9 @@ def test_losing_one_of_two_analyzers_gives_an_equal_run(
 
 
 def test_replacing_the_only_analyzer_gives_an_equal_run(
-    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
+    workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:
-    fleet = fleet_of(stage, *scenario1_words(births))
+    fleet = fleet_of(workspace, *scenario1_words(births))
     fleet.join("judge", "analyzer")
     fleet.join("one")
     share = np.random.default_rng(24).uniform(0.1, 0.7)
@@ -115,11 +115,11 @@ def test_replacing_the_only_analyzer_gives_an_equal_run(
 
 
 def test_run_replaces_its_only_worker_after_sigterm(
-    stage: Stage, undisturbed: Path, births: int
+    workspace: Workspace, undisturbed: Path, births: int
 ) -> None:
-    folder = stage.folder / "run"
+    folder = workspace.folder / "run"
     words = (*scenario1_words(births), "--workers", "1", "--out", "run")
-    command = stage.start("run", *words)
+    command = workspace.start("run", *words)
     share = np.random.default_rng(25).uniform(0.1, 0.7)
     wait_until(
         lambda: size(folder) > share * journal_size(undisturbed),
@@ -133,9 +133,13 @@ def test_run_replaces_its_only_worker_after_sigterm(
 
 @pytest.mark.parametrize("behaviour", ["twice", "late"])
 def test_duplicate_and_late_answers_give_an_equal_run(
-    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets, behaviour: str
+    workspace: Workspace,
+    undisturbed: Path,
+    births: int,
+    fleet_of: Fleets,
+    behaviour: str,
 ) -> None:
-    fleet = fleet_of(stage, *scenario1_words(births))
+    fleet = fleet_of(workspace, *scenario1_words(births))
     fleet.join("one")
     command = [sys.executable, str(MISBEHAVING_AGENT), fleet.address, behaviour]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

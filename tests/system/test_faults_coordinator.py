@@ -26,7 +26,7 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
 ]
 
-Stage = Any
+Workspace = Any
 Fleets = Callable[..., Any]
 PATIENCE_S = 120
 ROOT = Path(__file__).parents[2]
@@ -72,11 +72,11 @@ def test_kills_at_random_instants_give_equal_runs(
 
 
 def stopped_coordinator(
-    stage: Stage, fleet_of: Fleets, undisturbed: Path, births: int
+    workspace: Workspace, fleet_of: Fleets, undisturbed: Path, births: int
 ) -> Any:  # noqa: ANN401 - a fleet
     """Return a fleet whose coordinator is stopped by SIGSTOP during its run."""
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
-    fleet = fleet_of(stage, *words)
+    fleet = fleet_of(workspace, *words)
     fleet.join("judge", "analyzer")
     fleet.join("one")
     share = np.random.default_rng(43).uniform(0.2, 0.5)
@@ -86,10 +86,10 @@ def stopped_coordinator(
 
 
 def test_stopped_coordinator_keeps_the_lock_of_its_run(
-    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
+    workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:
-    fleet = stopped_coordinator(stage, fleet_of, undisturbed, births)
-    output = stage.run("resume", "run", "--quiet", code=2)
+    fleet = stopped_coordinator(workspace, fleet_of, undisturbed, births)
+    output = workspace.run("resume", "run", "--quiet", code=2)
     assert f"in use by process {fleet.coordinator.pid} on " in output
     assert len(output.strip().splitlines()) == 1
     fleet.coordinator.send_signal(signal.SIGCONT)
@@ -99,12 +99,12 @@ def test_stopped_coordinator_keeps_the_lock_of_its_run(
 
 @pytest.mark.parametrize("when", ["meanwhile", "afterwards"])
 def test_continued_coordinator_exits_and_writes_nothing_after_a_takeover(
-    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets, when: str
+    workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets, when: str
 ) -> None:
     """The epoch detects a takeover on file systems without locks."""
-    fleet = stopped_coordinator(stage, fleet_of, undisturbed, births)
+    fleet = stopped_coordinator(workspace, fleet_of, undisturbed, births)
     (fleet.folder / LOCK).unlink()
-    second = stage.start("resume", "run", "--workers", "1", "--quiet")
+    second = workspace.start("resume", "run", "--workers", "1", "--quiet")
     whole = (undisturbed / NAME).stat().st_size
     if when == "meanwhile":
         position = (fleet.folder / NAME).stat().st_size + 0.1 * whole

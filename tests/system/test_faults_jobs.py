@@ -21,7 +21,7 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
 ]
 
-Stage = Any
+Workspace = Any
 Fleets = Callable[..., Any]
 Until = Callable[[Callable[[], bool], str], None]
 
@@ -59,11 +59,13 @@ HARMS = {
 QUARANTINED = "quarantined: ended its own process 3 times, by "
 
 
-def write_plug_in(stage: Stage, harm: str = "pass", limit: float = 0.03) -> None:
-    """Write an experiment and its plug-in to the folder of the stage."""
-    (stage.folder / "harm.toml").write_text(DOCUMENT)
+def write_plug_in(
+    workspace: Workspace, harm: str = "pass", limit: float = 0.03
+) -> None:
+    """Write an experiment and its plug-in to the folder of the workspace."""
+    (workspace.folder / "harm.toml").write_text(DOCUMENT)
     text = PLUGGED.format(harm=harm, limit=limit)
-    (stage.folder / "plugged.py").write_text(text)
+    (workspace.folder / "plugged.py").write_text(text)
 
 
 def reasons(folder: Path) -> dict[int, str]:
@@ -77,25 +79,29 @@ WORDS = ("harm.toml", "--seed", "1", "--cpu-limit", "0.7", "--quiet")
 
 @pytest.mark.parametrize("kind", sorted(HARMS))
 def test_robot_that_crashes_three_processes_is_quarantined(
-    stage: Stage, kind: str
+    workspace: Workspace, kind: str
 ) -> None:
     harm, cause = HARMS[kind]
-    write_plug_in(stage, harm)
-    output = stage.run("run", *WORDS, "--workers", "2", "--out", "run")
-    failed = reasons(stage.folder / "run")
+    write_plug_in(workspace, harm)
+    output = workspace.run("run", *WORDS, "--workers", "2", "--out", "run")
+    failed = reasons(workspace.folder / "run")
     assert 1 <= len(failed) <= 3
     assert set(failed.values()) == {f"{QUARANTINED}{cause}"}
-    births = read_table(stage.folder / "run", "births")
+    births = read_table(workspace.folder / "run", "births")
     assert births.num_rows == 16
     for birth in failed:
         assert f"birth {birth} of island 0: {QUARANTINED}{cause}" in output
 
 
-def test_external_kills_do_not_lead_to_quarantine(stage: Stage, until: Until) -> None:
+def test_external_kills_do_not_lead_to_quarantine(
+    workspace: Workspace, until: Until
+) -> None:
     """Kill the worker of the same robot repeatedly from outside."""
-    write_plug_in(stage, "open('here', 'w').write(str(os.getpid())); signal.pause()")
-    pid_file = stage.folder / "here"
-    run = stage.start("run", *WORDS, "--workers", "1", "--out", "run")
+    write_plug_in(
+        workspace, "open('here', 'w').write(str(os.getpid())); signal.pause()"
+    )
+    pid_file = workspace.folder / "here"
+    run = workspace.start("run", *WORDS, "--workers", "1", "--out", "run")
     for _ in range(4):
         until(
             lambda: pid_file.exists() and pid_file.read_text() != "",
@@ -106,40 +112,40 @@ def test_external_kills_do_not_lead_to_quarantine(stage: Stage, until: Until) ->
         os.kill(victim, signal.SIGKILL)
     until(lambda: pid_file.exists() and pid_file.read_text() != "", "a worker is at it")
     assert run.poll() is None
-    assert reasons(stage.folder / "run") == {}
+    assert reasons(workspace.folder / "run") == {}
     run.kill()
     os.kill(int(pid_file.read_text()), signal.SIGKILL)
 
 
 def test_quarantine_pauses_a_run_with_that_option_and_resume_continues_it(
-    stage: Stage,
+    workspace: Workspace,
 ) -> None:
-    write_plug_in(stage, HARMS["segfault"][0])
-    stage.run("run", *WORDS, "--workers", "2", "--out", "through")
-    completed = stage.folder / "through"
+    write_plug_in(workspace, HARMS["segfault"][0])
+    workspace.run("run", *WORDS, "--workers", "2", "--out", "through")
+    completed = workspace.folder / "through"
     words = (*WORDS[1:], "--on-quarantine", "pause")
-    output = stage.run(
+    output = workspace.run(
         "run", "harm.toml", *words, "--workers", "2", "--out", "run", code=2
     )
     assert "quarantined" in output
     assert "resume to go on without it" in output
     for _ in reasons(completed):
-        again = stage.start("resume", "run", "--workers", "2", *words[2:])
+        again = workspace.start("resume", "run", "--workers", "2", *words[2:])
         if again.wait(120) == 0:
             break
-    assert compare(completed, stage.folder / "run") == []
+    assert compare(completed, workspace.folder / "run") == []
 
 
 def test_workers_with_a_missing_or_different_plug_in_are_refused(
-    stage: Stage, fleet_of: Fleets
+    workspace: Workspace, fleet_of: Fleets
 ) -> None:
-    write_plug_in(stage)
-    stage.run("run", *WORDS, "--in-process", "--out", "calm")
-    fleet = fleet_of(stage, *WORDS)
-    elsewhere = stage.folder / "elsewhere"
+    write_plug_in(workspace)
+    workspace.run("run", *WORDS, "--in-process", "--out", "calm")
+    fleet = fleet_of(workspace, *WORDS)
+    elsewhere = workspace.folder / "elsewhere"
     elsewhere.mkdir()
     (elsewhere / "plugged.py").write_text("fitness = lambda track, settings: 1.0\n")
-    nowhere = stage.folder / "nowhere"
+    nowhere = workspace.folder / "nowhere"
     nowhere.mkdir()
     fleet.join("judge", "analyzer")
     lines: list[str] = []
@@ -154,14 +160,14 @@ def test_workers_with_a_missing_or_different_plug_in_are_refused(
     assert "its plug-in 'plugged' differs from the coordinator's" in lines[-1]
     fleet.join("good")
     fleet.finish()
-    assert compare(stage.folder / "calm", fleet.folder) == []
+    assert compare(workspace.folder / "calm", fleet.folder) == []
 
 
 def test_audit_of_agreeing_workers_does_not_change_the_run(
-    stage: Stage, fleet_of: Fleets, undisturbed: Path, births: int
+    workspace: Workspace, fleet_of: Fleets, undisturbed: Path, births: int
 ) -> None:
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
-    fleet = fleet_of(stage, *words, "--audit", "0.2")
+    fleet = fleet_of(workspace, *words, "--audit", "0.2")
     fleet.join("one")
     fleet.join("other")
     fleet.begin(workers=2)
@@ -177,15 +183,15 @@ def test_audit_of_agreeing_workers_does_not_change_the_run(
 
 
 def test_disagreeing_workers_are_reported_and_stop_the_run(
-    stage: Stage, fleet_of: Fleets
+    workspace: Workspace, fleet_of: Fleets
 ) -> None:
     """One worker adds a rounding error; the run resumes without it."""
-    write_plug_in(stage)
-    module = stage.folder / "plugged.py"
+    write_plug_in(workspace)
+    module = workspace.folder / "plugged.py"
     drift = 'return value * (1 + 3e-16) if os.environ.get("DRIFT") else value'
     module.write_text(module.read_text().replace("return value", drift))
-    stage.run("run", *WORDS, "--in-process", "--out", "calm")
-    fleet = fleet_of(stage, *WORDS, "--audit", "1")
+    workspace.run("run", *WORDS, "--in-process", "--out", "calm")
+    fleet = fleet_of(workspace, *WORDS, "--audit", "1")
     fleet.join("sound")
     fleet.join("broken", environment={"DRIFT": "1"})
     fleet.begin(workers=2)
@@ -196,7 +202,7 @@ def test_disagreeing_workers_are_reported_and_stop_the_run(
     assert "broken-0." in message
     assert "'audits'" in message
     fleet.kill("broken")
-    stage.run("resume", "run", "--workers", "2", "--quiet", "--audit", "1")
+    workspace.run("resume", "run", "--workers", "2", "--quiet", "--audit", "1")
     rows = read_table(fleet.folder, "audits").to_pylist()
     disputed = [row for row in rows if not row["agrees"]]
     assert sorted(row["worker"].split("-")[0] for row in disputed) == [
@@ -206,4 +212,4 @@ def test_disagreeing_workers_are_reported_and_stop_the_run(
     one, other = (row["fitness"] for row in disputed)
     assert one != other
     assert one == pytest.approx(other, rel=1e-14)
-    assert compare(stage.folder / "calm", fleet.folder) == []
+    assert compare(workspace.folder / "calm", fleet.folder) == []

@@ -20,7 +20,7 @@ from coordinator.storage.compare import compare
 from coordinator.storage.journal import NAME, Journal
 from schema.agent.network import Tls
 
-Stage = Any
+Workspace = Any
 Fleets = Callable[..., Any]
 Certify = Callable[[Path, str, str, str], Tls]
 
@@ -91,13 +91,13 @@ class RemoteFleets:
     certify: Certify
     fleet_of: Fleets
 
-    def fleet(self, stage: Stage, *words: str) -> tuple[Any, list[str]]:
+    def fleet(self, workspace: Workspace, *words: str) -> tuple[Any, list[str]]:
         """Return a fleet with a remote worker, and the TLS flags of all processes."""
-        tls = self.certify(stage.folder, "machine", "ca", HOST)
+        tls = self.certify(workspace.folder, "machine", "ca", HOST)
         flags = ["--tls-ca", tls.ca, "--tls-certificate", tls.certificate]
         flags += ["--tls-key", tls.key]
         listen, near = f"tls/{HOST}:{PORT}", self.cable.near
-        fleet = self.fleet_of(stage, *words, *flags, listen=listen, inside=near)
+        fleet = self.fleet_of(workspace, *words, *flags, listen=listen, inside=near)
         fleet.join("far", "worker", *flags, inside=self.cable.far)
         return fleet, flags
 
@@ -116,10 +116,10 @@ def wait_for_line(process: Any, text: str) -> None:  # noqa: ANN401 - a process 
 
 
 def test_disconnecting_a_worker_gives_an_equal_run(
-    stage: Stage, undisturbed: Path, births: int, remote_fleets: RemoteFleets
+    workspace: Workspace, undisturbed: Path, births: int, remote_fleets: RemoteFleets
 ) -> None:
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
-    fleet, flags = remote_fleets.fleet(stage, *words)
+    fleet, flags = remote_fleets.fleet(workspace, *words)
     fleet.join("judge", "analyzer", *flags, inside=remote_fleets.cable.near)
     share = np.random.default_rng(31).uniform(0.1, 0.7)
     fleet.wait_for(share * (undisturbed / NAME).stat().st_size)
@@ -133,10 +133,10 @@ def test_disconnecting_a_worker_gives_an_equal_run(
 
 
 def test_arena_moves_to_another_worker_when_its_holder_is_disconnected(
-    small_arena_stage: Stage, small_arena_run: Path, remote_fleets: RemoteFleets
+    small_arena_workspace: Workspace, small_arena_run: Path, remote_fleets: RemoteFleets
 ) -> None:
     words = ("hamlet.toml", "--seed", "4", "--speed", "10", "--quiet")
-    fleet, flags = remote_fleets.fleet(small_arena_stage, *words)
+    fleet, flags = remote_fleets.fleet(small_arena_workspace, *words)
     whole = (small_arena_run / NAME).stat().st_size
     share = np.random.default_rng(32).uniform(0.1, 0.5)
     fleet.join("judge", "analyzer", *flags, inside=remote_fleets.cable.near)

@@ -15,7 +15,7 @@ from schema.tables.files import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Stage = Any
+Workspace = Any
 Until = Callable[[Callable[[], bool], str], None]
 
 RING = """
@@ -88,19 +88,21 @@ def size(folder: Path) -> int:
 class ComparedRuns:
     """Runs of an experiment; the first is the undisturbed reference."""
 
-    def __init__(self, stage: Stage, until: Until, name: str, text: str) -> None:
-        self.stage, self.until, self.name = stage, until, name
-        (stage.folder / f"{name}.toml").write_text(text, encoding="utf-8")
-        stage.run("run", *words(name, "calm"), "--workers", "1")
-        self.reference = stage.folder / "calm"
+    def __init__(
+        self, workspace: Workspace, until: Until, name: str, text: str
+    ) -> None:
+        self.workspace, self.until, self.name = workspace, until, name
+        (workspace.folder / f"{name}.toml").write_text(text, encoding="utf-8")
+        workspace.run("run", *words(name, "calm"), "--workers", "1")
+        self.reference = workspace.folder / "calm"
 
     def differences_after_resume(
         self, out: str, share: float, *, workers: int
     ) -> list[str]:
         """Kill and resume a coordinator; return the differences from the reference."""
-        folder = self.stage.folder / out
+        folder = self.workspace.folder / out
         count = "--workers", str(workers)
-        first = self.stage.start("run", *words(self.name, out), *count)
+        first = self.workspace.start("run", *words(self.name, out), *count)
         self.until(
             lambda: (
                 size(folder) > share * size(self.reference) or first.poll() is not None
@@ -109,21 +111,23 @@ class ComparedRuns:
         )
         first.kill()
         first.wait()
-        self.stage.run("resume", out, "--quiet", "--workers", str(4 - workers))
+        self.workspace.run("resume", out, "--quiet", "--workers", str(4 - workers))
         return compare(self.reference, folder)
 
     def differences_after_worker_kills(
         self, out: str, shares: Iterator[float], *, workers: int
     ) -> list[str]:
         """Kill all workers but one in turn; return differences from the reference."""
-        folder = self.stage.folder / out
+        folder = self.workspace.folder / out
         listen = "--listen", "tcp/127.0.0.1:0"
-        coordinator = self.stage.start("coordinator", *words(self.name, out), *listen)
+        coordinator = self.workspace.start(
+            "coordinator", *words(self.name, out), *listen
+        )
         self.until((folder / "address").exists, "the coordinator listens")
         address = (folder / "address").read_text().strip()
-        self.stage.start("analyzer", "--connect", address)
+        self.workspace.start("analyzer", "--connect", address)
         process_pool = [
-            self.stage.start("worker", "--connect", address, "--processes", "1")
+            self.workspace.start("worker", "--connect", address, "--processes", "1")
             for _ in range(workers)
         ]
         for process, share in zip(process_pool[1:], shares, strict=False):
@@ -144,22 +148,24 @@ class ComparedRuns:
         return compare(self.reference, folder)
 
 
-def test_runs_of_a_ring_of_eight_islands_are_equal(stage: Stage, until: Until) -> None:
-    runs = ComparedRuns(stage, until, "ring", RING)
+def test_runs_of_a_ring_of_eight_islands_are_equal(
+    workspace: Workspace, until: Until
+) -> None:
+    runs = ComparedRuns(workspace, until, "ring", RING)
     rng = np.random.default_rng(7)
     assert read_table(runs.reference, "migrations").num_rows == 8 * 2 * 2
     assert runs.differences_after_resume("two", rng.uniform(0.1, 0.5), workers=2) == []
     assert runs.differences_after_resume("one", rng.uniform(0.5, 0.9), workers=1) == []
     shares = iter(sorted(rng.uniform(0.1, 0.9, 2)))
     assert runs.differences_after_worker_kills("three", shares, workers=3) == []
-    stage.run("run", *words("ring", "three-calm"), "--workers", "3")
-    assert compare(runs.reference, stage.folder / "three-calm") == []
+    workspace.run("run", *words("ring", "three-calm"), "--workers", "3")
+    assert compare(runs.reference, workspace.folder / "three-calm") == []
 
 
 def test_two_arenas_survive_kills_of_a_worker_and_a_coordinator(
-    stage: Stage, until: Until
+    workspace: Workspace, until: Until
 ) -> None:
-    runs = ComparedRuns(stage, until, "arenas", ARENAS)
+    runs = ComparedRuns(workspace, until, "arenas", ARENAS)
     rng = np.random.default_rng(8)
     migrations = read_table(runs.reference, "migrations")
     assert migrations.num_rows > 2
@@ -179,9 +185,9 @@ def test_two_arenas_survive_kills_of_a_worker_and_a_coordinator(
 
 
 def test_off_line_island_and_arena_exchange_robots_and_resume(
-    stage: Stage, until: Until
+    workspace: Workspace, until: Until
 ) -> None:
-    runs = ComparedRuns(stage, until, "mixed", MIXED)
+    runs = ComparedRuns(workspace, until, "mixed", MIXED)
     evaluated = read_table(runs.reference, "evaluations")["birth_island"].drop_null()
     assert set(evaluated.to_pylist()) == {1}
     immigrants = read_table(runs.reference, "fitness")["birth_island"].drop_null()

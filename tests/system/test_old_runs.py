@@ -14,11 +14,11 @@ import pyarrow as pa
 import pytest
 from pyarrow.parquet import ParquetFile
 
-from tests.system.stage import PATIENCE_S, Stage
+from tests.system.workspace import PATIENCE_S, Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 
-Once = Callable[[str, Callable[[Stage], object]], Path]
+Once = Callable[[str, Callable[[Workspace], object]], Path]
 
 ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "tests" / "data" / "runs-3063df1"
@@ -103,9 +103,9 @@ def resumed(once: Once) -> Callable[[str], Path]:
     """Return a function that resumes a killed run and returns the parent folder."""
 
     def make(name: str) -> Path:
-        def build(stage: Stage) -> None:
-            unpack(name, stage.folder)
-            stage.run("resume", "killed", *RESUME)
+        def build(workspace: Workspace) -> None:
+            unpack(name, workspace.folder)
+            workspace.run("resume", "killed", *RESUME)
 
         return once(f"old-{name}", build)
 
@@ -145,87 +145,93 @@ def test_comparison_detects_differences(
 
 
 @each_run
-def test_commands_read_old_runs_without_a_resume(stage: Stage, name: str) -> None:
-    unpack(name, stage.folder)
-    births = births_in_status(stage.run("status", "killed"), name)
+def test_commands_read_old_runs_without_a_resume(
+    workspace: Workspace, name: str
+) -> None:
+    unpack(name, workspace.folder)
+    births = births_in_status(workspace.run("status", "killed"), name)
     assert 0 < births < BIRTHS[name]
-    assert births_in_status(stage.run("status", "undisturbed"), name) == BIRTHS[name]
-    assert f"births: {births} rows against {BIRTHS[name]}" in stage.run(
+    assert (
+        births_in_status(workspace.run("status", "undisturbed"), name) == BIRTHS[name]
+    )
+    assert f"births: {births} rows against {BIRTHS[name]}" in workspace.run(
         "compare", "killed", "undisturbed", code=1
     )
     for kind in ("killed", "undisturbed"):
-        stage.run("view", kind, "--save", f"{kind}.rrd")
-        assert (stage.folder / f"{kind}.rrd").stat().st_size
+        workspace.run("view", kind, "--save", f"{kind}.rrd")
+        assert (workspace.folder / f"{kind}.rrd").stat().st_size
     # Resuming a finished run does not change its tables.
-    before = tables(stage.folder / "undisturbed")
-    stage.run("resume", "undisturbed", *RESUME)
-    after = tables(stage.folder / "undisturbed")
+    before = tables(workspace.folder / "undisturbed")
+    workspace.run("resume", "undisturbed", *RESUME)
+    after = tables(workspace.folder / "undisturbed")
     assert all(before[table].equals(after[table]) for table in before)
 
 
 @each_run
 def test_compare_reads_a_resumed_run(
-    resumed: Callable[[str], Path], stage: Stage, name: str
+    resumed: Callable[[str], Path], workspace: Workspace, name: str
 ) -> None:
     folder = resumed(name)
     if len({platform(tables(folder / kind)) for kind in FOLDERS}) > 1:
         pytest.skip("runs of two platforms may differ")
-    stage.run("compare", *(str(folder / kind) for kind in FOLDERS))
+    workspace.run("compare", *(str(folder / kind) for kind in FOLDERS))
 
 
 @pytest.mark.slow
 def test_resumed_archipelago_is_analysed(
-    resumed: Callable[[str], Path], stage: Stage
+    resumed: Callable[[str], Path], workspace: Workspace
 ) -> None:
     """Analyze the archipelago, which has islands of both kinds."""
     folder = resumed("archipelago")
     report = ("--out", "report", "--processes", "1")
-    stage.run("analyze", str(folder / "killed"), *report)
-    assert (stage.folder / "report" / "report.html").stat().st_size
-    measures = {path.stem: path for path in stage.folder.glob("report/*/*.parquet")}
+    workspace.run("analyze", str(folder / "killed"), *report)
+    assert (workspace.folder / "report" / "report.html").stat().st_size
+    measures = {path.stem: path for path in workspace.folder.glob("report/*/*.parquet")}
     runs = ParquetFile(measures["runs"]).read()
     assert sum(runs["births"].to_pylist()) == BIRTHS["archipelago"]
 
 
 @pytest.mark.slow
-def test_arena_resumes_on_another_platform(stage: Stage) -> None:
+def test_arena_resumes_on_another_platform(workspace: Workspace) -> None:
     """The run continues without bitwise equality and records the drift."""
-    unpack("arena", stage.folder)
-    (stage.folder / "sitecustomize.py").write_text(
+    unpack("arena", workspace.folder)
+    (workspace.folder / "sitecustomize.py").write_text(
         "import platform\nplatform.machine = lambda: 'another'\n"
     )
-    path = os.pathsep.join([str(stage.folder), str(ROOT)])
-    process = stage.start("resume", "killed", *RESUME, environment={"PYTHONPATH": path})
+    path = os.pathsep.join([str(workspace.folder), str(ROOT)])
+    process = workspace.start(
+        "resume", "killed", *RESUME, environment={"PYTHONPATH": path}
+    )
     out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, out + err
-    old, new = (tables(stage.folder / kind) for kind in FOLDERS)
+    old, new = (tables(workspace.folder / kind) for kind in FOLDERS)
     assert platform(old) != platform(new)
     assert new["drifts"].num_rows == 1
     assert new["births"].num_rows == BIRTHS["arena"]
 
 
 @pytest.mark.parametrize("robot", ["parts.yaml", "robogen-parts.yaml", "fitness.xml"])
-def test_old_robot_files_load(stage: Stage, robot: str) -> None:
+def test_old_robot_files_load(workspace: Workspace, robot: str) -> None:
     experiment = DOCUMENTS / Path(robot).with_suffix(".toml")
     words = (str(DOCUMENTS / robot), "--experiment", str(experiment))
-    assert "16 parts" in stage.run("robot", "check", *words)
+    assert "16 parts" in workspace.run("robot", "check", *words)
 
 
 @pytest.mark.parametrize("name", ["parts", "robogen-parts", "fitness"])
-def test_old_documents_run(stage: Stage, name: str) -> None:
+def test_old_documents_run(workspace: Workspace, name: str) -> None:
     """Resolve all names of a document in a run of a few births."""
     document = str(DOCUMENTS / f"{name}.toml")
-    stage.run("run", document, "--in-process", "--quiet", "--out", "run")
-    found = tables(stage.folder / "run")
+    workspace.run("run", document, "--in-process", "--quiet", "--out", "run")
+    found = tables(workspace.folder / "run")
     (text,) = found["runs"]["document"].to_pylist()
     for path in import_paths(Path(document).read_text("utf-8")):
         assert f'"{path}"' in text
 
 
 def test_old_robot_is_evaluated_with_the_function_of_its_file(
-    stage: Stage,
+    workspace: Workspace,
 ) -> None:
-    output = stage.run("robot", "simulate", str(DOCUMENTS / "fitness.xml"))
+    output = workspace.run("robot", "simulate", str(DOCUMENTS / "fitness.xml"))
     assert "fitness:" in output
 
 

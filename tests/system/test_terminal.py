@@ -17,7 +17,7 @@ import revolve
 pytestmark = pytest.mark.system
 
 ROOT = Path(__file__).parents[2]
-Stage = Any
+Workspace = Any
 
 
 def _start(*words: str) -> subprocess.Popen[str]:
@@ -33,10 +33,10 @@ def _start(*words: str) -> subprocess.Popen[str]:
 
 @pytest.mark.parametrize("awaited", ["run.json", "address"])
 def test_ctrl_c_pressed_twice_while_processes_start(
-    stage: Stage, until: Callable[[Callable[[], bool], str], None], awaited: str
+    workspace: Workspace, until: Callable[[Callable[[], bool], str], None], awaited: str
 ) -> None:
     """Interrupt the process group twice while its processes import modules."""
-    run = stage.folder / "run"
+    run = workspace.folder / "run"
     process = _start("run", "scenario1", "--out", str(run))
     until((run / awaited).exists, awaited)
     os.killpg(process.pid, signal.SIGINT)

@@ -20,7 +20,7 @@ from schema.tables.files import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Stage = Any
+Workspace = Any
 Fleet = Callable[..., Any]
 Until = Callable[[Callable[[], bool], str], None]
 
@@ -117,7 +117,7 @@ def check_curves(file: Path, folder: Path) -> None:
 def replayed(once: Any, small_arena_run: Path) -> Path:  # noqa: ANN401 - the fixture
     """Return the recording of a replay of the small arena."""
     words = ("view", str(small_arena_run), "--save", "run.rrd")
-    folder: Path = once("replay", lambda stage: stage.run(*words))
+    folder: Path = once("replay", lambda workspace: workspace.run(*words))
     return folder / "run.rrd"
 
 
@@ -194,16 +194,19 @@ def test_log_contains_each_birth_and_death(
 
 
 def test_viewers_receive_everything_and_do_not_change_the_run(
-    small_arena_stage: Stage, small_arena_run: Path, fleet_of: Fleet, until: Until
+    small_arena_workspace: Workspace,
+    small_arena_run: Path,
+    fleet_of: Fleet,
+    until: Until,
 ) -> None:
     """Start three viewers; kill one and stop another during the run."""
-    stage = small_arena_stage
-    fleet = fleet_of(stage, *WORDS, "--speed", "10")
+    workspace = small_arena_workspace
+    fleet = fleet_of(workspace, *WORDS, "--speed", "10")
     viewers = {}
     for name in ("whole", "killed", "frozen"):
         words = ("view", "--connect", fleet.address, "--save", f"{name}.rrd")
-        viewers[name] = stage.start(*words)
-        file = stage.folder / f"{name}.rrd"
+        viewers[name] = workspace.start(*words)
+        file = workspace.folder / f"{name}.rrd"
         until(file.exists, f"the viewer {name} has received the run")
     fleet.join("w", "worker")
     fleet.begin(1)
@@ -216,7 +219,7 @@ def test_viewers_receive_everything_and_do_not_change_the_run(
     out, err = viewers["whole"].communicate(timeout=60)
     assert viewers["whole"].returncode == 0, out + err
     assert "the run has ended" in err
-    file = stage.folder / "whole.rrd"
+    file = workspace.folder / "whole.rrd"
     check_curves(file, fleet.folder)
     table = read_table(fleet.folder, "poses")
     shown = sum(len(poses(file, path)) for path in paths(file) if "/robots/" in path)
@@ -225,22 +228,22 @@ def test_viewers_receive_everything_and_do_not_change_the_run(
 
 
 def test_resimulated_robot_of_an_arena_moves_as_recorded(
-    stage: Stage, small_arena_run: Path
+    workspace: Workspace, small_arena_run: Path
 ) -> None:
     words = ("view", str(small_arena_run), "--robot", "0:3", "--robot", "best")
-    out = stage.run(*words, "--save", "again.rrd")
+    out = workspace.run(*words, "--save", "again.rrd")
     assert "0:3: moves as recorded, equal to the last bit" in out
-    again = poses(stage.folder / "again.rrd", "/motion/0-3")
+    again = poses(workspace.folder / "again.rrd", "/motion/0-3")
     table = read_table(small_arena_run, "poses").filter(pc.field("birth") == 3)
     # Brain steps are more frequent than recorded poses.
     assert len(again) > 1.5 * table.num_rows
 
 
 def test_resimulated_off_line_robot_moves_as_recorded(
-    stage: Stage, undisturbed: Path
+    workspace: Workspace, undisturbed: Path
 ) -> None:
     words = ("view", str(undisturbed), "--robot", "best", "--ancestry")
-    out = stage.run(*words, "--save", "again.rrd")
+    out = workspace.run(*words, "--save", "again.rrd")
     best = max(
         row["fitness"] or 0.0
         for row in read_table(undisturbed, "evaluations").to_pylist()
@@ -251,15 +254,15 @@ def test_resimulated_off_line_robot_moves_as_recorded(
     assert "DIFFERS" not in out
 
 
-def test_wrong_record_is_reported(stage: Stage, undisturbed: Path) -> None:
-    folder = stage.folder / "forged"
+def test_wrong_record_is_reported(workspace: Workspace, undisturbed: Path) -> None:
+    folder = workspace.folder / "forged"
     subprocess.run(["cp", "-r", str(undisturbed), str(folder)], check=True)
     (file,) = folder.glob("tables/*/*/evaluations.parquet")
     table = pq.ParquetFile(file).read()
     index = table.schema.get_field_index("fitness")
     fitness = pc.add(table["fitness"], 1e-9)
     pq.write_table(table.set_column(index, table.schema.field(index), fitness), file)
-    out = stage.run("view", str(folder), "--robot", "0:4", "--save", "a.rrd")
+    out = workspace.run("view", str(folder), "--robot", "0:4", "--save", "a.rrd")
     assert "0:4: DIFFERS from the record: fitness" in out
 
 
@@ -281,8 +284,8 @@ def test_wrong_record_is_reported(stage: Stage, undisturbed: Path) -> None:
     ],
 )
 def test_invalid_flags_are_reported_in_one_line(
-    stage: Stage, words: tuple[str, ...], message: str
+    workspace: Workspace, words: tuple[str, ...], message: str
 ) -> None:
-    out = stage.run(*words, code=2)
+    out = workspace.run(*words, code=2)
     assert message in out
     assert out.count("\n") == 1

@@ -22,7 +22,7 @@ from schema.tables.files import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Stage = Any
+Workspace = Any
 Fleet = Callable[..., Any]
 Until = Callable[[Callable[[], bool], str], None]
 Floats = npt.NDArray[np.float64]
@@ -116,10 +116,10 @@ def _hue(colour: Floats) -> Floats:
 
 
 def test_replay_shows_robots_at_their_recorded_positions(
-    viewer: ViewerClient, stage: Stage, small_arena_run: Path
+    viewer: ViewerClient, workspace: Workspace, small_arena_run: Path
 ) -> None:
-    stage.run("view", str(small_arena_run), "--save", "run.rrd")
-    picture = screenshot(viewer, str(stage.folder / "run.rrd"))
+    workspace.run("view", str(small_arena_run), "--save", "run.rrd")
+    picture = screenshot(viewer, str(workspace.folder / "run.rrd"))
     check_robots(picture, small_arena_run)
     # The check rejects a mirrored picture.
     with pytest.raises(AssertionError):
@@ -127,14 +127,17 @@ def test_replay_shows_robots_at_their_recorded_positions(
 
 
 def test_live_view_shows_robots_at_their_recorded_positions(
-    viewer: ViewerClient, small_arena_stage: Stage, fleet_of: Fleet, until: Until
+    viewer: ViewerClient,
+    small_arena_workspace: Workspace,
+    fleet_of: Fleet,
+    until: Until,
 ) -> None:
-    fleet = fleet_of(small_arena_stage, "hamlet.toml", "--seed", "4", "--quiet")
+    fleet = fleet_of(small_arena_workspace, "hamlet.toml", "--seed", "4", "--quiet")
     served = f"127.0.0.1:{free_port()}"
     words = ("--serve", served, "--save", "live.rrd")
-    small_arena_stage.start("view", "--connect", fleet.address, *words)
+    small_arena_workspace.start("view", "--connect", fleet.address, *words)
     until(
-        (small_arena_stage.folder / "live.rrd").exists,
+        (small_arena_workspace.folder / "live.rrd").exists,
         "the viewer has received the run",
     )
     fleet.join("w", "worker")

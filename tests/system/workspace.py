@@ -11,7 +11,7 @@ from pathlib import Path
 PATIENCE_S = 240.0
 
 
-class Stage:
+class Workspace:
     """Starts the commands of a test in a folder and kills remaining processes."""
 
     def __init__(self, folder: Path) -> None:
@@ -29,7 +29,7 @@ class Stage:
 
         Args:
             words: command-line arguments.
-            folder: working directory; default: the stage's folder.
+            folder: working directory; default: the workspace's folder.
             environment: additional environment variables.
             inside: network namespace; default: that of the test.
         """
