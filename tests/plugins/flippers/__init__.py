@@ -1,4 +1,4 @@
-"""A user's package: one part type of their own, and one that is none."""
+"""A user's plug-in package: part types, and an object that is not a part type."""
 
 from schema.parts import Box, PartType, Sensor, Shape, Slot
 

@@ -1,11 +1,11 @@
-"""A program: runs that are killed at random instants, again and again, until done.
+"""Program that kills and resumes runs at random instants until they are finished.
 
-Run with an experiment, a number of kills and a seed. All is imported once; each life
-is a fork of this process that does ``revolve run`` or ``resume`` without a network
-and dies of SIGKILL after a drawn time, up to half of what a whole run takes, until
-the run is done; then the next one begins. Time is the processor's that a life has
-used: how far one gets does not depend on who else uses the machine. Prints a line
-per kill, what stood on disk.
+Arguments: an experiment, a number of kills and a seed. Modules are imported once; each
+attempt is a fork of this process that executes ``revolve run`` or ``resume`` without a
+network. SIGKILL ends it after a random time, up to half of the time of a whole run.
+When a run is finished, the next one begins. Times are CPU times, so the progress of an
+attempt does not depend on the load of the machine. Prints the journal size at each
+kill.
 """
 
 import os
@@ -29,8 +29,8 @@ from coordinator.storage.journal import NAME  # noqa: E402
 FLAGS = ["--in-process", "--threads", "1", "--quiet"]
 
 
-def life(document: str, folder: Path, after_s: float) -> float | None:
-    """Live once; return what it took [s] if the run came to its end before its time."""
+def attempt(document: str, folder: Path, after_s: float) -> float | None:
+    """Run or resume once; return its CPU time [s], or None if it was killed."""
     words = ["resume", str(folder)]
     if not (folder / DETAILS).exists():
         words = ["run", document, "--seed", "4", "--out", str(folder)]
@@ -45,26 +45,26 @@ def life(document: str, folder: Path, after_s: float) -> float | None:
         if done:
             assert status == 0, f"{words} ended with {status}"
             return spent_s
-        time.sleep(0.0005)  # the interval of looking
+        time.sleep(0.0005)  # polling interval
     os.kill(child, signal.SIGKILL)
     _, status = os.waitpid(child, 0)
     return None if os.WIFSIGNALED(status) else spent_s
 
 
 def processor_clock(process: int) -> int:
-    """Return the clock of a process, as Linux numbers them: clock_getcpuclockid(3)."""
+    """Return the Linux id of a process's CPU clock; see clock_getcpuclockid(3)."""
     return (~process << 3) | 2
 
 
-def lives(document: str, kills: int, seed: int) -> None:
-    """Run, twice at least, and kill at least so often."""
+def kill_runs(document: str, kills: int, seed: int) -> None:
+    """Execute at least two runs with at least this number of kills in total."""
     rng = np.random.default_rng(seed)
-    whole_s = life(document, Path("whole"), 1000.0)
+    whole_s = attempt(document, Path("whole"), 1000.0)
     assert whole_s is not None
     run, killed = 0, 0
     while killed < kills or run < 2:
         folder = Path(f"run-{run}")
-        while life(document, folder, rng.uniform(0.0, 0.5 * whole_s)) is None:
+        while attempt(document, folder, rng.uniform(0.0, 0.5 * whole_s)) is None:
             killed += 1
             journal = folder / NAME
             size = journal.stat().st_size if journal.exists() else 0
@@ -73,4 +73,4 @@ def lives(document: str, kills: int, seed: int) -> None:
 
 
 if __name__ == "__main__":
-    lives(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
+    kill_runs(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
