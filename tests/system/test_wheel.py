@@ -29,7 +29,7 @@ def test_wheel_contains_every_file_of_the_rooms(names: set[str]) -> None:
         for path in (ROOT / room).rglob(pattern)
     }
     assert wanted <= names
-    assert {"revolve.py", "schema/revolve.proto"} <= names
+    assert {"revolve.py", "schema/wire/revolve.proto"} <= names
     assert any(name.startswith("schema/experiment/shipped/") for name in names)
 
 
