@@ -139,6 +139,7 @@ def children(pid: int) -> list[int]:
     return [int(each) for each in text.split()]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("draw", range(3))
 def test_killing_the_holder_twice_with_a_spare_worker_gives_an_equal_arena(
     crowded_arena_workspace: Workspace, crowded_arena_run: Path, until: Until, draw: int

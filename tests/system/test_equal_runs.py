@@ -86,6 +86,7 @@ def test_killed_coordinator_resumes_to_the_same_births(
     assert compare(undisturbed, folder) == []
 
 
+@pytest.mark.long
 def test_noise_is_the_same_in_every_process(workspace: Workspace) -> None:
     """Compare a single process, two workers with audits, and a re-simulation."""
     (workspace.folder / "noisy.toml").write_text(NOISY)

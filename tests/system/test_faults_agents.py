@@ -86,6 +86,7 @@ def test_stopping_and_continuing_the_holder_of_an_arena_gives_an_equal_run(
     assert holders == {"one", "two"}
 
 
+@pytest.mark.long
 def test_losing_one_of_two_analyzers_gives_an_equal_run(
     workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:
@@ -100,6 +101,7 @@ def test_losing_one_of_two_analyzers_gives_an_equal_run(
     assert compare(undisturbed, fleet.folder) == []
 
 
+@pytest.mark.long
 def test_replacing_the_only_analyzer_gives_an_equal_run(
     workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:

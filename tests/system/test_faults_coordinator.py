@@ -43,6 +43,7 @@ window_steps = 400
 """
 
 
+@pytest.mark.long
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "kills", "seed"), [("off", 40, 41), ("on", 20, 42)])
 def test_kills_at_random_instants_give_equal_runs(

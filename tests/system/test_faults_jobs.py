@@ -117,6 +117,7 @@ def test_external_kills_do_not_lead_to_quarantine(
     os.kill(int(pid_file.read_text()), signal.SIGKILL)
 
 
+@pytest.mark.long
 def test_quarantine_pauses_a_run_with_that_option_and_resume_continues_it(
     workspace: Workspace,
 ) -> None:

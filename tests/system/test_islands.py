@@ -148,6 +148,7 @@ class ComparedRuns:
         return compare(self.reference, folder)
 
 
+@pytest.mark.long
 def test_runs_of_a_ring_of_eight_islands_are_equal(
     workspace: Workspace, until: Until
 ) -> None:
@@ -162,6 +163,7 @@ def test_runs_of_a_ring_of_eight_islands_are_equal(
     assert compare(runs.reference, workspace.folder / "three-calm") == []
 
 
+@pytest.mark.long
 def test_two_arenas_survive_kills_of_a_worker_and_a_coordinator(
     workspace: Workspace, until: Until
 ) -> None:

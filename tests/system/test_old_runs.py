@@ -144,6 +144,7 @@ def test_comparison_detects_differences(
     assert differences(births, births.drop_columns(["rank"])) == ["rank"]
 
 
+@pytest.mark.long
 @each_run
 def test_commands_read_old_runs_without_a_resume(
     workspace: Workspace, name: str
@@ -177,6 +178,7 @@ def test_compare_reads_a_resumed_run(
     workspace.run("compare", *(str(folder / kind) for kind in FOLDERS))
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_resumed_archipelago_is_analysed(
     resumed: Callable[[str], Path], workspace: Workspace
@@ -191,6 +193,7 @@ def test_resumed_archipelago_is_analysed(
     assert sum(runs["births"].to_pylist()) == BIRTHS["archipelago"]
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_arena_resumes_on_another_platform(workspace: Workspace) -> None:
     """The run continues without bitwise equality and records the drift."""
