@@ -1,4 +1,4 @@
-"""What all tests need before anything else is imported."""
+"""Set-up that precedes all other imports of the tests."""
 
 import os
 from contextlib import suppress

@@ -81,7 +81,7 @@ def test_bare_steps_are_most_of_the_time_of_thirty_robots() -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_time_per_robot_is_nearly_constant_at_constant_density() -> None:
-    """Timed in turn, each relative to its own bare steps."""
+    """Time both in turn, each relative to its own bare steps."""
     growths = []
     for _ in range(3):
         few, many = timed(20, 10, bare=True), timed(200, 2, bare=True)

@@ -1,11 +1,10 @@
-"""How busy a campaign keeps its workers, and what dispatch and network cost.
+"""Utilisation of a campaign's workers, and cost of dispatch and network.
 
-Utilisation: of two workers in a campaign of eight runs of 15+1, vetting, journal and
-tables on, between the births that are a tenth and nine tenths of all. It is the time
-that the workers say their evaluations took, over twice the time that passed. The
-coordinator's share of the two cores is thereby set apart: a worker that has a job and
-waits for its core, because coordinator or analyzer is on it, is busy; one that waits
-for a job is not.
+The campaign has eight 15+1 runs and two workers, with vetting, journal and tables.
+Utilisation is the evaluation time that the workers report, divided by twice the wall
+time, between a tenth and nine tenths of all births. A worker that has a job but waits
+for its core, which the coordinator or the analyzer uses, counts as busy; one that waits
+for a job does not.
 """
 
 import time
@@ -51,7 +50,7 @@ BIRTHS = 60
 
 
 class Watched:
-    """Agents whose workers' busy time is counted."""
+    """Network that sums the busy time of the workers."""
 
     def __init__(self, network: Network) -> None:
         self.busy_s = 0.0
@@ -71,7 +70,7 @@ class Watched:
 
 @contextmanager
 def campaign(folder: Path) -> Iterator[tuple[RunScheduler, Watched]]:
-    """Give a campaign that is about to begin, and its agents."""
+    """Yield a campaign that has not started, and its network."""
     experiment = replace(read_experiment("scenario2"), births=BIRTHS)
     planned = [
         Planned(

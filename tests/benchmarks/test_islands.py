@@ -1,4 +1,4 @@
-"""What a generation of a small island costs beside its evaluations."""
+"""Cost of a generation of a small island, without its evaluations."""
 
 import time
 
@@ -18,7 +18,7 @@ BUDGET_S = 1.4e-3
 
 
 def per_generation(migration: Migration | None) -> float:
-    """Return processor time of one generation of one child [s], the least of three."""
+    """Return CPU time of one generation of one child [s], the least of three."""
     document = Experiment(
         name="small",
         births=5 + BROODS,

@@ -1,4 +1,4 @@
-"""What a birth costs the coordinator, and what a second worker brings."""
+"""Cost of a birth for the coordinator, and speed-up by a second worker."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -59,7 +59,7 @@ LEAVING_S = AHEAD_S + 0.2  # what one that leaves had ahead is done by then
 
 
 class Judged(Island):
-    """Asks for evaluations of ready-made robots, so many at a time; no mating."""
+    """Island that requests evaluations of ready-made robots; no mating."""
 
     def __init__(self, experiment: Experiment, robots: list[Robot]) -> None:
         super().__init__(experiment, 1, 0)
@@ -84,9 +84,10 @@ class Judged(Island):
 
 
 class Counted:
-    """A journal that counts the evaluations that it keeps.
+    """Journal that counts the evaluations that it stores.
 
-    Births are committed in order and so come in leaps; evaluations do not.
+    Births are committed in order, so their number rises in jumps; that of evaluations
+    does not.
     """
 
     def __init__(self, journal: Journal) -> None:
@@ -100,7 +101,7 @@ class Counted:
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """Evaluations per second; CPU of this process for each, its network's too [s]."""
+    """Evaluations per second, and CPU time of this process for each [s]."""
 
     per_s: float
     cpu_s: float
@@ -108,14 +109,14 @@ class Figures:
 
 @dataclass(frozen=True, slots=True)
 class Bench:
-    """A run on its way: its agents, its loop, and what it has evaluated."""
+    """Running run: its agents, its loop, and its number of evaluations."""
 
     fleet: Fleet
     loop: Loop
     journal: Counted
 
     def go_on(self, is_enough: Callable[[], bool]) -> Figures:
-        """Step until it is enough; return what that took."""
+        """Step until a number of evaluations is reached; return their cost."""
         before = self.journal.evaluations
         wall_s, cpu_s = time.perf_counter(), time.process_time()
         while not is_enough():
@@ -127,7 +128,7 @@ class Bench:
         return Figures(done / wall_s, cpu_s / max(1, done))
 
     def go_on_for(self, seconds: float) -> Figures:
-        """Step for so long; return what that took."""
+        """Step for a time; return the cost of its evaluations."""
         end_s = time.monotonic() + seconds
         return self.go_on(lambda: time.monotonic() >= end_s)
 
@@ -136,7 +137,7 @@ class Bench:
 def started(
     folder: Path, island: Island, experiment: Experiment, workers: int, body: Body
 ) -> Iterator[Bench]:
-    """Give a run that has begun, with all its workers there."""
+    """Yield a started run with all its workers connected."""
     details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
     with ExitStack() as stack:
         held = stack.enter_context(RunFolder(folder, details))
@@ -209,17 +210,17 @@ def test_null_evaluations_per_second(tmp_path: Path) -> None:
 
 
 def test_second_worker(tmp_path: Path) -> None:
-    """Evaluations per second of two workers against one, everything else counted.
+    """Evaluations per second of two workers against one, everything else included.
 
-    Coordinator, analyzer, two workers, real physics, network, journal and tables
-    share the machine; scenario 1's children of random founders, each vetted, bred
-    and evaluated. Two things differ from a run of scenario 1: the brood does not
-    end while it is measured, so that no worker waits for its last child, and 60
-    births are in flight. One of two workers leaves and joins in turn: the machine's
-    speed drifts, and both halves of the comparison must see the same of it. Whoever
-    leaves gives its jobs to the other, so that births go on being committed and each
-    half bears the breeding and vetting of its own births; what it had begun it ends,
-    idle thereafter, before the turn is counted.
+    Coordinator, analyzer, two workers, physics, network, journal and tables share the
+    machine. Children of random founders of scenario 1 are bred, vetted and evaluated.
+    Two things differ from a run of scenario 1: the brood does not end while it is
+    measured, so no worker waits for the last child, and 60 births are in flight.
+
+    One of two workers leaves and joins in turn, so that both halves of the comparison
+    see the same drift of the machine's speed. A worker that leaves returns its queued
+    jobs, so that the other worker gets them and births continue to be committed. It
+    finishes the job that it has begun, and is idle before the next turn is counted.
     """
     experiment = _experiment(10_000, 9_000)
     wide = replace(experiment.selection, window=60)

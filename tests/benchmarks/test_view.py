@@ -1,4 +1,4 @@
-"""Watching costs little, and costs a run nothing: promises of the viewer."""
+"""Cost of watching a run, for the viewer and for the run."""
 
 import os
 import signal
@@ -100,7 +100,7 @@ def message(poses: pa.Table) -> bytes:
 def test_an_arena_of_thirty_costs_the_viewer_a_fifth_of_a_core_at_most(
     tmp_path: Path,
 ) -> None:
-    """CPU of the process that watches, per simulated second at real time."""
+    """CPU time of the viewer's process per simulated second at real time."""
     told, tables = crowd()
     messages = [message(poses) for poses in tables]
     file = tmp_path / "watched.rrd"
@@ -127,7 +127,7 @@ def arena(tmp_path: Path) -> Path:
 
 
 def start(folder: Path, core: int, *words: str) -> subprocess.Popen[bytes]:
-    """Start a command that stays, with its children, on one core."""
+    """Start a command and keep it and its children on one core."""
     top = str(Path(__file__).parents[2])
     process = subprocess.Popen(
         [sys.executable, "-m", "revolve", *words],
@@ -141,7 +141,7 @@ def start(folder: Path, core: int, *words: str) -> subprocess.Popen[bytes]:
 
 
 def run(folder: Path, out: str, *, is_watched: bool) -> float:
-    """Return how long a run takes from its first birth on [s], viewer elsewhere."""
+    """Return the duration of a run from its first birth on [s]; viewer elsewhere."""
     cores = sorted(os.sched_getaffinity(0))
     words = ("watched.toml", "--seed", "2", "--quiet", "--out", out)
     listen = ("--listen", "tcp/127.0.0.1:0")
@@ -182,7 +182,7 @@ def wait_for(condition: Callable[[], bool]) -> None:
 
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="needs two cores")
 def test_a_run_that_is_watched_is_as_fast(arena: Path) -> None:
-    """Watched and not in turn: the same run, again and again."""
+    """Alternate runs with and without viewer; the run is the same."""
     alone_s, watched_s = [], []
     for pair in range(PAIRS):
         alone_s.append(run(arena, f"alone-{pair}", is_watched=False))

@@ -1,4 +1,4 @@
-"""What no committed file may hold: one machine's paths, one registry's address."""
+"""Committed files hold no path of one machine and no address of a registry."""
 
 import re
 import shutil
@@ -38,7 +38,7 @@ def tracked() -> list[Path]:
 
 
 def texts() -> dict[str, str]:
-    """Return the text of each tracked file by its name; bytes that are no text go."""
+    """Return the text of each tracked file by its name; binary files are skipped."""
     return {
         path.relative_to(ROOT).as_posix(): path.read_text("utf-8", errors="ignore")
         for path in tracked()

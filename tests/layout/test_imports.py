@@ -1,8 +1,8 @@
-"""Which file may import what: the house's walls, asked in two ways.
+"""Import rules between rooms and libraries, checked in two ways.
 
-import-linter follows chains between our own modules (contracts in
-pyproject.toml). The syntax trees are read besides: they see revolve.py too, and
-name the file and library at once.
+import-linter follows chains of imports between modules (contracts in pyproject.toml).
+The syntax trees are read as well: they include revolve.py, and they name the file and
+the library.
 """
 
 import ast
@@ -48,13 +48,13 @@ NEVER = {
 
 
 def sources() -> list[Path]:
-    """Return our Python files, tests left out, in a fixed order."""
+    """Return the project's Python files without tests, in a fixed order."""
     files = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
     return [*files, *ROOT.glob("revolve.py")]
 
 
 def imported(path: Path) -> Iterator[str]:
-    """Yield the top-level name of every import of a file, wherever it stands."""
+    """Yield the top-level name of every import of a file, at any depth."""
     for node in ast.walk(ast.parse(path.read_bytes(), filename=str(path))):
         if isinstance(node, ast.Import):
             yield from (alias.name.partition(".")[0] for alias in node.names)
@@ -65,7 +65,7 @@ def imported(path: Path) -> Iterator[str]:
 
 
 def is_composition_root(path: Path) -> bool:
-    """Return whether a file may put several rooms together."""
+    """Return whether a file may import several rooms."""
     return path == ROOT / "revolve.py" or path.name == "__main__.py"
 
 

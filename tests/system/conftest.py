@@ -39,9 +39,9 @@ Once = Callable[[str, Callable[[Stage], object]], Path]
 
 @pytest.fixture(scope="session")
 def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
-    """Return what makes a folder by its name, once for all who test at the same time.
+    """Return a function that makes a folder once for all parallel test processes.
 
-    Nobody may write into it: tests of other processes read it.
+    Tests of other processes read the folder, so no test may write into it.
     """
     place = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
@@ -64,7 +64,7 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
 
 @pytest.fixture(scope="session")
 def undisturbed(once: Once) -> Path:
-    """Return the folder of a run in one process: what all others must equal."""
+    """Return the folder of a run in one process: the reference for all others."""
     words = ("scenario1", "--seed", "5", "--births", str(BIRTHS), "--quiet")
     flags = ("--in-process", "--out", "run")
     return once("single", lambda stage: stage.run("run", *words, *flags)) / "run"
@@ -115,7 +115,7 @@ def _arena(stage: Stage, file: str, document: str) -> None:
 
 @pytest.fixture(scope="session")
 def calm(once: Once) -> Path:
-    """Return the folder of an arena in one process, to which nothing happened."""
+    """Return the folder of an undisturbed arena in one process."""
     return once("crowd", lambda stage: _arena(stage, "crowd.toml", CROWD)) / "run"
 
 
@@ -152,5 +152,5 @@ def hamlet_stage(stage: Stage) -> Stage:
 
 @pytest.fixture(scope="session")
 def quiet_hamlet(once: Once) -> Path:
-    """Return the folder of such an arena to which nothing happened."""
+    """Return the folder of an undisturbed run of ``hamlet.toml``."""
     return once("hamlet", lambda stage: _arena(stage, "hamlet.toml", HAMLET)) / "run"

@@ -1,4 +1,4 @@
-"""A coordinator and agents that come and go as a test has it."""
+"""Coordinator and agents that a test starts, stops and kills."""
 
 import os
 import signal
@@ -14,19 +14,19 @@ from tests.system.stage import Stage, wait_until
 
 
 def size(folder: Path) -> int:
-    """Return how long a run's journal is [bytes]; it may be growing."""
+    """Return the size of a run's journal [bytes]; it may be growing."""
     journal = folder / "journal.bin"
     return journal.stat().st_size if journal.exists() else 0
 
 
 def agent_processes(pid: int) -> list[int]:
-    """Return those of a command's children that do jobs, oldest first."""
+    """Return the children of a command that do jobs, oldest first."""
     listing = Path(f"/proc/{pid}/task/{pid}/children").read_text("utf-8").split()
     return [int(child) for child in listing if b"spawn_main" in _command_line(child)]
 
 
 def _command_line(pid: str) -> bytes:
-    """Return what a process was started with; nothing if it has just gone."""
+    """Return the command line of a process; nothing if it has just ended."""
     try:
         return Path(f"/proc/{pid}/cmdline").read_bytes()
     except (FileNotFoundError, ProcessLookupError):
@@ -34,7 +34,7 @@ def _command_line(pid: str) -> bytes:
 
 
 class Fleet:
-    """A coordinator and agents that can be frozen, killed and cut off."""
+    """Coordinator and agents that can be frozen, killed and disconnected."""
 
     def __init__(
         self, stage: Stage, *words: str, listen: str = "", inside: str = ""
@@ -65,7 +65,7 @@ class Fleet:
         return agent_processes(process.pid)[0]
 
     def begin(self, workers: int) -> None:
-        """Let an analyzer join as soon as so many workers are there: births begin."""
+        """Start an analyzer after so many workers have joined: births begin."""
         config = zenoh.Config.from_json5(client_config(self.address))
         with zenoh.open(config) as session:
             key = agents_alive("default", "worker")
@@ -76,7 +76,7 @@ class Fleet:
         self.join("judge", "analyzer")
 
     def kill(self, name: str) -> None:
-        """Kill an agent, and whoever would revive it."""
+        """Kill an agent and the supervisor that would restart it."""
         process_pool = self.agents.pop(name)
         process_pool.send_signal(signal.SIGSTOP)
         for child in agent_processes(process_pool.pid):
@@ -84,14 +84,14 @@ class Fleet:
         process_pool.send_signal(signal.SIGKILL)
 
     def wait_for(self, position: float) -> None:
-        """Wait until the journal is so long [bytes] or the run has ended."""
+        """Wait until the journal has a size [bytes] or the run has ended."""
         wait_until(
             lambda: size(self.folder) > position or self.is_over,
             "the run is on its way",
         )
 
     def finish(self) -> None:
-        """Wait for the end, which must be a good one."""
+        """Wait for the end of the run and check its exit code."""
         wait_until(lambda: self.is_over, "the run ends")
         assert self.coordinator.returncode == 0, self.coordinator.communicate()
 

@@ -1,11 +1,11 @@
-"""A program: runs that are killed at random instants, again and again, until done.
+"""Program that runs an experiment and kills it at random instants, until done.
 
-Run with an experiment, a number of kills and a seed. All is imported once; each life
-is a fork of this process that does ``revolve run`` or ``resume`` without a network
-and dies of SIGKILL after a drawn time, up to half of what a whole run takes, until
-the run is done; then the next one begins. Time is the processor's that a life has
-used: how far one gets does not depend on who else uses the machine. Prints a line
-per kill, what stood on disk.
+Arguments: an experiment, a number of kills and a seed. Modules are imported once. Each
+life is a fork of this process that does ``revolve run`` or ``resume`` without a
+network. SIGKILL ends it after a drawn time, up to half the duration of a whole run.
+After a run is finished the next one begins. Time is the CPU time of a life, so that
+progress does not depend on other load. The program prints one line per kill: what was
+on disk.
 """
 
 import os
@@ -30,7 +30,7 @@ FLAGS = ["--in-process", "--threads", "1", "--quiet"]
 
 
 def life(document: str, folder: Path, after_s: float) -> float | None:
-    """Live once; return what it took [s] if the run came to its end before its time."""
+    """Run one life; return its CPU time [s] if the run ended before the kill."""
     words = ["resume", str(folder)]
     if not (folder / DETAILS).exists():
         words = ["run", document, "--seed", "4", "--out", str(folder)]
@@ -52,12 +52,12 @@ def life(document: str, folder: Path, after_s: float) -> float | None:
 
 
 def processor_clock(process: int) -> int:
-    """Return the clock of a process, as Linux numbers them: clock_getcpuclockid(3)."""
+    """Return the CPU clock of a process, as clock_getcpuclockid(3) numbers it."""
     return (~process << 3) | 2
 
 
 def lives(document: str, kills: int, seed: int) -> None:
-    """Run, twice at least, and kill at least so often."""
+    """Repeat at least two runs, until a number of kills is reached."""
     rng = np.random.default_rng(seed)
     whole_s = life(document, Path("whole"), 1000.0)
     assert whole_s is not None

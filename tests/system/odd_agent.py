@@ -1,8 +1,8 @@
-"""A program: a worker that answers well, but twice, or after it was given up.
+"""Worker that answers correctly, but twice, or after it was declared lost.
 
-Run with the address of a hub and ``twice`` or ``late``. A late one lets its token
-vanish while it holds a job, answers when it was told that it is gone, and joins
-again. It ends on SIGTERM and prints what it did, and how often.
+Arguments: the address of a hub, and ``twice`` or ``late``. A late worker removes its
+token while it holds a job, answers when it learns that it is considered gone, and joins
+again. On SIGTERM it ends and prints what it did, and how often.
 """
 
 import signal

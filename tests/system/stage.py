@@ -1,4 +1,4 @@
-"""Commands of a test, started as a user starts them, in a folder of their own."""
+"""Commands of a test, started as a user starts them, in their own folder."""
 
 import os
 import signal
@@ -12,7 +12,7 @@ PATIENCE_S = 240.0
 
 
 class Stage:
-    """Starts the commands of one test in one folder and ends what is left."""
+    """Starts the commands of one test in one folder and ends those that remain."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -57,7 +57,7 @@ class Stage:
         return out + err
 
     def clear(self) -> None:
-        """Kill whatever still runs; a test that failed shows what all said."""
+        """Kill remaining processes; if the test failed, show their output."""
         for process in self._started:
             if process.poll() is None:
                 process.send_signal(signal.SIGCONT)

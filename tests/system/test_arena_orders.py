@@ -1,4 +1,4 @@
-"""An arena that is watched and given orders while it runs."""
+"""Arena with a viewer and with orders of an operator."""
 
 from collections.abc import Callable
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Promise 1 on-line: the same arena, however many threads and whatever dies.
+"""Arenas are repeatable: with any number of threads, and after any kills.
 
 Kills are drawn over the whole run; each test prints what its kills hit.
 """
@@ -58,7 +58,7 @@ def newest(folder: Path, table: str) -> int:
 
 
 class Tally:
-    """What kills hit, told by what the undisturbed run did at that time."""
+    """Statistics of kills: what the undisturbed run did at those times."""
 
     def __init__(self, calm: Path) -> None:
         self.steps = [event.advance.step for event in advances(calm)]
@@ -66,7 +66,7 @@ class Tally:
         self.hits: list[str] = []
 
     def note(self, what: str, folder: Path) -> list[str]:
-        """Take down a kill that has just been; return what it hit."""
+        """Record a kill; return what it hit."""
         last = max((event.advance.step for event in advances(folder)), default=0)
         following = min((step for step in self.steps if step > last), default=last)
         hit = []
@@ -112,13 +112,13 @@ class Fleet:
         self.workers[name] = self.stage.start("worker", *flags)
 
     def has_come_to(self, position: float) -> bool:
-        """Return whether the journal is so long [bytes]; all must be alive."""
+        """Return whether the journal has a size [bytes]; all must be alive."""
         for process in (self.coordinator, self.analyzer, *self.workers.values()):
             assert process.poll() is None, process.communicate()
         return size(self.folder) > position
 
     def kill_holder(self) -> str:
-        """Kill the worker that made the last advance, and whoever would revive it."""
+        """Kill the worker of the last advance, and its supervisor."""
         agent = advances(self.folder)[-1].provenance.agent
         name = agent.partition("-")[0]
         process_pool = self.workers.pop(name)
@@ -161,7 +161,7 @@ def test_holder_killed_twice_while_another_stands_by(
 def resume_until(
     stage: Stage, until: Until, is_time: Callable[[], bool], what: str
 ) -> None:
-    """Start or resume a run, and kill its coordinator when it is time."""
+    """Start or resume a run, and kill its coordinator when a condition holds."""
     is_new = not (stage.folder / "run" / EPOCH).exists()
     flags = ("--workers", "1", "--threads", "1")
     if is_new:
@@ -195,7 +195,7 @@ def test_killed_coordinator_resumes_the_same_arena(
 def test_killed_in_a_cluster_a_snapshot_and_a_segment_change(
     arena_stage: Stage, calm: Path, until: Until
 ) -> None:
-    """Kills that wait for the moment that chance may miss, again if they miss it."""
+    """Kill at chosen moments that random kills may miss; retry if one is missed."""
     tally = Tally(calm)
     folder = arena_stage.folder / "run"
 

@@ -1,4 +1,4 @@
-"""The bridge between off-line and on-line comes to the same, whatever dies."""
+"""Re-evaluation and culling are repeatable, whichever processes are killed."""
 
 import signal
 from collections.abc import Callable

@@ -72,7 +72,7 @@ def _sizes(folder: Path) -> int:
 
 
 def _make_alone(stage: Stage, path: Path, name: str, run: int) -> None:
-    """Make a single run as an older version without environments made it."""
+    """Make a run in the format of an older version without environments."""
     text = experiment_text(read_experiment(str(stage.folder / f"{name}.toml")))
     document = json.loads(text)
     del document["environment"]

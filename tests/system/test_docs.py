@@ -1,4 +1,4 @@
-"""The code in README and docs runs as it stands."""
+"""The code in README and docs runs as printed."""
 
 import os
 import re
@@ -35,7 +35,7 @@ def _environment(*paths: Path) -> dict[str, str]:
 def _python(
     words: Sequence[str], folder: Path, *paths: Path
 ) -> subprocess.CompletedProcess[str]:
-    """Run Python with these words to its end, as a reader would in a folder."""
+    """Run Python with these arguments in a folder, to its end."""
     return subprocess.run(
         [sys.executable, *words],
         cwd=folder,

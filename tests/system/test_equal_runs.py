@@ -1,4 +1,4 @@
-"""Promise 1: the same births, however many workers and whatever dies."""
+"""Runs are repeatable: the same births with any workers and any kills."""
 
 import signal
 from collections.abc import Callable
@@ -87,7 +87,7 @@ def test_killed_coordinator_resumes_to_the_same_births(
 
 
 def test_noise_is_the_same_whoever_draws_it(stage: Stage) -> None:
-    """In one process, by two workers with audits, and when it is looked at again."""
+    """In one process, by two workers with audits, and resumed after its end."""
     (stage.folder / "noisy.toml").write_text(NOISY)
     words = ("run", "noisy.toml", "--seed", "5", "--births", "30", "--quiet")
     stage.run(*words, "--in-process", "--out", "one")

@@ -217,7 +217,7 @@ def test_a_run_without_its_journal_does_not_start_again(
 
 
 def test_a_refusal_changes_nothing(stage: Stage, made: Path) -> None:
-    """Rows behind a gap are written again only from an intact journal."""
+    """Rows after a gap are written again only from an intact journal."""
     run = stage.folder / "run"
     shutil.copytree(made / "twice" / "seeing-0", run)
     shutil.rmtree(run / "tables")

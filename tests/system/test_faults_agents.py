@@ -1,6 +1,6 @@
-"""Whatever befalls workers and analyzers, the tables are those of a quiet run.
+"""Faults of workers and analyzers do not change the tables of a run.
 
-Each case is drawn over the run by a fixed seed. Agents that are killed stand in
+The time of each fault is drawn with a fixed seed. Agents that are killed are tested in
 test_equal_runs.py and test_arena_runs.py.
 """
 
@@ -46,7 +46,7 @@ HAMLET = ("hamlet.toml", "--seed", "4", "--speed", "10", "--quiet")
 
 
 def freeze_and_finish(fleet: Fleet, frozen: int, quiet: Path, seed: int) -> None:
-    """Stop a process for a third of a run; the run is equal to a quiet one."""
+    """Freeze a process for a third of a run; the run equals an undisturbed one."""
     share = np.random.default_rng(seed).uniform(0.1, 0.4)
     fleet.wait_for(share * whole(quiet))
     os.kill(frozen, signal.SIGSTOP)

@@ -1,7 +1,7 @@
-"""The coordinator is killed anywhere, or sleeps while another takes its run.
+"""The coordinator is killed, or freezes while another one resumes its run.
 
-Kills of a coordinator with a network of its own stand in test_equal_runs.py and
-test_arena_runs.py; here are many, at instants that nothing is known of.
+Kills of a coordinator with its own network are tested in test_equal_runs.py and
+test_arena_runs.py. Here there are many kills, at arbitrary instants.
 """
 
 import os
@@ -48,7 +48,7 @@ window_steps = 400
 def test_killed_at_any_point(
     tmp_path: Path, hamlet_document: str, kind: str, kills: int, seed: int
 ) -> None:
-    """Sixty instants in all, drawn over lives that last up to half a run."""
+    """Sixty kills in all, each at a random instant of up to half a run."""
     document = SINGLES if kind == "off" else hamlet_document
     (tmp_path / "mine.toml").write_text(document)
     done = subprocess.run(
@@ -72,7 +72,7 @@ def test_killed_at_any_point(
 
 
 def frozen(stage: Stage, fleet_of: Fleets, undisturbed: Path, births: int) -> Any:  # noqa: ANN401 - a fleet
-    """Return a fleet whose coordinator sleeps, somewhere in its run."""
+    """Return a fleet whose coordinator is frozen at some point of its run."""
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
     fleet = fleet_of(stage, *words)
     fleet.join("judge", "analyzer")
@@ -99,7 +99,7 @@ def test_one_that_sleeps_still_holds_its_run(
 def test_one_that_wakes_up_replaced_stops_and_writes_nothing(
     stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets, when: str
 ) -> None:
-    """Where locks do not reach (a file system that has none) the epoch tells."""
+    """On file systems without locks the epoch detects the replacement."""
     fleet = frozen(stage, fleet_of, undisturbed, births)
     (fleet.folder / LOCK).unlink()
     second = stage.start("resume", "run", "--workers", "1", "--quiet")

@@ -1,6 +1,6 @@
-"""A journal that is cut or damaged, as a user meets it: what is told helps.
+"""Journal that is cut or damaged: the commands in the error message repair it.
 
-A full disk stands in test_bad_input.py.
+A full disk is tested in test_bad_input.py.
 """
 
 import re
@@ -25,7 +25,7 @@ Until = Callable[[Callable[[], bool], str], None]
 
 @pytest.fixture
 def half(stage: Stage, undisturbed: Path, births: int, until: Until) -> Path:
-    """Return the journal of a run that was killed on its way."""
+    """Return the journal of a run that was killed before its end."""
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
     run = stage.start("run", *words, "--in-process", "--out", "run")
     journal: Path = stage.folder / "run" / NAME

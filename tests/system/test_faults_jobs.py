@@ -1,6 +1,6 @@
-"""Evaluations that end their own process, and workers that are not as they should be.
+"""Evaluations that end their own process, and workers that do not fit the run.
 
-The plug-ins do what no process may: their harm depends on the robot alone.
+The plug-ins crash, exit or hang; which of it depends on the robot alone.
 """
 
 import os
@@ -92,7 +92,7 @@ def test_what_ends_its_process_three_times_is_quarantined(
 
 
 def test_deaths_by_others_hands_count_for_nothing(stage: Stage, until: Until) -> None:
-    """A worker that is killed at the same robot again and again is only unlucky."""
+    """Kills of a worker from outside do not quarantine the robot."""
     plug(stage, "open('here', 'w').write(str(os.getpid())); signal.pause()")
     here = stage.folder / "here"
     run = stage.start("run", *WORDS, "--workers", "1", "--out", "run")
@@ -176,7 +176,7 @@ def test_an_audit_changes_nothing_where_workers_agree(
 def test_workers_that_do_not_agree_are_named_and_stop_the_run(
     stage: Stage, fleet_of: Fleets
 ) -> None:
-    """One machine adds the smallest of errors; without it the run goes on."""
+    """One machine adds a small error; the run continues without that machine."""
     plug(stage)
     module = stage.folder / "plugged.py"
     drift = 'return value * (1 + 3e-16) if os.environ.get("DRIFT") else value'

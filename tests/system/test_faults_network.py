@@ -1,7 +1,7 @@
-"""The network between machines is cut and healed: namespaces stand for machines.
+"""The network between machines is cut and restored; namespaces act as machines.
 
-Two namespaces with one cable between them: the coordinator's, and that of a worker
-far away. Whoever is cut off counts as lost after the lease; its jobs are others'.
+One cable connects two namespaces: that of the coordinator and that of a remote worker.
+A worker without connection counts as lost after the lease, and others get its jobs.
 """
 
 import os
@@ -50,7 +50,7 @@ pytestmark = [
 
 @dataclass(frozen=True)
 class Cable:
-    """Two machines and what joins them."""
+    """Two machines and the cable between them."""
 
     near: str
     far: str
@@ -85,14 +85,14 @@ def cable() -> Iterator[Cable]:
 
 @dataclass(frozen=True)
 class Distant:
-    """What it takes to have a coordinator and a worker on two machines."""
+    """Network namespaces and flags for a coordinator and a worker on two machines."""
 
     cable: Cable
     certify: Certify
     fleet_of: Fleets
 
     def fleet(self, stage: Stage, *words: str) -> tuple[Any, list[str]]:
-        """Return a fleet with a worker far away, and the flags of all."""
+        """Return a fleet with a remote worker, and the flags of all."""
         tls = self.certify(stage.folder, "machine", "ca", HOST)
         flags = ["--tls-ca", tls.ca, "--tls-certificate", tls.certificate]
         flags += ["--tls-key", tls.key]
@@ -108,7 +108,7 @@ def distant(cable: Cable, certify: Certify, fleet_of: Fleets) -> Distant:
 
 
 def heard(process: Any, what: str) -> None:  # noqa: ANN401 - a process with pipes
-    """Wait until a process says something."""
+    """Wait until a process prints a text."""
     lines = [process.stderr.readline()]
     while what not in lines[-1]:
         assert lines[-1], lines

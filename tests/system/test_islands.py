@@ -1,4 +1,4 @@
-"""Promise 1 with islands: equal runs, however many workers and whatever dies."""
+"""Archipelagos are repeatable: with any number of workers and any kills."""
 
 import os
 import signal
@@ -95,7 +95,7 @@ class Play:
         self.calm = stage.folder / "calm"
 
     def resumed(self, out: str, share: float, *, workers: int) -> list[str]:
-        """Kill a coordinator on its way; return what differs after its resume."""
+        """Kill a coordinator during a run; return what differs after its resume."""
         folder = self.stage.folder / out
         count = "--workers", str(workers)
         first = self.stage.start("run", *words(self.name, out), *count)

@@ -100,7 +100,7 @@ def births_said(status: str, name: str) -> int:
 
 @pytest.fixture(scope="session")
 def resumed(once: Once) -> Callable[[str], Path]:
-    """Return what gives, by name, the folders of a run, the killed one resumed."""
+    """Return a function name -> folders of a run; the killed run is resumed."""
 
     def make(name: str) -> Path:
         def build(stage: Stage) -> None:
@@ -187,7 +187,7 @@ def test_they_are_analysed(resumed: Callable[[str], Path], stage: Stage) -> None
 
 @pytest.mark.slow
 def test_an_arena_resumes_on_another_platform(stage: Stage) -> None:
-    """Equality ends there: the run goes on, and the drift is recorded."""
+    """The run continues and the drift is recorded; equality ends there."""
     unpack("arena", stage.folder)
     (stage.folder / "sitecustomize.py").write_text(
         "import platform\nplatform.machine = lambda: 'another'\n"
@@ -211,7 +211,7 @@ def test_robot_files_load(stage: Stage, robot: str) -> None:
 
 @pytest.mark.parametrize("name", ["parts", "robogen-parts", "fitness"])
 def test_documents_run(stage: Stage, name: str) -> None:
-    """Every name of a document is resolved by a run of a few births."""
+    """Every plug-in name of a document is resolved by a run of a few births."""
     document = str(DOCUMENTS / f"{name}.toml")
     stage.run("run", document, "--in-process", "--quiet", "--out", "run")
     found = tables(stage.folder / "run")
@@ -228,7 +228,7 @@ def test_a_robot_of_before_is_judged_by_the_function_that_its_file_names(
 
 
 def test_documents_name_what_recorded_ones_may_name() -> None:
-    """The import paths that must not move, each with all that it offers."""
+    """The public import paths, each with all its names."""
     texts = [path.read_text("utf-8") for path in DOCUMENTS.glob("*.toml")]
     found = {path.partition(":")[0] for text in texts for path in named(text)}
     assert found == {"schema.parts", "schema.robogen_parts", "worker.fitness"}

@@ -21,7 +21,7 @@ Stage = Any
 
 
 def _start(*words: str) -> subprocess.Popen[str]:
-    """Start a command as a shell does: as the head of a process group."""
+    """Start a command as a shell does: as leader of a process group."""
     return subprocess.Popen(
         [sys.executable, "-m", "revolve", *words],
         stderr=subprocess.PIPE,
@@ -51,7 +51,7 @@ def test_ctrl_c_pressed_twice_while_processes_start(
 def test_ctrl_c_while_an_engine_is_loaded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The engine turns the interrupt into an ImportError."""
+    """MuJoCo turns the interrupt into an ImportError."""
     (tmp_path / "engine_of_a_test.py").write_text(
         "try:\n    raise KeyboardInterrupt\n"
         "except KeyboardInterrupt as error:\n    raise ImportError('no') from error\n"
@@ -64,7 +64,7 @@ def test_ctrl_c_while_an_engine_is_loaded(
 def _said(
     words: str, unbuffered: str = "", output: int | None = None
 ) -> tuple[int, str]:
-    """Return exit code and standard error of ``revolve`` in a line of a shell."""
+    """Return exit code and standard error of ``revolve`` in a shell command."""
     done = subprocess.run(
         ["sh", "-c", f'"$1" -m revolve {words}', "sh", sys.executable],
         stdout=output,
@@ -111,7 +111,7 @@ def test_other_errors_are_not_reported_as_output_errors(
 
 
 def _shown(*words: str) -> str:
-    """Return what a command shows on a terminal that is its standard error."""
+    """Return the output of a command whose standard error is a terminal."""
     try:
         screen, terminal = os.openpty()
     except OSError as error:

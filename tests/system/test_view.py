@@ -51,7 +51,7 @@ def poses(file: Path, path: str) -> dict[int, Any]:
 
 
 def clears(file: Path, path: str) -> dict[int, int]:
-    """Return when a robot was taken away [ns], and the births by then."""
+    """Return the time at which a robot was removed [ns], and the births by then."""
     return {
         time.value: births.as_py()
         for batch, _ in batches(file, path)
@@ -87,7 +87,7 @@ def curves(file: Path, name: str) -> dict[int, tuple[float, ...]]:
 
 
 def expected_curve(folder: Path) -> dict[int, tuple[float, ...]]:
-    """Return mean and best fitness by births, as the table engine finds them."""
+    """Return mean and best fitness by births, computed by DuckDB."""
     rows = read_table(folder, "population").filter(pc.field("fitness").is_valid())
     grouped = rows.group_by("births").aggregate(
         [("fitness", "mean"), ("fitness", "max")]
@@ -196,7 +196,7 @@ def test_the_log_contains_each_birth_and_death(
 def test_viewers_receive_everything_and_do_not_change_the_run(
     hamlet_stage: Stage, quiet_hamlet: Path, fleet_of: Fleet, until: Until
 ) -> None:
-    """One viewer sees all of a run; one is killed, one frozen while it lives."""
+    """One viewer shows the whole run; one is killed and one is frozen during it."""
     stage = hamlet_stage
     fleet = fleet_of(stage, *WORDS, "--speed", "10")
     viewers = {}

@@ -85,7 +85,7 @@ def pixels(places: Floats, height: int, width: int) -> Floats:
 
 
 def check_robots(picture: Floats, folder: Path) -> None:
-    """Most cores show their colours where the table has them; the rest is hidden."""
+    """Most cores show their colours at the table's positions; the others are hidden."""
     rows = read_table(folder, "poses")
     rows = rows.filter(pc.less(pc.abs(pc.subtract(rows["sim_time_s"], SEEN_S)), 1e-6))
     colours = {

@@ -1,4 +1,4 @@
-"""The wheel holds all that runs, and nothing else."""
+"""Content of the wheel: all that runs, and nothing else."""
 
 import zipfile
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Arena by hand: founders, births, culls, samples, ends; each rule once."""
+"""Rules of an arena, each tested once by hand: births, culls, samples, ends."""
 
 from dataclasses import replace
 from typing import Any

@@ -1,4 +1,4 @@
-"""How arenas are held back for viewers."""
+"""Delays of arenas, for viewers."""
 
 import pytest
 

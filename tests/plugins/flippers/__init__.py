@@ -1,4 +1,4 @@
-"""A user's package: one part type of their own, and one that is none."""
+"""User package with a valid part type and an attribute that is no part type."""
 
 from schema.parts import Box, PartType, Sensor, Shape, Slot
 
