@@ -175,7 +175,7 @@ def level(branches: Iterable[MutableGenome]) -> None:
     Turns add up from the core outwards. Every levelled part gets the turn that brings
     the sum back to zero; all other parts keep theirs.
 
-    Source: facts of the original, section 2 (planarity).
+    Source: the code of the original (planarity).
     """
     turns: dict[MutableGenome, int] = {}
     for branch in branches:

@@ -1,12 +1,12 @@
-"""Probe of ``birth_trace.py``: notes which file of ours calls which, and when.
+"""Probe of ``birth_trace.py``: records calls between the project's files.
 
 ``birth_trace.py`` copies this file as ``sitecustomize.py`` into a folder of PYTHONPATH,
-so every process of a run imports it before anything of ours. It knows no module of
-ours, only the root of the tree and the names of its top folders.
+so every process of a run imports it before the project's modules. It names no
+module, only the root of the tree and the names of its top folders.
 
 A process writes its notes when it ends: a line of JSON (``files``, ``marks``,
 ``bits``), then unsigned 64-bit integers, one per call: microseconds, number of the
-calling file, number of the called file, each ``bits`` wide. File 0 is none of ours.
+calling file, number of the called file, each ``bits`` wide. File 0 is no project file.
 """
 
 import atexit
@@ -33,7 +33,7 @@ TOPS = ("schema", "coordinator", "worker", "analyzer", "analysis", "revolve")
 BITS = 12
 """Of a file's number in a note."""
 SLOWER = 1000
-"""How much slower the wall clock of our code goes once parents mate."""
+"""How much slower the project's wall clock runs once parents mate."""
 
 _NAMED_BY = 5  # run, island, birth, attempt, purpose
 _PARENTS = 2
@@ -71,7 +71,7 @@ class Probe:
         atexit.register(self.write)
 
     def watch(self, frame: FrameType, event: str, _argument: object) -> None:
-        """Note a call of a function of ours; a profile function."""
+        """Profile function: record a call of a project function."""
         if event != "call":
             return
         code = frame.f_code
@@ -104,7 +104,7 @@ class Probe:
         self.marks.append((int(key[1]), int(key[2]), self._now_us()))
 
     def monotonic(self) -> float:
-        """Return the time [s]; to our code it goes slower once parents mate."""
+        """Return the time [s]; project code sees it run slower once parents mate."""
         since_s, now_s = self._slow_since_s, _monotonic_s()
         if since_s is None or not self._number(sys._getframe(1).f_code.co_filename):
             return now_s
@@ -124,7 +124,7 @@ class Probe:
         return _now_ns() // 1000 - self._begin_us
 
     def _number(self, file: str) -> int:
-        """Return the number of a file of ours, 0 of any other."""
+        """Return the number of a project file, 0 for any other."""
         known = self._numbers.get(file)
         return self._new_number(file) if known is None else known
 
@@ -168,7 +168,7 @@ class _Patches:
 
 
 def _patch_streams(module: Any, probe: Probe) -> None:  # noqa: ANN401 - numpy.random
-    """Have seeds of random streams tell by what they are named."""
+    """Make seeds of random streams report their names."""
 
     class Marked(module.SeedSequence):  # type: ignore[misc]
         def __init__(
@@ -185,7 +185,7 @@ def _patch_streams(module: Any, probe: Probe) -> None:  # noqa: ANN401 - numpy.r
 
 
 def _patch_callbacks(module: Any, probe: Probe) -> None:  # noqa: ANN401 - zenoh
-    """Have callbacks watched that run on the network's own threads."""
+    """Profile callbacks that run on the network's threads."""
     original = module.handlers.Callback
 
     def callback(function: Any, *more: Any, **named: Any) -> Any:  # noqa: ANN401

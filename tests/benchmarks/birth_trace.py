@@ -4,20 +4,20 @@ Run as ``python tests/benchmarks/birth_trace.py [--json] [--pairs] [--tree FOLDE
 takes about a minute. Two small runs are traced, one off-line and one on-line, each with
 a coordinator, an analyzer and one worker. The figures of each:
 
-- **files**: source files of ours with a function that is called at every birth;
-- **pairs**: (calling file, called file), two different files of ours, where the first
+- **files**: project files with a function that is called at every birth;
+- **pairs**: (calling file, called file), two different project files, where the first
   calls a function of the second at every birth.
 
-**What is a file of ours:** a Python file below ``schema``, ``coordinator``, ``worker``,
+**Project file:** a Python file below ``schema``, ``coordinator``, ``worker``,
 ``analyzer``, ``analysis`` or ``revolve``. Code that the Protobuf compiler wrote
-(``*_pb2.py``) and tests do not count. **What is a call:** a Python function, method,
+(``*_pb2.py``) and tests do not count. **Call:** a Python function, method,
 property or generator is entered; bodies of modules and classes do not count, so imports
-are left out. The calling file is the innermost one of ours on the stack: frames of
-libraries between two files of ours are skipped. A message between two processes is no
+are left out. The calling file is the innermost project file on the stack: frames of
+libraries between two project files are skipped. A message between two processes is no
 call, and a callback of the network or the entry of a thread has no caller: the called
 file counts, and there is no pair. A call that a cache answers enters no function.
 
-**What is a birth:** the time from one birth's choice of parents to the next one's. This
+**Birth:** the time from one birth's choice of parents to the next one's. This
 span holds one whole path: mating, vetting, evaluation or insertion and advances,
 journal, rows. Off-line a brood is one child (15+1), so that one birth is in flight and
 the selection of survivors belongs to every birth. On-line the span goes from one
@@ -27,17 +27,17 @@ their random stream, the ``spawn_key`` (run, island, birth, attempt, purpose) th
 given to NumPy's ``SeedSequence``: these numbers are part of what a seed means and
 cannot change.
 
-**What is every birth:** at least 90 % of the births from number 40 to 64, each of which
+**Every birth:** at least 90 % of the births from number 40 to 64, each of which
 must have a row in the births table. Rarer events are left out: rare mutations, a cull
 every second birth, snapshots, rows that wait for others before they are written. Two
 measures keep the figures independent of the machine's speed. The coordinator's wall
-clock (``time.monotonic``, as read by our code) runs a thousand times slower once
+clock (``time.monotonic``, as the project reads it) runs a thousand times slower once
 parents mate, so what is done every so many seconds (progress, chores, status) is not
 done during these births. And a span includes what other processes do in the 5 ms after
 its end: an agent that has sent its answer still tidies up while the coordinator goes
 on. What the coordinator does at every turn of its main loop counts.
 
-No name of a module or function of ours is used, only the command line and the tables:
+No name of a project module or function is used, only the command line and the tables:
 the figures of two trees can be compared, however their files are laid out.
 """
 
@@ -96,7 +96,7 @@ population_floor = 8
 DOCUMENTS = {"off-line": OFF_LINE, "on-line": ON_LINE}
 
 Call = tuple[str, str]
-"""Calling and called file; the first is empty where no file of ours calls."""
+"""Calling and called file; the first is empty where no project file calls."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -143,11 +143,11 @@ def arena_robot(
 
 
 def replace_brain(robot: ArenaRobot, brain: Brain, width: Widths, start: int) -> None:
-    """Give a robot another brain, at rest.
+    """Replace a robot's brain; all neuron states are 0.
 
     Args:
         robot: the robot; its commands are held until its next tick.
-        brain: that fits its body.
+        brain: new brain, which fits its body.
         width: of every network.
         start: step of that tick, from which the brain's age counts.
     """

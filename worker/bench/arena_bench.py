@@ -1,6 +1,6 @@
 """``revolve bench arena`` and ``revolve bench spider``: the thesis's benchmarks.
 
-Source: Hupkes 2016, figures 6.1 and 7.1; facts of the original, section 9.
+Source: Hupkes 2016, figures 6.1 and 7.1; the code of the original.
 """
 
 import argparse
