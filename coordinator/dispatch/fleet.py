@@ -58,7 +58,7 @@ Encode = Callable[[AssignShard], tuple[bytes, Read]]
 """Returns the request of an advance, and what decodes and checks its answer."""
 
 End = Deliver | ShardDone | ShardFailed
-"""What a client is told about a job or an advance."""
+"""Result of a job or an advance, as its client receives it."""
 
 
 class Fleet:

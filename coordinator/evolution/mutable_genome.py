@@ -189,7 +189,7 @@ def level(branches: Iterable[MutableGenome]) -> None:
 
 
 class SizeCounts(NamedTuple):
-    """Counts of everything that the restrictions of a space limit, of some branches."""
+    """Numbers of parts, inputs, outputs and hidden neurons of some branches."""
 
     parts: int
     inputs: int

@@ -1,4 +1,4 @@
-"""What an analysis may cost: a pair of bodies, and the thesis's whole campaign."""
+"""Time limits of an analysis: a pair of bodies, and the thesis's whole campaign."""
 
 import subprocess
 import sys

@@ -102,7 +102,7 @@ def make_records() -> Callable[..., list[Record]]:
 
 
 def feed(folder: Path, rows: list[Record], every: int = 10) -> Recorder:
-    """Return a recorder that took rows and flushed after every few."""
+    """Return a recorder after it has recorded rows, with regular flushes."""
     recorder = Recorder(folder, DETAILS)
     for index, record in enumerate(rows, start=1):
         recorder.write(record)

@@ -62,7 +62,7 @@ def main(address: str, behaviour: str) -> None:
                 count += 1
                 if behaviour == "late":
                     token.undeclare()  # type: ignore[no-untyped-call]
-                    # Meanwhile the job is somebody else's.
+                    # Meanwhile another agent has the job.
                     stop.wait(GONE_S)
                 query.reply(member.jobs, data)
                 if behaviour == "twice":

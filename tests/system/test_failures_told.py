@@ -140,7 +140,7 @@ def test_a_damaged_run_does_not_hide_others(stage: Stage, made: Path) -> None:
     assert f"damaged: all/twice/{told}" in said
     assert "1 of 2 runs finished" in said
     assert "twice/seeing-0  damaged" in said
-    # The other one is begun anew: the damaged one keeps it from nothing.
+    # The other run is restarted in spite of the damaged one.
     shutil.rmtree(twice / "seeing-1")
     said = stage.run("resume", "all/twice", "--in-process", "--quiet", code=1)
     assert f"seeing-0 failed: all/twice/{told}" in said

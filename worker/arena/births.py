@@ -67,9 +67,9 @@ def _distinct(births: tuple[BirthId, ...]) -> tuple[BirthId, ...]:
 def possible(changes: Changes, living: Collection[BirthId]) -> Changes:
     """Return the part of changes from another platform that is possible here.
 
-    Robots that were lost here only are not removed again. Robots that were lost there
-    only, and return as migrants, are removed first. With the same robots alive as
-    there, the changes are the same.
+    A robot that died only on this platform is not removed again. A robot that died only
+    on the other platform, and returns as a migrant, is removed first. If the same
+    robots are alive on both, the changes are the same.
     """
     coming = [each.birth for each in changes.insertions]
     going = dict.fromkeys((*changes.removals, *coming))

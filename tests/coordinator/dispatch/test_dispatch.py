@@ -314,7 +314,7 @@ def test_late_job_is_duplicated_on_an_idle_agent(
     dispatch = late(typical_s)
     almost_s = typical_s + patience_s
     assert given_out(dispatch.handle(Ticked(almost_s))) == []
-    # The oldest first; nobody is idle for the second.
+    # The oldest first; no agent is idle for the second.
     assert given_out(dispatch.handle(Ticked(almost_s + 0.3))) == [(1, "b")]
     assert given_out(dispatch.handle(Ticked(almost_s + 9.0))) == []
 

@@ -227,7 +227,7 @@ def test_shard_does_not_drift_if_its_platform_returns_in_time() -> None:
         AssignShard(1, 0, "z", "theirs", is_whole=True)
     ]
     dispatch.handle(Left("z"))
-    # The while begins anew.
+    # The waiting time starts again.
     dispatch.handle(Ticked(110.0))
     assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == []
     assert len(dispatch.handle(Ticked(110.0 + DRIFT_S))) == 1
