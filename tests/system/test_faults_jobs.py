@@ -1,6 +1,6 @@
 """Evaluations that end their own process, and workers that do not fit the run.
 
-The plug-ins crash, exit or hang; which of it depends on the robot alone.
+The plug-in crashes, exits or hangs for some robots; it depends on the robot alone.
 """
 
 import os

@@ -87,7 +87,7 @@ def curves(file: Path, name: str) -> dict[int, tuple[float, ...]]:
 
 
 def expected_curve(folder: Path) -> dict[int, tuple[float, ...]]:
-    """Return mean and best fitness by births, computed by DuckDB."""
+    """Return mean and best fitness by births, computed by Arrow."""
     rows = read_table(folder, "population").filter(pc.field("fitness").is_valid())
     grouped = rows.group_by("births").aggregate(
         [("fitness", "mean"), ("fitness", "max")]

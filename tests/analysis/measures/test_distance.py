@@ -121,7 +121,7 @@ def three_bodies(draw: st.DrawFn) -> list[Body]:
 
 
 def as_labelled(body: Body, slots: SlotRule) -> list[tuple[object, ...]]:
-    """Return the part types and slots that a distance compares."""
+    """Return parent, type and slot of each part: all that the distance depends on."""
     slot = "parent_slot" if slots == "parent" else "child_slot"
     return [(one["parent"], one["kind"], one[slot]) for one in body]
 

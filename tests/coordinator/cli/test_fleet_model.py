@@ -40,7 +40,7 @@ def test_work_of_lost_workers_is_lost() -> None:
 
 
 def test_the_limit_is_found() -> None:
-    """At 1 ms per birth and 0.1 s per evaluation, 100 / 0.95 workers saturate it."""
+    """At 1 ms per birth and 0.1 s per evaluation, 100 / 0.95 workers are 95 % busy."""
     workers, outcome = most_workers(replace(FREE, evaluation_s=0.1, coordinator_s=1e-3))
     assert 95 <= workers <= 108
     assert outcome.utilisation >= 0.95

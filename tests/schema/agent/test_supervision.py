@@ -90,7 +90,7 @@ def test_exit_leaves_the_note_and_an_error_does_not(
 
 
 def die(signal_number: int, log: str, slot: ProcessSlot) -> None:
-    """Die of a job the first time, after writing the process id."""
+    """Record the causes of earlier deaths; crash in a job at the first two starts."""
     with Path(log).open("a", encoding="utf-8") as file:
         file.write(f"{[death.cause for death in slot.deaths]}\n")
     if len(slot.deaths) < 2:

@@ -109,7 +109,7 @@ if __name__ == "__main__":
 
 
 def test_ctrl_c_reaches_no_child_from_its_start_on(tmp_path: Path) -> None:
-    """The first child, which Python starts on its own, ignores it as well."""
+    """Includes the first child, with which Python starts a process of its own."""
     script = tmp_path / "pool.py"
     script.write_text(_SHIELDED)
     done = subprocess.check_output(
