@@ -1,12 +1,12 @@
-# Everything a person or CI does here. `make demo` and `make test` need only
-# Python 3.11-3.14, make and git; the first of them makes .venv.
+# Commands for users, developers and CI. `make demo` and `make test` need only
+# Python 3.11-3.14, make and git; the first of them creates .venv.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-# What `make demo` runs; make SEED=2 BIRTHS=3000 demo changes it.
+# Settings of `make demo`; to change them: make SEED=2 BIRTHS=3000 demo.
 SEED ?= 1
 BIRTHS ?= 1500
 DEMO = $(BIN)/revolve run scenario1 --seed $(SEED) --births $(BIRTHS) \
@@ -18,39 +18,39 @@ DEMO = $(BIN)/revolve run scenario1 --seed $(SEED) --births $(BIRTHS) \
 help:
 	@echo 'make demo         evolve robots for about a minute'
 	@echo 'make test         run all tests'
-	@echo 'make test-long    run what is too long for CI: about an hour, as root'
-	@echo 'make bench        hold the speed promises, on an idle machine'
+	@echo 'make test-long    run the tests that are too long for CI: about an hour, as root'
+	@echo 'make bench        check the performance targets, on an idle machine'
 	@echo 'make lint         ruff, mypy, import contracts'
 	@echo 'make check        lint and test'
-	@echo 'make format       let ruff format and mend'
+	@echo 'make format       fix and format the code with ruff'
 	@echo 'make proto        write schema/wire/revolve_pb2.py(i) from revolve.proto'
-	@echo 'make constraints  write constraints.txt anew from this environment'
+	@echo 'make constraints  update constraints.txt from this environment'
 	@echo 'make clean        remove the environment and all caches'
 
 demo: $(STAMP)
 	@$(DEMO)
 
-# Tests start hundreds of processes, each of which would compile all of it again where
-# Python is told to write no bytecode.
+# Tests start hundreds of processes. Where Python is configured to write no bytecode,
+# each of them would compile all modules again.
 compiled: $(STAMP)
 	@$(BIN)/python -m compileall -q schema coordinator worker analyzer analysis revolve.py
 
-# Many small tests, two at a time; then those that start processes and often wait.
+# Unit tests, two at a time; then system tests, which start processes and often wait.
 test: compiled
 	$(BIN)/python -m pytest -q -n 2 -m 'not system and not benchmark'
 	$(BIN)/python -m pytest -q -n 4 --dist worksteal -m 'system and not long'
 
-# What CI has no time for: run it before a release and say what it gave.
+# Tests that are too long for CI: run them before a release and report the results.
 test-long: test-many bench test-fresh
 
 test-many: compiled
 	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m long
 
-# make SUITES=sid test-fresh tries one release of Debian only.
+# To test one release of Debian only: make SUITES=sid test-fresh.
 test-fresh:
 	@tests/fresh_machine.sh $(SUITES)
 
-# Holds the speed promises to their figures: for a machine with nothing else to do.
+# Check the performance targets; needs an idle machine.
 bench: compiled
 	$(BIN)/python -m pytest -q -s -m benchmark
 
@@ -70,7 +70,7 @@ proto: $(STAMP)
 	$(BIN)/python -m grpc_tools.protoc -I. --python_out=. --pyi_out=. \
 		schema/wire/revolve.proto
 
-# Only names and versions: where they come from is each machine's own matter.
+# Only names and versions: each machine configures its own package sources.
 constraints: $(STAMP)
 	@{ sed -n '/^#/p' constraints.txt; \
 	   $(BIN)/python -m pip freeze --all --exclude pip --exclude-editable; } > $(VENV)/constraints.txt

@@ -1,4 +1,4 @@
-"""Set-up that precedes all other imports of the tests."""
+"""Settings of all tests, made before other modules are imported."""
 
 import os
 from contextlib import suppress
@@ -7,8 +7,8 @@ from hypothesis import settings
 
 from analysis.render.picture import NoPictures, choose_engine
 
-# MuJoCo settles what draws when it is first imported, and some test or other imports
-# it first. Processes that tests start choose for themselves.
+# MuJoCo selects its rendering engine when it is first imported, by whichever test comes
+# first. Processes that tests start select their own engine.
 _SETTING = os.environ.get("MUJOCO_GL")
 with suppress(NoPictures):
     choose_engine()
@@ -17,7 +17,8 @@ import mujoco  # noqa: E402, F401
 if _SETTING is None:
     os.environ.pop("MUJOCO_GL", None)
 
-# The same examples every time, however slow the machine: a test that fails by luck
-# teaches nothing. Here, for tests take the settings that hold when they are decorated.
+# Use the same examples in every run, independent of the machine's speed, so that
+# failures are reproducible. Set here because tests take the settings that are active
+# when they are decorated.
 settings.register_profile("fixed", derandomize=True, database=None, deadline=None)
 settings.load_profile("fixed")

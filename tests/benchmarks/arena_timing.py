@@ -1,4 +1,4 @@
-"""Timing of an arena beside the bare physics of its robots, second by second."""
+"""Timing of an arena compared with the bare physics of its robots, by second."""
 
 import math
 import time
@@ -51,7 +51,7 @@ class ArenaTiming:
 
     @property
     def ratio(self) -> float:
-        """Share of the time that the robots' bare steps need."""
+        """Ratio of the time of the robots' bare steps to the time of the arena."""
         return self.bare_s / self.wall_s
 
 
@@ -59,13 +59,12 @@ class Stopwatch:
     """Total time of some of an object's methods."""
 
     def __init__(self, clock: Clock) -> None:
-        """Start at zero."""
         self._clock = clock
         self._depth = 0
         self.total_s = 0.0
 
     def wrap(self, owner: object, *names: str) -> None:
-        """Time methods of an object from now on; nested calls count once."""
+        """Measure further calls of methods of an object; nested calls count once."""
         for name in names:
             setattr(owner, name, self._timed(getattr(owner, name)))
 
@@ -110,13 +109,13 @@ def time_arena(
     """Return the components of the time of an arena.
 
     Args:
-        settings: of the arena.
-        robots: inserted at the start; this is not timed.
-        seconds: timed [s].
-        threads: that step clusters.
-        spares: one is born in each second, and the oldest robot dies.
-        warm_up_s: simulated before the clock runs [s].
-        measures_bare: also time the same robots' bare steps, second by second.
+        settings: settings of the arena.
+        robots: inserted at the start, which is not timed.
+        seconds: simulated time that is timed [s].
+        threads: number of threads that step clusters.
+        spares: robots born one per second, each replacing the oldest robot.
+        warm_up_s: simulated time before the measurement [s].
+        measures_bare: also time the bare steps of the same robots in each second.
     """
     clock = time.thread_time if threads == 1 else time.perf_counter
     second = round(1.0 / settings.simulation.timestep_s)
@@ -132,11 +131,11 @@ def time_arena(
     changing.wrap(population, "regroup", "split", "remove", "catch_up")
     changing.wrap(world, "apply")
     merges, splits = population.merges, population.splits
-    waiting, pool = list(spares), Pool(threads)
+    unborn, pool = list(spares), Pool(threads)
     for _ in range(seconds):
         changes = Changes()
-        if waiting and world.births:
-            changes = Changes((world.births[0],), (waiting.pop(0),))
+        if unborn and world.births:
+            changes = Changes((world.births[0],), (unborn.pop(0),))
         start = clock()
         world.apply(changes)
         world.advance(world.step + second)
@@ -158,15 +157,15 @@ def time_arena(
 
 
 def bare_time(world: World, pool: Pool, steps: int, clock: Clock) -> float:
-    """Return the time of the steps of a world's robots, each alone.
+    """Return the time of the steps of a world's robots, each simulated alone.
 
-    Commands are constant; the world does not change.
+    Control signals are constant. The world does not change.
 
     Args:
-        world: of the robots.
-        pool: of threads.
-        steps: of each robot.
-        clock: to read [s].
+        world: world of the robots.
+        pool: thread pool.
+        steps: number of steps of each robot.
+        clock: function that returns the time [s].
     """
     tick = world.population.model_cache.settings.simulation.brain_steps
     jobs = []

@@ -1,12 +1,13 @@
 """Probe of ``birth_trace.py``: records calls between the project's files.
 
 ``birth_trace.py`` copies this file as ``sitecustomize.py`` into a folder of PYTHONPATH,
-so every process of a run imports it before the project's modules. It names no
-module, only the root of the tree and the names of its top folders.
+so every process of a run imports it before the project's modules. It depends on no
+module of the project, only on the root of the tree and the names of its top folders.
 
-A process writes its notes when it ends: a line of JSON (``files``, ``marks``,
+A process writes its records when it ends: a line of JSON (``files``, ``marks``,
 ``bits``), then unsigned 64-bit integers, one per call: microseconds, number of the
-calling file, number of the called file, each ``bits`` wide. File 0 is no project file.
+calling file, number of the called file, both ``bits`` wide. File 0 stands for all files
+outside the project.
 """
 
 import atexit
@@ -23,31 +24,31 @@ from types import FrameType, FunctionType, MethodType, ModuleType
 from typing import Any
 
 FOLDER = "BIRTH_TRACE_FOLDER"
-"""Environment variable: where the notes go."""
+"""Environment variable: output folder of the records."""
 ROOT = "BIRTH_TRACE_ROOT"
-"""Environment variable: root of the tree that is traced."""
+"""Environment variable: root of the traced tree."""
 BEGIN = "BIRTH_TRACE_BEGIN_US"
-"""Environment variable: time from which all processes count, of the monotonic clock."""
+"""Environment variable: zero of all recorded times, on the monotonic clock [us]."""
 TOPS = ("schema", "coordinator", "worker", "analyzer", "analysis", "revolve")
-"""Folders of the root, or single files, that hold our code."""
+"""Folders and single files in the root that contain the project's code."""
 BITS = 12
-"""Of a file's number in a note."""
+"""Width of a file number in a record."""
 SLOWER = 1000
-"""How much slower the project's wall clock runs once parents mate."""
+"""Factor by which the project's wall clock slows down after the first mating."""
 
-_NAMED_BY = 5  # run, island, birth, attempt, purpose
+_KEY_LENGTH = 5  # run, island, birth, attempt, purpose
 _PARENTS = 2
-_OPTIMIZED = 0x01  # code of a function, not of a module or class body
+_OPTIMIZED = 0x01  # flag of function code, not of module or class bodies
 
 _now_ns = time.monotonic_ns
 _monotonic_s = time.monotonic
 
 
 class Probe:
-    """The notes of one process.
+    """Records of one process.
 
     Attributes:
-        marks: island, birth and microsecond of each choice of parents.
+        marks: island, birth and time [us] of each parent selection.
     """
 
     def __init__(self, root: Path, folder: Path, begin_us: int) -> None:
@@ -57,21 +58,21 @@ class Probe:
         self._folder = folder
         self._names = [""]
         self._numbers: dict[str, int] = {}
-        self._notes = array("Q")
+        self._records = array("Q")
         self._slow_since_s: float | None = None
 
     def install(self) -> None:
-        """Watch all threads that Python starts, the clock and two libraries."""
-        import threading  # noqa: PLC0415 - its own clock is bound before ours is set
+        """Trace all Python threads; patch the clock and two libraries."""
+        import threading  # noqa: PLC0415 - binds the original clock
 
         time.monotonic = self.monotonic
-        threading.setprofile(self.watch)
-        sys.setprofile(self.watch)
+        threading.setprofile(self.record)
+        sys.setprofile(self.record)
         sys.meta_path.insert(0, _Patches(self))
         atexit.register(self.write)
 
-    def watch(self, frame: FrameType, event: str, _argument: object) -> None:
-        """Profile function: record a call of a project function."""
+    def record(self, frame: FrameType, event: str, _argument: object) -> None:
+        """Record a call of a function of the project (a profile function)."""
         if event != "call":
             return
         code = frame.f_code
@@ -82,49 +83,49 @@ class Probe:
         while back is not None and not caller:
             caller = self._number(back.f_code.co_filename)
             back = back.f_back
-        self._notes.append(((self._now_us() << BITS | caller) << BITS) | called)
+        self._records.append(((self._now_us() << BITS | caller) << BITS) | called)
 
-    def watched(self, function: Any) -> Any:  # noqa: ANN401 - any callable
-        """Return a callback that is watched on a thread that Python did not start."""
+    def traced(self, function: Any) -> Any:  # noqa: ANN401 - any callable
+        """Return a callback that is traced on threads that Python did not start."""
         if not isinstance(function, FunctionType | MethodType):
             return function
 
         def call(*arguments: object) -> object:
-            sys.setprofile(self.watch)
+            sys.setprofile(self.record)
             return function(*arguments)
 
         return call
 
     def mark(self, key: Sequence[int]) -> None:
-        """Note the first choice of parents for a birth by the name of its stream."""
-        if len(key) != _NAMED_BY or (key[3], key[4]) != (0, _PARENTS):
+        """Record the first parent selection of a birth, given its stream's key."""
+        if len(key) != _KEY_LENGTH or (key[3], key[4]) != (0, _PARENTS):
             return
         if self._slow_since_s is None:
             self._slow_since_s = _monotonic_s()
         self.marks.append((int(key[1]), int(key[2]), self._now_us()))
 
     def monotonic(self) -> float:
-        """Return the time [s]; project code sees it run slower once parents mate."""
+        """Return the time [s], slowed down for the project after the first mating."""
         since_s, now_s = self._slow_since_s, _monotonic_s()
         if since_s is None or not self._number(sys._getframe(1).f_code.co_filename):
             return now_s
         return since_s + (now_s - since_s) / SLOWER
 
     def write(self) -> None:
-        """Write the notes, if there are any."""
+        """Write the records, if any."""
         sys.setprofile(None)
-        if not self._notes:
+        if not self._records:
             return
         entries = {"files": self._names, "marks": self.marks, "bits": BITS}
         head = json.dumps(entries)
         path = self._folder / f"{os.getpid()}.trace"
-        path.write_bytes(head.encode() + b"\n" + self._notes.tobytes())
+        path.write_bytes(head.encode() + b"\n" + self._records.tobytes())
 
     def _now_us(self) -> int:
         return _now_ns() // 1000 - self._begin_us
 
     def _number(self, file: str) -> int:
-        """Return the number of a project file, 0 for any other."""
+        """Return the number of a file of the project, 0 for other files."""
         known = self._numbers.get(file)
         return self._new_number(file) if known is None else known
 
@@ -140,10 +141,10 @@ class Probe:
 
 
 class _Patches:
-    """Changes a library when it has been imported; an entry of ``sys.meta_path``."""
+    """Patches libraries after their import (an entry of ``sys.meta_path``)."""
 
     def __init__(self, probe: Probe) -> None:
-        self._waiting: dict[str, Callable[[ModuleType], None]] = {
+        self._pending: dict[str, Callable[[ModuleType], None]] = {
             "numpy.random": lambda module: _patch_streams(module, probe),
             "zenoh": lambda module: _patch_callbacks(module, probe),
         }
@@ -151,7 +152,7 @@ class _Patches:
     def find_spec(
         self, name: str, _path: object = None, _target: object = None
     ) -> ModuleSpec | None:
-        patch = self._waiting.pop(name, None)
+        patch = self._pending.pop(name, None)
         if patch is None:
             return None
         spec = find_spec(name)
@@ -168,7 +169,7 @@ class _Patches:
 
 
 def _patch_streams(module: Any, probe: Probe) -> None:  # noqa: ANN401 - numpy.random
-    """Make seeds of random streams report their names."""
+    """Record the spawn keys of random streams."""
 
     class Marked(module.SeedSequence):  # type: ignore[misc]
         def __init__(
@@ -185,12 +186,12 @@ def _patch_streams(module: Any, probe: Probe) -> None:  # noqa: ANN401 - numpy.r
 
 
 def _patch_callbacks(module: Any, probe: Probe) -> None:  # noqa: ANN401 - zenoh
-    """Profile callbacks that run on the network's threads."""
+    """Trace callbacks that run on the network's threads."""
     original = module.handlers.Callback
 
     def callback(function: Any, *more: Any, **named: Any) -> Any:  # noqa: ANN401
-        others = [probe.watched(each) for each in more]
-        return original(probe.watched(function), *others, **named)
+        others = [probe.traced(each) for each in more]
+        return original(probe.traced(function), *others, **named)
 
     module.handlers.Callback = callback
 

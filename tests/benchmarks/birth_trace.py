@@ -1,44 +1,43 @@
-"""Count the source files that a birth passes through, over all processes.
+"""Count the source files that are executed for every birth, over all processes.
 
 Run as ``python tests/benchmarks/birth_trace.py [--json] [--pairs] [--tree FOLDER]``; it
 takes about a minute. Two small runs are traced, one off-line and one on-line, each with
-a coordinator, an analyzer and one worker. The figures of each:
+a coordinator, an analyzer and one worker. The figures of each run:
 
-- **files**: project files with a function that is called at every birth;
-- **pairs**: (calling file, called file), two different project files, where the first
-  calls a function of the second at every birth.
+- **files**: source files of the project with a function that is called at every birth;
+- **pairs**: (calling file, called file), two different files of the project, where the
+  first calls a function of the second at every birth.
 
-**Project file:** a Python file below ``schema``, ``coordinator``, ``worker``,
-``analyzer``, ``analysis`` or ``revolve``. Code that the Protobuf compiler wrote
-(``*_pb2.py``) and tests do not count. **Call:** a Python function, method,
-property or generator is entered; bodies of modules and classes do not count, so imports
-are left out. The calling file is the innermost project file on the stack: frames of
-libraries between two project files are skipped. A message between two processes is no
-call, and a callback of the network or the entry of a thread has no caller: the called
-file counts, and there is no pair. A call that a cache answers enters no function.
+**Files** are Python files below ``schema``, ``coordinator``, ``worker``, ``analyzer``,
+``analysis`` or ``revolve``, except generated Protobuf code (``*_pb2.py``) and tests.
 
-**Birth:** the time from one birth's choice of parents to the next one's. This
-span holds one whole path: mating, vetting, evaluation or insertion and advances,
-journal, rows. Off-line a brood is one child (15+1), so that one birth is in flight and
-the selection of survivors belongs to every birth. On-line the span goes from one
-decision to mate to the next, with three advances and three samples of fitness; the
-intervals are those of scenario 3 divided by five. Births are recognised by the name of
-their random stream, the ``spawn_key`` (run, island, birth, attempt, purpose) that is
-given to NumPy's ``SeedSequence``: these numbers are part of what a seed means and
-cannot change.
+**Calls** enter a Python function, method, property or generator. Bodies of modules and
+classes do not count, so imports are excluded. The calling file is the innermost project
+file on the stack: frames of libraries in between are skipped. A message between two
+processes is not a call. A network callback and the entry of a thread have no caller:
+the called file counts, without a pair. A result from a cache enters no function.
 
-**Every birth:** at least 90 % of the births from number 40 to 64, each of which
-must have a row in the births table. Rarer events are left out: rare mutations, a cull
-every second birth, snapshots, rows that wait for others before they are written. Two
-measures keep the figures independent of the machine's speed. The coordinator's wall
-clock (``time.monotonic``, as the project reads it) runs a thousand times slower once
-parents mate, so what is done every so many seconds (progress, chores, status) is not
-done during these births. And a span includes what other processes do in the 5 ms after
-its end: an agent that has sent its answer still tidies up while the coordinator goes
-on. What the coordinator does at every turn of its main loop counts.
+**A birth** is the time from its parent selection to the next one. This span contains
+one complete path: mating, vetting, evaluation or insertion and advances, journal, rows.
+Off-line a brood has one child (15+1), so one birth is in flight and every birth
+includes survivor selection. On-line the span contains three advances and three fitness
+samples; the intervals are those of scenario 3 divided by five. The key of a random
+stream identifies the birth: the ``spawn_key`` (run, island, birth, attempt, purpose) of
+NumPy's ``SeedSequence``. These numbers are part of the meaning of a seed and cannot
+change.
 
-No name of a project module or function is used, only the command line and the tables:
-the figures of two trees can be compared, however their files are laid out.
+**Every birth** means at least 90 % of the births 40 to 64, each of which must have a
+row in the births table. This excludes rarer events: rare mutations, a cull every second
+birth, snapshots, rows that are written later. Two measures make the figures independent
+of the machine's speed. First, the coordinator's wall clock (``time.monotonic``, as read
+by the project) runs a thousand times slower after the first mating, so periodic tasks
+(progress, maintenance, status) do not run during these births. Second, a span includes
+the calls of other processes in the 5 ms after its end, because an agent still cleans up
+after it has sent its answer. All work in each turn of the coordinator's main loop
+counts.
+
+The trace uses no module or function name of the project, only the command line and the
+tables. The figures of two trees are therefore comparable for any layout of their files.
 """
 
 import argparse
@@ -96,19 +95,19 @@ population_floor = 8
 DOCUMENTS = {"off-line": OFF_LINE, "on-line": ON_LINE}
 
 Call = tuple[str, str]
-"""Calling and called file; the first is empty where no project file calls."""
+"""Calling and called file; the first is empty if no project file calls."""
 
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """What one process noted.
+    """Records of one process.
 
     Attributes:
-        files: names by number.
-        marks: island, birth and time of each choice of parents [us].
-        times: of each call, ascending but for threads [us].
-        calls: number of the calling file times 2^bits, plus that of the called one.
-        bits: of a file's number.
+        files: file names by number.
+        marks: island, birth and time [us] of each parent selection.
+        times: time of each call, ascending within a thread [us].
+        calls: number of the calling file times 2^bits plus number of the called file.
+        bits: width of a file number.
     """
 
     files: list[str]
@@ -119,17 +118,17 @@ class Trace:
 
     @classmethod
     def read(cls, path: Path) -> "Trace":
-        """Return what ``birth_probe.py`` wrote."""
-        head, _, notes = path.read_bytes().partition(b"\n")
+        """Read a file that ``birth_probe.py`` wrote."""
+        head, _, records = path.read_bytes().partition(b"\n")
         entries = json.loads(head)
         bits = entries["bits"]
-        numbers = np.frombuffer(notes, np.uint64)
+        numbers = np.frombuffer(records, np.uint64)
         calls = numbers & np.uint64((1 << 2 * bits) - 1)
         times = numbers >> np.uint64(2 * bits)
         return cls(entries["files"], entries["marks"], times, calls, bits)
 
     def between(self, begin_us: int, end_us: int) -> set[Call]:
-        """Return the distinct calls of a span of time."""
+        """Return the distinct calls of a time span."""
         inside = (self.times >= np.uint64(begin_us)) & (self.times < np.uint64(end_us))
         found = np.unique(self.calls[inside]).tolist()
         return {
@@ -139,14 +138,14 @@ class Trace:
 
 
 @dataclass(frozen=True, slots=True)
-class Passage:
-    """What every birth of a run passes through.
+class BirthPath:
+    """Files and calls of every birth of a run.
 
     Attributes:
-        births: that were counted.
+        births: number of counted births.
         files: source files, sorted.
-        pairs: of calling and called file, sorted.
-        rare: pairs that occur at some of the births only, with their number.
+        pairs: calling and called files, sorted.
+        rare: number of births of each pair that does not occur at every birth.
     """
 
     births: int
@@ -155,24 +154,24 @@ class Passage:
     rare: dict[Call, int]
 
 
-def trace(name: str, tree: Path, place: Path) -> tuple[list[Trace], set[int]]:
-    """Run an experiment; return the traces, and the births of its table.
+def trace(name: str, tree: Path, folder: Path) -> tuple[list[Trace], set[int]]:
+    """Run an experiment; return the traces and the births of its table.
 
     Args:
-        name: a key of ``DOCUMENTS``.
-        tree: root of the code that runs.
-        place: an empty folder.
+        name: key of ``DOCUMENTS``.
+        tree: root of the code to run.
+        folder: empty folder.
     """
-    hook, notes = place / "hook", place / "notes"
+    hook, notes = folder / "hook", folder / "notes"
     hook.mkdir()
     notes.mkdir()
     shutil.copy(PROBE, hook / "sitecustomize.py")
-    (place / "experiment.toml").write_text(DOCUMENTS[name])
+    (folder / "experiment.toml").write_text(DOCUMENTS[name])
     words = ("experiment.toml", "--seed", str(SEED), "--out", "run", "--quiet")
     flags = ("--workers", "1", "--threads", "1")
     done = subprocess.run(
         [sys.executable, "-m", "revolve", "run", *words, *flags],
-        cwd=place,
+        cwd=folder,
         env={
             **os.environ,
             "PYTHONPATH": os.pathsep.join([str(hook), str(tree)]),
@@ -187,13 +186,13 @@ def trace(name: str, tree: Path, place: Path) -> tuple[list[Trace], set[int]]:
     )
     if done.returncode:
         sys.exit(f"{name}: the run ended with {done.returncode}\n{done.stderr}")
-    (table,) = (place / "run" / "tables").glob("*/*/births.parquet")
+    (table,) = (folder / "run" / "tables").glob("*/*/births.parquet")
     born = ParquetFile(table).read(["birth"])["birth"].to_pylist()
     return [Trace.read(path) for path in sorted(notes.glob("*.trace"))], set(born)
 
 
 def spans(traces: Iterable[Trace], born: set[int]) -> list[tuple[int, int]]:
-    """Return begin and end of each birth that counts [us]."""
+    """Return begin and end of each counted birth [us]."""
     begins: dict[int, int] = {}
     for _, birth, time_us in sorted(mark for each in traces for mark in each.marks):
         begins.setdefault(birth, time_us)
@@ -208,25 +207,25 @@ def spans(traces: Iterable[Trace], born: set[int]) -> list[tuple[int, int]]:
     return found
 
 
-def passage(traces: list[Trace], born: set[int]) -> Passage:
-    """Return what every birth passes through."""
+def birth_path(traces: list[Trace], born: set[int]) -> BirthPath:
+    """Return the files and calls of every birth."""
     at_births = Counter[Call]()
     entered = Counter[str]()
-    taking_part: set[int] = set()
+    active: set[int] = set()
     found = spans(traces, born)
     for begin_us, end_us in found:
         calls: set[Call] = set()
         for number, each in enumerate(traces):
             late_us = 0 if each.marks else AFTER_US
             inside = each.between(begin_us, end_us + late_us)
-            taking_part |= {number} if inside else set()
+            active |= {number} if inside else set()
             calls |= inside
         entered.update({called for _, called in calls})
         at_births.update(call for call in calls if call[0] not in ("", call[1]))
-    if len(taking_part) != PROCESSES:
-        sys.exit(f"expected {PROCESSES} processes, got {len(taking_part)}")
+    if len(active) != PROCESSES:
+        sys.exit(f"expected {PROCESSES} processes, got {len(active)}")
     least = SHARE * len(found)
-    return Passage(
+    return BirthPath(
         births=len(found),
         files=sorted(file for file, count in entered.items() if count >= least),
         pairs=sorted(pair for pair, count in at_births.items() if count >= least),
@@ -236,8 +235,8 @@ def passage(traces: list[Trace], born: set[int]) -> Passage:
     )
 
 
-def lines(name: str, found: Passage, *, with_pairs: bool) -> Iterator[str]:
-    """Yield what is printed of a run."""
+def lines(name: str, found: BirthPath, *, with_pairs: bool) -> Iterator[str]:
+    """Yield the lines to print for a run."""
     yield f"{name}: {len(found.files)} files, {len(found.pairs)} pairs of files"
     if with_pairs:
         yield from (f"  {file}" for file in found.files)
@@ -260,18 +259,18 @@ def main() -> None:
         "--tree", type=Path, default=HERE.parents[2], help="root of the code to trace"
     )
     options = parser.parse_args()
-    found: dict[str, Passage] = {}
+    found: dict[str, BirthPath] = {}
     for name in DOCUMENTS:
-        with tempfile.TemporaryDirectory() as place:
-            found[name] = passage(*trace(name, options.tree.resolve(), Path(place)))
+        with tempfile.TemporaryDirectory() as folder:
+            found[name] = birth_path(*trace(name, options.tree.resolve(), Path(folder)))
         if not options.json:
             print(*lines(name, found[name], with_pairs=options.pairs), sep="\n")
     if options.json:
         print(json.dumps({name: as_json(each) for name, each in found.items()}))
 
 
-def as_json(found: Passage) -> dict[str, object]:
-    """Return the figures, and what was counted, for JSON."""
+def as_json(found: BirthPath) -> dict[str, object]:
+    """Return the figures and the counted files and pairs for JSON."""
     return {
         "births": found.births,
         "files": len(found.files),

@@ -1,4 +1,4 @@
-"""Time limits of an analysis: a pair of bodies, and the thesis's whole campaign."""
+"""Benchmarks of the analysis: a pair of bodies, and the campaign of the thesis."""
 
 import subprocess
 import sys
@@ -25,7 +25,7 @@ CAMPAIGN_BUDGET_S = 120.0
 RUNS, BIRTHS_EACH = 30, 3000
 
 
-def test_a_pair_of_bodies_of_30_parts() -> None:
+def test_distance_of_bodies_of_30_parts() -> None:
     rng = np.random.default_rng(1)
     trees = encode(column([random_body(rng, 30) for _ in range(150)]))
     first, second = np.triu_indices(150, 1)

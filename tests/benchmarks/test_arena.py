@@ -1,7 +1,7 @@
-"""An arena costs little more than the physics of its robots: goals of the design.
+"""Benchmarks of the overhead of an arena over the physics of its robots.
 
-Absolute speeds depend on the machine and are only printed. Ratios, measured second by
-second in the same run, are asserted.
+Absolute speeds depend on the machine and are only printed. The tests check ratios that
+are measured in each second of the same run.
 """
 
 import math
@@ -29,8 +29,8 @@ BIRTH_S = 15
 """Seconds between two births of scenario 3, in an arena of 30."""
 
 
-def timed(count: int, seconds: int, *, threads: int = 1, bare: bool) -> ArenaTiming:
-    """Return the timing of random robots at 30 per disc of 2 m, with births."""
+def measure(count: int, seconds: int, *, threads: int = 1, bare: bool) -> ArenaTiming:
+    """Time an arena of random robots with births, at 30 robots per disc of 2 m."""
     radius_m = 2.0 * math.sqrt(count / 30)
     born = math.ceil(seconds * count / 30 / BIRTH_S)
     robots = RobotSource(generate, analyze).vetted(EXPERIMENT, count + born, seed=3)
@@ -44,7 +44,7 @@ def timed(count: int, seconds: int, *, threads: int = 1, bare: bool) -> ArenaTim
         warm_up_s=2,
         measures_bare=bare,
     )
-    say(
+    report(
         f"{count} robots, {threads} thread(s): {found.factor:.2f} x real time, "
         f"{1000 * found.wall_s / seconds / count:.2f} ms per robot-second, "
         f"bare / arena {found.ratio:.3f}, "
@@ -55,15 +55,15 @@ def timed(count: int, seconds: int, *, threads: int = 1, bare: bool) -> ArenaTim
     return found
 
 
-def say(line: str) -> None:
+def report(line: str) -> None:
     sys.stdout.write(f"\n{line}")
 
 
-def best(count: int, seconds: int, least: float) -> list[ArenaTiming]:
-    """Return up to three timings, as other load on the machine distorts ratios."""
+def repeated_timings(count: int, seconds: int, least: float) -> list[ArenaTiming]:
+    """Return up to three timings, because other load distorts ratios."""
     found: list[ArenaTiming] = []
     while len(found) < 3 and max((t.ratio for t in found), default=0.0) < least:
-        found.append(timed(count, seconds, bare=True))
+        found.append(measure(count, seconds, bare=True))
     return found
 
 
@@ -71,8 +71,8 @@ def best(count: int, seconds: int, least: float) -> list[ArenaTiming]:
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_bare_steps_are_most_of_the_time_of_thirty_robots() -> None:
-    """At least 0.75 of the time is bare steps, at most 0.03 births and deaths."""
-    found = best(30, 15, least=0.75)
+    """Bare steps take at least 0.75 of the time, births and deaths at most 0.03."""
+    found = repeated_timings(30, 15, least=0.75)
     assert max(t.ratio for t in found) >= 0.75
     assert min(t.changing_s / t.wall_s for t in found) <= 0.03
 
@@ -81,10 +81,10 @@ def test_bare_steps_are_most_of_the_time_of_thirty_robots() -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_time_per_robot_is_nearly_constant_at_constant_density() -> None:
-    """Time both in turn, each relative to its own bare steps."""
+    """Alternate two sizes, each relative to its own bare steps."""
     growths = []
     for _ in range(3):
-        few, many = timed(20, 10, bare=True), timed(200, 2, bare=True)
+        few, many = measure(20, 10, bare=True), measure(200, 2, bare=True)
         growths.append(few.ratio / many.ratio)
         if growths[-1] <= 1.2:
             break
@@ -98,28 +98,28 @@ def test_time_per_robot_is_nearly_constant_at_constant_density() -> None:
 def test_two_threads_spend_at_least_0_6_of_the_time_on_bare_steps() -> None:
     """Targets of the printed factors: 30 robots: 10 and 18; 200: 3; 400: 1.
 
-    Births are about as frequent as in scenario 3. The bare steps run on two threads,
-    too, at the same time of the run and under the same load.
+    Births are about as frequent as in scenario 3. Bare steps also run on two threads,
+    at the same time of the run and under the same load.
     """
     ratios = []
     for _ in range(3):
-        timed(30, BIRTH_S, threads=1, bare=False)
-        ratios.append(timed(30, BIRTH_S, threads=2, bare=True).ratio)
+        measure(30, BIRTH_S, threads=1, bare=False)
+        ratios.append(measure(30, BIRTH_S, threads=2, bare=True).ratio)
         if ratios[-1] >= 0.6:
             break
     for count, seconds in ((200, 6), (400, 3)):
-        timed(count, seconds, threads=2, bare=False)
+        measure(count, seconds, threads=2, bare=False)
     assert max(ratios) >= 0.6
 
 
-def test_the_fit_recovers_the_coefficients_of_the_thesis() -> None:
+def test_fit_recovers_the_coefficients_of_the_thesis() -> None:
     sizes = list(range(5, 51, 5))
     factors = [-0.26 + 34.78 / p + 20.41 / p**2 for p in sizes]
     assert quadratic_fit(sizes, factors) == pytest.approx([-0.26, 34.78, 20.41])
 
 
 class Sleeper:
-    """Has a method of one second and one of two seconds that calls it."""
+    """Object with a method of one second and a method of two seconds that calls it."""
 
     now = 0.0
 

@@ -1,10 +1,11 @@
-"""Utilisation of a campaign's workers, and cost of dispatch and network.
+"""Benchmarks of worker utilisation and of the cost of dispatch and network.
 
-The campaign has eight 15+1 runs and two workers, with vetting, journal and tables.
-Utilisation is the evaluation time that the workers report, divided by twice the wall
-time, between a tenth and nine tenths of all births. A worker that has a job but waits
-for its core, which the coordinator or the analyzer uses, counts as busy; one that waits
-for a job does not.
+Utilisation is measured for two workers in a campaign of eight runs of 15+1, including
+vetting, journal and tables, between 10 % and 90 % of all births. It is the total
+evaluation time that the workers report, divided by twice the elapsed time. It excludes
+the load of the coordinator: a worker counts as busy while it has a job, even if its
+core executes the coordinator or the analyzer; it counts as idle while it waits for a
+job.
 """
 
 import time
@@ -40,7 +41,7 @@ from schema.agent.topics import unique_name
 from schema.experiment.file import read_experiment
 from schema.wire.codec import decode_answer
 
-prepare_process()  # as the command does, before anybody opens a session
+prepare_process()  # as the command does, before the first session is opened
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
 
@@ -49,8 +50,8 @@ RUNS = 8
 BIRTHS = 60
 
 
-class Watched:
-    """Network that sums the busy time of the workers."""
+class TimedNetwork:
+    """Network that adds up the evaluation time of the workers."""
 
     def __init__(self, network: Network) -> None:
         self.busy_s = 0.0
@@ -69,8 +70,8 @@ class Watched:
 
 
 @contextmanager
-def campaign(folder: Path) -> Iterator[tuple[RunScheduler, Watched]]:
-    """Yield a campaign that has not started, and its network."""
+def campaign(folder: Path) -> Iterator[tuple[RunScheduler, TimedNetwork]]:
+    """Yield the scheduler of a new campaign and its network."""
     experiment = replace(read_experiment("scenario2"), births=BIRTHS)
     planned = [
         Planned(
@@ -82,33 +83,35 @@ def campaign(folder: Path) -> Iterator[tuple[RunScheduler, Watched]]:
     ]
     with ExitStack() as stack:
         network = stack.enter_context(Network(name=unique_name("bench")))
-        judge = Agent("analyzer", "analyzer", network.address)
-        stack.enter_context(ProcessPool(analyzer.service.process, (judge,), size=1))
-        hand = Agent("worker", "worker", network.address)
-        stack.enter_context(ProcessPool(worker.serve.service.process, (hand,), size=2))
-        watched = Watched(network)
-        fleet = Fleet(watched)
+        vetting = Agent("analyzer", "analyzer", network.address)
+        stack.enter_context(ProcessPool(analyzer.service.process, (vetting,), size=1))
+        evaluation = Agent("worker", "worker", network.address)
+        stack.enter_context(
+            ProcessPool(worker.serve.service.process, (evaluation,), size=2)
+        )
+        timed = TimedNetwork(network)
+        fleet = Fleet(timed)
         scheduler = RunScheduler(
             planned,
             fleet,
-            open_run=lambda held, _watched: RunSession(held, fleet),
+            open_run=lambda held, _timed: RunSession(held, fleet),
             most=100,
             conclude=lambda _run: None,
             report=lambda _details, error: pytest.fail(str(error)),
         )
         stack.callback(scheduler.close)
-        yield scheduler, watched
+        yield scheduler, timed
 
 
-def test_two_workers_of_a_campaign_are_busy(tmp_path: Path) -> None:
+def test_utilisation_of_two_workers_of_a_campaign(tmp_path: Path) -> None:
     marks: list[tuple[float, float, float]] = []
-    with campaign(tmp_path) as (scheduler, watched):
+    with campaign(tmp_path) as (scheduler, timed):
         while len(marks) < 2:
             scheduler.turn(0.2, time.monotonic)
             born = scheduler.status(time.monotonic()).births
             if born >= (0.1, 0.9)[len(marks)] * RUNS * BIRTHS:
                 now_s = time.monotonic()
-                marks.append((now_s, watched.busy_s, time.process_time()))
+                marks.append((now_s, timed.busy_s, time.process_time()))
     wall_s, busy_s, own_s = (end - begin for begin, end in zip(*marks, strict=True))
     share = busy_s / (2 * wall_s)
     print(
@@ -118,7 +121,7 @@ def test_two_workers_of_a_campaign_are_busy(tmp_path: Path) -> None:
     assert share >= UTILISATION
 
 
-def test_null_evaluations() -> None:
+def test_rate_and_cpu_time_of_null_evaluations() -> None:
     best = max(
         (null_rate(worker.serve.null.process, 3.0) for _ in range(3)),
         key=lambda rate: rate.per_s,
@@ -128,7 +131,7 @@ def test_null_evaluations() -> None:
     assert best.per_s >= LEAST_NULL_PER_S
 
 
-def test_a_thousand_workers_with_evaluations_of_ten_seconds() -> None:
+def test_coordinator_serves_a_thousand_workers_at_ten_seconds_per_evaluation() -> None:
     cost = birth_cost(worker.serve.null.process, analyzer.service.process, 600).cpu_s
     setting = Setting(1, 10.0, cost)
     reached, outcome = most_workers(setting)

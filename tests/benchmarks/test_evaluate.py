@@ -1,4 +1,4 @@
-"""An evaluation costs little more than its physics: a goal of the design."""
+"""Benchmark of the overhead of an evaluation over its physics."""
 
 import pytest
 
@@ -25,5 +25,5 @@ def test_engine_steps_are_most_of_the_time_of_an_evaluation() -> None:
     assert timing.ratio >= LEAST_RATIO, timing
 
 
-def test_ratio_is_the_share_of_the_engine() -> None:
+def test_ratio_is_engine_time_over_evaluation_time() -> None:
     assert Timing(robots=2, evaluation_s=4.0, engine_s=3.0).ratio == 0.75

@@ -1,4 +1,4 @@
-"""Cost of a birth for the coordinator, and speed-up by a second worker."""
+"""Benchmarks of the coordinator's cost per birth and of the gain of a second worker."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -44,7 +44,7 @@ from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 
-prepare_process()  # as the command does, before anybody opens a session
+prepare_process()  # as the command does, before the first session is opened
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(300)]
 
@@ -55,11 +55,11 @@ SECOND_WORKER = 1.85
 TURNS = 10
 TURN_S = 2.0
 JOINING_S = 0.3
-LEAVING_S = AHEAD_S + 0.2  # what one that leaves had ahead is done by then
+LEAVING_S = AHEAD_S + 0.2  # time to finish the jobs that a leaving worker has
 
 
-class Judged(Island):
-    """Island that requests evaluations of ready-made robots; no mating."""
+class EvaluationIsland(Island):
+    """Island that requests evaluations of given robots, without mating."""
 
     def __init__(self, experiment: Experiment, robots: list[Robot]) -> None:
         super().__init__(experiment, 1, 0)
@@ -70,24 +70,23 @@ class Judged(Island):
     def handle(self, event: IslandEvent) -> list[IslandCommand]:
         commands: list[IslandCommand] = []
         if isinstance(event, Started):
-            asked = 64
+            requests = 64
         else:
             assert isinstance(event, Evaluated)
             self.births += 1
             commands.append(evaluation_record(event))
-            asked = 1
-        for _ in range(min(asked, self._births_wanted - self._requested)):
+            requests = 1
+        for _ in range(min(requests, self._births_wanted - self._requested)):
             robot = self._robots[self._requested % len(self._robots)]
             commands.append(Evaluate(BirthId(0, self._requested), robot))
             self._requested += 1
         return commands
 
 
-class Counted:
-    """Journal that counts the evaluations that it stores.
+class CountingJournal:
+    """Journal that counts evaluations.
 
-    Births are committed in order, so their number rises in jumps; that of evaluations
-    does not.
+    Births are committed in order and therefore in bursts; evaluations are not.
     """
 
     def __init__(self, journal: Journal) -> None:
@@ -101,7 +100,7 @@ class Counted:
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """Evaluations per second, and CPU time of this process for each [s]."""
+    """Evaluations per second; CPU time per evaluation [s], including the network."""
 
     per_s: float
     cpu_s: float
@@ -109,17 +108,17 @@ class Figures:
 
 @dataclass(frozen=True, slots=True)
 class Bench:
-    """Running run: its agents, its loop, and its number of evaluations."""
+    """Running experiment: its fleet, its loop and its journal."""
 
     fleet: Fleet
     loop: Loop
-    journal: Counted
+    journal: CountingJournal
 
-    def go_on(self, is_enough: Callable[[], bool]) -> Figures:
-        """Step until a number of evaluations is reached; return their cost."""
+    def measure(self, is_done: Callable[[], bool]) -> Figures:
+        """Step until a condition holds; return rate and CPU time."""
         before = self.journal.evaluations
         wall_s, cpu_s = time.perf_counter(), time.process_time()
-        while not is_enough():
+        while not is_done():
             ends = self.fleet.listen(0.2, time.monotonic())
             self.loop.act(time.monotonic(), ends.get(self.loop.client, ()))
         wall_s = time.perf_counter() - wall_s
@@ -127,17 +126,17 @@ class Bench:
         done = self.journal.evaluations - before
         return Figures(done / wall_s, cpu_s / max(1, done))
 
-    def go_on_for(self, seconds: float) -> Figures:
-        """Step for a time; return the cost of its evaluations."""
+    def measure_for(self, seconds: float) -> Figures:
+        """Step for a duration [s]; return rate and CPU time."""
         end_s = time.monotonic() + seconds
-        return self.go_on(lambda: time.monotonic() >= end_s)
+        return self.measure(lambda: time.monotonic() >= end_s)
 
 
 @contextmanager
 def started(
     folder: Path, island: Island, experiment: Experiment, workers: int, body: Body
 ) -> Iterator[Bench]:
-    """Yield a started run with all its workers connected."""
+    """Start a run and yield it once all its workers are connected."""
     details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
     with ExitStack() as stack:
         held = stack.enter_context(RunFolder(folder, details))
@@ -148,7 +147,7 @@ def started(
         stack.enter_context(ProcessPool(analyzer.service.process, (vetters,), size=1))
         agent = Agent("worker", "worker", network.address)
         stack.enter_context(ProcessPool(body, (agent,), size=workers))
-        journal = Counted(stack.enter_context(Journal.open(folder)))
+        journal = CountingJournal(stack.enter_context(Journal.open(folder)))
         fleet = Fleet(network)
         loop = Loop(
             {0: island},
@@ -160,7 +159,7 @@ def started(
         )
         loop.start([])
         bench = Bench(fleet, loop, journal)
-        bench.go_on(
+        bench.measure(
             lambda: (
                 journal.evaluations >= 40 and fleet.dispatch.agents("worker") == workers
             )
@@ -168,12 +167,12 @@ def started(
         yield bench
 
 
-def whole(
+def measure_run(
     folder: Path, island: Island, experiment: Experiment, workers: int, body: Body
 ) -> Figures:
-    """Run an island to its last evaluation."""
+    """Measure a run of an island to its last evaluation."""
     with started(folder, island, experiment, workers, body) as bench:
-        return bench.go_on(lambda: bench.journal.evaluations >= experiment.births)
+        return bench.measure(lambda: bench.journal.evaluations >= experiment.births)
 
 
 def _experiment(births: int, brood: int) -> Experiment:
@@ -185,7 +184,9 @@ def _experiment(births: int, brood: int) -> Experiment:
 def test_coordinator_cpu_per_birth(tmp_path: Path) -> None:
     experiment = _experiment(1500, 15)
     island = Island(experiment, 1, 0)
-    found = whole(tmp_path / "run", island, experiment, 1, worker.serve.null.process)
+    found = measure_run(
+        tmp_path / "run", island, experiment, 1, worker.serve.null.process
+    )
     print(
         f"\nwhole births without physics: {found.per_s:.0f}/s, "
         f"coordinator {1e3 * found.cpu_s:.2f} ms CPU per birth"
@@ -200,8 +201,10 @@ def test_null_evaluations_per_second(tmp_path: Path) -> None:
         develop(generate(np.random.default_rng(seed), experiment), space)
         for seed in range(50)
     ]
-    island = Judged(experiment, robots)
-    found = whole(tmp_path / "run", island, experiment, 1, worker.serve.null.process)
+    island = EvaluationIsland(experiment, robots)
+    found = measure_run(
+        tmp_path / "run", island, experiment, 1, worker.serve.null.process
+    )
     print(
         f"\nnull evaluations, journal and tables on: {found.per_s:.0f}/s, "
         f"coordinator {1e3 * found.cpu_s:.2f} ms CPU each"
@@ -209,18 +212,18 @@ def test_null_evaluations_per_second(tmp_path: Path) -> None:
     assert found.per_s >= NULL_PER_S
 
 
-def test_second_worker(tmp_path: Path) -> None:
-    """Evaluations per second of two workers against one, everything else included.
+def test_gain_of_a_second_worker(tmp_path: Path) -> None:
+    """Compare the evaluations per second of two workers with those of one.
 
-    Coordinator, analyzer, two workers, physics, network, journal and tables share the
-    machine. Children of random founders of scenario 1 are bred, vetted and evaluated.
-    Two things differ from a run of scenario 1: the brood does not end while it is
-    measured, so no worker waits for the last child, and 60 births are in flight.
-
-    One of two workers leaves and joins in turn, so that both halves of the comparison
-    see the same drift of the machine's speed. A worker that leaves returns its queued
-    jobs, so that the other worker gets them and births continue to be committed. It
-    finishes the job that it has begun, and is idle before the next turn is counted.
+    Coordinator, analyzer, two workers, real physics, network, journal and tables
+    share the machine. Children of random founders are bred, vetted and evaluated as
+    in scenario 1, with two differences: the brood does not end during the
+    measurement, so no worker waits for its last child, and 60 births are in flight.
+    One of the two workers leaves and joins in alternate turns, so that changes of the
+    machine's speed affect both settings equally. The jobs of a leaving worker go to
+    the other one, so births are still committed and each setting includes the
+    breeding and vetting of its own births. The leaving worker finishes its current
+    jobs and is idle before the turn is measured.
     """
     experiment = _experiment(10_000, 9_000)
     wide = replace(experiment.selection, window=60)
@@ -236,8 +239,8 @@ def test_second_worker(tmp_path: Path) -> None:
             workers = 1 + turn % 2
             joins = Joined(name, "worker", 1, platform)
             bench.fleet.tell(Left(name) if workers == 1 else joins)
-            bench.go_on_for(LEAVING_S if workers == 1 else JOINING_S)
-            found = bench.go_on_for(TURN_S)
+            bench.measure_for(LEAVING_S if workers == 1 else JOINING_S)
+            found = bench.measure_for(TURN_S)
             rates[workers].append(found.per_s)
             cpu_s.append(found.cpu_s)
     one, two = np.mean(rates[1]), np.mean(rates[2])

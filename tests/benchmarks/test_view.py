@@ -1,4 +1,4 @@
-"""Cost of watching a run, for the viewer and for the run."""
+"""Benchmarks of the viewer: its CPU time, and its effect on a run."""
 
 import os
 import signal
@@ -44,12 +44,12 @@ birth_interval_s = 6.0
 """
 
 
-def say(line: str) -> None:
+def report(line: str) -> None:
     sys.stdout.write(f"\n{line}")
 
 
-def crowd() -> tuple[Update, list[pa.Table]]:
-    """Return the births of 30 spiders, and poses of real motion, advance by advance."""
+def moving_spiders() -> tuple[Update, list[pa.Table]]:
+    """Return the births of 30 spiders and a table of simulated poses per advance."""
     experiment = read_experiment("scenario1")
     settings = EvaluationSettings(
         space=experiment.space,
@@ -66,7 +66,7 @@ def crowd() -> tuple[Update, list[pa.Table]]:
         Birth(BirthId(0, number), (), 1, number + 1, 0.0, body)
         for number in range(ROBOTS)
     )
-    told = Update("run", 1, 1, is_whole=True, experiment="watched", births=births)
+    update = Update("run", 1, 1, is_whole=True, experiment="watched", births=births)
     rows = ADVANCE_S * HERTZ
     tables = []
     for first in range(0, MINUTES * 60 * HERTZ, rows):
@@ -86,7 +86,7 @@ def crowd() -> tuple[Update, list[pa.Table]]:
                 own = own.set_column(at, own.schema.field(name), column)
             parts.append(own)
         tables.append(pa.concat_tables(parts))
-    return told, tables
+    return update, tables
 
 
 def message(poses: pa.Table) -> bytes:
@@ -97,17 +97,17 @@ def message(poses: pa.Table) -> bytes:
     return encode_live(Live("run", 0, Advance(1, bytes(32), (), (), (), columns)))
 
 
-def test_an_arena_of_thirty_costs_the_viewer_a_fifth_of_a_core_at_most(
+def test_viewer_of_an_arena_of_thirty_uses_at_most_a_fifth_of_a_core(
     tmp_path: Path,
 ) -> None:
-    """CPU time of the viewer's process per simulated second at real time."""
-    told, tables = crowd()
+    """Measure the viewer's CPU time per simulated second at real time."""
+    update, tables = moving_spiders()
     messages = [message(poses) for poses in tables]
     file = tmp_path / "watched.rrd"
     scene = scene_of(Experiment(name="watched", arena=Arena()))
     with Recording("watched", layout(scene), file=file) as recording:
         view = LiveView(Show(recording, scene.space), "run")
-        view.tell([told])
+        view.tell([update])
         began = time.process_time()
         for data in messages:
             view.tell([decode_live(data)])
@@ -115,7 +115,7 @@ def test_an_arena_of_thirty_costs_the_viewer_a_fifth_of_a_core_at_most(
         used_s = time.process_time() - began
     share = used_s / (60.0 * MINUTES)
     hour_mb = file.stat().st_size * 60.0 / MINUTES / 1e6
-    say(f"viewer: {100 * share:.1f} % of a core; {hour_mb:.0f} MB an hour")
+    report(f"viewer: {100 * share:.1f} % of a core; {hour_mb:.0f} MB an hour")
     assert share <= 0.20
     assert hour_mb <= 350.0
 
@@ -127,7 +127,7 @@ def arena(tmp_path: Path) -> Path:
 
 
 def start(folder: Path, core: int, *words: str) -> subprocess.Popen[bytes]:
-    """Start a command and keep it and its children on one core."""
+    """Start a command and pin it and its children to one core."""
     top = str(Path(__file__).parents[2])
     process = subprocess.Popen(
         [sys.executable, "-m", "revolve", *words],
@@ -141,7 +141,7 @@ def start(folder: Path, core: int, *words: str) -> subprocess.Popen[bytes]:
 
 
 def run(folder: Path, out: str, *, is_watched: bool) -> float:
-    """Return the duration of a run from its first birth on [s]; viewer elsewhere."""
+    """Return the time of a run from its first birth [s]; viewer on another core."""
     cores = sorted(os.sched_getaffinity(0))
     words = ("watched.toml", "--seed", "2", "--quiet", "--out", out)
     listen = ("--listen", "tcp/127.0.0.1:0")
@@ -173,22 +173,22 @@ def run(folder: Path, out: str, *, is_watched: bool) -> float:
 
 
 def wait_for(condition: Callable[[], bool]) -> None:
-    """Return once a condition holds."""
+    """Wait until a condition holds."""
     deadline = time.monotonic() + 120.0
     while not condition():
         assert time.monotonic() < deadline, "the run never got going"
-        time.sleep(0.002)  # the interval of looking
+        time.sleep(0.002)  # polling interval
 
 
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="needs two cores")
-def test_a_run_that_is_watched_is_as_fast(arena: Path) -> None:
-    """Alternate runs with and without viewer; the run is the same."""
+def test_viewer_does_not_slow_down_a_run(arena: Path) -> None:
+    """Repeat the same run alternately without and with a viewer."""
     alone_s, watched_s = [], []
     for pair in range(PAIRS):
         alone_s.append(run(arena, f"alone-{pair}", is_watched=False))
         watched_s.append(run(arena, f"watched-{pair}", is_watched=True))
     ratio = min(alone_s) / min(watched_s)
-    say(
+    report(
         f"unwatched {', '.join(f'{each:.2f}' for each in alone_s)} s, watched "
         f"{', '.join(f'{each:.2f}' for each in watched_s)} s, speed ratio {ratio:.3f}"
     )

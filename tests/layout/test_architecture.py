@@ -21,7 +21,7 @@ def sections() -> dict[str, str]:
 def step_lists(text: str) -> list[list[int]]:
     """Return the numbers of the steps of each list in a text."""
     numbers = [int(found) for found in re.findall(r"^(\d+)\. ", text, re.MULTILINE)]
-    starts = [place for place, number in enumerate(numbers) if number == 1]
+    starts = [index for index, number in enumerate(numbers) if number == 1]
     return [
         numbers[start:end]
         for start, end in zip(starts, [*starts[1:], len(numbers)], strict=True)
@@ -40,7 +40,7 @@ def paths(text: str) -> list[str]:
 
 
 @pytest.mark.slow
-def test_picture_is_drawn_from_the_imports_of_today() -> None:
+def test_picture_is_up_to_date_with_the_imports() -> None:
     drawn = draw()
     assert drawn == draw()
     assert PICTURE.read_text("utf-8") == drawn, "run python -m docs.architecture"

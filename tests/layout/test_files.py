@@ -1,4 +1,4 @@
-"""Committed files hold no path of one machine and no address of a registry."""
+"""Checks that no committed file contains a local path or a registry's address."""
 
 import re
 import shutil
@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 
-# Put together here so that this file does not hold them either.
+# Joined at run time so that this file does not contain them either.
 HOSTS = tuple(
     ".".join(labels)
     for labels in (
@@ -22,12 +22,12 @@ HOSTS = tuple(
         ("crates", "io"),
     )
 )
-# An absolute path below a folder that only one machine has.
+# Absolute path below a folder that is specific to one machine.
 MACHINE_PATH = re.compile(r"(?<![\w.}\])])/(?:work|root|home|Users)/\w")
 
 
 def tracked() -> list[Path]:
-    """Return the files that git tracks and that are there."""
+    """Return the files that git tracks and that exist."""
     if shutil.which("git") is None or not (ROOT / ".git").exists():
         pytest.skip("not a git checkout")
     listing = subprocess.run(
@@ -38,14 +38,14 @@ def tracked() -> list[Path]:
 
 
 def texts() -> dict[str, str]:
-    """Return the text of each tracked file by its name; binary files are skipped."""
+    """Return the text of each tracked file by name, without undecodable bytes."""
     return {
         path.relative_to(ROOT).as_posix(): path.read_text("utf-8", errors="ignore")
         for path in tracked()
     }
 
 
-def test_no_file_names_a_registry() -> None:
+def test_no_file_contains_the_address_of_a_registry() -> None:
     found = [
         (name, host)
         for name, text in texts().items()
@@ -55,18 +55,18 @@ def test_no_file_names_a_registry() -> None:
     assert found == []
 
 
-def test_no_file_names_a_path_of_one_machine() -> None:
+def test_no_file_contains_a_local_path() -> None:
     found = {name: MACHINE_PATH.findall(text) for name, text in texts().items()}
     assert {name: hits for name, hits in found.items() if hits} == {}
 
 
 @pytest.mark.parametrize("before", ["", "see ", "(", '"', "file://"])
-def test_a_path_of_one_machine_is_seen(before: str) -> None:
+def test_a_local_path_is_detected(before: str) -> None:
     assert MACHINE_PATH.search(before + "/" + "home/ada/runs")
 
 
 @pytest.mark.parametrize("text", ["runs/work/x", "../home/y", "tcp/host/root/z"])
-def test_a_relative_path_is_left_alone(text: str) -> None:
+def test_a_relative_path_is_allowed(text: str) -> None:
     assert not MACHINE_PATH.search(text)
 
 

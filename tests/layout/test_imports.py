@@ -1,8 +1,8 @@
-"""Import rules between rooms and libraries, checked in two ways.
+"""Checks of the permitted imports of each file.
 
-import-linter follows chains of imports between modules (contracts in pyproject.toml).
-The syntax trees are read as well: they include revolve.py, and they name the file and
-the library.
+import-linter follows import chains between the project's modules (contracts in
+pyproject.toml). In addition, these tests parse the syntax trees, which covers
+revolve.py and reports file and library directly.
 """
 
 import ast
@@ -16,8 +16,8 @@ from importlinter.cli import EXIT_STATUS_SUCCESS, lint_imports
 ROOT = Path(__file__).parents[2]
 ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis")
 
-# Library -> the files, as patterns from the root, that may import it.
-HOMES = {
+# Library -> patterns, relative to the root, of the files that may import it.
+PERMITTED = {
     "zenoh": ("*/**/service.py", "*/**/client_service.py", "analysis/viewer/live.py"),
     "mujoco": (
         "schema/mjcf/*.py",
@@ -33,8 +33,8 @@ HOMES = {
     "matplotlib": ("analysis/figures/*.py",),
     "networkx": ("coordinator/islands/topology.py",),
 }
-# Second opinions for tests and tools for developers: no room leans on them.
-NEVER = {
+# Reference implementations for tests and developer tools: no room imports them.
+TEST_ONLY = {
     "duckdb",
     "grpc_tools",
     "hypothesis",
@@ -48,13 +48,13 @@ NEVER = {
 
 
 def sources() -> list[Path]:
-    """Return the project's Python files without tests, in a fixed order."""
+    """Return the project's Python files except tests, in a fixed order."""
     files = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
     return [*files, *ROOT.glob("revolve.py")]
 
 
 def imported(path: Path) -> Iterator[str]:
-    """Yield the top-level name of every import of a file, at any depth."""
+    """Yield the top-level name of every import of a file, at any nesting level."""
     for node in ast.walk(ast.parse(path.read_bytes(), filename=str(path))):
         if isinstance(node, ast.Import):
             yield from (alias.name.partition(".")[0] for alias in node.names)
@@ -69,12 +69,12 @@ def is_composition_root(path: Path) -> bool:
     return path == ROOT / "revolve.py" or path.name == "__main__.py"
 
 
-def named(path: Path) -> str:
+def relative(path: Path) -> str:
     return path.relative_to(ROOT).as_posix()
 
 
-def is_at_home(path: Path, library: str) -> bool:
-    return any(path in ROOT.glob(pattern) for pattern in HOMES[library])
+def may_import(path: Path, library: str) -> bool:
+    return any(path in ROOT.glob(pattern) for pattern in PERMITTED[library])
 
 
 @pytest.mark.slow
@@ -86,70 +86,70 @@ def test_contracts_hold(
     assert status == EXIT_STATUS_SUCCESS, capsys.readouterr().out
 
 
-@pytest.mark.parametrize("library", sorted(HOMES))
-def test_library_is_imported_only_where_it_lives(library: str) -> None:
-    strays = [
-        named(path)
+@pytest.mark.parametrize("library", sorted(PERMITTED))
+def test_library_is_imported_only_by_permitted_files(library: str) -> None:
+    violations = [
+        relative(path)
         for path in sources()
-        if library in imported(path) and not is_at_home(path, library)
+        if library in imported(path) and not may_import(path, library)
     ]
-    assert strays == []
+    assert violations == []
 
 
-def test_no_room_leans_on_a_second_opinion() -> None:
-    strays = {named(path): NEVER & set(imported(path)) for path in sources()}
-    assert {path: names for path, names in strays.items() if names} == {}
+def test_no_room_imports_test_only_libraries() -> None:
+    violations = {relative(path): TEST_ONLY & set(imported(path)) for path in sources()}
+    assert {path: names for path, names in violations.items() if names} == {}
 
 
-def test_rooms_know_schema_and_themselves_only() -> None:
-    strays = {
-        named(path): (set(ROOMS) & set(imported(path)))
+def test_rooms_import_only_schema_and_themselves() -> None:
+    violations = {
+        relative(path): (set(ROOMS) & set(imported(path)))
         - {"schema", path.relative_to(ROOT).parts[0]}
         for path in sources()
         if not is_composition_root(path)
     }
-    assert {path: names for path, names in strays.items() if names} == {}
+    assert {path: names for path, names in violations.items() if names} == {}
 
 
-def test_only_a_main_hands_over_to_the_command() -> None:
-    # `python -m coordinator` is `revolve coordinator`; nothing below knows it.
+def test_only_main_modules_import_the_command() -> None:
+    # `python -m coordinator` is `revolve coordinator`; no other module imports it.
     importers = [
-        named(path)
+        relative(path)
         for path in sources()
         if "revolve" in imported(path) and not is_composition_root(path)
     ]
     assert importers == []
 
 
-def test_no_import_hides_from_the_layers() -> None:
-    hiding = [
-        named(path)
+def test_no_file_uses_type_checking_imports() -> None:
+    found = [
+        relative(path)
         for path in sources()
         if path.name != "revolve_pb2.py" and "TYPE_CHECKING" in path.read_text("utf-8")
     ]
-    assert hiding == []
+    assert found == []
 
 
 @pytest.mark.parametrize("room", ROOMS)
-def test_room_is_ours(room: str) -> None:
+def test_room_is_imported_from_this_tree(room: str) -> None:
     module = importlib.import_module(room)
     assert module.__file__ is not None
     assert Path(module.__file__).resolve() == (ROOT / room / "__init__.py").resolve()
 
 
 @pytest.mark.parametrize("room", ROOMS)
-def test_room_states_its_rule_and_has_no_second_names(room: str) -> None:
+def test_init_of_a_room_contains_only_a_docstring(room: str) -> None:
     tree = ast.parse((ROOT / room / "__init__.py").read_bytes())
     assert ast.get_docstring(tree)
     assert len(tree.body) == 1
 
 
-def test_tests_are_no_packages() -> None:
-    # A tests/schema that is a package would shadow schema. A user's package
-    # in tests/plugins may be one.
+def test_test_folders_are_not_packages() -> None:
+    # A package tests/schema would shadow schema. Plug-ins in tests/plugins are
+    # packages, as those of a user.
     tests = ROOT / "tests"
     packages = [
-        named(path)
+        relative(path)
         for path in tests.rglob("__init__.py")
         if tests / "plugins" not in path.parents
     ]

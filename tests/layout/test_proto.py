@@ -1,4 +1,4 @@
-"""The generated messages are those of the .proto file."""
+"""Checks that the generated messages match the .proto file."""
 
 import subprocess
 import sys
@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture(scope="module")
 def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with what `make proto` would write now."""
+    """Return a folder with the current output of `make proto`."""
     folder = tmp_path_factory.mktemp("proto")
     command = [sys.executable, "-m", "grpc_tools.protoc", f"-I{ROOT}"]
     outputs = [

@@ -1,4 +1,4 @@
-"""Whole runs as a user starts them: real processes, physics, network and disk."""
+"""Fixtures of the system tests: runs with real processes, physics, network, disk."""
 
 import fcntl
 import os
@@ -11,15 +11,15 @@ import pytest
 
 from schema.agent.network import Tls
 from tests.system.fleet import Fleet, make_certificate
-from tests.system.stage import Stage, wait_until
+from tests.system.workspace import Workspace, wait_until
 
 BIRTHS = 60
 
 
 @pytest.fixture
-def stage(tmp_path: Path) -> Iterator[Stage]:
+def workspace(tmp_path: Path) -> Iterator[Workspace]:
     with ExitStack() as stack:
-        made = Stage(tmp_path)
+        made = Workspace(tmp_path)
         stack.callback(made.clear)
         yield made
 
@@ -34,29 +34,29 @@ def births() -> int:
     return BIRTHS
 
 
-Once = Callable[[str, Callable[[Stage], object]], Path]
+Once = Callable[[str, Callable[[Workspace], object]], Path]
 
 
 @pytest.fixture(scope="session")
 def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
-    """Return a function that makes a folder once for all parallel test processes.
+    """Return a function that makes a folder once per test session, by name.
 
-    Tests of other processes read the folder, so no test may write into it.
+    All test processes share the folder, so tests must not write into it.
     """
-    place = tmp_path_factory.getbasetemp()
+    parent = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
-        place = place.parent
+        parent = parent.parent
 
-    def made(name: str, make: Callable[[Stage], object]) -> Path:
-        folder = place / f"once-{name}"
-        with (place / f"once-{name}.lock").open("w") as lock:
+    def made(name: str, make: Callable[[Workspace], object]) -> Path:
+        folder = parent / f"once-{name}"
+        with (parent / f"once-{name}.lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             if not folder.exists():
-                begun = folder.with_suffix(".begun")
-                shutil.rmtree(begun, ignore_errors=True)
-                begun.mkdir()
-                make(Stage(begun))
-                begun.rename(folder)
+                unfinished = folder.with_suffix(".begun")
+                shutil.rmtree(unfinished, ignore_errors=True)
+                unfinished.mkdir()
+                make(Workspace(unfinished))
+                unfinished.rename(folder)
         return folder
 
     return made
@@ -64,10 +64,12 @@ def once(tmp_path_factory: pytest.TempPathFactory) -> Once:
 
 @pytest.fixture(scope="session")
 def undisturbed(once: Once) -> Path:
-    """Return the folder of a run in one process: the reference for all others."""
+    """Return the folder of the reference run: undisturbed, in one process."""
     words = ("scenario1", "--seed", "5", "--births", str(BIRTHS), "--quiet")
     flags = ("--in-process", "--out", "run")
-    return once("single", lambda stage: stage.run("run", *words, *flags)) / "run"
+    return (
+        once("single", lambda workspace: workspace.run("run", *words, *flags)) / "run"
+    )
 
 
 @pytest.fixture
@@ -80,7 +82,7 @@ def fleet_of() -> type[Fleet]:
     return Fleet
 
 
-CROWD = """
+CROWDED_ARENA = """
 name = "crowd"
 births = 25
 [selection]
@@ -96,30 +98,33 @@ snapshot_interval_s = 10.0
 birth_radius_m = 0.5
 record_touches = true
 """
-"""An arena so small that its robots are in each other's way, and half of them die."""
+"""Small arena in which robots collide and half of them die."""
 
 
 @pytest.fixture
-def arena_stage(stage: Stage) -> Stage:
-    """Return a stage on which ``crowd.toml`` lies."""
-    (stage.folder / "crowd.toml").write_text(CROWD)
-    return stage
+def crowded_arena_workspace(workspace: Workspace) -> Workspace:
+    """Return a workspace whose folder contains ``crowd.toml``."""
+    (workspace.folder / "crowd.toml").write_text(CROWDED_ARENA)
+    return workspace
 
 
-def _arena(stage: Stage, file: str, document: str) -> None:
-    """Run an arena in one process, undisturbed."""
-    (stage.folder / file).write_text(document)
+def _arena(workspace: Workspace, file: str, document: str) -> None:
+    """Run an arena undisturbed in one process."""
+    (workspace.folder / file).write_text(document)
     flags = ("--seed", "4", "--quiet", "--in-process", "--threads", "1")
-    stage.run("run", file, *flags, "--out", "run")
+    workspace.run("run", file, *flags, "--out", "run")
 
 
 @pytest.fixture(scope="session")
-def calm(once: Once) -> Path:
-    """Return the folder of an undisturbed arena in one process."""
-    return once("crowd", lambda stage: _arena(stage, "crowd.toml", CROWD)) / "run"
+def crowded_arena_run(once: Once) -> Path:
+    """Return the folder of the undisturbed crowded arena, run in one process."""
+    return (
+        once("crowd", lambda workspace: _arena(workspace, "crowd.toml", CROWDED_ARENA))
+        / "run"
+    )
 
 
-HAMLET = """
+SMALL_ARENA = """
 name = "hamlet"
 births = 12
 [selection]
@@ -135,22 +140,25 @@ snapshot_interval_s = 6.0
 birth_radius_m = 0.4
 record_touches = true
 """
-"""An arena for little more than half a minute, in which all happens that can."""
+"""Arena of little more than half a minute that covers all kinds of events."""
 
 
 @pytest.fixture(scope="session")
-def hamlet_document() -> str:
-    return HAMLET
+def small_arena_document() -> str:
+    return SMALL_ARENA
 
 
 @pytest.fixture
-def hamlet_stage(stage: Stage) -> Stage:
-    """Return a stage on which ``hamlet.toml`` lies."""
-    (stage.folder / "hamlet.toml").write_text(HAMLET)
-    return stage
+def small_arena_workspace(workspace: Workspace) -> Workspace:
+    """Return a workspace whose folder contains ``hamlet.toml``, the small arena."""
+    (workspace.folder / "hamlet.toml").write_text(SMALL_ARENA)
+    return workspace
 
 
 @pytest.fixture(scope="session")
-def quiet_hamlet(once: Once) -> Path:
-    """Return the folder of an undisturbed run of ``hamlet.toml``."""
-    return once("hamlet", lambda stage: _arena(stage, "hamlet.toml", HAMLET)) / "run"
+def small_arena_run(once: Once) -> Path:
+    """Return the folder of the undisturbed small arena, run in one process."""
+    return (
+        once("hamlet", lambda workspace: _arena(workspace, "hamlet.toml", SMALL_ARENA))
+        / "run"
+    )

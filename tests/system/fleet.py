@@ -1,4 +1,4 @@
-"""Coordinator and agents that a test starts, stops and kills."""
+"""A coordinator and agents that a test starts, stops and kills."""
 
 import os
 import signal
@@ -10,7 +10,7 @@ import zenoh
 
 from schema.agent.network import Tls, client_config
 from schema.agent.topics import agents_alive
-from tests.system.stage import Stage, wait_until
+from tests.system.workspace import Workspace, wait_until
 
 
 def size(folder: Path) -> int:
@@ -20,13 +20,13 @@ def size(folder: Path) -> int:
 
 
 def agent_processes(pid: int) -> list[int]:
-    """Return the children of a command that do jobs, oldest first."""
+    """Return the agent processes of a command, oldest first."""
     listing = Path(f"/proc/{pid}/task/{pid}/children").read_text("utf-8").split()
     return [int(child) for child in listing if b"spawn_main" in _command_line(child)]
 
 
 def _command_line(pid: str) -> bytes:
-    """Return the command line of a process; nothing if it has just ended."""
+    """Return the command line of a process; empty if the process has ended."""
     try:
         return Path(f"/proc/{pid}/cmdline").read_bytes()
     except (FileNotFoundError, ProcessLookupError):
@@ -34,16 +34,16 @@ def _command_line(pid: str) -> bytes:
 
 
 class Fleet:
-    """Coordinator and agents that can be frozen, killed and disconnected."""
+    """A coordinator and agents that can be stopped, killed and disconnected."""
 
     def __init__(
-        self, stage: Stage, *words: str, listen: str = "", inside: str = ""
+        self, workspace: Workspace, *words: str, listen: str = "", inside: str = ""
     ) -> None:
-        self.stage = stage
-        self.folder = stage.folder / "run"
+        self.workspace = workspace
+        self.folder = workspace.folder / "run"
         self.address = listen or "tcp/127.0.0.1:0"
         all_words = (*words, "--out", "run", "--listen", self.address)
-        self.coordinator = stage.start("coordinator", *all_words, inside=inside)
+        self.coordinator = workspace.start("coordinator", *all_words, inside=inside)
         wait_until(
             lambda: (self.folder / "address").exists() or self.is_over,
             "the coordinator listens",
@@ -54,18 +54,18 @@ class Fleet:
 
     @property
     def is_over(self) -> bool:
-        """The coordinator has ended."""
+        """Whether the coordinator has ended."""
         return self.coordinator.poll() is not None
 
-    def join(self, name: str, role: str = "worker", *more: str, **where: Any) -> int:  # noqa: ANN401 - as of Stage.start
-        """Start an agent of one process and return that process's id."""
+    def join(self, name: str, role: str = "worker", *more: str, **where: Any) -> int:  # noqa: ANN401 - as of Workspace.start
+        """Start an agent with one process and return the id of that process."""
         words = (role, "--connect", self.address, "--name", name, "--processes", "1")
-        process = self.agents[name] = self.stage.start(*words, *more, **where)
+        process = self.agents[name] = self.workspace.start(*words, *more, **where)
         wait_until(lambda: agent_processes(process.pid) != [], f"{name} starts")
         return agent_processes(process.pid)[0]
 
     def begin(self, workers: int) -> None:
-        """Start an analyzer after so many workers have joined: births begin."""
+        """Start an analyzer once this many workers are connected; births begin."""
         config = zenoh.Config.from_json5(client_config(self.address))
         with zenoh.open(config) as session:
             key = agents_alive("default", "worker")
@@ -76,7 +76,7 @@ class Fleet:
         self.join("judge", "analyzer")
 
     def kill(self, name: str) -> None:
-        """Kill an agent and the supervisor that would restart it."""
+        """Kill an agent and the parent process that would restart it."""
         process_pool = self.agents.pop(name)
         process_pool.send_signal(signal.SIGSTOP)
         for child in agent_processes(process_pool.pid):
@@ -84,20 +84,20 @@ class Fleet:
         process_pool.send_signal(signal.SIGKILL)
 
     def wait_for(self, position: float) -> None:
-        """Wait until the journal has a size [bytes] or the run has ended."""
+        """Wait until the journal exceeds a size [bytes] or the run has ended."""
         wait_until(
             lambda: size(self.folder) > position or self.is_over,
             "the run is on its way",
         )
 
     def finish(self) -> None:
-        """Wait for the end of the run and check its exit code."""
+        """Wait for the end of the run; check that it succeeded."""
         wait_until(lambda: self.is_over, "the run ends")
         assert self.coordinator.returncode == 0, self.coordinator.communicate()
 
 
 def make_certificate(folder: Path, name: str, authority: str, host: str) -> Tls:
-    """Make a certificate with openssl, signed by an authority made for it."""
+    """Create a certificate with openssl, signed by a test authority."""
     script = f"""
     set -e; cd "{folder}"; exec 2>&1
     [ -f {authority}.pem ] || openssl req -x509 -newkey rsa:2048 -nodes -days 1 \

@@ -1,4 +1,4 @@
-"""``revolve worker`` and ``revolve analyzer`` as a user runs them."""
+"""Tests of ``revolve worker`` and ``revolve analyzer`` as started by a user."""
 
 import os
 import shutil
@@ -58,7 +58,7 @@ def agents(events: list[DispatchEvent]) -> list[str]:
 
 
 @pytest.mark.parametrize("role", ROLES)
-def test_an_agent_waits_for_a_coordinator_and_says_so(role: str) -> None:
+def test_agent_reports_and_retries_a_missing_coordinator(role: str) -> None:
     address = free_address()
     with command(role, "--connect", address, "--processes", "1") as process:
         assert process.stderr is not None
@@ -82,7 +82,7 @@ def test_an_agent_waits_for_a_coordinator_and_says_so(role: str) -> None:
 
 
 def children(pid: int) -> list[int]:
-    """Return the agents among a process's children."""
+    """Return the agent processes among the children of a process."""
     listing = Path(f"/proc/{pid}/task/{pid}/children").read_text("utf-8").split()
     lines = {
         int(child): Path(f"/proc/{child}/cmdline").read_bytes() for child in listing
@@ -91,7 +91,7 @@ def children(pid: int) -> list[int]:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_a_killed_process_is_replaced_under_another_name() -> None:
+def test_killed_process_is_replaced_under_another_name() -> None:
     with Network(name="c") as network:
         flags = ("--connect", network.address, "--processes", "2", "--name", "box")
         with command("worker", *flags) as process:
@@ -106,7 +106,7 @@ def test_a_killed_process_is_replaced_under_another_name() -> None:
             assert name[:6] == gone.agent[:6]
 
 
-def test_agents_end_with_whoever_holds_their_input() -> None:
+def test_agents_end_when_their_standard_input_closes() -> None:
     with Network(name="c") as network:
         flags = ("--connect", network.address, "--processes", "2", "--until-closed")
         with command("worker", *flags) as process:
@@ -140,7 +140,9 @@ def test_agents_do_not_outlive_their_command() -> None:
         ("--connect tcp/h:1 --slots 2", "unrecognized arguments: --slots 2"),
     ],
 )
-def test_a_wrong_flag_is_one_line(role: str, flags: str, complaint: str) -> None:
+def test_wrong_flag_is_reported_in_one_line(
+    role: str, flags: str, complaint: str
+) -> None:
     result = subprocess.run(
         [sys.executable, "-m", role, *flags.split()],
         cwd=ROOT,
@@ -165,7 +167,7 @@ def test_help_shows_an_example() -> None:
 
 
 @pytest.mark.skipif(not shutil.which("openssl"), reason="makes certificates")
-def test_only_who_is_certified_gets_in(
+def test_only_agents_with_a_certificate_connect(
     tmp_path: Path, certify: Callable[[Path, str, str, str], Tls]
 ) -> None:
     hub = certify(tmp_path, "hub", "ca", "127.0.0.1")

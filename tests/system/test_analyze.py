@@ -12,40 +12,48 @@ import pytest
 
 from analysis.figures.catalogue import FIGURES
 from analysis.measures.outputs import OUTPUTS, schema
-from tests.system.stage import Stage
+from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
 
 @pytest.fixture(scope="session")
-def analysed(once: Any, undisturbed: Path, calm: Path) -> tuple[Path, str]:  # noqa: ANN401 - the fixture
+def report_and_output(
+    once: Any,  # noqa: ANN401 - the fixture
+    undisturbed: Path,
+    crowded_arena_run: Path,
+) -> tuple[Path, str]:
     """Return the measures of two off-line runs, an arena and two broken runs.
 
     The off-line runs have one name, and one setting is different.
     """
 
-    def make(stage: Stage) -> None:
-        for name, run in (("a", undisturbed), ("b", calm), ("c", undisturbed)):
-            shutil.copytree(run, stage.folder / "runs" / name)
-        shutil.copytree(undisturbed, stage.folder / "runs" / "e")
-        details = stage.folder / "runs" / "e" / "run.json"
+    def make(workspace: Workspace) -> None:
+        for name, run in (
+            ("a", undisturbed),
+            ("b", crowded_arena_run),
+            ("c", undisturbed),
+        ):
+            shutil.copytree(run, workspace.folder / "runs" / name)
+        shutil.copytree(undisturbed, workspace.folder / "runs" / "e")
+        details = workspace.folder / "runs" / "e" / "run.json"
         entries = json.loads(details.read_text())
         document = json.loads(entries["document"])
         document["vetting"]["tolerance_m"] = 0.001
         details.write_text(json.dumps({**entries, "document": json.dumps(document)}))
-        (stage.folder / "runs" / "d").mkdir()
-        (stage.folder / "runs" / "d" / "run.json").write_text("{")
-        output = stage.run("analyze", "runs", "--out", "report")
-        (stage.folder / "output").write_text(output)
+        (workspace.folder / "runs" / "d").mkdir()
+        (workspace.folder / "runs" / "d" / "run.json").write_text("{")
+        output = workspace.run("analyze", "runs", "--out", "report")
+        (workspace.folder / "output").write_text(output)
 
     folder: Path = once("analysed", make)
     return folder / "report", (folder / "output").read_text()
 
 
 def test_runs_are_measured_and_left_out_runs_are_reported(
-    analysed: tuple[Path, str],
+    report_and_output: tuple[Path, str],
 ) -> None:
-    report, output = analysed
+    report, output = report_and_output
     measures = {path.stem: pq.read_table(path) for path in report.glob("*/*.parquet")}
     assert set(measures) == set(OUTPUTS) - {"between", "migrants"}
     for name, table in measures.items():
@@ -69,18 +77,18 @@ def test_runs_are_measured_and_left_out_runs_are_reported(
 
 
 def test_experiments_of_the_same_name_get_distinct_names(
-    analysed: tuple[Path, str],
+    report_and_output: tuple[Path, str],
 ) -> None:
-    report, output = analysed
+    report, output = report_and_output
     differs = "vetting.tolerance_m: 0.001 instead of 1e-06"
     assert f"scenario1~2: {differs}" in output
     assert differs in (report / "report.html").read_text("utf-8")
 
 
 def test_figures_are_written_or_left_out_with_a_reason(
-    analysed: tuple[Path, str],
+    report_and_output: tuple[Path, str],
 ) -> None:
-    report, output = analysed
+    report, output = report_and_output
     page = (report / "report.html").read_text("utf-8")
     drawn = {path.stem for path in (report / "figures").glob("*.png")}
     assert drawn == {path.stem for path in (report / "figures").glob("*.pdf")}
@@ -97,8 +105,10 @@ def test_figures_are_written_or_left_out_with_a_reason(
     }
 
 
-def test_three_libraries_read_the_same_tables(analysed: tuple[Path, str]) -> None:
-    report, _ = analysed
+def test_three_libraries_read_the_same_tables(
+    report_and_output: tuple[Path, str],
+) -> None:
+    report, _ = report_and_output
     for path in sorted(report.glob("measures/*.parquet")):
         arrow = pq.read_table(path)
         assert pl.read_parquet(path).rows() == [
@@ -108,23 +118,27 @@ def test_three_libraries_read_the_same_tables(analysed: tuple[Path, str]) -> Non
         assert rows == [tuple(row.values()) for row in arrow.to_pylist()]
 
 
-def test_a_missing_folder_is_reported_in_one_line(stage: Stage) -> None:
-    output = stage.run("analyze", "nowhere", code=2)
+def test_a_missing_folder_is_reported_in_one_line(workspace: Workspace) -> None:
+    output = workspace.run("analyze", "nowhere", code=2)
     assert output == "revolve: nowhere: no such folder\n"
 
 
-def test_a_file_as_output_folder_is_refused(stage: Stage, undisturbed: Path) -> None:
-    (stage.folder / "file").write_text("mine")
-    output = stage.run("analyze", str(undisturbed), "--out", "file", code=2)
+def test_a_file_as_output_folder_is_refused(
+    workspace: Workspace, undisturbed: Path
+) -> None:
+    (workspace.folder / "file").write_text("mine")
+    output = workspace.run("analyze", str(undisturbed), "--out", "file", code=2)
     assert output == "revolve: file: cannot be written: Not a directory\n"
-    assert (stage.folder / "file").read_text() == "mine"
+    assert (workspace.folder / "file").read_text() == "mine"
 
 
-def test_a_damaged_run_is_measured_in_part(stage: Stage, undisturbed: Path) -> None:
-    shutil.copytree(undisturbed, stage.folder / "run")
-    (evaluations,) = (stage.folder / "run").glob("tables/*/*/evaluations.parquet")
+def test_a_damaged_run_is_measured_in_part(
+    workspace: Workspace, undisturbed: Path
+) -> None:
+    shutil.copytree(undisturbed, workspace.folder / "run")
+    (evaluations,) = (workspace.folder / "run").glob("tables/*/*/evaluations.parquet")
     evaluations.write_bytes(b"")
-    output = stage.run("analyze", "run", "--out", "report")
+    output = workspace.run("analyze", "run", "--out", "report")
     assert "left out: run: table evaluations: " in output
-    robots = pq.read_table(stage.folder / "report" / "measures" / "robots.parquet")
+    robots = pq.read_table(workspace.folder / "report" / "measures" / "robots.parquet")
     assert robots.num_rows == 0

@@ -1,4 +1,4 @@
-"""Arena with a viewer and with orders of an operator."""
+"""Tests of orders to a running arena and of its live stream."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,61 +17,67 @@ from schema.wire.arena_codec import Live, decode_live
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Stage = Any
+Workspace = Any
 Until = Callable[[Callable[[], bool], str], None]
 
 
 def test_pause_list_insert_remove_snapshot_resume(
-    arena_stage: Stage, calm: Path, until: Until
+    crowded_arena_workspace: Workspace, crowded_arena_run: Path, until: Until
 ) -> None:
-    folder = arena_stage.folder / "run"
+    folder = crowded_arena_workspace.folder / "run"
     words = ("crowd.toml", "--seed", "4", "--quiet", "--out", "run")
     flags = ("--workers", "1", "--speed", "8", "--listen", "tcp/127.0.0.1:0")
-    coordinator = arena_stage.start("run", *words, *flags)
+    coordinator = crowded_arena_workspace.start("run", *words, *flags)
     until((folder / "address").exists, "the coordinator listens")
     address = (folder / "address").read_text().strip()
 
     def arena(*more: str, code: int = 0) -> str:
-        text = arena_stage.run("arena", *more, "--connect", address, code=code)
+        text = crowded_arena_workspace.run(
+            "arena", *more, "--connect", address, code=code
+        )
         return str(text)
 
-    seen: list[Live] = []
+    received: list[Live] = []
 
     def watch(sample: zenoh.Sample) -> None:
-        seen.append(decode_live(sample.payload.to_bytes()))
+        received.append(decode_live(sample.payload.to_bytes()))
 
     config = zenoh.Config.from_json5(client_config(address))
     with zenoh.open(config) as session:
         key = "revolve/default/w/*/arena/0/pose"
         _subscriber = session.declare_subscriber(key, watch)
-        until(lambda: len(seen) > 10, "somebody sees the arena")
+        until(lambda: len(received) > 10, "live poses of the arena arrive")
         assert "takes effect at" in arena("pause")
-        until(lambda: arena("list").startswith("paused"), "the arena stands still")
+        until(lambda: arena("list").startswith("paused"), "the arena pauses")
         before = arena("list")
         first = before.splitlines()[2].split()[0]
         assert "is not alive" in arena("remove", "999", code=1)
         arena("remove", first)
-        arena_stage.run("robot", "convert", str(calm / "best.yaml"), "guest.pb")
+        crowded_arena_workspace.run(
+            "robot", "convert", str(crowded_arena_run / "best.yaml"), "guest.pb"
+        )
         arena("insert", "guest.pb", "--place", "0.1", "0.2")
         arena("snapshot")
         assert first not in [line.split()[0] for line in arena("list").splitlines()[2:]]
         arena("resume")
         until(lambda: coordinator.poll() is not None, "the run ends")
     assert coordinator.returncode == 0, coordinator.communicate()
-    assert compare(calm, folder) != []
+    assert compare(crowded_arena_run, folder) != []
     assert "removed" in read_table(folder, "deaths")["reason"].to_pylist()
     with Journal.open(folder) as journal:
         events = journal.replay()
     orders = [type(e.order).__name__ for e in events if isinstance(e, Commanded)]
     assert orders == ["Pause", "Remove", "Insert", "Resume"]
-    # What was seen live is what stands in the journal and in the tables.
+    # Live advances equal those of the journal and the tables.
     known = {e.advance.step: e for e in events if isinstance(e, Advanced)}
-    for live in seen:
+    for live in received:
         event = known[live.advance.step]
         assert live.advance.digest == event.advance.digest
         assert read_columns("poses", live.advance.poses).num_rows == event.pose_rows
 
 
-def test_orders_without_an_arena_are_refused_in_one_line(stage: Stage) -> None:
-    said = stage.run("arena", "list", "--connect", "tcp/127.0.0.1:9", code=2)
-    assert said.strip() == "revolve: no coordinator at tcp/127.0.0.1:9"
+def test_orders_without_a_coordinator_are_refused_in_one_line(
+    workspace: Workspace,
+) -> None:
+    output = workspace.run("arena", "list", "--connect", "tcp/127.0.0.1:9", code=2)
+    assert output.strip() == "revolve: no coordinator at tcp/127.0.0.1:9"

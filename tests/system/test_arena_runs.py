@@ -1,6 +1,6 @@
-"""Arenas are repeatable: with any number of threads, and after any kills.
+"""Repeatability of arenas: equal runs for any number of threads and after any kill.
 
-Kills are drawn over the whole run; each test prints what its kills hit.
+Kills are drawn over the whole run; each test prints the events that its kills hit.
 """
 
 import os
@@ -26,7 +26,7 @@ from schema.tables.files import read_table, segments_of
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 
-Stage = Any
+Workspace = Any
 Process = subprocess.Popen[str]
 Until = Callable[[Callable[[], bool], str], None]
 
@@ -53,20 +53,22 @@ def advances(folder: Path) -> list[Advanced]:
 
 
 def newest(folder: Path, table: str) -> int:
-    """Return the number of a table's last segment; -1 if it has none."""
+    """Return the number of a table's newest segment; -1 if it has none."""
     return max((number for number, _ in segments_of(folder, table)), default=-1)
 
 
-class Tally:
-    """Statistics of kills: what the undisturbed run did at those times."""
+class KillLog:
+    """Events that kills interrupted, according to the undisturbed run."""
 
-    def __init__(self, calm: Path) -> None:
-        self.steps = [event.advance.step for event in advances(calm)]
-        self.touching = set(read_table(calm, "touches")["sim_time_s"].to_pylist())
+    def __init__(self, crowded_arena_run: Path) -> None:
+        self.steps = [event.advance.step for event in advances(crowded_arena_run)]
+        self.touching = set(
+            read_table(crowded_arena_run, "touches")["sim_time_s"].to_pylist()
+        )
         self.hits: list[str] = []
 
     def note(self, what: str, folder: Path) -> list[str]:
-        """Record a kill; return what it hit."""
+        """Record a kill that has just occurred; return the events that it hit."""
         last = max((event.advance.step for event in advances(folder)), default=0)
         following = min((step for step in self.steps if step > last), default=last)
         hit = []
@@ -79,46 +81,48 @@ class Tally:
         if what == "coordinator" and last_poses != last_fitness:
             hit.append("segment change")
         self.hits += hit
-        told = ", ".join(hit) or "nothing but robots"
-        sys.stdout.write(f"{what} killed at {last * DT:.0f} s: {told}\n")
+        events = ", ".join(hit) or "nothing but robots"
+        sys.stdout.write(f"{what} killed at {last * DT:.0f} s: {events}\n")
         return hit
 
 
 @pytest.mark.parametrize("threads", [1, 2, 4])
-def test_threads_change_nothing(arena_stage: Stage, calm: Path, threads: int) -> None:
+def test_number_of_threads_does_not_change_an_arena(
+    crowded_arena_workspace: Workspace, crowded_arena_run: Path, threads: int
+) -> None:
     flags = ("--workers", "1", "--threads", str(threads))
-    arena_stage.run("run", *words("run"), *flags)
-    assert compare(calm, arena_stage.folder / "run") == []
-    filled = {name for name in TABLES if read_table(calm, name).num_rows}
+    crowded_arena_workspace.run("run", *words("run"), *flags)
+    assert compare(crowded_arena_run, crowded_arena_workspace.folder / "run") == []
+    filled = {name for name in TABLES if read_table(crowded_arena_run, name).num_rows}
     assert filled >= {"births", "fitness", "poses", "population", "touches", "deaths"}
 
 
 class Fleet:
     """A coordinator, an analyzer and workers that can be killed."""
 
-    def __init__(self, stage: Stage, until: Until) -> None:
-        self.stage = stage
-        self.folder = stage.folder / "run"
+    def __init__(self, workspace: Workspace, until: Until) -> None:
+        self.workspace = workspace
+        self.folder = workspace.folder / "run"
         listen = ("--listen", "tcp/127.0.0.1:0")
         paced = (*words("run"), "--speed", "20")
-        self.coordinator = stage.start("coordinator", *paced, *listen)
+        self.coordinator = workspace.start("coordinator", *paced, *listen)
         until((self.folder / "address").exists, "the coordinator listens")
         self.address = (self.folder / "address").read_text().strip()
-        self.analyzer = stage.start("analyzer", "--connect", self.address)
+        self.analyzer = workspace.start("analyzer", "--connect", self.address)
         self.workers: dict[str, Process] = {}
 
     def join(self, name: str) -> None:
         flags = ("--connect", self.address, "--processes", "1", "--name", name)
-        self.workers[name] = self.stage.start("worker", *flags)
+        self.workers[name] = self.workspace.start("worker", *flags)
 
-    def has_come_to(self, position: float) -> bool:
-        """Return whether the journal has a size [bytes]; all must be alive."""
+    def has_reached(self, position: float) -> bool:
+        """Return whether the journal exceeds a size [bytes]; check all processes."""
         for process in (self.coordinator, self.analyzer, *self.workers.values()):
             assert process.poll() is None, process.communicate()
         return size(self.folder) > position
 
     def kill_holder(self) -> str:
-        """Kill the worker of the last advance, and its supervisor."""
+        """Kill the worker of the last advance and the parent that would restart it."""
         agent = advances(self.folder)[-1].provenance.agent
         name = agent.partition("-")[0]
         process_pool = self.workers.pop(name)
@@ -136,89 +140,89 @@ def children(pid: int) -> list[int]:
 
 
 @pytest.mark.parametrize("draw", range(3))
-def test_holder_killed_twice_while_another_stands_by(
-    arena_stage: Stage, calm: Path, until: Until, draw: int
+def test_killing_the_holder_twice_with_a_spare_worker_gives_an_equal_arena(
+    crowded_arena_workspace: Workspace, crowded_arena_run: Path, until: Until, draw: int
 ) -> None:
-    tally, whole = Tally(calm), size(calm)
+    kill_log, whole = KillLog(crowded_arena_run), size(crowded_arena_run)
     shares = np.sort(np.random.default_rng(draw).uniform(0.05, 0.85, 2))
-    fleet = Fleet(arena_stage, until)
+    fleet = Fleet(crowded_arena_workspace, until)
     fleet.join("w0")
     for number, share in enumerate(shares, start=1):
         fleet.join(f"w{number}")
         until(
-            lambda: fleet.has_come_to(share * whole),  # noqa: B023
+            lambda: fleet.has_reached(share * whole),  # noqa: B023
             "the run is on its way",
         )
         name = fleet.kill_holder()
-        tally.note(f"holder {name}", fleet.folder)
+        kill_log.note(f"holder {name}", fleet.folder)
     until(lambda: fleet.coordinator.poll() is not None, "the run ends")
     assert fleet.coordinator.returncode == 0, fleet.coordinator.communicate()
-    assert compare(calm, fleet.folder) == []
+    assert compare(crowded_arena_run, fleet.folder) == []
     holders = {event.provenance.agent for event in advances(fleet.folder)}
     assert len(holders) == 3
 
 
 def resume_until(
-    stage: Stage, until: Until, is_time: Callable[[], bool], what: str
+    workspace: Workspace, until: Until, is_due: Callable[[], bool], what: str
 ) -> None:
-    """Start or resume a run, and kill its coordinator when a condition holds."""
-    is_new = not (stage.folder / "run" / EPOCH).exists()
+    """Start or resume a run and kill its coordinator when a condition holds."""
+    is_new = not (workspace.folder / "run" / EPOCH).exists()
     flags = ("--workers", "1", "--threads", "1")
     if is_new:
-        process = stage.start("run", *words("run"), *flags)
+        process = workspace.start("run", *words("run"), *flags)
     else:
-        process = stage.start("resume", "run", "--quiet", *flags)
-    until(lambda: is_time() or process.poll() is not None, what)
+        process = workspace.start("resume", "run", "--quiet", *flags)
+    until(lambda: is_due() or process.poll() is not None, what)
     process.send_signal(signal.SIGKILL)
     process.wait()
 
 
 @pytest.mark.parametrize("draw", range(2))
 def test_killed_coordinator_resumes_the_same_arena(
-    arena_stage: Stage, calm: Path, until: Until, draw: int
+    crowded_arena_workspace: Workspace, crowded_arena_run: Path, until: Until, draw: int
 ) -> None:
-    tally, whole = Tally(calm), size(calm)
-    folder = arena_stage.folder / "run"
+    kill_log, whole = KillLog(crowded_arena_run), size(crowded_arena_run)
+    folder = crowded_arena_workspace.folder / "run"
     for share in np.sort(np.random.default_rng(10 + draw).random(4)):
-        enough = share * whole
+        least = share * whole
         resume_until(
-            arena_stage,
+            crowded_arena_workspace,
             until,
-            lambda: bool(size(folder) > enough),  # noqa: B023
+            lambda: bool(size(folder) > least),  # noqa: B023
             "the run is on its way",
         )
-        tally.note("coordinator", folder)
-    arena_stage.run("resume", "run", "--workers", "1", "--quiet")
-    assert compare(calm, folder) == []
+        kill_log.note("coordinator", folder)
+    crowded_arena_workspace.run("resume", "run", "--workers", "1", "--quiet")
+    assert compare(crowded_arena_run, folder) == []
 
 
-def test_killed_in_a_cluster_a_snapshot_and_a_segment_change(
-    arena_stage: Stage, calm: Path, until: Until
+def test_kills_in_a_cluster_a_snapshot_and_a_segment_change_give_an_equal_arena(
+    crowded_arena_workspace: Workspace, crowded_arena_run: Path, until: Until
 ) -> None:
-    """Kill at chosen moments that random kills may miss; retry if one is missed."""
-    tally = Tally(calm)
-    folder = arena_stage.folder / "run"
+    """Aim kills at events that random kills may miss; repeat missed ones."""
+    kill_log = KillLog(crowded_arena_run)
+    folder = crowded_arena_workspace.folder / "run"
 
     def reached(step: int) -> Callable[[], bool]:
-        looked_at = 0
+        checked_size = 0
 
-        def is_there() -> bool:
-            nonlocal looked_at
-            if size(folder) <= max(looked_at, 1000):
+        def has_reached_step() -> bool:
+            nonlocal checked_size
+            if size(folder) <= max(checked_size, 1000):
                 return False
-            looked_at = size(folder)
+            checked_size = size(folder)
             return any(each.advance.step >= step for each in advances(folder))
 
-        return is_there
+        return has_reached_step
 
     def before_touch() -> Callable[[], bool]:
-        touching = sorted(round(each / DT) for each in tally.touching)
+        touching = sorted(round(each / DT) for each in kill_log.touching)
         touch = touching[len(touching) // 3]
-        return reached(max(step for step in tally.steps if step < touch))
+        return reached(max(step for step in kill_log.steps if step < touch))
 
     def before_snapshot() -> Callable[[], bool]:
         last = max(each.advance.step for each in advances(folder))
-        pairs = zip(tally.steps, tally.steps[1:], strict=False)
+        pairs = zip(kill_log.steps, kill_log.steps[1:], strict=False)
         return reached(
             next(
                 step for step, following in pairs
@@ -237,9 +241,9 @@ def test_killed_in_a_cluster_a_snapshot_and_a_segment_change(
         ("segment change", new_segment),
     ):
         for _ in range(MOST_KILLS):
-            resume_until(arena_stage, until, moment(), what)
-            if what in tally.note("coordinator", folder):
+            resume_until(crowded_arena_workspace, until, moment(), what)
+            if what in kill_log.note("coordinator", folder):
                 break
-    assert {"merged cluster", "snapshot", "segment change"} <= set(tally.hits)
-    arena_stage.run("resume", "run", "--workers", "1", "--quiet")
-    assert compare(calm, folder) == []
+    assert {"merged cluster", "snapshot", "segment change"} <= set(kill_log.hits)
+    crowded_arena_workspace.run("resume", "run", "--workers", "1", "--quiet")
+    assert compare(crowded_arena_run, folder) == []

@@ -1,4 +1,4 @@
-"""A user's errors are reported in one line, with an exit code other than 0."""
+"""Checks that user errors are reported in one line with a nonzero exit code."""
 
 import os
 import shutil
@@ -12,22 +12,22 @@ import pytest
 
 pytestmark = pytest.mark.system
 
-Stage = Any
+Workspace = Any
 
 
-def _refused(stage: Stage, *words: str) -> str:
-    said: str = stage.run(*words, code=2)
-    assert len(said.strip().splitlines()) == 1, said
-    return said
+def _refused(workspace: Workspace, *words: str) -> str:
+    output: str = workspace.run(*words, code=2)
+    assert len(output.strip().splitlines()) == 1, output
+    return output
 
 
-def _document(stage: Stage, text: str) -> str:
-    (stage.folder / "mine.toml").write_text(text)
+def _document(workspace: Workspace, text: str) -> str:
+    (workspace.folder / "mine.toml").write_text(text)
     return "mine.toml"
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ('name = "a"\nbirth = 3', "'births'"),
         ('name = "a"\n[selection]\npopulaton = 3', "selection.populaton"),
@@ -41,80 +41,88 @@ def _document(stage: Stage, text: str) -> str:
         ("name = ", "not valid TOML"),
     ],
 )
-def test_broken_experiment(stage: Stage, text: str, told: str) -> None:
-    said = _refused(stage, "run", _document(stage, text), "--out", "x", "--quiet")
-    assert "mine.toml" in said or told in said
-    assert told in said
-    assert not (stage.folder / "x").exists()
+def test_invalid_experiment_is_refused(
+    workspace: Workspace, text: str, message: str
+) -> None:
+    output = _refused(
+        workspace, "run", _document(workspace, text), "--out", "x", "--quiet"
+    )
+    assert "mine.toml" in output or message in output
+    assert message in output
+    assert not (workspace.folder / "x").exists()
 
 
-def test_restriction_that_no_robot_meets_ends_the_run_with_its_reason(
-    stage: Stage,
+def test_restriction_that_no_robot_satisfies_ends_the_run_with_the_reason(
+    workspace: Workspace,
 ) -> None:
     text = 'name = "a"\n[space]\npart_types = ["schema.parts:CORE", '
     text += '"schema.parts:ACTIVE_HINGE"]\nmin_parts = 29\nmax_parts = 30'
     words = ("--out", "x", "--quiet", "--in-process", "--births", "15")
-    assert "space" in _refused(stage, "run", _document(stage, text), *words)
+    assert "space" in _refused(workspace, "run", _document(workspace, text), *words)
 
 
-def test_a_seed_above_64_bits_is_refused(stage: Stage) -> None:
+def test_a_seed_above_64_bits_is_refused(workspace: Workspace) -> None:
     words = ("scenario1", "--seed", str(2**64), "--out", "x", "--quiet")
-    assert "--seed: must be < 2^64" in _refused(stage, "run", *words)
+    assert "--seed: must be < 2^64" in _refused(workspace, "run", *words)
 
 
-def test_misspelt_command_and_experiment_get_the_nearest_name(stage: Stage) -> None:
-    assert "'resume'" in _refused(stage, "resum", "x")
-    assert "'scenario1'" in _refused(stage, "run", "senario1")
-    said = _refused(stage, "run", "thesys")
-    assert "; did you mean 'thesis'?" in said
-    assert "scenario3, thesis, or give a path" in said
+def test_misspelt_names_are_reported_with_the_nearest_name(
+    workspace: Workspace,
+) -> None:
+    assert "'resume'" in _refused(workspace, "resum", "x")
+    assert "'scenario1'" in _refused(workspace, "run", "senario1")
+    output = _refused(workspace, "run", "thesys")
+    assert "; did you mean 'thesis'?" in output
+    assert "scenario3, thesis, or give a path" in output
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "told"),
+    ("name", "content", "message"),
     [
         ("robot.yaml", "body: {type: Cor, id: c}\n", "Core"),
         ("robot.yaml", "body: [\n", "robot.yaml"),
         ("robot.pb", "\x01\x02\x03", "robot.pb"),
     ],
 )
-def test_broken_robot_file(stage: Stage, name: str, content: str, told: str) -> None:
-    (stage.folder / name).write_text(content)
-    assert told in _refused(stage, "robot", "check", name)
+def test_invalid_robot_file_is_refused(
+    workspace: Workspace, name: str, content: str, message: str
+) -> None:
+    (workspace.folder / name).write_text(content)
+    assert message in _refused(workspace, "robot", "check", name)
 
 
-def test_used_folder(stage: Stage) -> None:
-    (stage.folder / "used").mkdir()
-    (stage.folder / "used" / "thesis.pdf").write_text("mine")
-    assert "thesis.pdf" in _refused(stage, "run", "scenario1", "--out", "used")
-    assert (stage.folder / "used" / "thesis.pdf").read_text() == "mine"
+def test_folder_with_other_files_is_refused_and_unchanged(workspace: Workspace) -> None:
+    (workspace.folder / "used").mkdir()
+    (workspace.folder / "used" / "thesis.pdf").write_text("mine")
+    assert "thesis.pdf" in _refused(workspace, "run", "scenario1", "--out", "used")
+    assert (workspace.folder / "used" / "thesis.pdf").read_text() == "mine"
 
 
-def test_folder_without_a_run(stage: Stage) -> None:
-    assert "nowhere" in _refused(stage, "resume", "nowhere")
-    assert "nowhere" in _refused(stage, "compare", "nowhere", "nowhere")
+def test_folder_without_a_run_is_refused(workspace: Workspace) -> None:
+    assert "nowhere" in _refused(workspace, "resume", "nowhere")
+    assert "nowhere" in _refused(workspace, "compare", "nowhere", "nowhere")
 
 
-def test_port_in_use(stage: Stage) -> None:
+def test_port_in_use_is_refused(workspace: Workspace) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         address = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
         words = ("coordinator", "scenario1", "--out", "x", "--listen", address)
-        assert "in use" in _refused(stage, *words)
+        assert "in use" in _refused(workspace, *words)
 
 
-def test_nothing_listens_beyond_this_machine_without_certificates(
-    stage: Stage,
+def test_listening_on_the_network_needs_certificates(
+    workspace: Workspace,
 ) -> None:
     words = ("coordinator", "scenario1", "--out", "x", "--listen", "tcp/0.0.0.0:0")
-    assert "tls/" in _refused(stage, *words)
+    assert "tls/" in _refused(workspace, *words)
 
 
-def test_worker_without_a_coordinator_says_so_and_keeps_trying(
-    stage: Stage,
+def test_worker_without_a_coordinator_reports_it_and_retries(
+    workspace: Workspace,
 ) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-    worker = stage.start("worker", "--connect", f"tcp/127.0.0.1:{port}")
+    worker = workspace.start("worker", "--connect", f"tcp/127.0.0.1:{port}")
     line = worker.stderr.readline()
     assert f"127.0.0.1:{port}" in line
     assert worker.poll() is None
@@ -122,50 +130,50 @@ def test_worker_without_a_coordinator_says_so_and_keeps_trying(
     assert worker.wait(30) == 0
 
 
-def _fill_the_disk(stage: Stage, *words: str, kilobytes: int) -> None:
-    """Run on a small disk until it is full; copy the folder to ``moved``."""
-    disk = stage.folder / "disk"
+def _fill_the_disk(workspace: Workspace, *words: str, kilobytes: int) -> None:
+    """Run on a small disk until it is full; copy the run folder to ``moved``."""
+    disk = workspace.folder / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(disk)]
     if subprocess.run(mount, check=False).returncode:
         pytest.skip("a small disk cannot be mounted here")
     try:
-        said = stage.run("run", *words, "--quiet", "--out", "disk/run", code=2)
-        assert "full" in said
-        assert "Traceback" not in said
-        shutil.copytree(disk / "run", stage.folder / "moved")
+        output = workspace.run("run", *words, "--quiet", "--out", "disk/run", code=2)
+        assert "full" in output
+        assert "Traceback" not in output
+        shutil.copytree(disk / "run", workspace.folder / "moved")
     finally:
         subprocess.run(["umount", str(disk)], check=True)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
 @pytest.mark.parametrize("flags", [("--in-process",), ("--workers", "2")])
-def test_full_disk_loses_nothing(
-    stage: Stage, undisturbed: Path, births: int, flags: tuple[str, ...]
+def test_run_resumes_after_a_full_disk(
+    workspace: Workspace, undisturbed: Path, births: int, flags: tuple[str, ...]
 ) -> None:
     words = ("scenario1", "--seed", "5", "--births", str(births), *flags)
-    _fill_the_disk(stage, *words, kilobytes=64)
-    stage.run("resume", "moved", "--quiet", *flags)
-    said = stage.run("compare", "moved", str(undisturbed))
-    assert "equal" in said
+    _fill_the_disk(workspace, *words, kilobytes=64)
+    workspace.run("resume", "moved", "--quiet", *flags)
+    output = workspace.run("compare", "moved", str(undisturbed))
+    assert "equal" in output
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounting a small disk needs root")
-def test_full_disk_loses_nothing_of_an_arena(
-    hamlet_stage: Stage, quiet_hamlet: Path
+def test_arena_resumes_after_a_full_disk(
+    small_arena_workspace: Workspace, small_arena_run: Path
 ) -> None:
     flags = ("--in-process", "--threads", "1")
     words = ("hamlet.toml", "--seed", "4", *flags)
-    _fill_the_disk(hamlet_stage, *words, kilobytes=120)
-    hamlet_stage.run("resume", "moved", "--quiet", *flags)
-    said = hamlet_stage.run("compare", "moved", str(quiet_hamlet))
-    assert "equal" in said
+    _fill_the_disk(small_arena_workspace, *words, kilobytes=120)
+    small_arena_workspace.run("resume", "moved", "--quiet", *flags)
+    output = small_arena_workspace.run("compare", "moved", str(small_arena_run))
+    assert "equal" in output
 
 
-def test_a_reader_that_closes_the_pipe_is_no_error(stage: Stage) -> None:
-    stage.run("robot", "random", "some.yaml")
-    process = stage.start("robot", "show", "some.yaml")
+def test_closed_pipe_prints_no_error(workspace: Workspace) -> None:
+    workspace.run("robot", "random", "some.yaml")
+    process = workspace.start("robot", "show", "some.yaml")
     process.stdout.close()
     process.stdout = None
-    _, told = process.communicate(timeout=60)
-    assert (process.returncode, told) == (1, "")
+    _, errors = process.communicate(timeout=60)
+    assert (process.returncode, errors) == (1, "")

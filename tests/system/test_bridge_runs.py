@@ -1,4 +1,4 @@
-"""Re-evaluation and culling are repeatable, whichever processes are killed."""
+"""Repeatability of the bridge experiment: equal tables after a kill and a resume."""
 
 import signal
 from collections.abc import Callable
@@ -29,27 +29,27 @@ share = 0.4
 population_limit = 12
 population_floor = 6
 """
-"""Judged over 2 s; a quarter of its evaluations are of who lives already."""
+"""Evaluations of 2 s to 4 s; a quarter of them are re-evaluations."""
 
 
-def test_killed_bridge_resumes_to_the_tables_of_one_process(
-    stage: Any,  # noqa: ANN401 - the fixture
+def test_killed_bridge_resumes_to_the_tables_of_a_single_process(
+    workspace: Any,  # noqa: ANN401 - the fixture
     until: Callable[[Callable[[], bool], str], None],
 ) -> None:
-    (stage.folder / "short.toml").write_text(SHORT)
+    (workspace.folder / "short.toml").write_text(SHORT)
     words = ("short.toml", "--seed", "3", "--quiet", "--out")
-    stage.run("run", *words, "calm", "--in-process")
-    calm, killed = stage.folder / "calm", stage.folder / "killed"
-    rows = read_table(calm, "evaluations")
+    workspace.run("run", *words, "calm", "--in-process")
+    reference, killed = workspace.folder / "calm", workspace.folder / "killed"
+    rows = read_table(reference, "evaluations")
     assert rows.filter(pc.greater(rows["trial"], 0)).num_rows >= 6
-    lasted = np.array(rows["simulated_s"].drop_null())
-    assert lasted.min() >= 2.0
-    assert lasted.max() <= 4.0
-    assert len(np.unique(lasted)) > 0.9 * len(lasted)
+    durations_s = np.array(rows["simulated_s"].drop_null())
+    assert durations_s.min() >= 2.0
+    assert durations_s.max() <= 4.0
+    assert len(np.unique(durations_s)) > 0.9 * len(durations_s)
 
     share = np.random.default_rng(5).uniform(0.5, 0.9)
-    journal, whole = killed / "journal.bin", (calm / "journal.bin").stat().st_size
-    first = stage.start("run", *words, "killed", "--workers", "2")
+    journal, whole = killed / "journal.bin", (reference / "journal.bin").stat().st_size
+    first = workspace.start("run", *words, "killed", "--workers", "2")
     until(
         lambda: (
             (journal.exists() and journal.stat().st_size > share * whole)
@@ -59,5 +59,5 @@ def test_killed_bridge_resumes_to_the_tables_of_one_process(
     )
     first.send_signal(signal.SIGKILL)
     first.wait()
-    stage.run("resume", "killed", "--workers", "2", "--quiet")
-    assert compare(calm, killed) == []
+    workspace.run("resume", "killed", "--workers", "2", "--quiet")
+    assert compare(reference, killed) == []

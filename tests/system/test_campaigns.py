@@ -1,4 +1,4 @@
-"""Campaigns as a user runs them: interrupted, killed, adopted, shared."""
+"""Tests of campaigns: interruption, kills, existing runs, a shared hub."""
 
 import json
 import signal
@@ -14,7 +14,7 @@ from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder, read_state
 from schema.agent.network import hub_config
 from schema.experiment.file import experiment_text, read_experiment
-from tests.system.stage import Stage
+from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -29,7 +29,7 @@ children = {children}
 [simulation]
 window_steps = 400
 """
-"""Two seconds of each robot's life: what is tested here is not the physics."""
+"""Evaluations of two seconds, as these tests do not depend on the physics."""
 
 HUB = "tcp/127.0.0.1:0"
 REPEATS = 2
@@ -50,11 +50,11 @@ def _words(out: str, *more: str) -> tuple[str, ...]:
 
 @pytest.fixture(scope="session")
 def whole(once: Any) -> Path:  # noqa: ANN401 - the fixture
-    """Return an undisturbed campaign that ran in one process."""
+    """Return the folder of an undisturbed campaign, run in one process."""
 
-    def make(stage: Stage) -> None:
-        _write(stage.folder)
-        stage.run(*_words("all", "--in-process", "--quiet"))
+    def make(workspace: Workspace) -> None:
+        _write(workspace.folder)
+        workspace.run(*_words("all", "--in-process", "--quiet"))
 
     folder: Path = once("campaign", make)
     return folder / "all"
@@ -71,102 +71,112 @@ def _sizes(folder: Path) -> int:
     return sum(path.stat().st_size for path in folder.glob("*/journal.bin"))
 
 
-def _make_alone(stage: Stage, path: Path, name: str, run: int) -> None:
-    """Make a run in the format of an older version without environments."""
-    text = experiment_text(read_experiment(str(stage.folder / f"{name}.toml")))
+def _make_single_run(workspace: Workspace, path: Path, name: str, run: int) -> None:
+    """Write a single run in the format of versions without environments."""
+    text = experiment_text(read_experiment(str(workspace.folder / f"{name}.toml")))
     document = json.loads(text)
     del document["environment"]
     with RunFolder(path, RunDetails(name, run, 7, json.dumps(document))):
         pass
-    stage.run("resume", str(path), "--in-process", "--quiet")
+    workspace.run("resume", str(path), "--in-process", "--quiet")
 
 
-def test_a_killed_campaign_resumes_and_adopts_existing_runs(
-    stage: Stage, whole: Path, until: Until
+def test_killed_campaign_resumes_and_includes_existing_runs(
+    workspace: Workspace, whole: Path, until: Until
 ) -> None:
-    _write(stage.folder)
-    campaign = stage.folder / "campaign"
-    _make_alone(stage, campaign / "steady-1", "steady", 1)
-    taken = campaign / "steady-1" / "journal.bin"
-    before = taken.stat().st_mtime_ns
-    first = stage.start(*_words("campaign", "--workers", "2"))
-    share = taken.stat().st_size + 0.4 * (_sizes(whole) - taken.stat().st_size)
+    _write(workspace.folder)
+    campaign = workspace.folder / "campaign"
+    _make_single_run(workspace, campaign / "steady-1", "steady", 1)
+    existing = campaign / "steady-1" / "journal.bin"
+    before = existing.stat().st_mtime_ns
+    first = workspace.start(*_words("campaign", "--workers", "2"))
+    share = existing.stat().st_size + 0.4 * (_sizes(whole) - existing.stat().st_size)
     until(lambda: _sizes(campaign) > share, "the campaign is on its way")
     first.send_signal(signal.SIGKILL)
     first.communicate()
-    assert "stopped" in stage.run("status", "campaign")
-    said = stage.run("resume", "campaign", "--workers", "1", "--quiet")
-    assert "4 runs are finished" in said
+    assert "stopped" in workspace.run("status", "campaign")
+    output = workspace.run("resume", "campaign", "--workers", "1", "--quiet")
+    assert "4 runs are finished" in output
     assert (
-        "keeps its own number of births" not in said
+        "keeps its own number of births" not in output
     )  # it has as many births as the others
     _check_equal(whole, campaign)
-    assert taken.stat().st_mtime_ns == before
-    again = stage.run("resume", "campaign", "--workers", "1", "--quiet")
+    assert existing.stat().st_mtime_ns == before
+    again = workspace.run("resume", "campaign", "--workers", "1", "--quiet")
     assert "4 of 4 runs are already finished" in again
 
 
-def test_ctrl_c_stops_all_runs_and_says_how_to_resume(
-    stage: Stage, whole: Path, until: Until
+def test_ctrl_c_stops_all_runs_and_shows_how_to_resume(
+    workspace: Workspace, whole: Path, until: Until
 ) -> None:
-    _write(stage.folder)
-    campaign = stage.folder / "campaign"
-    first = stage.start(*_words("campaign", "--workers", "2"))
+    _write(workspace.folder)
+    campaign = workspace.folder / "campaign"
+    first = workspace.start(*_words("campaign", "--workers", "2"))
     until(lambda: _sizes(campaign) > 0.3 * _sizes(whole), "the campaign is on its way")
     first.send_signal(signal.SIGINT)
     out, err = first.communicate(timeout=60)
     assert first.returncode == 130, out + err
     assert "revolve resume campaign" in err
     assert "Traceback" not in err
-    there = [path.parent for path in campaign.glob("*/run.json")]
-    assert {read_state(path) for path in there} <= {"stopped", "finished"}
-    assert stage.run(*_words("campaign"), code=2).count("revolve resume campaign") == 1
-    stage.run("resume", "campaign", "--in-process", "--quiet")
+    begun = [path.parent for path in campaign.glob("*/run.json")]
+    assert {read_state(path) for path in begun} <= {"stopped", "finished"}
+    assert (
+        workspace.run(*_words("campaign"), code=2).count("revolve resume campaign") == 1
+    )
+    workspace.run("resume", "campaign", "--in-process", "--quiet")
     _check_equal(whole, campaign)
 
 
-def test_two_coordinators_share_the_workers_of_a_hub(stage: Stage, whole: Path) -> None:
-    _write(stage.folder)
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        address = f"tcp/127.0.0.1:{free.getsockname()[1]}"
+def test_two_coordinators_share_the_workers_of_a_hub(
+    workspace: Workspace, whole: Path
+) -> None:
+    _write(workspace.folder)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp/127.0.0.1:{server.getsockname()[1]}"
     with zenoh.open(zenoh.Config.from_json5(hub_config((address,)))):
-        users = [
-            stage.start(
+        commands = [
+            workspace.start(
                 "run", f"{name}.toml", "--seed", "7", "--repeats", str(REPEATS),
                 "--connect", address, "--out", name,
             )
             for name in NAMES
         ]  # fmt: skip
-        stage.start("analyzer", "--connect", address)
-        stage.start("worker", "--connect", address, "--processes", "2")
-        for user in users:
-            out, err = user.communicate(timeout=200)
-            assert user.returncode == 0, out + err
+        workspace.start("analyzer", "--connect", address)
+        workspace.start("worker", "--connect", address, "--processes", "2")
+        for command in commands:
+            out, err = command.communicate(timeout=200)
+            assert command.returncode == 0, out + err
     for name in NAMES:
         for repeat in range(REPEATS):
             run = f"{name}-{repeat}"
-            assert compare(whole / run, stage.folder / name / run) == []
+            assert compare(whole / run, workspace.folder / name / run) == []
 
 
-def test_status_of_all_coordinators_of_a_hub(stage: Stage, until: Until) -> None:
-    _write(stage.folder)
-    first = stage.start("coordinator", *_words("one")[1:], "--listen", HUB)
-    until((stage.folder / "one" / "address").exists, "the first one listens")
-    address = (stage.folder / "one" / "address").read_text().strip()
-    stage.start("coordinator", "steady.toml", "--connect", address, "--out", "two")
-    until((stage.folder / "two" / "address").exists, "the second one is there")
+def test_status_of_all_coordinators_of_a_hub(
+    workspace: Workspace, until: Until
+) -> None:
+    _write(workspace.folder)
+    first = workspace.start("coordinator", *_words("one")[1:], "--listen", HUB)
+    until((workspace.folder / "one" / "address").exists, "the first one listens")
+    address = (workspace.folder / "one" / "address").read_text().strip()
+    workspace.start("coordinator", "steady.toml", "--connect", address, "--out", "two")
+    until((workspace.folder / "two" / "address").exists, "the second one is connected")
 
-    def told() -> str:
-        text = stage.run("status", "--connect", address)
+    def status() -> str:
+        text = workspace.run("status", "--connect", address)
         return str(text)
 
-    until(lambda: "two" in told() and "broods-1" in told(), "both tell")
-    assert "0 workers" not in told()
-    assert "0 of 4 runs finished, 0 of 80 births" in told()
-    # By the folder's own coordinator: the folder alone knows nothing of time left.
-    assert "left" not in stage.run("status", "one")
-    stage.start("worker", "--connect", address, "--processes", "1")
-    until(lambda: "1 workers, 0 analyzers" in stage.run("status", "one"), "it tells")
+    until(
+        lambda: "two" in status() and "broods-1" in status(), "both coordinators answer"
+    )
+    assert "0 workers" not in status()
+    assert "0 of 4 runs finished, 0 of 80 births" in status()
+    # The folder's own coordinator answers; a folder alone has no estimate of time left.
+    assert "left" not in workspace.run("status", "one")
+    workspace.start("worker", "--connect", address, "--processes", "1")
+    until(
+        lambda: "1 workers, 0 analyzers" in workspace.run("status", "one"), "it answers"
+    )
     assert first.poll() is None
 
 
@@ -181,9 +191,9 @@ def test_status_of_all_coordinators_of_a_hub(stage: Stage, until: Until) -> None
         (("run", "scenario1", "--connect", "tcp/127.0.0.1:9"), "no hub"),
     ],
 )
-def test_errors_are_one_line(
-    stage: Stage, words: tuple[str, ...], complaint: str
+def test_errors_are_reported_in_one_line(
+    workspace: Workspace, words: tuple[str, ...], complaint: str
 ) -> None:
-    said = stage.run(*words, code=2)
-    assert complaint in said
-    assert len(said.strip().splitlines()) == 1
+    output = workspace.run(*words, code=2)
+    assert complaint in output
+    assert len(output.strip().splitlines()) == 1

@@ -1,4 +1,4 @@
-"""The code in README and docs runs as printed."""
+"""Runs the code of README and docs unchanged."""
 
 import os
 import re
@@ -35,7 +35,7 @@ def _environment(*paths: Path) -> dict[str, str]:
 def _python(
     words: Sequence[str], folder: Path, *paths: Path
 ) -> subprocess.CompletedProcess[str]:
-    """Run Python with these arguments in a folder, to its end."""
+    """Run Python with arguments in a folder, as a reader would."""
     return subprocess.run(
         [sys.executable, *words],
         cwd=folder,
@@ -49,7 +49,7 @@ def _python(
 @pytest.mark.parametrize(
     ("page", "least"), [("tables.md", 5), ("analysis.md", 3), ("viewing.md", 0)]
 )
-def test_python_of_the_pages_on_tables(
+def test_code_of_pages_about_tables_runs(
     page: str, least: int, undisturbed: Path, tmp_path: Path
 ) -> None:
     shutil.copytree(undisturbed, tmp_path / "runs" / "a")
@@ -65,7 +65,7 @@ def test_python_of_the_pages_on_tables(
         assert done.returncode == 0, f"{words[-1]}\n{done.stderr}"
 
 
-def test_experiments_of_the_experiments_page(tmp_path: Path) -> None:
+def test_experiments_of_the_experiments_page_run(tmp_path: Path) -> None:
     page = TOP / "docs" / "experiments.md"
     (module,) = _blocks(page, "python")
     (tmp_path / "my_parts.py").write_text(module)
@@ -86,36 +86,36 @@ def test_experiments_of_the_experiments_page(tmp_path: Path) -> None:
             parse_experiment(document, str(tmp_path / page.name))
 
 
-def test_the_arenas_page_lists_all_keys_with_their_defaults() -> None:
+def test_arenas_page_lists_all_keys_with_their_defaults() -> None:
     page = (TOP / "docs" / "arenas.md").read_text()
-    told = re.findall(r"^\| `(\w+)` \| (\S+) \|", page, re.MULTILINE)
-    assert told == [
+    listed = re.findall(r"^\| `(\w+)` \| (\S+) \|", page, re.MULTILINE)
+    assert listed == [
         (field.name, str(field.default).lower())
         for field in msgspec.structs.fields(Arena)
     ]
 
 
-def test_commands_of_the_robots_page(tmp_path: Path) -> None:
+def test_commands_of_the_robots_page_run(tmp_path: Path) -> None:
     page = TOP / "docs" / "robots.md"
     (document,) = _blocks(page, "toml")
     (tmp_path / "robogen.toml").write_text(document)
     (block,) = _blocks(page, "sh")
     own = "revolve robot simulate some.yaml --experiment robogen.toml"
-    told: list[str] = []
+    printed: list[str] = []
     for line in (*block.splitlines(), own):
         words = line.partition("#")[0].split()
         done = _python(("-m", *words), tmp_path)
         if "render" in words and "pictures need" in done.stderr:
             continue
         assert done.returncode == 0, f"{line}\n{done.stderr}"
-        told += [done.stdout] if "simulate" in words else []
-    assert told[0] == told[1]
-    assert told[2] != told[0]
+        printed += [done.stdout] if "simulate" in words else []
+    assert printed[0] == printed[1]
+    assert printed[2] != printed[0]
     some, again = (tmp_path / name for name in ("some.yaml", "again.yaml"))
     assert some.read_text() == again.read_text()
 
 
-def test_the_archipelagos_of_the_islands_page(tmp_path: Path) -> None:
+def test_archipelagos_of_the_islands_page_run(tmp_path: Path) -> None:
     page = TOP / "docs" / "islands.md"
     (document,) = _blocks(page, "toml")
     (tmp_path / "mine.toml").write_text(document)
@@ -127,7 +127,7 @@ def test_the_archipelagos_of_the_islands_page(tmp_path: Path) -> None:
         assert done.returncode == 0, f"{line}\n{done.stderr}"
 
 
-def test_the_campaign_of_the_campaigns_page(tmp_path: Path) -> None:
+def test_campaign_of_the_campaigns_page_runs(tmp_path: Path) -> None:
     (block,) = _blocks(TOP / "docs" / "campaigns.md", "sh")
     for line in block.splitlines():
         done = _python(("-m", *line.split()), tmp_path)
@@ -135,7 +135,7 @@ def test_the_campaign_of_the_campaigns_page(tmp_path: Path) -> None:
     assert "4 of 4 runs are already finished" in done.stderr
 
 
-def test_every_command_that_a_page_names_exists() -> None:
+def test_every_command_on_the_pages_exists() -> None:
     named = {
         word
         for page in PAGES
@@ -145,7 +145,7 @@ def test_every_command_that_a_page_names_exists() -> None:
     assert named <= set(COMMANDS)
 
 
-def test_every_link_leads_somewhere() -> None:
+def test_every_link_has_a_target() -> None:
     for page in PAGES:
         for target in re.findall(r"\]\(([^)#:]+)\)", page.read_text()):
             assert (page.parent / target).exists(), f"{page.name}: {target}"

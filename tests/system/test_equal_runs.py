@@ -1,4 +1,4 @@
-"""Runs are repeatable: the same births with any workers and any kills."""
+"""Repeatability: equal runs for any number of workers and after any kill."""
 
 import signal
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from schema.tables.files import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Stage = Any
+Workspace = Any
 Until = Callable[[Callable[[], bool], str], None]
 
 
@@ -38,24 +38,24 @@ def _size(folder: Path) -> int:
     return journal.stat().st_size if journal.exists() else 0
 
 
-def test_one_worker_gives_the_births_of_one_process(
-    stage: Stage, undisturbed: Path, births: int
+def test_one_worker_gives_the_same_births_as_a_single_process(
+    workspace: Workspace, undisturbed: Path, births: int
 ) -> None:
-    stage.run("run", *_words(births, "one"), "--workers", "1")
-    assert compare(undisturbed, stage.folder / "one") == []
+    workspace.run("run", *_words(births, "one"), "--workers", "1")
+    assert compare(undisturbed, workspace.folder / "one") == []
 
 
-def test_three_workers_of_which_one_is_killed(
-    stage: Stage, undisturbed: Path, births: int, until: Until
+def test_killing_one_of_three_workers_gives_the_same_births(
+    workspace: Workspace, undisturbed: Path, births: int, until: Until
 ) -> None:
-    folder = stage.folder / "three"
+    folder = workspace.folder / "three"
     words = _words(births, "three")
-    coordinator = stage.start("coordinator", *words, "--listen", "tcp/127.0.0.1:0")
+    coordinator = workspace.start("coordinator", *words, "--listen", "tcp/127.0.0.1:0")
     until((folder / "address").exists, "the coordinator listens")
     address = (folder / "address").read_text().strip()
-    stage.start("analyzer", "--connect", address)
+    workspace.start("analyzer", "--connect", address)
     workers = [
-        stage.start("worker", "--connect", address, "--processes", "1")
+        workspace.start("worker", "--connect", address, "--processes", "1")
         for _ in range(3)
     ]
     whole = _size(undisturbed)
@@ -69,66 +69,66 @@ def test_three_workers_of_which_one_is_killed(
 
 @pytest.mark.parametrize("draw", range(4))
 def test_killed_coordinator_resumes_to_the_same_births(
-    stage: Stage, undisturbed: Path, births: int, until: Until, draw: int
+    workspace: Workspace, undisturbed: Path, births: int, until: Until, draw: int
 ) -> None:
-    folder = stage.folder / "killed"
+    folder = workspace.folder / "killed"
     whole = _size(undisturbed)
-    # One kill in each quarter of the run, the instant within it drawn.
+    # One kill at a random instant of each quarter of the run.
     share = (draw + np.random.default_rng(draw).random()) / 4
-    first = stage.start("run", *_words(births, "killed"), "--workers", "2")
+    first = workspace.start("run", *_words(births, "killed"), "--workers", "2")
     until(
         lambda: _size(folder) > share * whole or first.poll() is not None,
         "the run is on its way",
     )
     first.send_signal(signal.SIGKILL)
     first.wait()
-    stage.run("resume", "killed", "--workers", "2", "--quiet")
+    workspace.run("resume", "killed", "--workers", "2", "--quiet")
     assert compare(undisturbed, folder) == []
 
 
-def test_noise_is_the_same_whoever_draws_it(stage: Stage) -> None:
-    """In one process, by two workers with audits, and resumed after its end."""
-    (stage.folder / "noisy.toml").write_text(NOISY)
+def test_noise_is_the_same_in_every_process(workspace: Workspace) -> None:
+    """Compare a single process, two workers with audits, and a re-simulation."""
+    (workspace.folder / "noisy.toml").write_text(NOISY)
     words = ("run", "noisy.toml", "--seed", "5", "--births", "30", "--quiet")
-    stage.run(*words, "--in-process", "--out", "one")
-    stage.run(*words, "--workers", "2", "--audit", "0.3", "--out", "two")
-    one, two = stage.folder / "one", stage.folder / "two"
+    workspace.run(*words, "--in-process", "--out", "one")
+    workspace.run(*words, "--workers", "2", "--audit", "0.3", "--out", "two")
+    one, two = workspace.folder / "one", workspace.folder / "two"
     assert compare(one, two) == []
     agrees = read_table(two, "audits")["agrees"].to_pylist()
     assert agrees
     assert all(agrees)
     reevaluations = read_table(one, "evaluations").to_pylist()
-    again = {row["birth"] for row in reevaluations if row["trial"]}
-    assert again
-    robots = ("--robot", "best", "--robot", f"0:{min(again)}")
-    out = stage.run("view", "one", *robots, "--save", "a.rrd")
+    repeated = {row["birth"] for row in reevaluations if row["trial"]}
+    assert repeated
+    robots = ("--robot", "best", "--robot", f"0:{min(repeated)}")
+    out = workspace.run("view", "one", *robots, "--save", "a.rrd")
     assert out.count("moves as recorded, equal to the last bit") == 2
     assert "DIFFERS" not in out
 
 
-def test_second_coordinator_is_refused_with_the_holder(
-    stage: Stage, births: int, until: Until
+def test_second_coordinator_is_refused_with_the_id_of_the_first(
+    workspace: Workspace, births: int, until: Until
 ) -> None:
-    folder = stage.folder / "held"
-    first = stage.start(
+    folder = workspace.folder / "held"
+    first = workspace.start(
         "coordinator", *_words(births, "held"), "--listen", "tcp/127.0.0.1:0"
     )
     until((folder / "address").exists, "the coordinator listens")
-    said = stage.run("resume", "held", "--quiet", code=2)
-    assert str(first.pid) in said
-    assert len(said.strip().splitlines()) == 1
+    output = workspace.run("resume", "held", "--quiet", code=2)
+    assert str(first.pid) in output
+    assert len(output.strip().splitlines()) == 1
 
 
-def test_ctrl_c_stops_cleanly_and_says_how_to_go_on(
-    stage: Stage, undisturbed: Path, births: int, until: Until
+def test_ctrl_c_stops_cleanly_and_shows_how_to_resume(
+    workspace: Workspace, undisturbed: Path, births: int, until: Until
 ) -> None:
-    folder = stage.folder / "stopped"
-    first = stage.start("run", *_words(births, "stopped"), "--workers", "2")
+    folder = workspace.folder / "stopped"
+    first = workspace.start("run", *_words(births, "stopped"), "--workers", "2")
     until(lambda: _size(folder) > _size(undisturbed) // 3, "the run is on its way")
     first.send_signal(signal.SIGINT)
     out, err = first.communicate(timeout=60)
     assert first.returncode == 130, out + err
     assert "revolve resume stopped" in out + err
     assert "Traceback" not in err
-    stage.run("resume", "stopped", "--workers", "1", "--quiet")
+    workspace.run("resume", "stopped", "--workers", "1", "--quiet")
     assert compare(undisturbed, folder) == []

@@ -1,7 +1,7 @@
-"""Faults of workers and analyzers do not change the tables of a run.
+"""Repeatability after faults of workers and analyzers.
 
-The time of each fault is drawn with a fixed seed. Agents that are killed are tested in
-test_equal_runs.py and test_arena_runs.py.
+A fixed seed draws the instant of each fault. test_equal_runs.py and test_arena_runs.py
+contain the tests with killed agents.
 """
 
 import os
@@ -19,7 +19,7 @@ from coordinator.islands.events import Advanced
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import NAME, Journal
 from tests.system.fleet import Fleet, agent_processes, size
-from tests.system.stage import wait_until
+from tests.system.workspace import wait_until
 
 pytestmark = [
     pytest.mark.system,
@@ -27,55 +27,57 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
 ]
 
-Stage = Any
+Workspace = Any
 Fleets = Callable[..., Any]
 ROOT = Path(__file__).parents[2]
-ODD_AGENT = Path(__file__).with_name("odd_agent.py")
+MISBEHAVING_AGENT = Path(__file__).with_name("misbehaving_agent.py")
 
 
-def whole(folder: Path) -> int:
-    """Return the length of a finished run's journal [bytes]."""
+def journal_size(folder: Path) -> int:
+    """Return the size of the journal of a finished run [bytes]."""
     return (folder / NAME).stat().st_size
 
 
-def singles(births: int) -> tuple[str, ...]:
+def scenario1_words(births: int) -> tuple[str, ...]:
     return ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
 
 
-HAMLET = ("hamlet.toml", "--seed", "4", "--speed", "10", "--quiet")
+SMALL_ARENA = ("hamlet.toml", "--seed", "4", "--speed", "10", "--quiet")
 
 
-def freeze_and_finish(fleet: Fleet, frozen: int, quiet: Path, seed: int) -> None:
-    """Freeze a process for a third of a run; the run equals an undisturbed one."""
-    share = np.random.default_rng(seed).uniform(0.1, 0.4)
-    fleet.wait_for(share * whole(quiet))
-    os.kill(frozen, signal.SIGSTOP)
-    fleet.wait_for((share + 0.3) * whole(quiet))
-    os.kill(frozen, signal.SIGCONT)
-    fleet.finish()
-    assert compare(quiet, fleet.folder) == []
-
-
-def test_a_worker_is_frozen_and_comes_back(
-    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
+def stop_continue_and_finish(
+    fleet: Fleet, pid: int, reference: Path, seed: int
 ) -> None:
-    fleet = fleet_of(stage, *singles(births))
-    frozen = fleet.join("one")
+    """Stop a process for a third of a run; check that the run equals a reference."""
+    share = np.random.default_rng(seed).uniform(0.1, 0.4)
+    fleet.wait_for(share * journal_size(reference))
+    os.kill(pid, signal.SIGSTOP)
+    fleet.wait_for((share + 0.3) * journal_size(reference))
+    os.kill(pid, signal.SIGCONT)
+    fleet.finish()
+    assert compare(reference, fleet.folder) == []
+
+
+def test_stopping_and_continuing_a_worker_gives_an_equal_run(
+    workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets
+) -> None:
+    fleet = fleet_of(workspace, *scenario1_words(births))
+    stopped = fleet.join("one")
     fleet.join("two")
     fleet.begin(workers=2)
-    freeze_and_finish(fleet, frozen, undisturbed, seed=21)
+    stop_continue_and_finish(fleet, stopped, undisturbed, seed=21)
 
 
 @pytest.mark.slow
-def test_the_holder_of_an_arena_is_frozen_and_comes_back(
-    hamlet_stage: Stage, quiet_hamlet: Path, fleet_of: Fleets
+def test_stopping_and_continuing_the_holder_of_an_arena_gives_an_equal_run(
+    small_arena_workspace: Workspace, small_arena_run: Path, fleet_of: Fleets
 ) -> None:
-    fleet = fleet_of(hamlet_stage, *HAMLET)
+    fleet = fleet_of(small_arena_workspace, *SMALL_ARENA)
     # The first by name is the holder.
-    frozen = fleet.join("one")
+    stopped = fleet.join("one")
     fleet.join("two")
     fleet.begin(workers=2)
-    freeze_and_finish(fleet, frozen, quiet_hamlet, seed=22)
+    stop_continue_and_finish(fleet, stopped, small_arena_run, seed=22)
     with Journal.open(fleet.folder) as journal:
         events = journal.replay()
     holders = {
@@ -84,43 +86,44 @@ def test_the_holder_of_an_arena_is_frozen_and_comes_back(
     assert holders == {"one", "two"}
 
 
-def test_an_analyzer_is_lost_while_another_is_there(
-    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
+def test_losing_one_of_two_analyzers_gives_an_equal_run(
+    workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:
-    fleet = fleet_of(stage, *singles(births))
+    fleet = fleet_of(workspace, *scenario1_words(births))
     fleet.join("judge", "analyzer")
     fleet.join("another", "analyzer")
     fleet.join("one")
     share = np.random.default_rng(23).uniform(0.1, 0.7)
-    fleet.wait_for(share * whole(undisturbed))
+    fleet.wait_for(share * journal_size(undisturbed))
     fleet.kill("judge")
     fleet.finish()
     assert compare(undisturbed, fleet.folder) == []
 
 
-def test_the_only_analyzer_is_lost_and_replaced(
-    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
+def test_replacing_the_only_analyzer_gives_an_equal_run(
+    workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:
-    fleet = fleet_of(stage, *singles(births))
+    fleet = fleet_of(workspace, *scenario1_words(births))
     fleet.join("judge", "analyzer")
     fleet.join("one")
     share = np.random.default_rng(24).uniform(0.1, 0.7)
-    fleet.wait_for(share * whole(undisturbed))
+    fleet.wait_for(share * journal_size(undisturbed))
     fleet.kill("judge")
     fleet.join("another", "analyzer")
     fleet.finish()
     assert compare(undisturbed, fleet.folder) == []
 
 
-def test_a_run_replaces_its_only_worker_when_somebody_asks_it_to_end(
-    stage: Stage, undisturbed: Path, births: int
+def test_run_replaces_its_only_worker_after_sigterm(
+    workspace: Workspace, undisturbed: Path, births: int
 ) -> None:
-    folder = stage.folder / "run"
-    words = (*singles(births), "--workers", "1", "--out", "run")
-    command = stage.start("run", *words)
+    folder = workspace.folder / "run"
+    words = (*scenario1_words(births), "--workers", "1", "--out", "run")
+    command = workspace.start("run", *words)
     share = np.random.default_rng(25).uniform(0.1, 0.7)
     wait_until(
-        lambda: size(folder) > share * whole(undisturbed), "the run is on its way"
+        lambda: size(folder) > share * journal_size(undisturbed),
+        "the run is on its way",
     )
     os.kill(agent_processes(command.pid)[-1], signal.SIGTERM)
     wait_until(lambda: command.poll() is not None, "the run ends")
@@ -129,23 +132,27 @@ def test_a_run_replaces_its_only_worker_when_somebody_asks_it_to_end(
 
 
 @pytest.mark.parametrize("behaviour", ["twice", "late"])
-def test_answers_come_twice_or_late(
-    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets, behaviour: str
+def test_duplicate_and_late_answers_give_an_equal_run(
+    workspace: Workspace,
+    undisturbed: Path,
+    births: int,
+    fleet_of: Fleets,
+    behaviour: str,
 ) -> None:
-    fleet = fleet_of(stage, *singles(births))
+    fleet = fleet_of(workspace, *scenario1_words(births))
     fleet.join("one")
-    command = [sys.executable, str(ODD_AGENT), fleet.address, behaviour]
+    command = [sys.executable, str(MISBEHAVING_AGENT), fleet.address, behaviour]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     with subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, text=True
-    ) as odd:
+    ) as agent_process:
         try:
             fleet.begin(workers=2)
             fleet.finish()
         finally:
-            odd.terminate()
-        assert odd.stdout is not None
-        did = odd.stdout.read().split()
-    assert did[0] == behaviour
-    assert int(did[1]) > 0
+            agent_process.terminate()
+        assert agent_process.stdout is not None
+        report = agent_process.stdout.read().split()
+    assert report[0] == behaviour
+    assert int(report[1]) > 0
     assert compare(undisturbed, fleet.folder) == []

@@ -1,7 +1,7 @@
-"""The coordinator is killed, or freezes while another one resumes its run.
+"""Faults of the coordinator: kills at random instants, and a replacement while stopped.
 
-Kills of a coordinator with its own network are tested in test_equal_runs.py and
-test_arena_runs.py. Here there are many kills, at arbitrary instants.
+test_equal_runs.py and test_arena_runs.py kill coordinators that have a network. These
+tests kill many processes at instants that are independent of the journal.
 """
 
 import os
@@ -26,13 +26,13 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
 ]
 
-Stage = Any
+Workspace = Any
 Fleets = Callable[..., Any]
 PATIENCE_S = 120
 ROOT = Path(__file__).parents[2]
-MORTAL = Path(__file__).with_name("mortal.py")
+KILLABLE = Path(__file__).with_name("killable.py")
 
-SINGLES = """
+OFF_LINE = """
 name = "singles"
 births = 40
 [selection]
@@ -45,14 +45,14 @@ window_steps = 400
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "kills", "seed"), [("off", 40, 41), ("on", 20, 42)])
-def test_killed_at_any_point(
-    tmp_path: Path, hamlet_document: str, kind: str, kills: int, seed: int
+def test_kills_at_random_instants_give_equal_runs(
+    tmp_path: Path, small_arena_document: str, kind: str, kills: int, seed: int
 ) -> None:
-    """Sixty kills in all, each at a random instant of up to half a run."""
-    document = SINGLES if kind == "off" else hamlet_document
+    """Sixty kills in total, each after up to half the time of a whole run."""
+    document = OFF_LINE if kind == "off" else small_arena_document
     (tmp_path / "mine.toml").write_text(document)
     done = subprocess.run(
-        [sys.executable, str(MORTAL), "mine.toml", str(kills), str(seed)],
+        [sys.executable, str(KILLABLE), "mine.toml", str(kills), str(seed)],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
@@ -71,10 +71,12 @@ def test_killed_at_any_point(
         assert compare(tmp_path / "whole", run) == []
 
 
-def frozen(stage: Stage, fleet_of: Fleets, undisturbed: Path, births: int) -> Any:  # noqa: ANN401 - a fleet
-    """Return a fleet whose coordinator is frozen at some point of its run."""
+def stopped_coordinator(
+    workspace: Workspace, fleet_of: Fleets, undisturbed: Path, births: int
+) -> Any:  # noqa: ANN401 - a fleet
+    """Return a fleet whose coordinator is stopped by SIGSTOP during its run."""
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
-    fleet = fleet_of(stage, *words)
+    fleet = fleet_of(workspace, *words)
     fleet.join("judge", "analyzer")
     fleet.join("one")
     share = np.random.default_rng(43).uniform(0.2, 0.5)
@@ -83,26 +85,26 @@ def frozen(stage: Stage, fleet_of: Fleets, undisturbed: Path, births: int) -> An
     return fleet
 
 
-def test_one_that_sleeps_still_holds_its_run(
-    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets
+def test_stopped_coordinator_keeps_the_lock_of_its_run(
+    workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets
 ) -> None:
-    fleet = frozen(stage, fleet_of, undisturbed, births)
-    said = stage.run("resume", "run", "--quiet", code=2)
-    assert f"in use by process {fleet.coordinator.pid} on " in said
-    assert len(said.strip().splitlines()) == 1
+    fleet = stopped_coordinator(workspace, fleet_of, undisturbed, births)
+    output = workspace.run("resume", "run", "--quiet", code=2)
+    assert f"in use by process {fleet.coordinator.pid} on " in output
+    assert len(output.strip().splitlines()) == 1
     fleet.coordinator.send_signal(signal.SIGCONT)
     fleet.finish()
     assert compare(undisturbed, fleet.folder) == []
 
 
 @pytest.mark.parametrize("when", ["meanwhile", "afterwards"])
-def test_one_that_wakes_up_replaced_stops_and_writes_nothing(
-    stage: Stage, undisturbed: Path, births: int, fleet_of: Fleets, when: str
+def test_continued_coordinator_exits_and_writes_nothing_after_a_takeover(
+    workspace: Workspace, undisturbed: Path, births: int, fleet_of: Fleets, when: str
 ) -> None:
-    """On file systems without locks the epoch detects the replacement."""
-    fleet = frozen(stage, fleet_of, undisturbed, births)
+    """The epoch detects a takeover on file systems without locks."""
+    fleet = stopped_coordinator(workspace, fleet_of, undisturbed, births)
     (fleet.folder / LOCK).unlink()
-    second = stage.start("resume", "run", "--workers", "1", "--quiet")
+    second = workspace.start("resume", "run", "--workers", "1", "--quiet")
     whole = (undisturbed / NAME).stat().st_size
     if when == "meanwhile":
         position = (fleet.folder / NAME).stat().st_size + 0.1 * whole
@@ -114,6 +116,6 @@ def test_one_that_wakes_up_replaced_stops_and_writes_nothing(
     assert fleet.coordinator.returncode == 2, err
     assert "coordinator 2 has taken it over" in err
     assert "Traceback" not in err
-    said = second.communicate(timeout=PATIENCE_S)
-    assert second.returncode == 0, said
+    output = second.communicate(timeout=PATIENCE_S)
+    assert second.returncode == 0, output
     assert compare(undisturbed, fleet.folder) == []

@@ -1,6 +1,6 @@
-"""Journal that is cut or damaged: the commands in the error message repair it.
+"""Recovery from a truncated or damaged journal with the printed instructions.
 
-A full disk is tested in test_bad_input.py.
+test_bad_input.py tests full disks.
 """
 
 import re
@@ -19,16 +19,18 @@ from coordinator.storage.journal import NAME
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Stage = Any
+Workspace = Any
 Until = Callable[[Callable[[], bool], str], None]
 
 
 @pytest.fixture
-def half(stage: Stage, undisturbed: Path, births: int, until: Until) -> Path:
-    """Return the journal of a run that was killed before its end."""
+def partial_journal(
+    workspace: Workspace, undisturbed: Path, births: int, until: Until
+) -> Path:
+    """Return the journal of a run that was killed after a third of it."""
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
-    run = stage.start("run", *words, "--in-process", "--out", "run")
-    journal: Path = stage.folder / "run" / NAME
+    run = workspace.start("run", *words, "--in-process", "--out", "run")
+    journal: Path = workspace.folder / "run" / NAME
     whole = (undisturbed / NAME).stat().st_size
     until(
         lambda: journal.exists() and journal.stat().st_size > whole // 3,
@@ -39,25 +41,31 @@ def half(stage: Stage, undisturbed: Path, births: int, until: Until) -> Path:
     return journal
 
 
-def test_a_journal_that_is_cut(stage: Stage, undisturbed: Path, half: Path) -> None:
-    size = half.stat().st_size
-    with half.open("r+b") as file:
+def test_truncated_journal_is_repaired_by_resume(
+    workspace: Workspace, undisturbed: Path, partial_journal: Path
+) -> None:
+    size = partial_journal.stat().st_size
+    with partial_journal.open("r+b") as file:
         file.truncate(size - int(np.random.default_rng(51).integers(1, 60)))
-    said = stage.run("resume", "run", "--in-process", "--quiet")
-    assert re.search(r"dropped a cut record of \d+ bytes", said)
-    assert compare(undisturbed, half.parent) == []
+    output = workspace.run("resume", "run", "--in-process", "--quiet")
+    assert re.search(r"dropped a cut record of \d+ bytes", output)
+    assert compare(undisturbed, partial_journal.parent) == []
 
 
-def test_a_journal_that_is_damaged(stage: Stage, undisturbed: Path, half: Path) -> None:
-    data = bytearray(half.read_bytes())
-    place = int(np.random.default_rng(52).integers(len(data) // 4, len(data) // 2))
-    data[place] ^= 0xFF
-    half.write_bytes(data)
-    said = stage.run("resume", "run", "--in-process", "--quiet", code=2)
-    assert "Traceback" not in said
-    told = re.search(r"damaged at byte (\d+) .*\('(truncate -s \1 [^']+)'\)", said)
-    assert told is not None
-    assert int(told[1]) <= place
-    subprocess.run(shlex.split(told[2]), cwd=stage.folder, check=True)
-    stage.run("resume", "run", "--in-process", "--quiet")
-    assert compare(undisturbed, half.parent) == []
+def test_damaged_journal_is_repaired_by_the_printed_command(
+    workspace: Workspace, undisturbed: Path, partial_journal: Path
+) -> None:
+    data = bytearray(partial_journal.read_bytes())
+    position = int(np.random.default_rng(52).integers(len(data) // 4, len(data) // 2))
+    data[position] ^= 0xFF
+    partial_journal.write_bytes(data)
+    output = workspace.run("resume", "run", "--in-process", "--quiet", code=2)
+    assert "Traceback" not in output
+    instruction = re.search(
+        r"damaged at byte (\d+) .*\('(truncate -s \1 [^']+)'\)", output
+    )
+    assert instruction is not None
+    assert int(instruction[1]) <= position
+    subprocess.run(shlex.split(instruction[2]), cwd=workspace.folder, check=True)
+    workspace.run("resume", "run", "--in-process", "--quiet")
+    assert compare(undisturbed, partial_journal.parent) == []

@@ -1,7 +1,7 @@
-"""The network between machines is cut and restored; namespaces act as machines.
+"""Interruptions of the network between machines, which network namespaces simulate.
 
-One cable connects two namespaces: that of the coordinator and that of a remote worker.
-A worker without connection counts as lost after the lease, and others get its jobs.
+A cable connects two namespaces: that of the coordinator and that of a remote worker. A
+disconnected worker counts as lost after its lease; other workers get its jobs.
 """
 
 import os
@@ -20,7 +20,7 @@ from coordinator.storage.compare import compare
 from coordinator.storage.journal import NAME, Journal
 from schema.agent.network import Tls
 
-Stage = Any
+Workspace = Any
 Fleets = Callable[..., Any]
 Certify = Callable[[Path, str, str, str], Tls]
 
@@ -58,7 +58,7 @@ class Cable:
     def cut(self) -> None:
         ip(f"-n {self.far} link set wire down")
 
-    def heal(self) -> None:
+    def reconnect(self) -> None:
         ip(f"-n {self.far} link set wire up")
 
 
@@ -84,69 +84,69 @@ def cable() -> Iterator[Cable]:
 
 
 @dataclass(frozen=True)
-class Distant:
-    """Network namespaces and flags for a coordinator and a worker on two machines."""
+class RemoteFleets:
+    """Makes fleets with a coordinator and a worker on two machines."""
 
     cable: Cable
     certify: Certify
     fleet_of: Fleets
 
-    def fleet(self, stage: Stage, *words: str) -> tuple[Any, list[str]]:
-        """Return a fleet with a remote worker, and the flags of all."""
-        tls = self.certify(stage.folder, "machine", "ca", HOST)
+    def fleet(self, workspace: Workspace, *words: str) -> tuple[Any, list[str]]:
+        """Return a fleet with a remote worker, and the TLS flags of all processes."""
+        tls = self.certify(workspace.folder, "machine", "ca", HOST)
         flags = ["--tls-ca", tls.ca, "--tls-certificate", tls.certificate]
         flags += ["--tls-key", tls.key]
         listen, near = f"tls/{HOST}:{PORT}", self.cable.near
-        fleet = self.fleet_of(stage, *words, *flags, listen=listen, inside=near)
+        fleet = self.fleet_of(workspace, *words, *flags, listen=listen, inside=near)
         fleet.join("far", "worker", *flags, inside=self.cable.far)
         return fleet, flags
 
 
 @pytest.fixture
-def distant(cable: Cable, certify: Certify, fleet_of: Fleets) -> Distant:
-    return Distant(cable, certify, fleet_of)
+def remote_fleets(cable: Cable, certify: Certify, fleet_of: Fleets) -> RemoteFleets:
+    return RemoteFleets(cable, certify, fleet_of)
 
 
-def heard(process: Any, what: str) -> None:  # noqa: ANN401 - a process with pipes
-    """Wait until a process prints a text."""
+def wait_for_line(process: Any, text: str) -> None:  # noqa: ANN401 - a process with pipes
+    """Wait until a process writes a line that contains a text."""
     lines = [process.stderr.readline()]
-    while what not in lines[-1]:
+    while text not in lines[-1]:
         assert lines[-1], lines
         lines.append(process.stderr.readline())
 
 
-def test_a_worker_is_cut_off_and_comes_back(
-    stage: Stage, undisturbed: Path, births: int, distant: Distant
+def test_disconnecting_a_worker_gives_an_equal_run(
+    workspace: Workspace, undisturbed: Path, births: int, remote_fleets: RemoteFleets
 ) -> None:
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
-    fleet, flags = distant.fleet(stage, *words)
-    fleet.join("judge", "analyzer", *flags, inside=distant.cable.near)
+    fleet, flags = remote_fleets.fleet(workspace, *words)
+    fleet.join("judge", "analyzer", *flags, inside=remote_fleets.cable.near)
     share = np.random.default_rng(31).uniform(0.1, 0.7)
     fleet.wait_for(share * (undisturbed / NAME).stat().st_size)
-    distant.cable.cut()
-    heard(fleet.agents["far"], "no coordinator at")
+    remote_fleets.cable.cut()
+    wait_for_line(fleet.agents["far"], "no coordinator at")
     assert not fleet.is_over
-    distant.cable.heal()
-    heard(fleet.agents["far"], "connected to")
+    remote_fleets.cable.reconnect()
+    wait_for_line(fleet.agents["far"], "connected to")
     fleet.finish()
     assert compare(undisturbed, fleet.folder) == []
 
 
-def test_an_arena_moves_when_its_holder_is_cut_off(
-    hamlet_stage: Stage, quiet_hamlet: Path, distant: Distant
+def test_arena_moves_to_another_worker_when_its_holder_is_disconnected(
+    small_arena_workspace: Workspace, small_arena_run: Path, remote_fleets: RemoteFleets
 ) -> None:
     words = ("hamlet.toml", "--seed", "4", "--speed", "10", "--quiet")
-    fleet, flags = distant.fleet(hamlet_stage, *words)
-    whole = (quiet_hamlet / NAME).stat().st_size
+    fleet, flags = remote_fleets.fleet(small_arena_workspace, *words)
+    whole = (small_arena_run / NAME).stat().st_size
     share = np.random.default_rng(32).uniform(0.1, 0.5)
-    fleet.join("judge", "analyzer", *flags, inside=distant.cable.near)
+    fleet.join("judge", "analyzer", *flags, inside=remote_fleets.cable.near)
     fleet.wait_for(share * whole)
-    distant.cable.cut()
-    fleet.join("near", "worker", *flags, inside=distant.cable.near)
+    remote_fleets.cable.cut()
+    fleet.join("near", "worker", *flags, inside=remote_fleets.cable.near)
     fleet.wait_for((share + 0.3) * whole)
-    distant.cable.heal()
+    remote_fleets.cable.reconnect()
     fleet.finish()
-    assert compare(quiet_hamlet, fleet.folder) == []
+    assert compare(small_arena_run, fleet.folder) == []
     with Journal.open(fleet.folder) as journal:
         events = journal.replay()
     advances = [event for event in events if isinstance(event, Advanced)]

@@ -1,4 +1,4 @@
-"""Archipelagos are repeatable: with any number of workers and any kills."""
+"""Repeatability with islands: equal runs for any number of workers and any kill."""
 
 import os
 import signal
@@ -15,7 +15,7 @@ from schema.tables.files import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Stage = Any
+Workspace = Any
 Until = Callable[[Callable[[], bool], str], None]
 
 RING = """
@@ -85,93 +85,112 @@ def size(folder: Path) -> int:
     return journal.stat().st_size if journal.exists() else 0
 
 
-class Play:
-    """Runs of one experiment; the first is undisturbed."""
+class ComparedRuns:
+    """Runs of an experiment; the first is the undisturbed reference."""
 
-    def __init__(self, stage: Stage, until: Until, name: str, text: str) -> None:
-        self.stage, self.until, self.name = stage, until, name
-        (stage.folder / f"{name}.toml").write_text(text, encoding="utf-8")
-        stage.run("run", *words(name, "calm"), "--workers", "1")
-        self.calm = stage.folder / "calm"
+    def __init__(
+        self, workspace: Workspace, until: Until, name: str, text: str
+    ) -> None:
+        self.workspace, self.until, self.name = workspace, until, name
+        (workspace.folder / f"{name}.toml").write_text(text, encoding="utf-8")
+        workspace.run("run", *words(name, "calm"), "--workers", "1")
+        self.reference = workspace.folder / "calm"
 
-    def resumed(self, out: str, share: float, *, workers: int) -> list[str]:
-        """Kill a coordinator during a run; return what differs after its resume."""
-        folder = self.stage.folder / out
+    def differences_after_resume(
+        self, out: str, share: float, *, workers: int
+    ) -> list[str]:
+        """Kill and resume a coordinator; return the differences from the reference."""
+        folder = self.workspace.folder / out
         count = "--workers", str(workers)
-        first = self.stage.start("run", *words(self.name, out), *count)
+        first = self.workspace.start("run", *words(self.name, out), *count)
         self.until(
-            lambda: size(folder) > share * size(self.calm) or first.poll() is not None,
+            lambda: (
+                size(folder) > share * size(self.reference) or first.poll() is not None
+            ),
             "the run is on its way",
         )
         first.kill()
         first.wait()
-        self.stage.run("resume", out, "--quiet", "--workers", str(4 - workers))
-        return compare(self.calm, folder)
+        self.workspace.run("resume", out, "--quiet", "--workers", str(4 - workers))
+        return compare(self.reference, folder)
 
-    def bereft(self, out: str, shares: Iterator[float], *, workers: int) -> list[str]:
-        """Kill all workers but one, one by one; return what differs at the end."""
-        folder = self.stage.folder / out
+    def differences_after_worker_kills(
+        self, out: str, shares: Iterator[float], *, workers: int
+    ) -> list[str]:
+        """Kill all workers but one in turn; return differences from the reference."""
+        folder = self.workspace.folder / out
         listen = "--listen", "tcp/127.0.0.1:0"
-        coordinator = self.stage.start("coordinator", *words(self.name, out), *listen)
+        coordinator = self.workspace.start(
+            "coordinator", *words(self.name, out), *listen
+        )
         self.until((folder / "address").exists, "the coordinator listens")
         address = (folder / "address").read_text().strip()
-        self.stage.start("analyzer", "--connect", address)
+        self.workspace.start("analyzer", "--connect", address)
         process_pool = [
-            self.stage.start("worker", "--connect", address, "--processes", "1")
+            self.workspace.start("worker", "--connect", address, "--processes", "1")
             for _ in range(workers)
         ]
-        for one, share in zip(process_pool[1:], shares, strict=False):
+        for process, share in zip(process_pool[1:], shares, strict=False):
             self.until(
                 lambda share=share: (  # type: ignore[misc]
-                    size(folder) > share * size(self.calm)
+                    size(folder) > share * size(self.reference)
                     or coordinator.poll() is not None
                 ),
                 "the run is on its way",
             )
-            # First the process that would revive the worker, stopped, then both.
-            one.send_signal(signal.SIGSTOP)
-            found = Path(f"/proc/{one.pid}/task/{one.pid}/children").read_text()
-            for pid in (*found.split(), one.pid):
+            # Stop the parent that would restart the worker, then kill both.
+            process.send_signal(signal.SIGSTOP)
+            found = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text()
+            for pid in (*found.split(), process.pid):
                 os.kill(int(pid), signal.SIGKILL)
         self.until(lambda: coordinator.poll() is not None, "the run ends")
         assert coordinator.returncode == 0, coordinator.communicate()
-        return compare(self.calm, folder)
+        return compare(self.reference, folder)
 
 
-def test_a_ring_of_eight_islands_gives_five_equal_runs(
-    stage: Stage, until: Until
+def test_runs_of_a_ring_of_eight_islands_are_equal(
+    workspace: Workspace, until: Until
 ) -> None:
-    play = Play(stage, until, "ring", RING)
-    draws = np.random.default_rng(7)
-    assert read_table(play.calm, "migrations").num_rows == 8 * 2 * 2
-    assert play.resumed("two", draws.uniform(0.1, 0.5), workers=2) == []
-    assert play.resumed("one", draws.uniform(0.5, 0.9), workers=1) == []
-    shares = iter(sorted(draws.uniform(0.1, 0.9, 2)))
-    assert play.bereft("three", shares, workers=3) == []
-    stage.run("run", *words("ring", "three-calm"), "--workers", "3")
-    assert compare(play.calm, stage.folder / "three-calm") == []
+    runs = ComparedRuns(workspace, until, "ring", RING)
+    rng = np.random.default_rng(7)
+    assert read_table(runs.reference, "migrations").num_rows == 8 * 2 * 2
+    assert runs.differences_after_resume("two", rng.uniform(0.1, 0.5), workers=2) == []
+    assert runs.differences_after_resume("one", rng.uniform(0.5, 0.9), workers=1) == []
+    shares = iter(sorted(rng.uniform(0.1, 0.9, 2)))
+    assert runs.differences_after_worker_kills("three", shares, workers=3) == []
+    workspace.run("run", *words("ring", "three-calm"), "--workers", "3")
+    assert compare(runs.reference, workspace.folder / "three-calm") == []
 
 
-def test_two_arenas_outlive_a_worker_and_a_coordinator(
-    stage: Stage, until: Until
+def test_two_arenas_survive_kills_of_a_worker_and_a_coordinator(
+    workspace: Workspace, until: Until
 ) -> None:
-    play = Play(stage, until, "arenas", ARENAS)
-    draws = np.random.default_rng(8)
-    moved = read_table(play.calm, "migrations")
-    assert moved.num_rows > 2
-    deaths = read_table(play.calm, "deaths")["reason"].to_pylist()
-    assert deaths.count("migrated") == moved.num_rows
-    abroad = read_table(play.calm, "poses")["birth_island"].drop_null()
-    assert len(abroad)
-    assert play.bereft("bereft", iter([draws.uniform(0.2, 0.8)]), workers=2) == []
-    assert play.resumed("resumed", draws.uniform(0.2, 0.8), workers=2) == []
+    runs = ComparedRuns(workspace, until, "arenas", ARENAS)
+    rng = np.random.default_rng(8)
+    migrations = read_table(runs.reference, "migrations")
+    assert migrations.num_rows > 2
+    deaths = read_table(runs.reference, "deaths")["reason"].to_pylist()
+    assert deaths.count("migrated") == migrations.num_rows
+    birth_islands = read_table(runs.reference, "poses")["birth_island"].drop_null()
+    assert len(birth_islands)
+    assert (
+        runs.differences_after_worker_kills(
+            "bereft", iter([rng.uniform(0.2, 0.8)]), workers=2
+        )
+        == []
+    )
+    assert (
+        runs.differences_after_resume("resumed", rng.uniform(0.2, 0.8), workers=2) == []
+    )
 
 
-def test_an_off_line_island_and_an_arena(stage: Stage, until: Until) -> None:
-    play = Play(stage, until, "mixed", MIXED)
-    judged = read_table(play.calm, "evaluations")["birth_island"].drop_null()
-    assert set(judged.to_pylist()) == {1}
-    lived = read_table(play.calm, "fitness")["birth_island"].drop_null()
-    assert set(lived.to_pylist()) == {0}
+def test_off_line_island_and_arena_exchange_robots_and_resume(
+    workspace: Workspace, until: Until
+) -> None:
+    runs = ComparedRuns(workspace, until, "mixed", MIXED)
+    evaluated = read_table(runs.reference, "evaluations")["birth_island"].drop_null()
+    assert set(evaluated.to_pylist()) == {1}
+    immigrants = read_table(runs.reference, "fitness")["birth_island"].drop_null()
+    assert set(immigrants.to_pylist()) == {0}
     share = np.random.default_rng(9).uniform(0.3, 0.7)
-    assert play.resumed("resumed", share, workers=2) == []
+    assert runs.differences_after_resume("resumed", share, workers=2) == []

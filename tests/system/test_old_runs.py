@@ -1,7 +1,7 @@
-"""Runs and documents that commit 3063df1 wrote: today's code opens and resumes them.
+"""Checks that the current code reads and resumes runs and documents of commit 3063df1.
 
-``tests/data/runs-3063df1/README.md`` says how they were made. Tables are compared with
-pyarrow alone: column names, and which of them repeat, are those of the old files.
+``tests/data/runs-3063df1/README.md`` describes how they were made. Tables are compared
+with pyarrow only: the old files determine the columns and which of them are repeatable.
 """
 
 import os
@@ -14,11 +14,11 @@ import pyarrow as pa
 import pytest
 from pyarrow.parquet import ParquetFile
 
-from tests.system.stage import PATIENCE_S, Stage
+from tests.system.workspace import PATIENCE_S, Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 
-Once = Callable[[str, Callable[[Stage], object]], Path]
+Once = Callable[[str, Callable[[Workspace], object]], Path]
 
 ROOT = Path(__file__).parents[2]
 RUNS = ROOT / "tests" / "data" / "runs-3063df1"
@@ -39,23 +39,23 @@ FILLED = {
         "runs",
     },
 }
-"""Tables with rows, of each undisturbed run."""
+"""Tables that have rows in each undisturbed run."""
 
-# A drift is allowed and without effect where the platform is the recorded one. An arena
-# that drifts waits half a minute for a worker of its own platform first.
+# --allow-drift has no effect on the recorded platform. On another platform an arena
+# first waits half a minute for a worker of the recorded one.
 RESUME = ("--workers", "1", "--threads", "1", "--quiet", "--allow-drift")
 
 each_run = pytest.mark.parametrize("name", list(BIRTHS))
 
 
 def unpack(name: str, folder: Path) -> None:
-    """Write the folders ``killed`` and ``undisturbed`` of a run into a folder."""
+    """Extract the folders ``killed`` and ``undisturbed`` of a run into a folder."""
     with ZipFile(RUNS / f"{name}.zip") as archive:
         archive.extractall(folder)
 
 
 def tables(folder: Path) -> dict[str, pa.Table]:
-    """Return the tables of a finished run by name, as they are in its files."""
+    """Return the tables in the files of a finished run by name."""
     files = sorted((folder / "tables").glob("*/*/*.parquet"))
     return {file.stem: ParquetFile(file).read() for file in files}
 
@@ -69,10 +69,10 @@ def repeatable(schema: pa.Schema) -> list[str]:
 
 
 def differences(old: pa.Table, new: pa.Table) -> list[str]:
-    """Return the repeatable columns of an old table that a new one has otherwise.
+    """Return the repeatable columns of an old table that differ in a new one.
 
-    A difference is a missing column or another value. Floats are compared by their
-    text: to the last bit, and a NaN equals itself.
+    A difference is a missing column or another value. Floats are compared as text, that
+    is, exactly, and NaN equals NaN.
     """
     return [
         name
@@ -88,24 +88,24 @@ def platform(found: dict[str, pa.Table]) -> str:
     return str(tag)
 
 
-def births_said(status: str, name: str) -> int:
-    """Return how many births ``revolve status`` counts in a run."""
-    (said,) = {
+def births_in_status(status: str, name: str) -> int:
+    """Return the number of births of a run in the output of ``revolve status``."""
+    (count,) = {
         int(births)
         for births, wanted in re.findall(r"(\d+) of (\d+)", status)
         if int(wanted) == BIRTHS[name]
     }
-    return said
+    return count
 
 
 @pytest.fixture(scope="session")
 def resumed(once: Once) -> Callable[[str], Path]:
-    """Return a function name -> folders of a run; the killed run is resumed."""
+    """Return a function that resumes a killed run and returns the parent folder."""
 
     def make(name: str) -> Path:
-        def build(stage: Stage) -> None:
-            unpack(name, stage.folder)
-            stage.run("resume", "killed", *RESUME)
+        def build(workspace: Workspace) -> None:
+            unpack(name, workspace.folder)
+            workspace.run("resume", "killed", *RESUME)
 
         return once(f"old-{name}", build)
 
@@ -113,7 +113,7 @@ def resumed(once: Once) -> Callable[[str], Path]:
 
 
 @each_run
-def test_a_killed_run_resumes_to_the_tables_of_the_undisturbed_one(
+def test_killed_run_resumes_to_the_tables_of_the_undisturbed_run(
     resumed: Callable[[str], Path], name: str
 ) -> None:
     folder = resumed(name)
@@ -130,7 +130,7 @@ def test_a_killed_run_resumes_to_the_tables_of_the_undisturbed_one(
 
 
 @each_run
-def test_the_comparison_sees_what_differs(
+def test_comparison_detects_differences(
     resumed: Callable[[str], Path], name: str
 ) -> None:
     births = tables(resumed(name) / "undisturbed")["births"]
@@ -145,95 +145,103 @@ def test_the_comparison_sees_what_differs(
 
 
 @each_run
-def test_commands_read_runs_as_they_were_left(stage: Stage, name: str) -> None:
-    unpack(name, stage.folder)
-    born = births_said(stage.run("status", "killed"), name)
-    assert 0 < born < BIRTHS[name]
-    assert births_said(stage.run("status", "undisturbed"), name) == BIRTHS[name]
-    assert f"births: {born} rows against {BIRTHS[name]}" in stage.run(
+def test_commands_read_old_runs_without_a_resume(
+    workspace: Workspace, name: str
+) -> None:
+    unpack(name, workspace.folder)
+    births = births_in_status(workspace.run("status", "killed"), name)
+    assert 0 < births < BIRTHS[name]
+    assert (
+        births_in_status(workspace.run("status", "undisturbed"), name) == BIRTHS[name]
+    )
+    assert f"births: {births} rows against {BIRTHS[name]}" in workspace.run(
         "compare", "killed", "undisturbed", code=1
     )
     for kind in ("killed", "undisturbed"):
-        stage.run("view", kind, "--save", f"{kind}.rrd")
-        assert (stage.folder / f"{kind}.rrd").stat().st_size
-    # Finished is finished: nothing is begun again.
-    before = tables(stage.folder / "undisturbed")
-    stage.run("resume", "undisturbed", *RESUME)
-    after = tables(stage.folder / "undisturbed")
+        workspace.run("view", kind, "--save", f"{kind}.rrd")
+        assert (workspace.folder / f"{kind}.rrd").stat().st_size
+    # Resuming a finished run does not change its tables.
+    before = tables(workspace.folder / "undisturbed")
+    workspace.run("resume", "undisturbed", *RESUME)
+    after = tables(workspace.folder / "undisturbed")
     assert all(before[table].equals(after[table]) for table in before)
 
 
 @each_run
 def test_compare_reads_a_resumed_run(
-    resumed: Callable[[str], Path], stage: Stage, name: str
+    resumed: Callable[[str], Path], workspace: Workspace, name: str
 ) -> None:
     folder = resumed(name)
     if len({platform(tables(folder / kind)) for kind in FOLDERS}) > 1:
         pytest.skip("runs of two platforms may differ")
-    stage.run("compare", *(str(folder / kind) for kind in FOLDERS))
+    workspace.run("compare", *(str(folder / kind) for kind in FOLDERS))
 
 
 @pytest.mark.slow
-def test_they_are_analysed(resumed: Callable[[str], Path], stage: Stage) -> None:
-    """The archipelago has islands of both kinds."""
+def test_resumed_archipelago_is_analysed(
+    resumed: Callable[[str], Path], workspace: Workspace
+) -> None:
+    """Analyze the archipelago, which has islands of both kinds."""
     folder = resumed("archipelago")
     report = ("--out", "report", "--processes", "1")
-    stage.run("analyze", str(folder / "killed"), *report)
-    assert (stage.folder / "report" / "report.html").stat().st_size
-    measures = {path.stem: path for path in stage.folder.glob("report/*/*.parquet")}
+    workspace.run("analyze", str(folder / "killed"), *report)
+    assert (workspace.folder / "report" / "report.html").stat().st_size
+    measures = {path.stem: path for path in workspace.folder.glob("report/*/*.parquet")}
     runs = ParquetFile(measures["runs"]).read()
     assert sum(runs["births"].to_pylist()) == BIRTHS["archipelago"]
 
 
 @pytest.mark.slow
-def test_an_arena_resumes_on_another_platform(stage: Stage) -> None:
-    """The run continues and the drift is recorded; equality ends there."""
-    unpack("arena", stage.folder)
-    (stage.folder / "sitecustomize.py").write_text(
+def test_arena_resumes_on_another_platform(workspace: Workspace) -> None:
+    """The run continues without bitwise equality and records the drift."""
+    unpack("arena", workspace.folder)
+    (workspace.folder / "sitecustomize.py").write_text(
         "import platform\nplatform.machine = lambda: 'another'\n"
     )
-    path = os.pathsep.join([str(stage.folder), str(ROOT)])
-    process = stage.start("resume", "killed", *RESUME, environment={"PYTHONPATH": path})
+    path = os.pathsep.join([str(workspace.folder), str(ROOT)])
+    process = workspace.start(
+        "resume", "killed", *RESUME, environment={"PYTHONPATH": path}
+    )
     out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 0, out + err
-    old, new = (tables(stage.folder / kind) for kind in FOLDERS)
+    old, new = (tables(workspace.folder / kind) for kind in FOLDERS)
     assert platform(old) != platform(new)
     assert new["drifts"].num_rows == 1
     assert new["births"].num_rows == BIRTHS["arena"]
 
 
 @pytest.mark.parametrize("robot", ["parts.yaml", "robogen-parts.yaml", "fitness.xml"])
-def test_robot_files_load(stage: Stage, robot: str) -> None:
+def test_old_robot_files_load(workspace: Workspace, robot: str) -> None:
     experiment = DOCUMENTS / Path(robot).with_suffix(".toml")
     words = (str(DOCUMENTS / robot), "--experiment", str(experiment))
-    assert "16 parts" in stage.run("robot", "check", *words)
+    assert "16 parts" in workspace.run("robot", "check", *words)
 
 
 @pytest.mark.parametrize("name", ["parts", "robogen-parts", "fitness"])
-def test_documents_run(stage: Stage, name: str) -> None:
-    """Every plug-in name of a document is resolved by a run of a few births."""
+def test_old_documents_run(workspace: Workspace, name: str) -> None:
+    """Resolve all names of a document in a run of a few births."""
     document = str(DOCUMENTS / f"{name}.toml")
-    stage.run("run", document, "--in-process", "--quiet", "--out", "run")
-    found = tables(stage.folder / "run")
+    workspace.run("run", document, "--in-process", "--quiet", "--out", "run")
+    found = tables(workspace.folder / "run")
     (text,) = found["runs"]["document"].to_pylist()
-    for path in named(Path(document).read_text("utf-8")):
+    for path in import_paths(Path(document).read_text("utf-8")):
         assert f'"{path}"' in text
 
 
-def test_a_robot_of_before_is_judged_by_the_function_that_its_file_names(
-    stage: Stage,
+def test_old_robot_is_evaluated_with_the_function_of_its_file(
+    workspace: Workspace,
 ) -> None:
-    said = stage.run("robot", "simulate", str(DOCUMENTS / "fitness.xml"))
-    assert "fitness:" in said
+    output = workspace.run("robot", "simulate", str(DOCUMENTS / "fitness.xml"))
+    assert "fitness:" in output
 
 
-def test_documents_name_what_recorded_ones_may_name() -> None:
-    """The public import paths, each with all its names."""
+def test_old_documents_contain_all_permanent_import_paths() -> None:
+    """Check the set of import paths that must not change."""
     texts = [path.read_text("utf-8") for path in DOCUMENTS.glob("*.toml")]
-    found = {path.partition(":")[0] for text in texts for path in named(text)}
+    found = {path.partition(":")[0] for text in texts for path in import_paths(text)}
     assert found == {"schema.parts", "schema.robogen_parts", "worker.fitness"}
 
 
-def named(text: str) -> list[str]:
-    """Return the paths of code that a document names."""
+def import_paths(text: str) -> list[str]:
+    """Return the import paths in a document."""
     return [match[1] for match in re.finditer(r'"([\w.]+:\w+)"', text)]

@@ -1,4 +1,4 @@
-"""Behaviour with interrupted terminals, closed pipes and full devices."""
+"""Tests of interrupts, closed pipes and full devices."""
 
 import os
 import signal
@@ -17,11 +17,11 @@ import revolve
 pytestmark = pytest.mark.system
 
 ROOT = Path(__file__).parents[2]
-Stage = Any
+Workspace = Any
 
 
 def _start(*words: str) -> subprocess.Popen[str]:
-    """Start a command as a shell does: as leader of a process group."""
+    """Start a command as a shell does: as the leader of a process group."""
     return subprocess.Popen(
         [sys.executable, "-m", "revolve", *words],
         stderr=subprocess.PIPE,
@@ -33,25 +33,25 @@ def _start(*words: str) -> subprocess.Popen[str]:
 
 @pytest.mark.parametrize("awaited", ["run.json", "address"])
 def test_ctrl_c_pressed_twice_while_processes_start(
-    stage: Stage, until: Callable[[Callable[[], bool], str], None], awaited: str
+    workspace: Workspace, until: Callable[[Callable[[], bool], str], None], awaited: str
 ) -> None:
-    """The signal reaches the whole group, which is still importing."""
-    run = stage.folder / "run"
+    """Interrupt the process group twice while its processes import modules."""
+    run = workspace.folder / "run"
     process = _start("run", "scenario1", "--out", str(run))
     until((run / awaited).exists, awaited)
     os.killpg(process.pid, signal.SIGINT)
-    time.sleep(0.1)  # as a finger does; nothing is waited for
+    time.sleep(0.1)  # interval between two key presses
     os.killpg(process.pid, signal.SIGINT)
-    _, said = process.communicate(timeout=60)
-    assert "Traceback" not in said
-    assert f"stopped; to resume: revolve resume {run}" in said
+    _, output = process.communicate(timeout=60)
+    assert "Traceback" not in output
+    assert f"stopped; to resume: revolve resume {run}" in output
     assert process.returncode == 130
 
 
-def test_ctrl_c_while_an_engine_is_loaded(
+def test_ctrl_c_during_the_import_of_an_engine(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """MuJoCo turns the interrupt into an ImportError."""
+    """The engine replaces the interrupt by an ImportError."""
     (tmp_path / "engine_of_a_test.py").write_text(
         "try:\n    raise KeyboardInterrupt\n"
         "except KeyboardInterrupt as error:\n    raise ImportError('no') from error\n"
@@ -61,10 +61,10 @@ def test_ctrl_c_while_an_engine_is_loaded(
     assert revolve.main(["status"]) == 130
 
 
-def _said(
+def _run_in_shell(
     words: str, unbuffered: str = "", output: int | None = None
 ) -> tuple[int, str]:
-    """Return exit code and standard error of ``revolve`` in a shell command."""
+    """Run ``revolve`` in a shell; return exit code and standard error."""
     done = subprocess.run(
         ["sh", "-c", f'"$1" -m revolve {words}', "sh", sys.executable],
         stdout=output,
@@ -78,26 +78,28 @@ def _said(
 
 
 @pytest.mark.parametrize("words", ["--help", "run --help", "run scenario1 --out x"])
-def test_closed_output_is_refused_before_anything_is_done(words: str) -> None:
-    told = (2, "revolve: standard output is closed\n")
-    assert _said(f"{words} >&-") == told
+def test_closed_output_is_refused_before_the_command_starts(words: str) -> None:
+    expected = (2, "revolve: standard output is closed\n")
+    assert _run_in_shell(f"{words} >&-") == expected
     assert not (ROOT / "x").exists()
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("words", ["--help", "run --help"])
-def test_output_on_a_full_device(words: str, unbuffered: str) -> None:
-    told = (2, "revolve: standard output: no space left on device\n")
-    assert _said(f"{words} > /dev/full", unbuffered) == told
+def test_output_to_a_full_device_is_reported(words: str, unbuffered: str) -> None:
+    expected = (2, "revolve: standard output: no space left on device\n")
+    assert _run_in_shell(f"{words} > /dev/full", unbuffered) == expected
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("words", ["--help", "run --help"])
-def test_a_closed_pipe_ends_the_command_quietly(words: str, unbuffered: str) -> None:
+def test_closed_pipe_ends_the_command_without_a_message(
+    words: str, unbuffered: str
+) -> None:
     reader, writer = os.pipe()
     os.close(reader)
     try:
-        assert _said(words, unbuffered, writer) == (1, "")
+        assert _run_in_shell(words, unbuffered, writer) == (1, "")
     finally:
         os.close(writer)
 
@@ -110,7 +112,7 @@ def test_other_errors_are_not_reported_as_output_errors(
         revolve.main([])
 
 
-def _shown(*words: str) -> str:
+def _terminal_output(*words: str) -> str:
     """Return the output of a command whose standard error is a terminal."""
     try:
         screen, terminal = os.openpty()
@@ -124,7 +126,7 @@ def _shown(*words: str) -> str:
     ):
         os.close(terminal)
         shown = b""
-        # A terminal whose last user is gone fails to be read.
+        # Reading fails once the last process has closed the terminal.
         with os.fdopen(screen, "rb", buffering=0) as file, suppress(OSError):
             while more := file.read(4096):
                 shown += more
@@ -132,7 +134,7 @@ def _shown(*words: str) -> str:
 
 
 def test_benchmarks_show_progress(undisturbed: Path) -> None:
-    assert "100%" in _shown("bench", "evaluate", "--robots", "1")
-    shown = _shown("bench", "fidelity", str(undisturbed), "--per-third", "1")
+    assert "100%" in _terminal_output("bench", "evaluate", "--robots", "1")
+    shown = _terminal_output("bench", "fidelity", str(undisturbed), "--per-third", "1")
     assert "robots drawn" in shown
     assert "winners" in shown

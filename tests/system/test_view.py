@@ -1,4 +1,4 @@
-"""Tests of ``revolve view``: recordings equal the tables, viewers affect no run."""
+"""Tests of ``revolve view``: recordings equal tables, viewers do not affect runs."""
 
 import signal
 import subprocess
@@ -20,7 +20,7 @@ from schema.tables.files import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Stage = Any
+Workspace = Any
 Fleet = Callable[..., Any]
 Until = Callable[[Callable[[], bool], str], None]
 
@@ -29,7 +29,7 @@ CENTRES, QUATERNIONS = "Boxes3D:centers", "Boxes3D:quaternions"
 
 
 def batches(file: Path, path: str) -> Iterator[tuple[pa.RecordBatch, bool]]:
-    """Return the data of an entity, and whether it is static."""
+    """Yield the record batches of an entity, and whether each is static."""
     for chunk in RrdReader(file).stream().filter(content=path):
         yield chunk.to_record_batch(), chunk.is_static
 
@@ -39,7 +39,7 @@ def paths(file: Path) -> set[str]:
 
 
 def poses(file: Path, path: str) -> dict[int, Any]:
-    """Return centres (B, 3) by time [ns] of a robot."""
+    """Return the centres (B, 3) of a robot's boxes by time [ns]."""
     found = {}
     for batch, _ in batches(file, path):
         if CENTRES not in batch.schema.names:
@@ -51,7 +51,7 @@ def poses(file: Path, path: str) -> dict[int, Any]:
 
 
 def clears(file: Path, path: str) -> dict[int, int]:
-    """Return the time at which a robot was removed [ns], and the births by then."""
+    """Return the number of births at each removal of a robot, by time [ns]."""
     return {
         time.value: births.as_py()
         for batch, _ in batches(file, path)
@@ -67,7 +67,7 @@ def clears(file: Path, path: str) -> dict[int, int]:
 
 
 def last_births(file: Path, path: str) -> int:
-    """Return the births by a robot's last pose."""
+    """Return the number of births at the last pose of a robot."""
     columns = [
         pa.chunked_array([batch["births"]])
         for batch, _ in batches(file, path)
@@ -77,7 +77,7 @@ def last_births(file: Path, path: str) -> int:
 
 
 def curves(file: Path, name: str) -> dict[int, tuple[float, ...]]:
-    """Return an island's curve by births."""
+    """Return a curve of island 0 by number of births."""
     return {
         births.as_py(): tuple(row.as_py())
         for batch, is_static in batches(file, f"/islands/0/{name}")
@@ -87,7 +87,7 @@ def curves(file: Path, name: str) -> dict[int, tuple[float, ...]]:
 
 
 def expected_curve(folder: Path) -> dict[int, tuple[float, ...]]:
-    """Return mean and best fitness by births, computed by Arrow."""
+    """Return mean and best fitness by births, computed with pyarrow."""
     rows = read_table(folder, "population").filter(pc.field("fitness").is_valid())
     grouped = rows.group_by("births").aggregate(
         [("fitness", "mean"), ("fitness", "max")]
@@ -114,17 +114,17 @@ def check_curves(file: Path, folder: Path) -> None:
 
 
 @pytest.fixture(scope="session")
-def replayed(once: Any, quiet_hamlet: Path) -> Path:  # noqa: ANN401 - the fixture
-    """Return a recording of a run's tables."""
-    words = ("view", str(quiet_hamlet), "--save", "run.rrd")
-    folder: Path = once("replay", lambda stage: stage.run(*words))
+def replayed(once: Any, small_arena_run: Path) -> Path:  # noqa: ANN401 - the fixture
+    """Return the recording of a replay of the small arena."""
+    words = ("view", str(small_arena_run), "--save", "run.rrd")
+    folder: Path = once("replay", lambda workspace: workspace.run(*words))
     return folder / "run.rrd"
 
 
-def test_a_replay_has_each_pose_of_each_robot(
-    replayed: Path, quiet_hamlet: Path
+def test_replay_contains_each_pose_of_each_robot(
+    replayed: Path, small_arena_run: Path
 ) -> None:
-    table = read_table(quiet_hamlet, "poses")
+    table = read_table(small_arena_run, "poses")
     for number in sorted(set(table["birth"].to_pylist())):
         rows = table.filter(pc.field("birth") == number)
         shown = poses(replayed, f"/islands/0/robots/0-{number}")
@@ -133,28 +133,28 @@ def test_a_replay_has_each_pose_of_each_robot(
             for row in rows.select(["sim_time_s", "x", "y", "z"]).to_pylist()
         }
         assert shown.keys() == recorded.keys()
-        for time, place in recorded.items():
-            # One of the boxes is the core, whose centre the table has.
-            apart = np.linalg.norm(shown[time] - np.array(place), axis=1)
-            assert apart.min() < 1e-3
+        for time, position in recorded.items():
+            # One of the boxes is the core, whose centre is in the table.
+            distances = np.linalg.norm(shown[time] - np.array(position), axis=1)
+            assert distances.min() < 1e-3
 
 
 def test_dead_robots_are_cleared_at_their_death(
-    replayed: Path, quiet_hamlet: Path
+    replayed: Path, small_arena_run: Path
 ) -> None:
     deaths = {
         row["birth"]: nanoseconds(row["sim_time_s"])
-        for row in read_table(quiet_hamlet, "deaths").to_pylist()
+        for row in read_table(small_arena_run, "deaths").to_pylist()
     }
     assert deaths
     robots = [path for path in paths(replayed) if "/robots/" in path]
-    assert len(robots) == read_table(quiet_hamlet, "births").num_rows
+    assert len(robots) == read_table(small_arena_run, "births").num_rows
     for path in robots:
         number = int(path.rpartition("-")[2])
         if number in deaths:
             cleared = clears(replayed, path)
             assert deaths[number] in cleared
-            # On the time line of births, too, no pose comes after it.
+            # On the timeline of births, too, no pose follows the removal.
             assert cleared[deaths[number]] >= last_births(replayed, path)
         assert not any(is_static for _, is_static in batches(replayed, path))
 
@@ -174,73 +174,76 @@ def test_boxes_are_logged_with_the_first_pose(replayed: Path) -> None:
 
 
 def test_curves_of_a_replay_equal_the_tables(
-    replayed: Path, quiet_hamlet: Path
+    replayed: Path, small_arena_run: Path
 ) -> None:
-    check_curves(replayed, quiet_hamlet)
+    check_curves(replayed, small_arena_run)
 
 
-def test_the_log_contains_each_birth_and_death(
-    replayed: Path, quiet_hamlet: Path
+def test_log_contains_each_birth_and_death(
+    replayed: Path, small_arena_run: Path
 ) -> None:
     lines = [
         line.as_py()[0]
         for batch, _ in batches(replayed, "/log")
         for line in batch["TextLog:text"]
     ]
-    births = read_table(quiet_hamlet, "births").num_rows
-    deaths = read_table(quiet_hamlet, "deaths").num_rows
+    births = read_table(small_arena_run, "births").num_rows
+    deaths = read_table(small_arena_run, "deaths").num_rows
     assert sum("is born" in line for line in lines) == births
     assert sum("is gone" in line for line in lines) == deaths
 
 
 def test_viewers_receive_everything_and_do_not_change_the_run(
-    hamlet_stage: Stage, quiet_hamlet: Path, fleet_of: Fleet, until: Until
+    small_arena_workspace: Workspace,
+    small_arena_run: Path,
+    fleet_of: Fleet,
+    until: Until,
 ) -> None:
-    """One viewer shows the whole run; one is killed and one is frozen during it."""
-    stage = hamlet_stage
-    fleet = fleet_of(stage, *WORDS, "--speed", "10")
+    """Start three viewers; kill one and stop another during the run."""
+    workspace = small_arena_workspace
+    fleet = fleet_of(workspace, *WORDS, "--speed", "10")
     viewers = {}
     for name in ("whole", "killed", "frozen"):
         words = ("view", "--connect", fleet.address, "--save", f"{name}.rrd")
-        viewers[name] = stage.start(*words)
-        file = stage.folder / f"{name}.rrd"
+        viewers[name] = workspace.start(*words)
+        file = workspace.folder / f"{name}.rrd"
         until(file.exists, f"the viewer {name} has received the run")
     fleet.join("w", "worker")
     fleet.begin(1)
-    fleet.wait_for(0.4 * (quiet_hamlet / NAME).stat().st_size)
+    fleet.wait_for(0.4 * (small_arena_run / NAME).stat().st_size)
     assert not fleet.is_over
     viewers["killed"].kill()
     viewers["frozen"].send_signal(signal.SIGSTOP)
     fleet.finish()
-    assert not compare(fleet.folder, quiet_hamlet)
+    assert not compare(fleet.folder, small_arena_run)
     out, err = viewers["whole"].communicate(timeout=60)
     assert viewers["whole"].returncode == 0, out + err
     assert "the run has ended" in err
-    file = stage.folder / "whole.rrd"
+    file = workspace.folder / "whole.rrd"
     check_curves(file, fleet.folder)
     table = read_table(fleet.folder, "poses")
     shown = sum(len(poses(file, path)) for path in paths(file) if "/robots/" in path)
-    # Best effort: but nothing is lost on a machine that keeps up.
+    # Delivery is best effort: a machine that is fast enough loses no poses.
     assert 0.9 * table.num_rows <= shown <= table.num_rows
 
 
-def test_a_resimulated_robot_of_an_arena_moves_as_recorded(
-    stage: Stage, quiet_hamlet: Path
+def test_resimulated_robot_of_an_arena_moves_as_recorded(
+    workspace: Workspace, small_arena_run: Path
 ) -> None:
-    words = ("view", str(quiet_hamlet), "--robot", "0:3", "--robot", "best")
-    out = stage.run(*words, "--save", "again.rrd")
+    words = ("view", str(small_arena_run), "--robot", "0:3", "--robot", "best")
+    out = workspace.run(*words, "--save", "again.rrd")
     assert "0:3: moves as recorded, equal to the last bit" in out
-    again = poses(stage.folder / "again.rrd", "/motion/0-3")
-    table = read_table(quiet_hamlet, "poses").filter(pc.field("birth") == 3)
-    # Brains tick more often than poses are recorded.
+    again = poses(workspace.folder / "again.rrd", "/motion/0-3")
+    table = read_table(small_arena_run, "poses").filter(pc.field("birth") == 3)
+    # Brain steps are more frequent than recorded poses.
     assert len(again) > 1.5 * table.num_rows
 
 
-def test_a_resimulated_off_line_robot_moves_as_recorded(
-    stage: Stage, undisturbed: Path
+def test_resimulated_off_line_robot_moves_as_recorded(
+    workspace: Workspace, undisturbed: Path
 ) -> None:
     words = ("view", str(undisturbed), "--robot", "best", "--ancestry")
-    out = stage.run(*words, "--save", "again.rrd")
+    out = workspace.run(*words, "--save", "again.rrd")
     best = max(
         row["fitness"] or 0.0
         for row in read_table(undisturbed, "evaluations").to_pylist()
@@ -251,15 +254,15 @@ def test_a_resimulated_off_line_robot_moves_as_recorded(
     assert "DIFFERS" not in out
 
 
-def test_a_wrong_record_is_reported(stage: Stage, undisturbed: Path) -> None:
-    folder = stage.folder / "forged"
+def test_wrong_record_is_reported(workspace: Workspace, undisturbed: Path) -> None:
+    folder = workspace.folder / "forged"
     subprocess.run(["cp", "-r", str(undisturbed), str(folder)], check=True)
     (file,) = folder.glob("tables/*/*/evaluations.parquet")
     table = pq.ParquetFile(file).read()
     index = table.schema.get_field_index("fitness")
     fitness = pc.add(table["fitness"], 1e-9)
     pq.write_table(table.set_column(index, table.schema.field(index), fitness), file)
-    out = stage.run("view", str(folder), "--robot", "0:4", "--save", "a.rrd")
+    out = workspace.run("view", str(folder), "--robot", "0:4", "--save", "a.rrd")
     assert "0:4: DIFFERS from the record: fitness" in out
 
 
@@ -281,8 +284,8 @@ def test_a_wrong_record_is_reported(stage: Stage, undisturbed: Path) -> None:
     ],
 )
 def test_invalid_flags_are_reported_in_one_line(
-    stage: Stage, words: tuple[str, ...], message: str
+    workspace: Workspace, words: tuple[str, ...], message: str
 ) -> None:
-    out = stage.run(*words, code=2)
+    out = workspace.run(*words, code=2)
     assert message in out
     assert out.count("\n") == 1

@@ -1,6 +1,6 @@
-"""Tests of the pictures that a viewer shows, live and in a replay, without a screen.
+"""Tests of screenshots of a headless viewer, live and in a replay.
 
-Needs a Vulkan driver (Debian: mesa-vulkan-drivers) and is skipped without one.
+They need a Vulkan driver (Debian: mesa-vulkan-drivers) and are skipped without one.
 """
 
 import io
@@ -22,16 +22,16 @@ from schema.tables.files import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
-Stage = Any
+Workspace = Any
 Fleet = Callable[..., Any]
 Until = Callable[[Callable[[], bool], str], None]
 Floats = npt.NDArray[np.float64]
 
-SEEN_S = 12.0
-"""A time at which all founders live."""
+PICTURE_TIME_S = 12.0
+"""Time at which all founders are alive [s]."""
 FIELD_OF_VIEW = np.radians(55.0)
 EYE = 1.2 * 1.3 * 0.4 * np.array([0.35, -1.0, 0.8])
-"""Where the camera is in an arena of 0.4 m, if the layout is as it says."""
+"""Position of the camera that the layout defines for an arena of 0.4 m."""
 
 
 def free_port() -> int:
@@ -50,59 +50,61 @@ def viewer() -> Iterator[ViewerClient]:
             executable_path=program,
         )
         client.take_screenshot()
-    except Exception as error:  # noqa: BLE001 - the library tells it in many ways
+    except Exception as error:  # noqa: BLE001 - the library raises many types
         pytest.skip(f"no viewer without a Vulkan driver: {type(error).__name__}")
     with client:
         yield client
 
 
-def look(viewer: ViewerClient, source: str) -> Floats:
-    """Return the picture of the arena, (H, W, 3), after checking all views."""
+def screenshot(viewer: ViewerClient, source: str) -> Floats:
+    """Check all views and return a picture of the arena (H, W, 3)."""
     viewer.open(source)
     deadline = time.monotonic() + 60.0
     while viewer.get_state().loading or not viewer.get_state().views:
         assert time.monotonic() < deadline, "the viewer never has the recording"
         time.sleep(0.1)
-    time.sleep(1.0)  # the viewer does not tell when a recording has become active
-    viewer.set_time("sim_time", duration=SEEN_S, play_state="paused")
-    time.sleep(2.0)  # nor when it has drawn what it loads on demand
+    time.sleep(1.0)  # the viewer does not report when a recording is active
+    viewer.set_time("sim_time", duration=PICTURE_TIME_S, play_state="paused")
+    time.sleep(2.0)  # nor when data loaded on demand is drawn
     views = {view.name: view for view in viewer.get_state().views}
     assert {"Arena 0", "Fitness", "Population", "Ancestry", "Workers"} <= views.keys()
     assert [view.reports for view in views.values() if view.reports] == []
-    shot = viewer.take_screenshot(view_id=views["Arena 0"].view_id)
-    return np.asarray(Image.open(io.BytesIO(shot)).convert("RGB"), dtype=np.float64)
+    image = viewer.take_screenshot(view_id=views["Arena 0"].view_id)
+    return np.asarray(Image.open(io.BytesIO(image)).convert("RGB"), dtype=np.float64)
 
 
-def pixels(places: Floats, height: int, width: int) -> Floats:
-    """Return where points (N, 3) are in a picture, (N, 2) column and row."""
+def pixels(positions: Floats, height: int, width: int) -> Floats:
+    """Project points (N, 3) to columns and rows (N, 2) of a picture."""
     forward = -EYE / np.linalg.norm(EYE)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
-    seen = places - EYE
-    scale = 0.5 * height / np.tan(0.5 * FIELD_OF_VIEW) / (seen @ forward)
-    across, up = seen @ right * scale, seen @ np.cross(right, forward) * scale
+    relative = positions - EYE
+    scale = 0.5 * height / np.tan(0.5 * FIELD_OF_VIEW) / (relative @ forward)
+    across, up = relative @ right * scale, relative @ np.cross(right, forward) * scale
     return np.stack([0.5 * width + across, 0.5 * height - up], axis=1)
 
 
 def check_robots(picture: Floats, folder: Path) -> None:
-    """Most cores show their colours at the table's positions; the others are hidden."""
+    """Check that most cores are visible in their colours at the recorded positions."""
     rows = read_table(folder, "poses")
-    rows = rows.filter(pc.less(pc.abs(pc.subtract(rows["sim_time_s"], SEEN_S)), 1e-6))
+    rows = rows.filter(
+        pc.less(pc.abs(pc.subtract(rows["sim_time_s"], PICTURE_TIME_S)), 1e-6)
+    )
     colours = {
         row["birth"]: np.array(row["body"][0]["params"][-3:]) * 255.0
         for row in read_table(folder, "births").to_pylist()
     }
-    places = np.stack([rows[axis].to_numpy() for axis in "xyz"], axis=1)
+    positions = np.stack([rows[axis].to_numpy() for axis in "xyz"], axis=1)
     height, width, _ = picture.shape
     found = []
     for birth, (column, row) in zip(
-        rows["birth"].to_pylist(), pixels(places, height, width), strict=True
+        rows["birth"].to_pylist(), pixels(positions, height, width), strict=True
     ):
         x, y = round(column), round(row)
         if not (2 <= x < width - 2 and 2 <= y < height - 2):
             continue
         shown = picture[y - 2 : y + 3, x - 2 : x + 3].reshape(-1, 3)
-        # Light and shade change how bright a face is, not which colour it has.
+        # Light and shade change the brightness of a face, not its hue.
         faces = [_hue(colours[birth]) @ _hue(each) for each in shown]
         found.append(max(faces) > 0.995)
     assert len(found) >= 3
@@ -113,32 +115,38 @@ def _hue(colour: Floats) -> Floats:
     return np.asarray(colour / max(float(np.linalg.norm(colour)), 1e-9))
 
 
-def test_a_replay_shows_robots_where_they_were(
-    viewer: ViewerClient, stage: Stage, quiet_hamlet: Path
+def test_replay_shows_robots_at_their_recorded_positions(
+    viewer: ViewerClient, workspace: Workspace, small_arena_run: Path
 ) -> None:
-    stage.run("view", str(quiet_hamlet), "--save", "run.rrd")
-    picture = look(viewer, str(stage.folder / "run.rrd"))
-    check_robots(picture, quiet_hamlet)
-    # Robots on the wrong side are noticed.
+    workspace.run("view", str(small_arena_run), "--save", "run.rrd")
+    picture = screenshot(viewer, str(workspace.folder / "run.rrd"))
+    check_robots(picture, small_arena_run)
+    # The check rejects a mirrored picture.
     with pytest.raises(AssertionError):
-        check_robots(picture[:, ::-1], quiet_hamlet)
+        check_robots(picture[:, ::-1], small_arena_run)
 
 
-def test_a_live_view_shows_robots_where_they_are(
-    viewer: ViewerClient, hamlet_stage: Stage, fleet_of: Fleet, until: Until
+def test_live_view_shows_robots_at_their_recorded_positions(
+    viewer: ViewerClient,
+    small_arena_workspace: Workspace,
+    fleet_of: Fleet,
+    until: Until,
 ) -> None:
-    fleet = fleet_of(hamlet_stage, "hamlet.toml", "--seed", "4", "--quiet")
+    fleet = fleet_of(small_arena_workspace, "hamlet.toml", "--seed", "4", "--quiet")
     served = f"127.0.0.1:{free_port()}"
     words = ("--serve", served, "--save", "live.rrd")
-    hamlet_stage.start("view", "--connect", fleet.address, *words)
-    until((hamlet_stage.folder / "live.rrd").exists, "the viewer has received the run")
+    small_arena_workspace.start("view", "--connect", fleet.address, *words)
+    until(
+        (small_arena_workspace.folder / "live.rrd").exists,
+        "the viewer has received the run",
+    )
     fleet.join("w", "worker")
     fleet.begin(1)
     fleet.finish()
-    picture = look(viewer, f"rerun+http://{served}/proxy")
+    picture = screenshot(viewer, f"rerun+http://{served}/proxy")
     check_robots(picture, fleet.folder)
 
 
-def test_a_wrong_picture_fails_the_check(quiet_hamlet: Path) -> None:
+def test_blank_picture_fails_the_check(small_arena_run: Path) -> None:
     with pytest.raises(AssertionError):
-        check_robots(np.full((900, 1200, 3), 246.0), quiet_hamlet)
+        check_robots(np.full((900, 1200, 3), 246.0), small_arena_run)

@@ -1,4 +1,4 @@
-"""Content of the wheel: all that runs, and nothing else."""
+"""Checks that the wheel contains all source and data files, and no other files."""
 
 import zipfile
 from pathlib import Path
@@ -14,14 +14,14 @@ pytestmark = pytest.mark.system
 
 @pytest.fixture(scope="module")
 def names(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
-    """Return the names in a freshly built wheel."""
+    """Build a wheel and return the names of its files."""
     folder = tmp_path_factory.mktemp("wheel")
     builder = WheelBuilder(str(ROOT))
     (wheel,) = builder.build(directory=str(folder), versions=["standard"])
     return set(zipfile.ZipFile(wheel).namelist())
 
 
-def test_wheel_holds_every_file_of_the_rooms(names: set[str]) -> None:
+def test_wheel_contains_every_file_of_the_rooms(names: set[str]) -> None:
     wanted = {
         path.relative_to(ROOT).as_posix()
         for room in ROOMS
@@ -29,11 +29,11 @@ def test_wheel_holds_every_file_of_the_rooms(names: set[str]) -> None:
         for path in (ROOT / room).rglob(pattern)
     }
     assert wanted <= names
-    assert {"revolve.py", "schema/revolve.proto"} <= names
+    assert {"revolve.py", "schema/wire/revolve.proto"} <= names
     assert any(name.startswith("schema/experiment/shipped/") for name in names)
 
 
-def test_wheel_holds_nothing_else(names: set[str]) -> None:
+def test_wheel_contains_no_other_files(names: set[str]) -> None:
     tops = {name.partition("/")[0] for name in names}
     (metadata,) = (top for top in tops if top.endswith(".dist-info"))
     assert tops == {"revolve.py", *ROOMS, metadata}

@@ -1,4 +1,4 @@
-"""User package with a valid part type and an attribute that is no part type."""
+"""A user's plug-in package: part types, and an object that is not a part type."""
 
 from schema.parts import Box, PartType, Sensor, Shape, Slot
 

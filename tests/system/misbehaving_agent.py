@@ -1,8 +1,8 @@
-"""Worker that answers correctly, but twice, or after it was declared lost.
+"""Program: a worker with correct answers that sends them twice or too late.
 
 Arguments: the address of a hub, and ``twice`` or ``late``. A late worker removes its
-token while it holds a job, answers when it learns that it is considered gone, and joins
-again. On SIGTERM it ends and prints what it did, and how often.
+liveliness token while it has a job, answers after the coordinator counts it as lost,
+and joins again. Ends on SIGTERM and prints its behaviour and the number of answers.
 """
 
 import signal
@@ -24,7 +24,7 @@ GONE_S = 0.3
 def main(address: str, behaviour: str) -> None:
     """Serve until SIGTERM."""
     prepare_process()
-    from worker.serve.jobs import answer  # noqa: PLC0415 - numpy comes with it
+    from worker.serve.jobs import answer  # noqa: PLC0415 - imports numpy
 
     stop = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stop.set())
@@ -41,15 +41,15 @@ def main(address: str, behaviour: str) -> None:
     inbox: SimpleQueue[zenoh.Query] = SimpleQueue()
     count = 0
 
-    def tell(query: zenoh.Query) -> None:
+    def reply_info(query: zenoh.Query) -> None:
         with query:
             query.reply(member.info, info)
 
     with zenoh.open(zenoh.Config.from_json5(client_config(address))) as session:
-        take = zenoh.handlers.Callback(inbox.put, indirect=False)
-        told = zenoh.handlers.Callback(tell)
-        _jobs = session.declare_queryable(member.jobs, take, complete=True)
-        _info = session.declare_queryable(member.info, told, complete=True)
+        on_job = zenoh.handlers.Callback(inbox.put, indirect=False)
+        on_info = zenoh.handlers.Callback(reply_info)
+        _jobs = session.declare_queryable(member.jobs, on_job, complete=True)
+        _info = session.declare_queryable(member.info, on_info, complete=True)
         token = session.liveliness().declare_token(member.alive)
         while not stop.is_set():
             try:
@@ -62,7 +62,7 @@ def main(address: str, behaviour: str) -> None:
                 count += 1
                 if behaviour == "late":
                     token.undeclare()  # type: ignore[no-untyped-call]
-                    # Meanwhile another agent has the job.
+                    # Meanwhile the job is sent to another worker.
                     stop.wait(GONE_S)
                 query.reply(member.jobs, data)
                 if behaviour == "twice":

@@ -1,4 +1,4 @@
-"""Commands of a test, started as a user starts them, in their own folder."""
+"""Runs the commands of a test as a user does, in a separate folder."""
 
 import os
 import signal
@@ -11,8 +11,8 @@ from pathlib import Path
 PATIENCE_S = 240.0
 
 
-class Stage:
-    """Starts the commands of one test in one folder and ends those that remain."""
+class Workspace:
+    """Starts the commands of a test in a folder and kills remaining processes."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -25,13 +25,13 @@ class Stage:
         environment: dict[str, str] | None = None,
         inside: str = "",
     ) -> subprocess.Popen[str]:
-        """Start ``revolve`` with these words and return at once.
+        """Start ``revolve`` with arguments and return immediately.
 
         Args:
-            words: of the command line.
-            folder: where, instead of the stage's own.
-            environment: variables besides those that are set.
-            inside: a network namespace.
+            words: command-line arguments.
+            folder: working directory; default: the workspace's folder.
+            environment: additional environment variables.
+            inside: network namespace; default: that of the test.
         """
         prefix = ("ip", "netns", "exec", inside) if inside else ()
         process = subprocess.Popen(
@@ -50,14 +50,14 @@ class Stage:
         return process
 
     def run(self, *words: str, code: int = 0) -> str:
-        """Run ``revolve`` to its end; return what it printed, both streams."""
+        """Run ``revolve`` to its end; return standard output and standard error."""
         process = self.start(*words)
         out, err = process.communicate(timeout=PATIENCE_S)
         assert process.returncode == code, f"{words}: {process.returncode}\n{out}{err}"
         return out + err
 
     def clear(self) -> None:
-        """Kill remaining processes; if the test failed, show their output."""
+        """Kill remaining processes and write all output to the test report."""
         for process in self._started:
             if process.poll() is None:
                 process.send_signal(signal.SIGCONT)
@@ -67,8 +67,8 @@ class Stage:
 
 
 def wait_until(condition: Callable[[], bool], what: str) -> None:
-    """Return once a condition holds; fail the test if it never does."""
+    """Wait until a condition holds; fail the test after a timeout."""
     deadline = time.monotonic() + PATIENCE_S
     while not condition():
         assert time.monotonic() < deadline, f"never happened: {what}"
-        time.sleep(0.005)  # the interval of looking, not a wait for luck
+        time.sleep(0.005)  # polling interval

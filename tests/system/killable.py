@@ -1,11 +1,11 @@
-"""Program that runs an experiment and kills it at random instants, until done.
+"""Program that kills and resumes runs at random instants until they are finished.
 
-Arguments: an experiment, a number of kills and a seed. Modules are imported once. Each
-life is a fork of this process that does ``revolve run`` or ``resume`` without a
-network. SIGKILL ends it after a drawn time, up to half the duration of a whole run.
-After a run is finished the next one begins. Time is the CPU time of a life, so that
-progress does not depend on other load. The program prints one line per kill: what was
-on disk.
+Arguments: an experiment, a number of kills and a seed. Modules are imported once; each
+attempt is a fork of this process that executes ``revolve run`` or ``resume`` without a
+network. SIGKILL ends it after a random time, up to half of the time of a whole run.
+When a run is finished, the next one begins. Times are CPU times, so the progress of an
+attempt does not depend on the load of the machine. Prints the journal size at each
+kill.
 """
 
 import os
@@ -29,8 +29,8 @@ from coordinator.storage.journal import NAME  # noqa: E402
 FLAGS = ["--in-process", "--threads", "1", "--quiet"]
 
 
-def life(document: str, folder: Path, after_s: float) -> float | None:
-    """Run one life; return its CPU time [s] if the run ended before the kill."""
+def attempt(document: str, folder: Path, after_s: float) -> float | None:
+    """Run or resume once; return its CPU time [s], or None if it was killed."""
     words = ["resume", str(folder)]
     if not (folder / DETAILS).exists():
         words = ["run", document, "--seed", "4", "--out", str(folder)]
@@ -45,26 +45,26 @@ def life(document: str, folder: Path, after_s: float) -> float | None:
         if done:
             assert status == 0, f"{words} ended with {status}"
             return spent_s
-        time.sleep(0.0005)  # the interval of looking
+        time.sleep(0.0005)  # polling interval
     os.kill(child, signal.SIGKILL)
     _, status = os.waitpid(child, 0)
     return None if os.WIFSIGNALED(status) else spent_s
 
 
 def processor_clock(process: int) -> int:
-    """Return the CPU clock of a process, as clock_getcpuclockid(3) numbers it."""
+    """Return the Linux id of a process's CPU clock; see clock_getcpuclockid(3)."""
     return (~process << 3) | 2
 
 
-def lives(document: str, kills: int, seed: int) -> None:
-    """Repeat at least two runs, until a number of kills is reached."""
+def kill_runs(document: str, kills: int, seed: int) -> None:
+    """Execute at least two runs with at least this number of kills in total."""
     rng = np.random.default_rng(seed)
-    whole_s = life(document, Path("whole"), 1000.0)
+    whole_s = attempt(document, Path("whole"), 1000.0)
     assert whole_s is not None
     run, killed = 0, 0
     while killed < kills or run < 2:
         folder = Path(f"run-{run}")
-        while life(document, folder, rng.uniform(0.0, 0.5 * whole_s)) is None:
+        while attempt(document, folder, rng.uniform(0.0, 0.5 * whole_s)) is None:
             killed += 1
             journal = folder / NAME
             size = journal.stat().st_size if journal.exists() else 0
@@ -73,4 +73,4 @@ def lives(document: str, kills: int, seed: int) -> None:
 
 
 if __name__ == "__main__":
-    lives(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
+    kill_runs(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))

@@ -1,0 +1,323 @@
+"""Tests of failure reports in the summary, in status and before a resume."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coordinator.cli.status import main as status
+from coordinator.storage.compare import compare
+from coordinator.storage.folder import RunDetails, RunFolder, read_state
+from coordinator.storage.folder_status import check_rewritable, folder_status
+from coordinator.storage.journal import Journal
+from schema.errors import RunFolderError
+from schema.experiment.file import experiment_text, read_experiment
+from schema.tables.columns import TABLES
+from schema.tables.files import parquet_path
+
+pytestmark = pytest.mark.system
+
+Workspace = Any
+Until = Callable[[Callable[[], bool], str], None]
+
+SHORT = """
+name = "{name}"
+births = 12
+[selection]
+population = 6
+children = 6
+[simulation]
+window_steps = 400
+[fitness]
+function = "{fitness}"
+"""
+
+ARENA = """
+name = "arena"
+births = 30
+[selection]
+population = 6
+[simulation]
+warmup_steps = 200
+window_steps = 400
+[arena]
+population_limit = 12
+population_floor = 5
+[fitness]
+function = "{fitness}"
+"""
+
+FITNESS = """
+from worker.fitness import thesis
+
+def few(track, settings):
+    value = thesis(track, settings)
+    if value > 0.005:
+        raise ValueError("too fast to see")
+    return value
+
+def none(track, settings):
+    raise ValueError("nobody looked")
+"""
+
+
+def _write(workspace: Workspace, name: str, fitness: str) -> str:
+    (workspace.folder / "judge.py").write_text(FITNESS)
+    text = SHORT.format(name=name, fitness=fitness)
+    (workspace.folder / f"{name}.toml").write_text(text)
+    return f"{name}.toml"
+
+
+def _run(workspace: Workspace, *words: str, code: int = 0) -> str:
+    output: str = workspace.run("run", *words, "--in-process", "--quiet", code=code)
+    return output
+
+
+def test_run_without_any_fitness_has_no_best_robot(workspace: Workspace) -> None:
+    source = _write(workspace, "blind", "judge:none")
+    output = _run(workspace, source, "--out", "a b", code=1)
+    assert "12 births; no robot of the last population has a fitness" in output
+    assert "12 of 12 evaluations failed, all: " in output
+    assert "nobody looked" in output
+    assert "best robot" not in output
+    assert not (workspace.folder / "a b" / "best.yaml").exists()
+    assert "revolve view 'a b'" in output
+    assert "best -" in workspace.run("status", "a b")
+
+
+def test_run_reports_failed_evaluations_and_the_reason(workspace: Workspace) -> None:
+    output = _run(workspace, _write(workspace, "dim", "judge:few"), "--out", "a")
+    failed = [line for line in output.splitlines() if "evaluations failed" in line]
+    assert len(failed) == 1
+    assert "too fast to see" in failed[0]
+    assert "of 12 evaluations failed, all: " in failed[0]
+    assert "best robot: birth " in output
+    assert (workspace.folder / "a" / "best.yaml").exists()
+
+
+def test_campaign_reports_runs_without_any_fitness(workspace: Workspace) -> None:
+    sources = [
+        _write(workspace, "blind", "judge:none"),
+        _write(workspace, "seeing", "worker.fitness:thesis"),
+    ]
+    output = _run(workspace, *sources, "--out", "both", code=1)
+    assert "both/blind-0: 12 of 12 evaluations failed, all: " in output
+    assert "seeing-0" not in output
+    assert "2 runs are finished" in output
+    again = workspace.run("resume", "both", "--in-process", "--quiet", code=1)
+    assert "2 of 2 runs are already finished" in again
+    # A campaign of one run reports the reason, too.
+    (workspace.folder / "both" / "blind-0" / "state").write_text("tired")
+    shutil.rmtree(workspace.folder / "both" / "seeing-0")
+    text = (workspace.folder / "both" / "campaign.toml").read_text()
+    text = text[: text.rindex("[[experiments]]")]
+    (workspace.folder / "both" / "campaign.toml").write_text(text)
+    alone = workspace.run("resume", "both", "--in-process", "--quiet", code=1)
+    assert "blind-0 failed: both/blind-0/state: must be one of running" in alone
+
+
+@pytest.fixture(scope="module")
+def campaign_folder(once: Any) -> Path:  # noqa: ANN401 - the fixture
+    """Return a folder with a campaign of two finished runs."""
+
+    def make(workspace: Workspace) -> None:
+        words = ("--repeats", "2", "--out", "all/twice")
+        _run(workspace, _write(workspace, "seeing", "worker.fitness:thesis"), *words)
+
+    folder: Path = once("failures-told", make)
+    return folder / "all"
+
+
+def test_damaged_run_does_not_hide_other_runs(
+    workspace: Workspace, campaign_folder: Path
+) -> None:
+    shutil.copytree(campaign_folder, workspace.folder / "all")
+    twice = workspace.folder / "all" / "twice"
+    damage = "seeing-0/run.json: cannot be read: Object missing required field `name`"
+    (twice / "seeing-0" / "run.json").write_text("{}")
+    output = workspace.run("status", "all", code=1)
+    assert f"damaged: all/twice/{damage}" in output
+    assert "1 of 2 runs finished" in output
+    assert "twice/seeing-0  damaged" in output
+    # A damaged run does not prevent the other run from starting again.
+    shutil.rmtree(twice / "seeing-1")
+    output = workspace.run("resume", "all/twice", "--in-process", "--quiet", code=1)
+    assert f"seeing-0 failed: all/twice/{damage}" in output
+    assert read_state(twice / "seeing-1") == "finished"
+    assert compare(twice / "seeing-1", campaign_folder / "twice" / "seeing-1") == []
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "message"),
+    [
+        ("state", "", "must be one of running, stopped, finished, got ''"),
+        ("births.parquet", "", "births.parquet: cannot be read"),
+        ("births.parquet", None, "is finished, but its tables are missing"),
+    ],
+    ids=["state", "births.parquet", "no tables"],
+)
+def test_damaged_and_missing_files_are_reported(
+    tmp_path: Path, campaign_folder: Path, file: str, content: str | None, message: str
+) -> None:
+    run = tmp_path / "run"
+    shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
+    assert folder_status(run).births == 12
+    (path,) = run.glob(f"**/{file}")
+    if content is None:
+        path.unlink()
+    else:
+        path.write_text(content)
+    with pytest.raises(RunFolderError, match=message):
+        folder_status(run)
+
+
+def test_narrow_terminal_does_not_truncate_the_status(
+    campaign_folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    assert status(["status", str(campaign_folder)]) == 0
+    output = capsys.readouterr().out
+    assert "2 of 2 runs finished, 24 of 24 births" in output
+    assert "no coordinator is running" not in output
+    for name in ("twice/seeing-0", "twice/seeing-1"):
+        (line,) = [line for line in output.splitlines() if name in line]
+        assert line.split()[1:6] == ["finished", "12", "of", "12", "best"]
+
+
+def test_missing_tables_are_written_again(
+    workspace: Workspace, campaign_folder: Path
+) -> None:
+    run = workspace.folder / "run"
+    shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
+    words = ("resume", "run", "--in-process", "--quiet")
+    assert "already finished" in workspace.run(*words)
+    shutil.rmtree(run / "tables")
+    output = workspace.run(*words)
+    assert "tables are missing; writing them again from the journal" in output
+    assert "12 births" in output
+    assert compare(run, campaign_folder / "twice" / "seeing-0") == []
+
+
+@pytest.mark.parametrize("tables", ["tables", "no tables"])
+def test_run_without_its_journal_does_not_restart(
+    workspace: Workspace, campaign_folder: Path, tables: str
+) -> None:
+    run = workspace.folder / "run"
+    shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
+    (run / "journal.bin").unlink()
+    words = ("resume", "run", "--in-process", "--quiet")
+    if tables == "tables":
+        (run / "state").unlink()
+        message = "journal.bin: is lost"
+    else:
+        shutil.rmtree(run / "tables")
+        message = "put a copy of the tables in their place"
+    assert message in workspace.run(*words, code=2)
+    (run / "journal.bin").touch()
+    assert message in workspace.run(*words, code=2)
+
+
+def test_refused_resume_does_not_change_the_folder(
+    workspace: Workspace, campaign_folder: Path
+) -> None:
+    """Lost rows are rewritten only from an intact journal."""
+    run = workspace.folder / "run"
+    shutil.copytree(campaign_folder / "twice" / "seeing-0", run)
+    shutil.rmtree(run / "tables")
+    (run / "state").unlink()
+    (run / "segments").mkdir()
+    schema = TABLES["births"].serialize().to_pybytes()
+    (run / "segments" / "births-001.arrows").write_bytes(schema)
+    journal = bytearray((run / "journal.bin").read_bytes())
+    journal[40] ^= 1
+    (run / "journal.bin").write_bytes(journal)
+    output = workspace.run("resume", "run", "--in-process", "--quiet", code=2)
+    assert "journal.bin: damaged at byte" in output
+    (run / "journal.bin").unlink()
+    output = workspace.run("resume", "run", "--in-process", "--quiet", code=2)
+    assert "journal.bin: is lost" in output
+    assert [path.name for path in (run / "segments").iterdir()] == ["births-001.arrows"]
+
+
+def test_tables_of_an_arena_are_rewritable_only_with_its_poses(tmp_path: Path) -> None:
+    experiment = read_experiment("scenario3")
+    details = RunDetails("scenario3", 0, 1, experiment_text(experiment))
+    with RunFolder(tmp_path, details), Journal.open(tmp_path):
+        pass
+    (tmp_path / "state").write_text("finished")
+    with pytest.raises(RunFolderError, match="put a copy of the tables in their place"):
+        check_rewritable(tmp_path, details)
+    with pytest.raises(RunFolderError, match="put a copy of the tables in their place"):
+        folder_status(tmp_path)
+    poses = parquet_path(tmp_path, "scenario3", 0, "poses")
+    poses.parent.mkdir(parents=True)
+    poses.touch()
+    check_rewritable(tmp_path, details)
+    with pytest.raises(RunFolderError, match="to write them again"):
+        folder_status(tmp_path)
+
+
+def test_status_follows_a_link_to_a_run(
+    tmp_path: Path, campaign_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "here").symlink_to(campaign_folder / "twice" / "seeing-0")
+    (tmp_path / "stranger").mkdir()
+    (tmp_path / "stranger" / "run.json").write_text('{"name": "not ours"}')
+    (tmp_path / "again").symlink_to(tmp_path)
+    assert status(["status", str(tmp_path)]) == 0
+    output = capsys.readouterr().out
+    assert "1 of 1 runs finished, 12 of 12 births" in output
+
+
+def test_arena_without_any_fitness_reports_the_reason(workspace: Workspace) -> None:
+    (workspace.folder / "judge.py").write_text(FITNESS)
+    text = ARENA.format(fitness="judge:none")
+    (workspace.folder / "arena.toml").write_text(text)
+    output = _run(workspace, "arena.toml", "--out", "a", code=1)
+    assert "too few robots are left to mate" in output
+    assert "deaths were failures, all: " in output
+    assert "nobody looked" in output
+    assert "already finished" in workspace.run("resume", "a", "--in-process", code=1)
+
+
+@pytest.mark.parametrize("repeats", [(), ("--repeats", "2")])
+def test_wrong_address_leaves_the_folder_usable(
+    workspace: Workspace, repeats: tuple[str, ...]
+) -> None:
+    source = _write(workspace, "seeing", "worker.fitness:thesis")
+    words = ("run", source, *repeats, "--out", "new", "--quiet")
+    output = workspace.run(*words, "--connect", "tcp/127.0.0.1:1", code=2)
+    assert "no hub at tcp/127.0.0.1:1" in output
+    workspace.run(*words, "--in-process")
+
+
+def test_no_lock_is_created_in_a_folder_with_other_files(workspace: Workspace) -> None:
+    (workspace.folder / "mine").mkdir()
+    (workspace.folder / "mine" / "thesis.tex").write_text("years of work")
+    source = _write(workspace, "seeing", "worker.fitness:thesis")
+    output = workspace.run("run", source, "--out", "mine", code=2)
+    assert "not empty (contains 'thesis.tex')" in output
+    assert [path.name for path in (workspace.folder / "mine").iterdir()] == [
+        "thesis.tex"
+    ]
+
+
+def test_moved_folder_is_reported(workspace: Workspace, until: Until) -> None:
+    words = ("scenario1", "--births", "3000", "--workers", "1", "--out", "gone")
+    process = workspace.start("run", *words, "--quiet")
+    journal = workspace.folder / "gone" / "journal.bin"
+    until(
+        lambda: journal.exists() and journal.stat().st_size > 2000,
+        "the run is on its way",
+    )
+    (workspace.folder / "gone").rename(workspace.folder / "elsewhere")
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert "was moved or removed" in err
+    details = json.loads((workspace.folder / "elsewhere" / "run.json").read_text())
+    assert details["name"] == "scenario1"
