@@ -8,8 +8,8 @@ the thesis. An experiment names the types::
     [space]
     part_types = ["schema.robogen_parts:CORE", "schema.robogen_parts:FIXED_BRICK"]
 
-Source: facts of the original, section 1.5, and RoboGen's published sources for the
-gaps between boxes.
+Source: the code of the original, and RoboGen's published sources for the gaps between
+boxes.
 """
 
 import math

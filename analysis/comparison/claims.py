@@ -1,7 +1,7 @@
 """Findings of the thesis as data: measure, experiments and direction.
 
 Each finding is expressed by a measure; where the thesis does not define one, the choice
-is our own and the text names it. Source: Hupkes 2016, chapter 6.
+is that of this project, and the text names it. Source: Hupkes 2016, chapter 6.
 """
 
 from dataclasses import dataclass

@@ -57,9 +57,10 @@ def _of_island(
 
 
 def _share(values: Numbers, counts: Numbers, middle: float, *, is_late: bool) -> float:
-    """Return the share of a change that happened after (or before) ``middle``.
+    """Return the share of a change that happened before or after ``middle``.
 
-    NaN if fitness (late) did not rise or diversity (early) did not fall.
+    ``is_late`` selects the share after it, of an increase; otherwise the share before
+    it, of a decrease. NaN without such an increase or decrease.
     """
     known = ~np.isnan(values)
     values, counts = values[known], counts[known]

@@ -23,7 +23,7 @@ def progression(populations: pa.Table) -> pa.Table:
         95 % interval by Student's t; null for one run), ``least``, ``greatest``,
         ``runs``. There is no row where no run has a value.
 
-    Source: Hupkes 2016, figures 6.3, 6.5 and 6.7; the intervals are our own.
+    Source: Hupkes 2016, figures 6.3, 6.5 and 6.7; the intervals: own.
     """
     keys = ["experiment", "births"]
     pieces = []

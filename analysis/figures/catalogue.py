@@ -34,7 +34,7 @@ class Figure:
     """A figure of the catalogue.
 
     Attributes:
-        number: number in the thesis; a letter for a figure of our own.
+        number: number in the thesis; a letter for a figure that is not in it.
         title: subject of the figure.
         caption: description of what the figure shows.
         source: tables whose rows it shows.
@@ -150,4 +150,4 @@ FIGURES: tuple[Figure, ...] = (
            "the thesis's finding (> greater, < smaller, = no large difference).",
            ("findings",), effects),
 )  # fmt: skip
-"""Figures of the thesis in its order, then our own."""
+"""Figures of the thesis in its order, then further figures."""

@@ -160,7 +160,7 @@ def ordered(
         edges: (child, parent).
 
     Source: Sugiyama, Tagawa, Toda, *Methods for visual understanding of hierarchical
-    system structures*, 1981, for the first step; exchanges are our own.
+    system structures*, 1981, for the first step; exchanges: own.
     """
     place: dict[int, float] = {}
     rows = []

@@ -1,1 +1,1 @@
-"""Pure machine of an on-line island: births, deaths, orders and migration."""
+"""State machine of an on-line island: births, deaths, orders and migration."""

@@ -1,9 +1,9 @@
-"""On-line island: births, deaths and migration of robots in one world. A pure machine.
+"""On-line island: state machine of births, deaths and migration in one world.
 
 A worker advances the world from one decision to the next. At each decision the arena
 samples, begins a birth, culls, and inserts viable robots. Simulated time stops during
-vetting. Before all that come the founders, one by one, the last made first.
-Source: Hupkes 2016, section 5.3.3; facts of the original, section 5.2.
+vetting. The founders are inserted before all that, one by one, in reverse order of
+their generation. Source: Hupkes 2016, section 5.3.3; the code of the original.
 """
 
 from coordinator.arena.arena_migration import ArenaMigration
@@ -204,7 +204,7 @@ class Arena:
         return commands if self._vetting_queue.is_busy else commands + self._conclude()
 
     def _mate(self) -> list[Vet]:
-        """Begin a birth if there is room and there are parents (trap B12)."""
+        """Begin a birth if there is room and there are parents."""
         mature = self._living.mature()
         needed = self._parents_needed
         if not self._living.has_room or len(mature) < needed:

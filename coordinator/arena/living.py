@@ -148,8 +148,8 @@ class LivingRobots:
 def draw_place(draws: BufferedRng, others: Sequence[Place], arena: Arena) -> Place:
     """Return a random place away from all others, or the last one tried.
 
-    Places are uniform in radius, so denser in the centre (facts of the original,
-    section 5).
+    Places are uniform in radius, so denser in the centre (as in the
+    code of the original).
 
     Args:
         draws: source of two numbers for each try, the angle first.

@@ -135,7 +135,7 @@ def _parser() -> argparse.ArgumentParser:
         )  # fmt: skip
         action.add_argument(
             "--run", default="", metavar="NAME",
-            help="end of the run folder's name (default: the only run)",
+            help="run, by the end of its folder's name (default: the only run)",
         )  # fmt: skip
         add_count(action, "--island", 0, "island number", least=0)
         add_network_flags(action)

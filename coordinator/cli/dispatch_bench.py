@@ -1,9 +1,9 @@
 """``revolve bench dispatch``: cost of dispatch, and the largest fleet it can serve.
 
-Null evaluations over the real network measure dispatch and network alone. Whole births
-without physics measure a birth's cost for the coordinator. Evaluations of fixed
-duration measure the utilisation of real workers. With the cost of a birth, fleets that
-are larger than this machine are simulated (``coordinator.cli.fleet_model``).
+Evaluations that return at once measure dispatch and network alone. Births without
+physics measure a birth's cost for the coordinator. Evaluations of fixed duration
+measure the utilisation of workers. From the cost of a birth, larger fleets than this
+machine can hold are simulated (``coordinator.cli.fleet_model``).
 """
 
 import argparse

@@ -24,7 +24,7 @@ _COMMANDS = {
         "revolve resume runs/scenario1-seed1",
     ),
     "compare": (
-        "Compare two runs row by row, in all columns that the same seed repeats.",
+        "Compare two runs row by row, in all columns that are equal for equal seeds.",
         "revolve compare runs/a runs/b",
     ),
     "bench dispatch": (

@@ -60,7 +60,7 @@ def _journal_of(folder: Path, *, is_followed: bool) -> Path:
     """Return the path of a run's journal.
 
     Raises:
-        RunFolderError: there is none, and none to wait for.
+        RunFolderError: there is no journal, and no unfinished run to wait for.
     """
     path = folder / NAME
     if not folder.is_dir():

@@ -1,1 +1,1 @@
-"""Pure machines that assign jobs and arena shards to agents."""
+"""State machines that assign jobs and arena shards to agents."""

@@ -1,4 +1,4 @@
-"""Assigns jobs to agents: a pure machine.
+"""State machine that assigns jobs to agents.
 
 Each requested job is delivered exactly once, unless it is withdrawn, even if agents
 join, leave, die, fail or answer late. An agent holds ``slots + 1`` jobs, so that the
@@ -54,7 +54,7 @@ VETS_AT_HAND = 16
 
 
 class Dispatch:
-    """The machine; events enter only through ``handle``.
+    """State machine of jobs; events enter only through ``handle``.
 
     Attributes:
         malformed: answers that did not decode or did not fit their job.

@@ -1,8 +1,8 @@
-"""The agents that all runs of this process share, and the routing of their jobs.
+"""Agents that all runs of this process share, and the routing of their jobs.
 
-Jobs of all runs go through the same machines, with numbers from one sequence, so that
-runs do not know of each other and none of them can take all workers. The client of a
-job is noted here; only the client knows what an answer means.
+The jobs of all runs are numbered from one sequence and assigned by the same state
+machines. Runs are therefore independent of each other, and none can take all workers.
+An answer is returned to the client that requested the job, which interprets it.
 """
 
 from collections.abc import Callable, Sequence
@@ -58,11 +58,11 @@ Encode = Callable[[AssignShard], tuple[bytes, Read]]
 """Returns the request of an advance, and what decodes and checks its answer."""
 
 End = Deliver | ShardDone | ShardFailed
-"""What a client is told about a job or an advance."""
+"""Result of a job or an advance, as its client receives it."""
 
 
 class Fleet:
-    """Workers and analyzers, the jobs of all runs, and the way between them.
+    """Workers and analyzers, the jobs of all runs, and the routing between them.
 
     Attributes:
         dispatch: assigns jobs about single robots.
@@ -70,7 +70,7 @@ class Fleet:
     """
 
     def __init__(self, agents: Agents, *, allows_drift: bool = False) -> None:
-        """Share out agents.
+        """Connect to agents.
 
         Args:
             agents: the connection to them.
@@ -102,7 +102,7 @@ class Fleet:
         return next(self._numbers)
 
     def request(self, job: Job) -> None:
-        """Have a job done."""
+        """Request a job."""
         self._obey(self.dispatch.handle(Requested(job)))
 
     def new_shard(self, client: Client, encode: Encode, platform: str) -> int:
@@ -119,7 +119,7 @@ class Fleet:
         return shard
 
     def advance(self, shard: int) -> None:
-        """Have a shard advanced; its client knows how far."""
+        """Request an advance of a shard; its client gives the last step."""
         self._advancing.add(shard)
         self._move(ShardRequested(shard))
 
@@ -198,7 +198,7 @@ class Fleet:
                 self._agents.cancel(command.agent, job.payload)
 
     def _move(self, event: ShardEvent) -> None:
-        """Pass an event to the machine that assigns shards, and do what it says."""
+        """Pass an event to ``shards``, and carry out its commands."""
         for command in self.shards.handle(event):
             client, encode = self._shard_clients[command.shard]
             if isinstance(command, AssignShard):

@@ -1,4 +1,4 @@
-"""Assigns arena shards to workers: a pure machine.
+"""State machine that assigns arena shards to workers.
 
 One worker holds the state of a shard and makes its advances. If that worker is gone,
 fails or lacks the state, the advance goes, with all that is needed to rebuild the
@@ -70,7 +70,7 @@ class _Shard:
 
 
 class ShardDispatch:
-    """The machine; events enter only through ``handle``."""
+    """State machine of shards; events enter only through ``handle``."""
 
     def __init__(self, numbers: Iterator[int], *, allows_drift: bool = False) -> None:
         """Initialise without shards.

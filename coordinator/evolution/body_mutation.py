@@ -1,9 +1,9 @@
 """Mutation of the body, step by step; `variation` calls the steps in order.
 
 Each step changes a tree in place and keeps every restriction. Source: Hupkes 2016,
-section 4.4.6; facts of the original, section 4.5. Two errors of the original are
-avoided: a new part may connect to every neuron, and the mean size of the subtrees
-that can be duplicated is a mean.
+section 4.4.6; the code of the original. Two of its errors are avoided: a new part may
+connect to every neuron, and the mean size of the subtrees that can be duplicated is a
+mean.
 """
 
 from collections.abc import Iterable, Iterator

@@ -1,8 +1,8 @@
 """Mutation of the brain, step by step; `variation` calls the steps in order.
 
 Each step changes a tree in place and keeps every restriction. Source: Hupkes 2016,
-section 4.4.6; facts of the original, section 4.5. One error of the original is
-avoided: deleting a hidden neuron redirects no other connection.
+section 4.4.6; the code of the original. One of its errors is avoided: deleting a hidden
+neuron redirects no other connection.
 """
 
 from collections.abc import Sequence

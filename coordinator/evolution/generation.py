@@ -1,8 +1,8 @@
 """Random genomes, and the random parts, neurons and connections that mutation adds.
 
-Source: Hupkes 2016, section 4.4.2; facts of the original, 4.3 and 4.5. Two errors of
-the original are avoided: no robot has fewer parts than the experiment allows, and
-every part has its own identity beside the common colour.
+Source: Hupkes 2016, section 4.4.2; the code of the original. Two of its errors are
+avoided: no robot has fewer parts than the experiment allows, and every part has its own
+identity beside the common colour.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -132,7 +132,7 @@ def random_part(
     Args:
         draws: source of its slot, orientation, parameters and neurons.
         kind: its type; a root gets no slot and no orientation.
-        genes: the next of them becomes its identity.
+        genes: source of identities; the part gets the next one.
         colour: red, green, blue; empty for a random colour.
     """
     return MutableGenome(

@@ -175,7 +175,7 @@ def level(branches: Iterable[MutableGenome]) -> None:
     Turns add up from the core outwards. Every levelled part gets the turn that brings
     the sum back to zero; all other parts keep theirs.
 
-    Source: facts of the original, section 2 (planarity).
+    Source: the code of the original (planarity).
     """
     turns: dict[MutableGenome, int] = {}
     for branch in branches:
@@ -189,7 +189,7 @@ def level(branches: Iterable[MutableGenome]) -> None:
 
 
 class SizeCounts(NamedTuple):
-    """Counts of everything that the restrictions of a space limit, of some branches."""
+    """Numbers of parts, inputs, outputs and hidden neurons of some branches."""
 
     parts: int
     inputs: int

@@ -1,6 +1,6 @@
 """Selection of parents and of survivors, and culling.
 
-Source: Hupkes 2016, sections 5.3 and 8.2; facts of the original, sections 5.1 and 5.2.
+Source: Hupkes 2016, sections 5.3 and 8.2; the code of the original.
 """
 
 from collections.abc import Sequence
@@ -142,7 +142,7 @@ def select_culled(
     Robots below a share of the mean fitness are culled ("selection"). If there are
     none, and the mature alone reach the population limit, a share of the limit is
     culled ("cull"). At least ``population_floor`` of the mature remain. The original
-    cut an unsorted list instead (trap B11).
+    did not sort the list first.
 
     Args:
         mature: the robots that were evaluated over a whole window.

@@ -1,7 +1,7 @@
 """Variation: the genome of a child by crossover and mutation.
 
-Source: Hupkes 2016, sections 4.4.3 to 4.4.6; facts of the original, sections 4.4 to
-4.6. The analyzer checks the body of the child later.
+Source: Hupkes 2016, sections 4.4.3 to 4.4.6; the code of the original. The analyzer
+checks the body of the child later.
 """
 
 from collections.abc import Iterable, Iterator

@@ -1,1 +1,1 @@
-"""Pure machines of off-line islands and of migration; events of all islands."""
+"""State machines of off-line islands and of migration; events of all islands."""

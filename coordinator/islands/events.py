@@ -227,7 +227,7 @@ ArenaEvent = Started | Vetted | VettingFailed | Advanced | Commanded | Migration
 
 @dataclass(frozen=True, slots=True)
 class Vet:
-    """Have a candidate's body checked by the analyzer."""
+    """Vet a candidate's body on an analyzer."""
 
     birth: BirthId
     attempt: int
@@ -236,7 +236,7 @@ class Vet:
 
 @dataclass(frozen=True, slots=True)
 class Evaluate:
-    """Have a robot evaluated.
+    """Evaluate a robot on a worker.
 
     Attributes:
         birth: id of the robot.
@@ -279,13 +279,13 @@ class Append:
 
 @dataclass(frozen=True, slots=True)
 class AdvanceShard:
-    """Have an arena shard changed and then advanced.
+    """Change an arena shard, then advance it.
 
     Attributes:
         island: number of the arena.
         number: number of the advance, from 0.
         until: step to reach.
-        changes: changes to make before.
+        changes: changes before the advance.
         wants_snapshot: a snapshot is due at the end of the advance.
     """
 

@@ -1,9 +1,9 @@
-"""Off-line island: births, evaluations, selection and migration. A pure machine.
+"""Off-line island: state machine of births, evaluations, selection and migration.
 
 Founders come first, then broods of children of the population at the start of the
 brood. Births of a brood are in flight together, up to the experiment's window. They
 are committed in birth order, whatever the order of their answers.
-Source: Hupkes 2016, section 5.3; facts of the original, section 5.1.
+Source: Hupkes 2016, section 5.3; the code of the original.
 """
 
 from dataclasses import dataclass

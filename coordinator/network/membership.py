@@ -1,6 +1,6 @@
 """Agents of a fleet: which ones are alive, their properties, and which may join.
 
-Pure: liveliness tokens and agent infos in, dispatch events out.
+State only: liveliness tokens and agent infos in, dispatch events out.
 """
 
 from google.protobuf.message import DecodeError
@@ -75,7 +75,7 @@ class Membership:
         """Take an agent's description of itself and of the processes it replaces.
 
         Args:
-            agent: a stranger.
+            agent: a member without properties so far.
             data: bytes of an ``AgentInfo``.
 
         Returns:

@@ -301,7 +301,7 @@ class Network:
             self._ask(asked, member.info, None, ASK_TIMEOUT_S)
 
     def _introduced(self, asked: _Asked) -> Sequence[DispatchEvent]:
-        """Let an agent join if its properties are valid and its version is ours."""
+        """Let an agent join if its properties are valid and its version is equal."""
         agent, reply = asked.agent, asked.reply
         if not self._membership.is_stranger(agent):
             return []

@@ -1,1 +1,1 @@
-"""Drives one run or many: events in, journal first, commands out."""
+"""Main loop of runs: journals events, then carries out the islands' commands."""

@@ -1,4 +1,4 @@
-"""Cross-checks: evaluations that two workers do, to see whether they agree. Pure.
+"""Cross-checks: evaluations that two workers do, to compare the results.
 
 The birth decides whether an evaluation is checked, so that a resumed run checks the
 same ones. A check changes no birth: equal answers count as one, and different answers

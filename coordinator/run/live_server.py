@@ -1,4 +1,4 @@
-"""Serves the viewers of a run: publishes updates, replies to queries with the whole.
+"""Server for viewers of a run: publishes updates, and replies with all past ones.
 
 The run's thread encodes at a limited rate. A second thread sends the replies, which
 a slow connection may block.
@@ -21,7 +21,7 @@ from schema.wire.updates import WorkerInfo, encode_update
 _UPDATE_S = 0.2
 """Least time between two updates [s]."""
 _WHOLE_S = 1.0
-"""Least time between two encodings of the whole [s]."""
+"""Least time between two encodings of all past updates [s]."""
 
 
 class LiveServer:

@@ -1,7 +1,7 @@
-"""Drives a run: journals answers first, then carries out the machines' decisions.
+"""Main loop of a run: journals each answer, then passes it to the state machines.
 
-The machines decide and this loop carries out their commands. No effect of an answer
-is acted on before the journal has the answer, so a coordinator that is killed at any
+The state machines decide, and this loop carries out their commands. It stores each
+answer in the journal before it acts on it, so a coordinator that is killed at any
 point makes the same decisions again when it replays its journal.
 """
 
@@ -82,7 +82,7 @@ class Loop:
     """The islands of a run and their connection to agents, journal and tables.
 
     Attributes:
-        islands: the machines, by their numbers.
+        islands: the state machines of the islands, by number.
         shard_requests: the advances of the arenas.
         client: identifies this run to the fleet.
         throttle: limits the speed of arenas; None: no limit.
@@ -102,10 +102,10 @@ class Loop:
         confirm: Callable[[], None] = lambda: None,
         watch: Callable[[Record], None] | None = None,
     ) -> None:
-        """Connect the machines; ``start`` starts them.
+        """Connect the state machines; ``start`` starts them.
 
         Args:
-            islands: the machines, by their numbers.
+            islands: the state machines of the islands, by number.
             context: what all requests have in common.
             fleet: the agents.
             log: the journal.

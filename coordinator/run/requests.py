@@ -62,7 +62,7 @@ class Requests:
         self._bodies: dict[BirthId, tuple[Robot, bytes]] = {}
 
     def send(self, command: Vet | Evaluate) -> None:
-        """Have a robot vetted or evaluated."""
+        """Request the vetting or evaluation of a robot."""
         context = self._context
         if isinstance(command, Vet):
             kind: JobKind = "vet"

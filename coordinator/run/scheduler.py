@@ -1,4 +1,4 @@
-"""Runs side by side on one fleet: as many at once as keep it busy.
+"""Scheduler: starts as many runs at once as keep the fleet busy.
 
 A run that needs the result of one birth before the next has a single open request;
 many such runs together keep all workers busy. Another run is therefore started
@@ -210,7 +210,8 @@ class RunScheduler:
 def _cause(run: RunSession, error: RevolveError) -> RevolveError:
     """Return why a run cannot continue.
 
-    If another coordinator took it over while this one slept, that is the cause.
+    If another coordinator took it over while this process was suspended, that is the
+    cause.
     """
     try:
         run.held.confirm()

@@ -148,10 +148,10 @@ class RunSession:
                 self.feed.read()
 
     def do_chores(self) -> None:
-        """Check that the folder is still ours; flush rows to disk.
+        """Check that this process still owns the folder; flush rows to disk.
 
         Raises:
-            RunFolderError: it is not, or the disk is full or failed.
+            RunFolderError: it does not, or the disk is full or failed.
         """
         self.held.confirm()
         self._recorder.flush()
@@ -160,7 +160,7 @@ class RunSession:
         """Write the last row, and convert all tables to their final form.
 
         Raises:
-            RunFolderError: the folder is not ours, or the disk is full or failed.
+            RunFolderError: another process owns the folder, or the disk failed.
         """
         self.held.confirm()
         self._recorder.write(_runs_row(self.held))
@@ -171,7 +171,7 @@ class RunSession:
         """Flush everything, so that the run can be resumed.
 
         Raises:
-            RunFolderError: the folder is not ours, or the disk is full or failed.
+            RunFolderError: another process owns the folder, or the disk failed.
         """
         self.held.confirm()
         self._recorder.flush()

@@ -155,7 +155,7 @@ class ShardRequests:
         self._fleet.advance(self._numbers[shard])
 
     def request_snapshot(self, shard: int) -> None:
-        """Have the state stored at the end of the next advance that is assigned."""
+        """Request a snapshot at the end of the next advance that is assigned."""
         self._past(shard).wants_snapshot = True
 
     def commit(self, event: Advanced) -> Drift | None:

@@ -1,4 +1,4 @@
-"""Simulated time held back to a multiple of real time, for viewers.
+"""Limits simulated time to a multiple of real time, for viewers.
 
 Results do not depend on it: it only delays the advances of arenas.
 """
@@ -25,7 +25,7 @@ class RealTimeThrottle:
 
     @property
     def wake_s(self) -> float:
-        """When the next arena that is held back may go on [s]."""
+        """Time at which the next delayed advance may start [s]."""
         return self._held_back[0][0] if self._held_back else inf
 
     def holds_back(self, command: AdvanceShard, step: int, now_s: float) -> bool:

@@ -1,4 +1,4 @@
-"""Comparison of two runs in all columns that the same seed repeats."""
+"""Comparison of two runs in all repeatable columns."""
 
 from operator import itemgetter
 from pathlib import Path

@@ -1,9 +1,10 @@
 """Snapshots of arenas in a run folder; the newest of each shard is kept.
 
-``snapshots/island-N-STEP.bin`` is complete or absent. An older snapshot is removed only
-once the journal has reached the newer one. A snapshot that the journal does not reach,
-after a kill between the two writes, is ignored and written again. If the step is later
-reached on another platform, the state differs, and so does its digest.
+``snapshots/island-N-STEP.bin`` is complete or absent. A snapshot is written before the
+journal record of its step; the previous snapshot is removed after that record. A
+snapshot whose step is not in the journal (the process was killed between the two
+writes) is ignored and overwritten. On another platform the state at that step, and
+therefore its digest, may differ.
 """
 
 import re

@@ -44,7 +44,7 @@ def our_version() -> str:
 
 
 def wire_version() -> str:
-    """Return our version and, after a ``+``, that of the messages."""
+    """Return this project's version and, after a ``+``, that of its messages."""
     messages = sha256(DESCRIPTOR.serialized_pb).hexdigest()
     return f"{our_version()}+{messages[:8]}.{MEANING}"
 

@@ -121,8 +121,8 @@ def own_agent(agent: Agent, index: int) -> Agent:
     """Return the agent of one process of a pool.
 
     Args:
-        agent: of the whole pool.
-        index: of the process.
+        agent: agent of the whole pool.
+        index: index of the process in the pool.
     """
     return replace(
         agent,

@@ -259,7 +259,7 @@ class Arena(Section, frozen=True):
     """An on-line world: robots are born, evaluated all the time and die in it.
 
     Times are simulated. Source: Hupkes 2016, section 5.3.3, and the intervals of its
-    code (facts of the original, section 5.2).
+    code.
 
     Attributes:
         founder_interval_s: time between births of founders [s].

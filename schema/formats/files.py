@@ -21,7 +21,7 @@ from schema.wire.codec import decode_robot, encode_robot
 
 
 def robot_from_yaml(text: str, file: str, space: BodySpace) -> Robot:
-    """Return the robot of a YAML text, in our form or in that of Revolve (2016).
+    """Return the robot of a YAML text, in the current form or that of Revolve (2016).
 
     Args:
         text: the document.

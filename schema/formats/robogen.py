@@ -52,7 +52,7 @@ class RobogenPart:
 
     Attributes:
         name: unique in the file.
-        kind: our name of the part type.
+        kind: Revolve's name of the part type.
         orientation: quarter turns, 0..3.
         parameters: as in the file: length [m], alpha and beta [degrees].
         where: file and line or path, for messages.
@@ -117,7 +117,7 @@ def checked_part(
 
 
 def neuron_kind(name: str, where: str) -> str:
-    """Return our type of a neuron, given RoboGen's.
+    """Return Revolve's type of a neuron, given RoboGen's.
 
     Raises:
         InvalidRobot: an unknown type.
@@ -162,7 +162,7 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
 
 @dataclass(slots=True)
 class _Body:
-    """Our parts so far, and their names in RoboGen."""
+    """Revolve's parts so far, and their names in RoboGen."""
 
     parts: list[Part] = field(default_factory=list)
     names: list[str] = field(default_factory=list)
@@ -205,7 +205,7 @@ def _levelled(part: RobogenPart, inherited: int) -> tuple[int, int]:
 
 
 def _parameters(part: RobogenPart) -> tuple[float, ...]:
-    """Return the parameters of a part in our units."""
+    """Return the parameters of a part in Revolve's units."""
     if part.kind != "ParametricBarJoint":
         return ()
     length_m, alpha, beta = part.parameters
@@ -215,7 +215,7 @@ def _parameters(part: RobogenPart) -> tuple[float, ...]:
 def _neurons(
     theirs: RobogenRobot, body: _Body, space: BodySpace
 ) -> tuple[list[Neuron], dict[Ending, int]]:
-    """Return our neurons in order, and their indices by RoboGen's names."""
+    """Return Revolve's neurons in order, and their indices by RoboGen's names."""
     neurons: list[Neuron] = []
     index: dict[Ending, int] = {}
 

@@ -1,4 +1,4 @@
-"""Conversion of RoboGen's slots and quarter turns into ours.
+"""Conversion of RoboGen's slots and quarter turns into Revolve's.
 
 Source: RoboGen's published sources of 2018.
 """
@@ -21,7 +21,7 @@ _Z: Vector = (0.0, 0.0, 1.0)
 
 
 def our_slot(kind: str, slot: int) -> int:
-    """Return our number of a slot, given RoboGen's."""
+    """Return Revolve's number of a slot, given RoboGen's."""
     return _OUR_SLOTS[slot] if kind in SQUARE else slot
 
 
@@ -30,9 +30,9 @@ def our_orientation(parent: str, slot: int, child: str, quarter: int) -> int:
     """Return the orientation [degrees] that matches RoboGen's quarter turns.
 
     Args:
-        parent: our type of the parent.
+        parent: Revolve's type of the parent.
         slot: RoboGen's slot of it.
-        child: our type of the child, attached by its first slot.
+        child: Revolve's type of the child, attached by its first slot.
         quarter: RoboGen's quarter turns.
     """
     # RoboGen turns the child about its own normal, we turn the tangent: opposite.
@@ -58,7 +58,7 @@ def _their_slot(kind: str, slot: int) -> Slot:
 
 
 def _our_slot(kind: str, slot: int) -> Slot:
-    """Return our slot, without tilt."""
+    """Return Revolve's slot, without tilt."""
     part_type = BUILT_IN[kind]
     values = tuple(parameter.default for parameter in part_type.parameters)
     return part_type.shape(values).slots[slot]

@@ -1,8 +1,8 @@
 """Reader of the YAML form of Revolve (2016).
 
-It differs from ours in its defaults: a part is attached by its slot 0, every output
-has a neuron, of type Simple unless ``params`` gives another, and hidden neurons are a
-mapping by name. Connections go from ``src`` to ``dst``.
+It differs from the current form in its defaults: a part is attached by its slot 0,
+every output has a neuron, of type Simple unless ``params`` gives another, and hidden
+neurons are a mapping by name. Connections go from ``src`` to ``dst``.
 
 Source: the conversion of the published code (revolve/convert), and its examples.
 """

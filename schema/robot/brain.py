@@ -1,7 +1,7 @@
 """Recurrent neural networks as data: neuron types, neurons, connections.
 
-Formulas (a = weighted sum of inputs and of the previous states; facts of the
-original, section 3.1):
+Formulas (a = weighted sum of inputs and of the previous states; from the code
+of the original):
 
 * ``Simple``: gain * (a - bias)
 * ``Sigmoid``: 1 / (1 + exp(-gain * (a - bias)))

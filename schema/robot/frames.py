@@ -2,7 +2,7 @@
 
 Rule: the slot points of child and parent coincide, their normals are opposite, and
 the child's tangent, rotated by the orientation about the child's normal, equals the
-parent's tangent. Source: facts of the original, section 2.
+parent's tangent. Source: the code of the original.
 """
 
 import math

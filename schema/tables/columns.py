@@ -431,7 +431,7 @@ def sizes(robot: Robot, genome: Genome, space: BodySpace) -> dict[str, int]:
         (parts without children; a lone core counts 1), ``inputs``, ``outputs``,
         ``hidden``, and ``connections`` of the genome, including unresolved ones.
 
-    Source: thesis section 6.3; facts of the original, section 8.
+    Source: thesis section 6.3; the code of the original.
     """
     kinds = [space[part.kind] for part in robot.parts]
     layers = [neuron.layer for neuron in robot.brain.neurons]

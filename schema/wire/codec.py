@@ -100,7 +100,7 @@ def decode_robot(data: bytes) -> Robot:
 
 
 def decode_body(data: bytes) -> Robot:
-    """Return the robot of some bytes without its brain.
+    """Return an encoded robot as a robot without brain.
 
     Raises:
         MalformedMessage: not a robot's bytes, or parts that are not a tree.

@@ -81,7 +81,7 @@ class OperatorRequest(Message, frozen=True):
         request_id: unique; a request that arrives twice is carried out once.
         island: number of the arena's island.
         action: what to do.
-        run: end of the run folder's path, to choose among a coordinator's runs.
+        run: last part of the run folder's path, which selects one of several runs.
     """
 
     request_id: Annotated[str, Meta(min_length=1)]

@@ -130,7 +130,7 @@ def _births(
 
 
 def _samples(rng: np.random.Generator, levels: Levels) -> Columns:
-    """Return three samples of each robot between two births."""
+    """Return three fitness samples of each robot between two births."""
     rows = [
         (count, living, count * _BIRTH_S + sample * _SAMPLE_S)
         for count, living in levels

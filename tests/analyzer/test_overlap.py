@@ -160,7 +160,7 @@ def test_a_ring_of_bricks_intersects_its_start() -> None:
 
 
 def test_pads_of_a_touch_sensor_reach_beyond_the_slot_they_sit_on() -> None:
-    # Facts 1.1: the pads reach |y| = 19.5 mm, the base 17 mm.
+    # In the original the pads reach |y| = 19.5 mm, the base 17 mm.
     robot = Robot((CORE, Part("TouchSensor", 0, 1, 0, 0, GREY)))
     boxes = place_boxes(robot, BUILT_IN)
     lower, upper = boxes.lower[2:], boxes.upper[2:]

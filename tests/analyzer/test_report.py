@@ -33,7 +33,7 @@ def test_the_core_alone() -> None:
 def test_a_hinge_adds_its_length_on_its_side(
     slot: int, lower: tuple[float, ...], upper: tuple[float, ...]
 ) -> None:
-    # Slot to slot an active hinge measures 37.7 mm (facts 1.1).
+    # Slot to slot an active hinge measures 37.7 mm.
     robot = Robot((CORE, Part("ActiveHinge", 0, slot, 0, 0, GREY)))
     report = analyze(robot, BUILT_IN, Vetting())
     assert report.lower == pytest.approx(lower, abs=1e-12)

@@ -1,4 +1,4 @@
-"""Hand-made rows, and a disk that is full, for tests of what is written."""
+"""Hand-made rows and a full disk, for tests of storage."""
 
 import resource
 from collections.abc import Callable, Iterator
@@ -102,7 +102,7 @@ def make_records() -> Callable[..., list[Record]]:
 
 
 def feed(folder: Path, rows: list[Record], every: int = 10) -> Recorder:
-    """Return a recorder that took rows and flushed after every few."""
+    """Return a recorder after it has recorded rows, with regular flushes."""
     recorder = Recorder(folder, DETAILS)
     for index, record in enumerate(rows, start=1):
         recorder.write(record)
@@ -112,7 +112,7 @@ def feed(folder: Path, rows: list[Record], every: int = 10) -> Recorder:
 
 
 def expected(rows: list[Record], table: str) -> pa.Table:
-    """Return what a table must hold."""
+    """Return the expected content of a table."""
     own = [record.row for record in rows if record.table == table]
     numbered = [{"record": index, **row} for index, row in enumerate(own)]
     return pa.Table.from_pylist(numbered, TABLES[table])
@@ -127,7 +127,7 @@ def assert_complete(folder: Path, rows: list[Record]) -> None:
 
 @contextmanager
 def no_file_beyond(size: int) -> Iterator[None]:
-    """Let no file of this process grow beyond a size, as a full disk would not."""
+    """Limit the size of this process's files, to imitate a full disk."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
@@ -150,5 +150,5 @@ def check_complete() -> Callable[[Path, list[Record]], None]:
 
 @pytest.fixture
 def full_beyond() -> Callable[[int], AbstractContextManager[None]]:
-    """Return a context in which no file grows beyond a size."""
+    """Return a context that limits the size of files."""
     return no_file_beyond

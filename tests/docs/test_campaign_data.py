@@ -72,7 +72,7 @@ def _early_mark(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with three experiments, and the campaign of them below it."""
+    """Return a folder with three experiments, and a campaign of them in it."""
     folder = tmp_path_factory.mktemp("campaign")
     for name, children in (("scenario2", 1), ("scenario1", 15)):
         text = OFF_LINE.format(name=name, children=children)

@@ -19,7 +19,7 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False)
 
 @dataclass
 class Draft:
-    """A node in the making."""
+    """Node of a genome under construction."""
 
     node: Node
     children: dict[int, "Draft"] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""What flags take, and the one line that says why not."""
+"""Values that flags accept, and the errors of others."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""Numbers of the part types: facts of the original, tables 1.1 and 1.3."""
+"""Numbers of the part types, as in the code of the original."""
 
 import math
 

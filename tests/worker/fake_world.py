@@ -1,6 +1,6 @@
-"""A world without physics that keeps the contract of a real one.
+"""World without physics that fulfils the contract of a real one.
 
-Its advances depend on all earlier ones, and its snapshot holds that past.
+Its advances depend on all earlier ones, and its snapshot contains them.
 """
 
 import hashlib
@@ -14,7 +14,7 @@ from tests.coordinator.arena_world import DT, MATURE, poses
 
 
 class FakeWorld:
-    """World whose robots' fitness is drawn from its past."""
+    """World in which the fitness of robots depends on all earlier advances."""
 
     made = 0
     """Number of worlds that were made or restored; reset it before use."""

@@ -67,9 +67,9 @@ def _distinct(births: tuple[BirthId, ...]) -> tuple[BirthId, ...]:
 def possible(changes: Changes, living: Collection[BirthId]) -> Changes:
     """Return the part of changes from another platform that is possible here.
 
-    Robots that were lost here only are not removed again. Robots that were lost there
-    only, and return as migrants, are removed first. With the same robots alive as
-    there, the changes are the same.
+    A robot that died only on this platform is not removed again. A robot that died only
+    on the other platform, and returns as a migrant, is removed first. If the same
+    robots are alive on both, the changes are the same.
     """
     coming = [each.birth for each in changes.insertions]
     going = dict.fromkeys((*changes.removals, *coming))
@@ -143,11 +143,11 @@ def arena_robot(
 
 
 def replace_brain(robot: ArenaRobot, brain: Brain, width: Widths, start: int) -> None:
-    """Give a robot another brain, at rest.
+    """Replace a robot's brain; all neuron states are 0.
 
     Args:
         robot: the robot; its commands are held until its next tick.
-        brain: that fits its body.
+        brain: new brain, which fits its body.
         width: of every network.
         start: step of that tick, from which the brain's age counts.
     """

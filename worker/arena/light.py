@@ -4,7 +4,7 @@ The light is a point. A sensor faces along its part's x axis from the face of it
 box and reads cos(theta) min(1, (1 m / d)^2): theta is the angle between its axis
 and the direction of the light, d the distance of the light. It reads 0 if the light
 is behind it or hidden by a robot or a wall. Source: own; the fall with distance is
-that of the original's PointIntensity sensor (facts, section 1.2). No camera is used,
+that of the original's PointIntensity sensor. No camera is used,
 so births and deaths do not disturb the readings.
 """
 

@@ -1,9 +1,9 @@
 """Snapshots: the whole state of an arena as bytes, and back.
 
 MessagePack of fixed fields; arrays are little-endian float64. Decoding executes no
-code. What is missing here is a function of the fields (models, contacts, frames of
-bodies) or a cache (measured distances). Contact durations and samples of poses leave
-with each advance, so there are none between two advances.
+code. Data that is not stored is a function of the fields (models, contacts, frames of
+bodies) or a cache (measured distances). Each advance returns its contact durations and
+pose samples, so there are none between two advances.
 """
 
 import hashlib
@@ -45,7 +45,7 @@ class _RobotState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
 
 
 class _CasualtyState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A robot that was lost and is not yet reported by an advance."""
+    """A robot that diverged and is not yet reported by an advance."""
 
     birth: tuple[int, int]
     step: int

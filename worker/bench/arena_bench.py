@@ -1,6 +1,6 @@
 """``revolve bench arena`` and ``revolve bench spider``: the thesis's benchmarks.
 
-Source: Hupkes 2016, figures 6.1 and 7.1; facts of the original, section 9.
+Source: Hupkes 2016, figures 6.1 and 7.1; the code of the original.
 """
 
 import argparse
@@ -99,10 +99,12 @@ def add_commands(kinds: Any) -> None:  # noqa: ANN401 - argparse hides its type
             metavar="N",
             help="numbers of robots (default: 5 10 ... 50)",
         )
-        add_count(parser, "--seconds", seconds, "simulated in each repetition")
-        add_count(parser, "--repetitions", repetitions, "of each size")
-        add_count(parser, "--threads", 1, "that step clusters of the arena")
-        add_count(parser, "--seed", 1, "of the robots and their places", least=0)
+        add_count(parser, "--seconds", seconds, "simulated seconds per repetition")
+        add_count(
+            parser, "--repetitions", repetitions, "repetitions per number of robots"
+        )
+        add_count(parser, "--threads", 1, "threads that simulate the arena")
+        add_count(parser, "--seed", 1, "seed of the robots and their places", least=0)
         parser.add_argument("--out", type=Path, help="Parquet file for the results")
 
 

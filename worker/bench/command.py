@@ -1,9 +1,8 @@
 """Benchmarks of simulation: its speed on this machine, and its fidelity.
 
-``revolve bench evaluate`` compares evaluations with bare physics steps;
-``revolve bench fidelity RUN`` re-simulates a run's robots with a time step five times
-finer (``worker.bench.fidelity``); ``revolve bench arena`` and ``revolve bench spider``
-repeat the thesis's benchmarks (``worker.bench.arena_bench``).
+'revolve bench evaluate' compares evaluations with bare physics steps. 'revolve bench
+fidelity RUN' re-simulates a run's robots with a time step five times finer. 'revolve
+bench arena' and 'revolve bench spider' repeat the thesis's benchmarks.
 """
 
 import argparse
@@ -149,13 +148,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     arena_bench.add_experiment(timing, "scenario1")
     add_count(timing, "--robots", 30, "number of random robots")
-    add_count(timing, "--seed", 1, "of the robots that are drawn", least=0)
+    add_count(timing, "--seed", 1, "seed of the random robots", least=0)
     study = kinds.add_parser(
         "fidelity", help="re-simulate a run's robots with other settings"
     )
     study.add_argument("run", type=Path, help="folder of a run")
     add_count(study, "--per-third", 20, "robots drawn from each third of the fitness")
-    add_count(study, "--seed", 1, "of the robots that are drawn", least=0)
+    add_count(study, "--seed", 1, "seed of the choice of robots", least=0)
     study.add_argument(
         "--against",
         action="append",

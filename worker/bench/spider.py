@@ -50,7 +50,7 @@ def spider() -> Robot:
 
 
 def grid(count: int) -> list[tuple[float, float]]:
-    """Return places in rows of five (trap B22: the first row, too)."""
+    """Return places in rows of five, the first row included."""
     return [
         (SPACING_M * (number % _COLUMNS), SPACING_M * (number // _COLUMNS))
         for number in range(count)

@@ -44,7 +44,7 @@ class Schedule:
         return step % self._merge_steps == 0
 
     def is_split(self, step: int) -> bool:
-        """Whether clusters are checked for splits at a step; also one of merges."""
+        """Whether clusters are checked for splits, and merges, at a step."""
         return step % self._split_steps == 0
 
     def next_tick(self, step: int) -> int:

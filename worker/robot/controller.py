@@ -142,8 +142,8 @@ class Bank:
         """Start all networks at state 0.
 
         Args:
-            networks: packed with the same widths.
-            width: those widths.
+            networks: packed with ``width``.
+            width: of the arrays.
             tick_s: time between two ticks [s].
         """
         count, states = len(networks), width.states

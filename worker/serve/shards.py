@@ -212,10 +212,10 @@ def _repeat(world: World, history: Sequence[PastAdvance]) -> None:
 def _approximate(
     world: World, history: Sequence[PastAdvance], living: Sequence[BirthId]
 ) -> None:
-    """Repeat a history of another platform, as far as it is possible here.
+    """Repeat a history of another platform as exactly as this platform can.
 
-    Robots that were lost there only are removed at the end. Robots that were lost here
-    only stay lost.
+    Robots that are not among ``living`` are removed at the end. Robots that diverge
+    only on this platform are not restored.
     """
     for past in history:
         world.apply(possible(past.changes, world.births))

@@ -137,7 +137,7 @@ def test_missing_data_is_named() -> None:
 
 
 def test_catalogue_has_all_figures_of_the_thesis_and_each_names_missing_data() -> None:
-    # Figures of the thesis except rendered ones, then our own.
+    # Figures of the thesis except rendered ones, then further ones.
     numbers = [one.number for one in FIGURES]
     thesis = [number.rstrip("ab") for number in numbers if number[0].isdigit()]
     assert list(dict.fromkeys(thesis)) == [

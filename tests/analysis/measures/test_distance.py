@@ -70,7 +70,7 @@ def test_equal_trees_are_stored_once() -> None:
 
 
 class Oracle:
-    """A body as the older implementation wants its trees."""
+    """Body in the tree type of the older implementation."""
 
     def __init__(self, body: Body, index: int = 0) -> None:
         self.kind, self.slot = body[index]["kind"], body[index]["parent_slot"]
@@ -121,7 +121,7 @@ def three_bodies(draw: st.DrawFn) -> list[Body]:
 
 
 def as_labelled(body: Body, slots: SlotRule) -> list[tuple[object, ...]]:
-    """Return all that a distance knows of a body: by own slots, not where parts sit."""
+    """Return parent, type and slot of each part: all that the distance depends on."""
     slot = "parent_slot" if slots == "parent" else "child_slot"
     return [(one["parent"], one["kind"], one[slot]) for one in body]
 

@@ -34,7 +34,7 @@ Maker = Callable[..., Path]
 
 @pytest.fixture
 def made(tmp_path: Path) -> Maker:
-    """Return what makes a run folder, finished or not."""
+    """Return a function that makes a run folder, finished or not."""
 
     def make(name: str, *, seed: int = 1, state: str = "finished") -> Path:
         folder = tmp_path / name

@@ -30,7 +30,7 @@ ROBOT = Robot(
 
 
 def _oracle(root: Floats, angles: Floats) -> list[tuple[Floats, Floats]]:
-    """Return corners' centre and the corner set of each geom, by the engine."""
+    """Return centre and set of corners of each geom, from MuJoCo."""
     model = robot_spec(ROBOT, BUILT_IN, Simulation()).spec.compile()
     data = mujoco.MjData(model)
     data.qpos[:7], data.qpos[7:] = root, angles

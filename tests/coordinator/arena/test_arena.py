@@ -1,4 +1,4 @@
-"""Arena by hand: founders, births, culls, samples, ends; each rule once."""
+"""Rules of an arena, each tested once by hand: births, culls, samples, ends."""
 
 from dataclasses import replace
 from typing import Any
@@ -106,7 +106,7 @@ def test_robots_below_a_share_of_the_mean_are_culled() -> None:
 
 
 def test_culling_keeps_the_fittest_eight() -> None:
-    """14 of 15 are below the mean's share, but only 7 may go (trap B11)."""
+    """14 of 15 are below the mean's share, but only 7 may be removed."""
 
     def fit(birth: BirthId, _step: int) -> float:
         return 1.0 if birth.number == 0 else birth.number * 7 % 15 / 1000

@@ -36,7 +36,7 @@ def life() -> ArenaRun:
 
 
 def order(lived: ArenaRun, wanted: Order, name: str = "") -> list[ArenaCommand]:
-    """Give an order now."""
+    """Send an order to the arena."""
     identity = name or f"order {len(lived.events)}"
     return lived.tell(Commanded(0, identity, lived.arena.next_step, wanted))
 

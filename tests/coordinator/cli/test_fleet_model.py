@@ -16,7 +16,7 @@ def test_a_coordinator_without_cost_keeps_all_workers_busy() -> None:
 
 
 def test_a_saturated_coordinator_limits_the_rate() -> None:
-    """20 workers could do 20 a second; the coordinator handles 10."""
+    """20 workers could do 20 evaluations per second; the coordinator handles 10."""
     outcome = FleetModel(replace(FREE, coordinator_s=0.1)).run()
     assert outcome.coordinator == pytest.approx(1.0, abs=0.001)
     assert outcome.births_per_s == pytest.approx(10.0, rel=0.01)
@@ -33,14 +33,14 @@ def test_waiting_for_a_job_costs_a_round_trip() -> None:
 
 
 def test_work_of_lost_workers_is_lost() -> None:
-    """A loss each 0.5 s, of 20 workers with 1 s: half an evaluation each time."""
+    """Each loss costs half an evaluation: 2 losses per s, 20 workers, 1 s each."""
     outcome = FleetModel(replace(FREE, losses_per_s=2.0)).run()
     assert outcome.lost > 100
     assert outcome.utilisation == pytest.approx(1.0 - 0.05, abs=0.03)
 
 
 def test_the_limit_is_found() -> None:
-    """At 1 ms per birth and 0.1 s per evaluation 100 / 0.95 workers are the most."""
+    """At 1 ms per birth and 0.1 s per evaluation, 100 / 0.95 workers are 95 % busy."""
     workers, outcome = most_workers(replace(FREE, evaluation_s=0.1, coordinator_s=1e-3))
     assert 95 <= workers <= 108
     assert outcome.utilisation >= 0.95

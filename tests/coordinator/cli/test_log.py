@@ -283,7 +283,7 @@ def test_follow_prints_what_another_process_appends_until_the_run_is_finished(
     rest = b""
 
     def pause(seconds: float) -> None:
-        """Write between two looks, in place of another process."""
+        """Append to the journal between two reads, as another process would."""
         nonlocal looks, rest
         assert seconds >= 0.5
         looks += 1

@@ -1,4 +1,4 @@
-"""Who gets which job: every job once, whatever happens to whoever does it."""
+"""Dispatch: each job is done once, whatever happens to its agents."""
 
 from itertools import count
 from random import Random
@@ -90,10 +90,10 @@ def test_an_agent_holds_one_job_more_than_it_has_slots() -> None:
 def busy_pair(
     *job_s: float,
 ) -> tuple[Dispatch, list[tuple[int, str]], list[tuple[int, str]]]:
-    """Return two workers who did a job each of 30, and what either answer set off.
+    """Return two workers after one of 30 jobs each, and the commands of each answer.
 
     Args:
-        job_s: how long the first worker and the second one were at it, ascending.
+        job_s: durations of the jobs of the first and the second worker, ascending.
     """
     dispatch = told(Ticked(0.0), worker("a"), worker("b"), *requests(*range(30)))
     assert dispatch.waiting("worker") == 26  # how long they take is not known yet
@@ -297,7 +297,7 @@ def test_invalid_events_raise_and_change_nothing(event: DispatchEvent) -> None:
 
 
 def late(typical_s: float = 0.5) -> Dispatch:
-    """Return a machine whose worker a is late with 1, while b has nothing to do."""
+    """Return a dispatcher whose worker a is late with job 1 while b is idle."""
     dispatch = told(Ticked(0.0), worker("a"), *requests(0), Ticked(typical_s))
     dispatch.handle(ok(0, "a"))
     for request in requests(1, 2):
@@ -314,7 +314,7 @@ def test_late_job_is_duplicated_on_an_idle_agent(
     dispatch = late(typical_s)
     almost_s = typical_s + patience_s
     assert given_out(dispatch.handle(Ticked(almost_s))) == []
-    # The oldest first; nobody is idle for the second.
+    # The oldest first; no agent is idle for the second.
     assert given_out(dispatch.handle(Ticked(almost_s + 0.3))) == [(1, "b")]
     assert given_out(dispatch.handle(Ticked(almost_s + 9.0))) == []
 
@@ -407,7 +407,7 @@ def test_twins_go_to_two_workers_if_there_are_two() -> None:
 
 
 class World:
-    """All that can happen to jobs, and what must hold after each step."""
+    """All events that jobs can meet, and the invariants after each step."""
 
     def __init__(self, seed: int) -> None:
         self.dispatch = Dispatch()
@@ -448,7 +448,7 @@ class World:
         self.check()
 
     def check(self) -> None:
-        """Hold the machine's books against the world's."""
+        """Compare the dispatcher's records with the model."""
         inside = self.dispatch
         ended = len(self.delivered) + len(self.withdrawn)
         assert inside.pending == len(self.jobs) - ended
@@ -471,7 +471,7 @@ class World:
         self.tell(Requested(self.jobs[number]))
 
     def withdraw(self) -> None:
-        """Nobody wants a job more that may be waiting, out, or long done."""
+        """A client withdraws a job that may be waiting, assigned or long done."""
         if self.jobs:
             number = self.random.choice(sorted(self.jobs))
             if number not in self.delivered:
@@ -521,7 +521,7 @@ class World:
         self.give_back("lost")
 
     def die(self) -> None:
-        """Somebody died of a job that may be long done."""
+        """An agent dies of a job that may be long done."""
         if self.jobs:
             number = self.random.choice(sorted(self.jobs))
             self.killed.setdefault(number, []).append(f"dead-{next(self.names)}")
@@ -532,7 +532,7 @@ class World:
         self.tell(Ticked(self.now_s))
 
     def repeat(self) -> None:
-        """A message of the past once more, if its sender is not asked just now."""
+        """Repeat an earlier message unless its sender is working on a request."""
         event = self.random.choice(self.past) if self.past else Left("nobody")
         if isinstance(event, Returned) and event.number not in self.held.get(
             event.agent, ()
@@ -540,7 +540,7 @@ class World:
             self.tell(event)
 
     def finish(self) -> None:
-        """Let one good agent of each kind join, and time pass."""
+        """Let one healthy agent of each kind join, and let time pass."""
         self.enter(Joined("z1", "worker", 1, "p"))
         self.enter(Joined("z2", "analyzer", 1, "p"))
         while self.dispatch.pending:

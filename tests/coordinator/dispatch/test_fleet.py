@@ -35,7 +35,7 @@ def encode(command: AssignShard) -> tuple[bytes, Read]:
 
 
 class Agents:
-    """Two workers that answer when told to."""
+    """Two workers that answer when the test says so."""
 
     def __init__(self) -> None:
         self.sent: list[tuple[int, str, bytes]] = []

@@ -1,4 +1,4 @@
-"""Who gets which shard, event by event."""
+"""Assignment of shards to workers, event by event."""
 
 from itertools import count
 
@@ -184,7 +184,7 @@ def test_second_request_for_a_shard_raises() -> None:
 
 
 def drifting(*, allows_drift: bool) -> ShardDispatch:
-    """Return one whose shard was advanced on a platform that is gone."""
+    """Return a shard dispatcher whose shard ran on a platform that has left."""
     dispatch = ShardDispatch(count(1), allows_drift=allows_drift)
     dispatch.handle(ShardSeen(0, "theirs"))
     dispatch.handle(joined("b", "ours"))
@@ -227,7 +227,7 @@ def test_shard_does_not_drift_if_its_platform_returns_in_time() -> None:
         AssignShard(1, 0, "z", "theirs", is_whole=True)
     ]
     dispatch.handle(Left("z"))
-    # The while begins anew.
+    # The waiting time starts again.
     dispatch.handle(Ticked(110.0))
     assert dispatch.handle(Ticked(100.0 + DRIFT_S)) == []
     assert len(dispatch.handle(Ticked(110.0 + DRIFT_S))) == 1

@@ -283,11 +283,11 @@ def test_a_new_part_has_its_own_identity_colour_and_outgoing_connections() -> No
 
 
 def test_with_the_thesis_s_numbers_parts_are_rarely_added() -> None:
-    """Facts 4.5: the expectation is positive in 1.8 % of random robots, or 0.2 %.
+    """The expectation is positive in 1.8 % of random robots, or 0.2 %.
 
-    Those figures come out of bodies without hidden neurons. With them, subtrees that
-    hold some often do not fit a second time, and what does fit is small: then the
-    expectation is positive in 9 %, or 4 %.
+    These shares are those of bodies without hidden neurons. A subtree with hidden
+    neurons often does not fit a second time, so smaller subtrees are duplicated: the
+    expectation is then positive in 9 %, or 4 %.
     """
     figures = {
         (0, "mean"): 0.018,

@@ -115,7 +115,7 @@ def wiring(genome: Genome) -> Counter[tuple[object, ...]]:
 def test_deleting_hidden_neurons_keeps_other_connections(
     seed: int, probability: float
 ) -> None:
-    """An oracle that works on the robot: drop the lost neurons' edges, no more."""
+    """Oracle on the robot: drop the edges of the removed neurons, and no others."""
     genome = generate(np.random.default_rng(seed), experiment())
     root = to_mutable(genome, TYPES)
     delete_hidden_neurons(draws(seed), preorder(root), probability)

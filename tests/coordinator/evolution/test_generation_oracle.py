@@ -1,8 +1,8 @@
-"""The generator against an independent Monte Carlo of 12000 robots (facts 4.3).
+"""The generator against an independent Monte Carlo of 12000 robots of the original.
 
-That oracle has another author, another language of geometry and no line in common
-with ours. Each of its figures must come out within 2 %, plus half of the last digit
-in which it is published where it is a mean.
+The oracle was written separately, with other geometry code, and shares no line with
+this generator. Each of its figures must come out within 2 %, plus half of the last
+digit in which it is published where it is a mean.
 """
 
 import numpy as np

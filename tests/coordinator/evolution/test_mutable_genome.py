@@ -1,4 +1,4 @@
-"""The tree that variation works on."""
+"""Mutable genome: the tree that crossover and mutation change."""
 
 from itertools import islice
 

@@ -1,4 +1,4 @@
-"""Chance: what each draw gives, and how often."""
+"""Random draws: values and frequencies."""
 
 from collections import Counter
 

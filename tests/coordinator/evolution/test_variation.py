@@ -218,7 +218,7 @@ def test_children_are_well_formed_and_within_all_restrictions(
 
 
 def test_a_lineage_stays_within_all_restrictions() -> None:
-    """Fifty generations without selection, so that broken paths pile up."""
+    """Fifty generations without selection, so that broken paths accumulate."""
     population = [founder(seed) for seed in range(8)]
     rng = np.random.default_rng(0)
     for generation in range(50):

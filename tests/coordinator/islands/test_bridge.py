@@ -54,7 +54,7 @@ BRIDGE = Experiment(
 
 
 def answer(command: Vet | Evaluate) -> Answered:
-    """Judge by birth, trial and duration; every eleventh trial fails."""
+    """Evaluate by birth, trial and duration; every eleventh trial fails."""
     birth = command.birth
     if isinstance(command, Vet):
         return Vetted(birth, command.attempt, VIABLE)
@@ -68,7 +68,7 @@ def answer(command: Vet | Evaluate) -> Answered:
 def live(
     experiment: Experiment, order: Iterator[int] | None = None, *, twice: bool = False
 ) -> list[IslandCommand]:
-    """Run an island to its end, answering in some order, each question once or twice.
+    """Run an island to its end and answer each request once or twice, in some order.
 
     The island must not be finished while requests are open.
     """
@@ -122,7 +122,7 @@ def test_durations_are_in_range_and_differ() -> None:
 def test_population_rows_are_the_survivors_of_the_culling_rule(
     share: float, sizes: int
 ) -> None:
-    """An oracle of its own: the rule worked out from the tables alone."""
+    """Oracle: apply the rule to the tables alone."""
     culling = Culling(
         population_limit=12, population_floor=5, survive_share_of_mean=share
     )
@@ -152,7 +152,7 @@ def test_population_rows_are_the_survivors_of_the_culling_rule(
 def survivors(
     alive: set[int], fitness: dict[int, float], share: float, births: int
 ) -> set[int]:
-    """Return the survivors at a number of births: 6 founders, then a cull a brood."""
+    """Return the survivors after some births: 6 founders, a cull after each brood."""
     if births == 6:
         return alive
     limit = share * sum(fitness[one] for one in alive) / len(alive)

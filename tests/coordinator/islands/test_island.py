@@ -54,12 +54,12 @@ def small(**selection: Any) -> Experiment:  # noqa: ANN401 - any setting
 
 
 def fitness_of(birth: BirthId) -> float:
-    """Return a fitness without order or ties, in (0, 1)."""
+    """Return a fitness in (0, 1), in no order and without ties."""
     return (birth.number * 0.6180339887498949 + 0.1) % 1.0
 
 
 def answer(command: Vet | Evaluate) -> Answered:
-    """Refuse every third attempt's body, fail every seventh birth's simulation."""
+    """Reject every third body; fail the simulation of every seventh birth."""
     birth = command.birth
     if isinstance(command, Vet):
         if (birth.number + command.attempt) % 3 == 1:
@@ -74,7 +74,7 @@ def answer(command: Vet | Evaluate) -> Answered:
 
 
 def well(command: Vet | Evaluate) -> Answered:
-    """Find every body viable and every simulation fine."""
+    """Accept every body and every simulation."""
     if isinstance(command, Vet):
         return Vetted(command.birth, command.attempt, VIABLE)
     fitness = fitness_of(command.birth)
@@ -88,7 +88,7 @@ def requests(commands: list[IslandCommand]) -> list[Vet | Evaluate]:
 def live(
     island: Island, reply: Answer = answer, order: Iterator[int] | None = None
 ) -> list[IslandCommand]:
-    """Run an island to its end, answering questions in some order."""
+    """Run an island to its end, with requests answered in some order."""
     commands = island.handle(Started())
     open_requests = deque(requests(commands))
     while open_requests:
@@ -409,7 +409,7 @@ def test_a_fitness_that_is_not_finite_raises() -> None:
 
 
 def never(command: Vet | Evaluate) -> Answered:
-    """Find no body viable."""
+    """Reject every body."""
     assert isinstance(command, Vet)
     return Vetted(command.birth, command.attempt, CROWDED)
 

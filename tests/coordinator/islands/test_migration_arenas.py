@@ -23,7 +23,7 @@ def arenas(
     rules: dict[str, Any] | None = None,
     **migration: Any,  # noqa: ANN401 - any setting
 ) -> ArchipelagoRun:
-    """Return arenas with five founders, dropped in the first 4 s; a birth each 15 s."""
+    """Return arenas: five founders in the first 4 s, then a birth every 15 s."""
     wanted = {"population_limit": 12, "population_floor": 4, **(rules or {})}
     document = Experiment(
         name="test",
@@ -120,7 +120,7 @@ def test_immigrants_of_a_full_arena_await_room() -> None:
 
 
 def falling(lived: ArchipelagoRun, island: int, step: int) -> None:
-    """Have all but one of an arena's robots break at a step."""
+    """Let all but one of an arena's robots diverge at a step."""
     world = World(
         fit=lived.worlds[island].fit,
         diverges=lambda birth, at: at == step and birth != BirthId(island, 0),

@@ -1,4 +1,4 @@
-"""What holds of every archipelago, in whatever order its questions are answered."""
+"""Properties of every archipelago, with answers in any order."""
 
 import random
 from collections import Counter

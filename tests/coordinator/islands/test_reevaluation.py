@@ -65,7 +65,7 @@ def names(asked: list[Evaluate]) -> list[tuple[int, int]]:
 def repeat(
     found: Reevaluations, births: int, numbers: list[int]
 ) -> list[tuple[int, int]]:
-    """Do the re-evaluations that are due; return their births and trials."""
+    """Run the re-evaluations that are due; return their births and trials."""
     population = tuple(one(number) for number in numbers)
     asked = found.start(births, population)
     for command in asked:

@@ -1,8 +1,8 @@
-"""A program: an agent with a made-up answer, for tests of the network.
+"""Agent process with a made-up answer, for tests of the network.
 
-Run with the agent's role, name and hub, and one of: ``good`` answers, ``stuck``
-says so and never answers, ``slow`` says so and answers when told to go on, ``old``
-is of another version.
+Arguments: the agent's role, name and hub, and its behaviour. ``good`` answers;
+``stuck`` prints a line and never answers; ``slow`` prints a line and answers when told
+to; ``old`` has another version.
 """
 
 import sys

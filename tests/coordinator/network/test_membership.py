@@ -1,4 +1,4 @@
-"""Who is there: tokens and introductions in, news out."""
+"""Membership of agents: tokens and introductions in, events out."""
 
 import pytest
 from hypothesis import given, settings

@@ -54,7 +54,7 @@ def network() -> Iterator[Network]:
 def agent(
     network: Network, name: str, behaviour: str = "good", role: str = "worker"
 ) -> Iterator[subprocess.Popen[str]]:
-    """Run an agent; what it is told stays open, so that it waits where it should."""
+    """Run an agent; its standard input stays open, so that it can wait for a line."""
     command = [sys.executable, str(PROGRAM), role, name, network.address, behaviour]
     with subprocess.Popen(
         command,
@@ -72,7 +72,7 @@ def agent(
 def until(
     network: Network, is_enough: Callable[[list[DispatchEvent]], bool]
 ) -> list[DispatchEvent]:
-    """Return all that happens until it is enough."""
+    """Return all events until a condition holds."""
     events: list[DispatchEvent] = []
     end_s = time.monotonic() + PATIENCE_S
     while not is_enough(events):
@@ -91,7 +91,7 @@ def line_of(process: subprocess.Popen[str]) -> str:
 
 
 class Driver:
-    """Dispatch and network together, without anything else of a coordinator."""
+    """Dispatch and network without the rest of a coordinator."""
 
     def __init__(self, network: Network) -> None:
         self.network = network

@@ -1,7 +1,7 @@
-"""An arena whose coordinator dies at any point of its work, and comes back.
+"""Arena whose coordinator is killed at any point of its work and resumed.
 
-Everything is real but the physics: arena, loop, shards, analyzer, journal, tables
-and snapshots.
+Everything but the physics is real: arena, loop, shards, analyzer, journal, tables and
+snapshots.
 """
 
 from collections.abc import Callable
@@ -57,11 +57,11 @@ Point = Callable[[str], None]
 
 
 class Killed(BaseException):
-    """The coordinator dies here."""
+    """Simulated death of the coordinator."""
 
 
 class Fuse:
-    """Kills at the n-th point of one name, or of any."""
+    """Kills the coordinator at the n-th call of one method, or of any."""
 
     def __init__(self, after: int, name: str = "") -> None:
         self.left = after
@@ -75,7 +75,7 @@ class Fuse:
 
 
 class Frail:
-    """Whatever it wraps dies before or after each call of some methods."""
+    """Wrapper that dies before or after each call of some methods."""
 
     def __init__(self, inner: object, point: Point, *names: str) -> None:
         self._inner, self._point, self._names = inner, point, names
@@ -95,7 +95,7 @@ class Frail:
 
 
 class Run:
-    """One incarnation of a run's coordinator, and a worker that may outlive it."""
+    """One coordinator process of a run, and a worker that may outlive it."""
 
     def __init__(
         self,
@@ -139,7 +139,7 @@ class Run:
 
 
 def run(path: Path, point: Point = lambda _: None, **other: Any) -> bool:  # noqa: ANN401 - the loop's
-    """Run, or go on, until the end or until killed; return whether it ended."""
+    """Start or resume until the end or a kill; return whether the run ended."""
     with ExitStack() as stack:
         try:
             one = Run(path, stack, point, **other)
@@ -157,7 +157,7 @@ def run(path: Path, point: Point = lambda _: None, **other: Any) -> bool:  # noq
 
 @pytest.fixture(scope="module")
 def calm(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of a run that nothing happened to."""
+    """Return the folder of an undisturbed run."""
     path = tmp_path_factory.mktemp("calm") / "run"
     assert run(path)
     return path
@@ -205,12 +205,12 @@ def test_killed_again_and_again(tmp_path: Path, calm: Path, seed: int) -> None:
 
 
 class Mortal(LocalAgents):
-    """Workers that die now and then with all they hold; another one is there."""
+    """Workers that die at times with all their state; another one takes over."""
 
     left = 5
 
     def receive(self, timeout_s: float, pause_s: float = 0.0, /) -> list[DispatchEvent]:
-        """Let every fifth job of a worker be its last."""
+        """Die after every fifth job of a worker."""
         news: list[DispatchEvent] = []
         for event in super().receive(timeout_s, pause_s):
             if isinstance(event, Returned) and event.agent == "local-worker":
@@ -259,7 +259,7 @@ def test_throttle_changes_no_result(tmp_path: Path, calm: Path) -> None:
 
 
 def ordered(path: Path, point: Point) -> list[str]:
-    """Run with orders of an operator until the end or until killed."""
+    """Run with an operator's orders until the end or a kill."""
     said: list[str] = []
     with ExitStack() as stack:
         try:
@@ -353,7 +353,7 @@ def test_missing_snapshot_is_named(tmp_path: Path) -> None:
 def test_another_platform_continues_an_arena_if_allowed(
     tmp_path: Path, calm: Path
 ) -> None:
-    """Recorded once, whatever comes then; nobody's end is forgotten."""
+    """Each death is recorded once, in every continuation."""
     path = tmp_path / "run"
     assert not run(path, Fuse(60))
     other: dict[str, Any] = {"platform": "other", "allows_drift": True}
@@ -373,7 +373,7 @@ def test_another_platform_continues_an_arena_if_allowed(
 def test_drift_that_is_not_in_the_journal_has_no_effect(
     tmp_path: Path, calm: Path
 ) -> None:
-    """Its snapshot is there, and the old platform comes to that step after all."""
+    """The snapshot exists, and the old platform reaches that step later."""
     path = tmp_path / "run"
     assert not run(path, Fuse(60))
     other: dict[str, Any] = {"platform": "other", "allows_drift": True}

@@ -1,4 +1,4 @@
-"""Which evaluations are done twice, and what becomes of a pair."""
+"""Audits: which evaluations are done twice, and what happens to the pair."""
 
 from dataclasses import replace
 

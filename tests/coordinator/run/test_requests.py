@@ -1,4 +1,4 @@
-"""Questions about single robots: what becomes of answers, good and bad."""
+"""Requests about single robots: results of valid and invalid answers."""
 
 from collections.abc import Callable
 
@@ -63,7 +63,7 @@ VIABLE = Report(True, "", (), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.1, 1)
 
 
 class SentRequests:
-    """Questions whose jobs are caught, with two workers and an analyzer."""
+    """Requests whose jobs are recorded, with two workers and an analyzer."""
 
     def __init__(self, evaluation: bytes = b"evaluation", audit: float = 0.0) -> None:
         self.sent: list[tuple[int, str, bytes]] = []
@@ -191,7 +191,7 @@ def test_evaluation_names_its_worker_and_platform(sent_requests: SentRequests) -
 def test_bodies_of_robots_that_are_never_evaluated_are_dropped(
     sent_requests: SentRequests,
 ) -> None:
-    """An arena's robots are vetted, born and gone: 3000 of them in a run."""
+    """3000 robots of an arena are vetted, inserted and removed in one run."""
     for number in range(REMEMBERED + 50):
         sent_requests.requests.send(Vet(BirthId(0, number), 0, ROBOT))
         (event,) = sent_requests.tell(sent_requests.reply(VIABLE))

@@ -1,6 +1,6 @@
-"""A run that dies again and again comes to the tables of one that never did.
+"""A run that is killed repeatedly has the tables of an undisturbed run.
 
-Everything is real but the physics: island, loop, analyzer, journal and tables.
+Everything but the physics is real: island, loop, analyzer, journal and tables.
 """
 
 import os
@@ -35,12 +35,12 @@ DETAILS = RunDetails("resume", 0, 3, experiment_text(EXPERIMENT))
 
 
 class Killed(BaseException):
-    """The coordinator dies here."""
+    """Simulated death of the coordinator."""
 
 
 @dataclass
 class Worker:
-    """Answers at once, by the robot's bytes, and dies after some answers."""
+    """Agents that answer by the robot's bytes, and die after some answers."""
 
     left: int
     asked: int = field(default=0)
@@ -58,7 +58,7 @@ class Worker:
 
 
 def run(path: Path, *, answers: int = 10**9) -> int:
-    """Run, or go on, until the end or a number of evaluations; return their number."""
+    """Start or resume until the end or N evaluations; return their number."""
     worker = Worker(answers)
     details = None if (path / NAME).exists() else DETAILS
     with RunFolder(path, details) as folder, Journal.open(path) as journal:
@@ -90,7 +90,7 @@ def run(path: Path, *, answers: int = 10**9) -> int:
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of a run that nothing happened to."""
+    """Return the folder of an undisturbed run."""
     path = tmp_path_factory.mktemp("undisturbed") / "run"
     assert run(path) == EXPERIMENT.births
     return path

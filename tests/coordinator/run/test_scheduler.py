@@ -1,4 +1,4 @@
-"""Runs side by side: each as if it were alone, as many as keep the workers busy."""
+"""Runs of a campaign in parallel: results as alone, all workers busy."""
 
 from collections.abc import Callable
 from functools import partial
@@ -37,7 +37,7 @@ def local() -> LocalAgents:
 
 
 def plan(folder: Path) -> list[Planned]:
-    """Return the runs of the campaign, taken up where they stand."""
+    """Return the runs of the campaign, resumed where they exist."""
     planned = []
     for path, details in CAMPAIGN.runs(folder):
         if path.exists():
@@ -75,7 +75,7 @@ def conduct(scheduler: RunScheduler, turns: int = 10**6) -> None:
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with the same runs, made one after the other."""
+    """Return a folder with the same runs, run one after the other."""
     folder = tmp_path_factory.mktemp("alone")
     for planned in plan(folder):
         conduct(scheduler_of([planned], local()))
@@ -123,7 +123,7 @@ def test_rate_is_known_at_the_first_query(tmp_path: Path) -> None:
 
 
 def test_error_in_a_run_that_was_taken_over_is_the_takeover(tmp_path: Path) -> None:
-    """It slept just after it had found the run its own."""
+    """It was suspended just after it had checked that it owned the run."""
     scheduler = scheduler_of(plan(tmp_path)[:1], local())
     conduct(scheduler, 30)
     (run,) = scheduler.active
@@ -142,7 +142,7 @@ def broken() -> None:
 
 
 def replaced(planned: Planned) -> Planned:
-    """Return the same, but it must not be begun."""
+    """Return the same, but fail if it starts."""
     return Planned(planned.details, planned.status, never)
 
 
@@ -161,10 +161,10 @@ class Silent:
         ]
 
     def send(self, number: int, agent: str, payload: bytes) -> None:
-        """Take a job, for ever."""
+        """Take a job and never answer."""
 
     def cancel(self, agent: str, payload: bytes, /) -> None:
-        """Go on all the same."""
+        """Continue in any case."""
 
     def receive(
         self, _timeout_s: float, _pause_s: float = 0.0, /

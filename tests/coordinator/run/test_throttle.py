@@ -1,4 +1,4 @@
-"""How arenas are held back for viewers."""
+"""Delays of arenas, for viewers."""
 
 import pytest
 
@@ -14,7 +14,7 @@ def advance(shard: int = 0) -> AdvanceShard:
 def test_each_advance_waits_for_its_time() -> None:
     throttle = RealTimeThrottle(2.0, 0.005)
     assert not throttle.holds_back(advance(), 0, 100.0)
-    # 5 s of the arena are 2.5 s of ours.
+    # 5 simulated seconds take 2.5 s.
     assert throttle.holds_back(advance(), 1000, 100.1)
     assert throttle.wake_s == pytest.approx(102.5)
     assert throttle.due(102.4) == []

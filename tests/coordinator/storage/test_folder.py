@@ -55,7 +55,7 @@ def test_the_epoch_grows_with_every_opening(tmp_path: Path) -> None:
 
 
 def test_a_new_run_in_a_removed_folder_has_another_name(tmp_path: Path) -> None:
-    """Workers that outlive a run must not mistake the new run for it."""
+    """Workers that outlive a run must not confuse it with the new run."""
     path = tmp_path / "run"
     with RunFolder(path, DETAILS) as first:
         assert first.name.endswith(f":{path}")

@@ -1,4 +1,4 @@
-"""The journal through kills, damage and full disks."""
+"""Journal after kills, damage and full disks."""
 
 import os
 import signal
@@ -175,7 +175,7 @@ def test_a_repeated_record_is_damage(tmp_path: Path) -> None:
 
 
 def test_records_of_a_replaced_coordinator_are_void(tmp_path: Path) -> None:
-    """It stalls before it writes; the other continues from the records it found."""
+    """It pauses before it writes; the other continues from the records it found."""
     with Journal.open(tmp_path, epoch=1) as old:
         old.append(EVENTS[:2])
         with Journal.open(tmp_path, epoch=2) as new:

@@ -1,4 +1,4 @@
-"""Tables of a running run: killed at any byte, and on full disks."""
+"""Tables of an unfinished run: killed at any byte, and on full disks."""
 
 import os
 from collections.abc import Callable
@@ -81,7 +81,7 @@ def test_rows_of_a_replaced_coordinator_count_once(
     check_complete: Check,
     begun: int,
 ) -> None:
-    """It stalls with buffered rows, before or after its first segment."""
+    """It pauses with buffered rows, before or after its first segment."""
     rows = make_records(30)
     old = feed_rows(tmp_path, rows[:begun])
     for record in rows[begun:25]:

@@ -22,11 +22,11 @@ Check = Callable[[Path, list[Record]], None]
 
 
 class Killed(BaseException):
-    """The process dies here."""
+    """Simulated death of the process."""
 
 
 def kill_at(monkeypatch: pytest.MonkeyPatch, step: int) -> list[str]:
-    """Make the ``step``-th change to the disk the last; return the steps' names."""
+    """Die after the ``step``-th change of the disk; return the names of the steps."""
     steps: list[str] = []
 
     def dying(name: str, real: Callable[..., Any]) -> Callable[..., Any]:

@@ -1,4 +1,4 @@
-"""Who listens where, and who lets whom in."""
+"""Zenoh sessions: listening addresses and TLS."""
 
 import json
 from typing import Any

@@ -1,4 +1,4 @@
-"""Every request gets one reply, and a bad one its reason."""
+"""Every request gets one reply; an invalid request gets the reason."""
 
 from collections.abc import Callable
 
@@ -135,7 +135,7 @@ def test_one_source_is_served_in_the_order_of_arrival() -> None:
 
 
 def _shares(jobs_s: dict[bytes, float], until_s: float) -> dict[bytes, float]:
-    """Return the time that sources get that always have two jobs waiting."""
+    """Return the time of each source if all sources always have two jobs waiting."""
     turns: FairQueue[bytes] = FairQueue()
     for source in (*jobs_s, *jobs_s):
         turns.put(source, source)

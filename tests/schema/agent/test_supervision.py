@@ -1,4 +1,4 @@
-"""What a process died of, as whoever started it can tell."""
+"""Cause of a process's death, as seen by its supervisor."""
 
 import os
 import signal
@@ -90,7 +90,7 @@ def test_exit_leaves_the_note_and_an_error_does_not(
 
 
 def die(signal_number: int, log: str, slot: ProcessSlot) -> None:
-    """Die of a job the first time, and write down who died before."""
+    """Record the causes of earlier deaths; crash in a job at the first two starts."""
     with Path(log).open("a", encoding="utf-8") as file:
         file.write(f"{[death.cause for death in slot.deaths]}\n")
     if len(slot.deaths) < 2:
@@ -136,7 +136,7 @@ def leave(how: str, slot: ProcessSlot) -> None:
 def test_process_that_exits_by_itself_is_restarted_later_each_time(
     how: str, code: int
 ) -> None:
-    """After 1 s, then 2 s: whatever befell it may befall it again."""
+    """Restarts after 1 s, then 2 s: the cause may recur."""
     began_s = time.monotonic()
     with ProcessPool(leave, (how,), size=1) as process_pool:
         until(process_pool, lambda: process_pool.exit_codes == [code])

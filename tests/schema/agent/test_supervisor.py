@@ -1,4 +1,4 @@
-"""What one process asks of the system for itself and for all that it starts."""
+"""Settings of a process and of its children."""
 
 import os
 import signal
@@ -69,9 +69,9 @@ print((resident() - before) >> 20)
 
 
 def test_child_returns_unused_memory() -> None:
-    """Of 50 MiB of models whose robots died, with what lives on between them.
+    """Memory is returned: 50 MiB of models are freed, small objects in between stay.
 
-    Measured with and without our setting: where a C library returns the memory in both
+    Measured with and without the setting: where a C library returns the memory in both
     cases, the setting has no effect to test.
     """
     start = (
@@ -109,7 +109,7 @@ if __name__ == "__main__":
 
 
 def test_ctrl_c_reaches_no_child_from_its_start_on(tmp_path: Path) -> None:
-    """Nor the first one, with which Python starts a process of its own."""
+    """Includes the first child, with which Python starts a process of its own."""
     script = tmp_path / "pool.py"
     script.write_text(_SHIELDED)
     done = subprocess.check_output(

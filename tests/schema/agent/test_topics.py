@@ -1,4 +1,4 @@
-"""Where on the network whom can be reached."""
+"""Zenoh key expressions of agents and coordinators."""
 
 import pytest
 import zenoh

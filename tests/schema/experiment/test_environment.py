@@ -43,7 +43,7 @@ def test_ground_is_flat_by_default() -> None:
 
 
 def test_gravity_pulls_downhill() -> None:
-    """Half of it at 30 degrees, and the cosine into the ground."""
+    """At 30 degrees: g / 2 along the slope, and g cos(30 degrees) into the ground."""
     x, y, z = Environment(slope_deg=30.0).gravity_vector(10.0)
     assert x == pytest.approx(-5.0)
     assert y == 0.0
@@ -86,7 +86,7 @@ def test_empty_scenery_file_is_refused(tmp_path: Path, text: str) -> None:
 def test_scenery_file_is_read_relative_to_the_document_and_stored(
     tmp_path: Path,
 ) -> None:
-    """On any island; the stored experiment needs no file."""
+    """On any island; the stored experiment does not need the file."""
     (tmp_path / "worlds").mkdir()
     (tmp_path / "worlds" / "wall.xml").write_text(WALL, encoding="utf-8-sig")
     text = (

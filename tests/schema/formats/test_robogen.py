@@ -226,7 +226,7 @@ def test_ending_selects_the_format(tmp_path: Path) -> None:
 
 
 def test_dimensions_of_2016() -> None:
-    # Grams and millimetres from the facts, section 1.5.
+    # Grams and millimetres, as in RoboGen's sources.
     def mass_g(name: str, *values: float) -> float:
         shape = ROBOGEN_2016[name].shape((*values, 0.5, 0.5, 0.5))
         return 1000.0 * sum(box.mass for box in shape.boxes)

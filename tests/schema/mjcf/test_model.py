@@ -1,4 +1,4 @@
-"""MuJoCo models of robots: masses, sizes, joints and height, against the facts."""
+"""MuJoCo models of robots: masses, sizes, joints, height; numbers of the original."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Frames of parts: facts of the original, 1.1 (golden positions) and 2 (rule)."""
+"""Frames of parts: positions and rule of the original code."""
 
 import math
 from collections.abc import Callable

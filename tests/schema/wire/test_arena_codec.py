@@ -1,4 +1,4 @@
-"""Requests to advance shards and answers: round trips, and any bytes."""
+"""Arena requests and answers: round trips, and decoding of arbitrary bytes."""
 
 import math
 from contextlib import suppress

@@ -1,4 +1,4 @@
-"""Robots, genomes, requests and answers: round trips, and any bytes."""
+"""Robots, genomes, requests, answers: round trips, and arbitrary bytes."""
 
 import math
 from collections.abc import Callable

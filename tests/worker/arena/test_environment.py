@@ -57,7 +57,7 @@ def arena(environment: Environment, **keys: object) -> ArenaSettings:
 def test_imu_at_rest_on_a_slope_reads_the_components_of_gravity(
     slope_deg: float,
 ) -> None:
-    """Namely g sin a along x, uphill, and g cos a along z."""
+    """The readings are g sin a along x, uphill, and g cos a along z."""
     world = populated(
         arena(Environment(slope_deg=slope_deg), drop_m=0.01),
         [Insertion(A, BOX, (0.5, 0.0))],
@@ -73,7 +73,7 @@ def test_imu_at_rest_on_a_slope_reads_the_components_of_gravity(
 def test_box_without_friction_accelerates_down_the_slope(
     slope_deg: float,
 ) -> None:
-    """By g sin(a) t^2 / 2 towards -x: 2.45 m in a second at 30 degrees."""
+    """It moves by g sin(a) t^2 / 2 towards -x: 2.45 m in a second at 30 degrees."""
     clock = Simulation(friction=0.0, window_steps=400)
     track = simulate(BOX, Space(), clock, Environment(slope_deg=slope_deg))
     times = np.arange(len(track.core_position)) * track.interval_s
@@ -124,7 +124,7 @@ def test_robots_stay_above_rough_ground(robot_of: Robots) -> None:
 
 
 def test_robot_alone_in_an_arena_has_the_off_line_track(robot_of: Robots) -> None:
-    """On a slope, on rough ground, beside scenery: the same to the last bit."""
+    """The same to the last bit: on a slope, on rough ground, beside scenery."""
     robot, settings = robot_of(3), arena(WILD)
     world = populated(settings, [Insertion(A, robot, (0.0, 0.0))])
     world.advance(600 + 800)
@@ -141,7 +141,7 @@ def test_robot_alone_in_an_arena_has_the_off_line_track(robot_of: Robots) -> Non
 def test_rough_arena_is_repeatable_with_threads_and_after_a_restore(
     robot_of: Robots,
 ) -> None:
-    """With births on obstacles, merges on rough ground, and deaths."""
+    """The run has births on obstacles, merges on rough ground, and deaths."""
     settings, found = arena(WILD), []
     for threads in (1, 2):
         world = populated(settings, crowd(robot_of, 10, 0.5), threads)

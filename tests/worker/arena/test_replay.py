@@ -47,7 +47,7 @@ def test_replay_on_one_platform_is_equal(robot_of: Robots) -> None:
 def test_replay_of_a_drift_is_an_approximation_and_says_so(
     robot_of: Robots,
 ) -> None:
-    """C was lost here only; A there only, and returned as a migrant."""
+    """C died only in the replay; A only in the original, and returned as a migrant."""
     one, other = crowd(robot_of, 2, 0.4)
     swaps = tuple(BrainChange(birth, robot_of(0).brain) for birth in (A, C))
     there = Changes(removals=(C,), insertions=(one,), brains=swaps)

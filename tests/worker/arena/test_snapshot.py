@@ -30,7 +30,7 @@ RECORDING = settings_of(record_touches=True)
 def test_thirty_robots_continue_after_a_snapshot(
     robot_of: Robots,
 ) -> None:
-    """Taken right after merges, with contacts; prints size and time."""
+    """The snapshot is taken right after merges, with contacts."""
     world = populated(RECORDING, crowd(robot_of, 30, 0.8))
     taken: list[tuple[int, bytes]] = []
     merges = 0
@@ -68,7 +68,7 @@ def _continued(world: World) -> list[object]:
 
 
 def test_advance_has_the_digest_of_its_snapshot(robot_of: Robots) -> None:
-    """A coordinator identifies snapshot files by it."""
+    """A coordinator identifies snapshot files by the digest."""
     world = populated(RECORDING, crowd(robot_of, 14, 0.5))
     advance = seconds(world, 2.0)
     assert advance.touches
@@ -76,7 +76,7 @@ def test_advance_has_the_digest_of_its_snapshot(robot_of: Robots) -> None:
 
 
 def test_snapshot_right_after_changes_continues_equally(robot_of: Robots) -> None:
-    """With newborns in the air."""
+    """The snapshot includes newborns in the air."""
     world = populated(SETTINGS, crowd(robot_of, 3, 0.3))
     seconds(world, 1.0)
     newborns = crowd(robot_of, 3, 0.3, seed=5, first=10)

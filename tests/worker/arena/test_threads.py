@@ -1,4 +1,4 @@
-"""Thread pool."""
+"""Thread pool of an arena."""
 
 import threading
 

@@ -35,7 +35,7 @@ A, B = BirthId(0, 0), BirthId(0, 1)
 
 @pytest.mark.slow
 def test_advances_are_independent_of_threads(robot_of: Robots) -> None:
-    """With births, deaths, merges and falls."""
+    """The run has births, deaths, merges and falls."""
     found = []
     for threads in (1, 2, 4):
         world = populated(SETTINGS, crowd(robot_of, 14, 0.7), threads)
@@ -61,7 +61,7 @@ def test_result_is_independent_of_the_number_of_advances(robot_of: Robots) -> No
 
 
 def test_robot_alone_has_the_track_of_an_off_line_simulation(turtle: Robot) -> None:
-    """Same drop, same warm-up, at the origin: the same track to the last bit."""
+    """With the same drop and warm-up, at the origin: the same track to the last bit."""
     world = populated(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
     advance = world.advance(600 + 2400)
     simulation = replace(SETTINGS.simulation, drop_m=SETTINGS.arena.drop_m)

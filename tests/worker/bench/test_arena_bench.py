@@ -22,7 +22,7 @@ ROBOTS = RobotSource(generate, analyze)
 
 
 def test_spider_has_mass_motors_and_height_of_the_thesis() -> None:
-    """383 g, 8 servos, underside 2.25 cm below the core (facts, section 9)."""
+    """383 g, 8 servos, underside 2.25 cm below the core."""
     robot = spider()
     check_robot(robot, BUILT_IN)
     model = solo_model(robot, BUILT_IN, Simulation(), FLAT)

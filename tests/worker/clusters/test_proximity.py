@@ -1,4 +1,4 @@
-"""Boxes and hulls only save measurements; they do not change the pairs."""
+"""Boxes and hulls save distance measurements and do not change the pairs."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ Robots = Callable[[int], Robot]
 
 
 def measured(world: World, scene: Scene, gap_m: float) -> Pairs:
-    """Return the pairs to merge, with every pair of different clusters measured."""
+    """Return the pairs to merge, from the distances of all pairs of clusters."""
     population, settings = world.population, world.population.model_cache.settings
     steps = settings.arena.proximity_steps + 1
     moves = np.minimum(scene.speeds[0], FASTEST) * steps * 0.005
@@ -34,7 +34,7 @@ def measured(world: World, scene: Scene, gap_m: float) -> Pairs:
 def test_pairs_to_merge_equal_those_of_all_measurements(
     robot_of: Robots, gap_m: float
 ) -> None:
-    """For falling robots, also with distances greater than the arena's own."""
+    """For falling robots, with distances greater than the arena's as well."""
     world = populated(settings_of(drop_m=0.5), crowd(robot_of, 20, 1.2))
     proximity = Proximity(settings_of(merge_distance_m=gap_m))
     pairs = 0

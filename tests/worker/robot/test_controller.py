@@ -111,7 +111,7 @@ def networks(robot_of: Callable[[int], Robot]) -> list[Network]:
 def test_outputs_are_independent_of_the_batch(
     networks: list[Network], count: int
 ) -> None:
-    """To the last bit: alone, and in any row of any batch."""
+    """Outputs are equal to the last bit: alone, and in any row of any batch."""
     rng = np.random.default_rng(count)
     ticks = 96
     readings = rng.normal(0.0, 5.0, (ticks, 100, WIDTH.inputs))

@@ -240,7 +240,7 @@ def test_extreme_noise_keeps_positions_finite(robot_of: Robots) -> None:
 
 
 def test_noise_of_a_robot_alone_equals_that_off_line(robot_of: Robots) -> None:
-    """With one identity, from step 0 on: equal to the last bit."""
+    """Noise of one identity is equal from step 0 on, to the last bit."""
     for seed in (3, 4):
         world = populated(NOISY, [Insertion(A, robot_of(seed), (0.0, 0.0))])
         world.advance(600 + 800)
@@ -256,7 +256,7 @@ def test_noise_of_a_robot_alone_equals_that_off_line(robot_of: Robots) -> None:
 
 
 def test_distant_births_and_deaths_do_not_change_the_noise(robot_of: Robots) -> None:
-    """Births with smaller and with greater numbers."""
+    """Other robots have smaller and greater birth numbers."""
     own = Insertion(BirthId(0, 5), robot_of(3), (0.0, 0.0))
     lonely, busy = populated(NOISY, [own]), populated(NOISY, [own])
     seconds(lonely, 3.0)

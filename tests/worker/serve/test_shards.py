@@ -224,7 +224,7 @@ def test_malformed_request_is_rejected() -> None:
 
 
 def test_history_of_another_platform_is_approximated() -> None:
-    """Robots lost only here are ignored, robots lost only there are removed."""
+    """Deaths only in the rebuilt arena are ignored; recorded deaths are applied."""
     requester = lived(Shards(FakeWorld))
     changes = Changes(removals=(BirthId(0, 9),), insertions=insertion(2).insertions)
     requester.history.append(PastAdvance(changes, 300, b"\0" * 32))
