@@ -324,3 +324,8 @@ class Finish:
 IslandCommand = Vet | Evaluate | Record | Emigrate | Finish
 
 ArenaCommand = Vet | AdvanceShard | Record | Append | Emigrate | Finish
+
+
+def fitness_of(outcome: Evaluated | EvaluationFailed) -> float | None:
+    """Return the fitness of an outcome; None if the evaluation failed."""
+    return outcome.evaluation.fitness if isinstance(outcome, Evaluated) else None

@@ -10,9 +10,10 @@ from coordinator.islands.events import (
     EvaluationFailed,
     MigrationEvent,
     Record,
+    fitness_of,
 )
 from coordinator.islands.migration import MigrationEpochs
-from coordinator.islands.rows import evaluation_record, fitness_of, migration_records
+from coordinator.islands.rows import evaluation_record, migration_records
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
 from schema.robot.genome import develop
@@ -25,8 +26,8 @@ class IslandMigration:
     """Emigrants and immigrants of one island.
 
     All immigrants of an epoch settle together, after the last of their
-    re-evaluations. An immigrant that lives on the island already is dropped, be it
-    the original or a copy.
+    re-evaluations. An immigrant that lives on the island already, as the original or
+    as a copy, is dropped.
 
     Attributes:
         epochs: when the island sends migrants, and what its neighbours sent.

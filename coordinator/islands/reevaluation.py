@@ -18,8 +18,9 @@ from coordinator.islands.events import (
     EvaluationFailed,
     IslandCommand,
     Record,
+    fitness_of,
 )
-from coordinator.islands.rows import evaluation_record, fitness_of
+from coordinator.islands.rows import evaluation_record
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, Simulation, body_space, steps_of
 from schema.robot.genome import develop

@@ -117,8 +117,3 @@ def migration_records(
         for command in sent
         for one in command.migrants
     ]
-
-
-def fitness_of(outcome: Evaluated | EvaluationFailed) -> float | None:
-    """Return the fitness of an outcome; None if the evaluation failed."""
-    return outcome.evaluation.fitness if isinstance(outcome, Evaluated) else None
