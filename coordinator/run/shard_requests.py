@@ -9,21 +9,24 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Protocol
 
-import pyarrow as pa
-import pyarrow.compute
-
 from coordinator.dispatch.events import AssignShard, Read, ShardFailed
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Advanced, AdvanceShard
+from coordinator.run.advance_checks import (
+    ExpectedAdvance,
+    check_advance,
+    check_snapshot,
+)
+from coordinator.run.answer_checks import check_job
 from coordinator.run.drift import Drift, with_losses
+from coordinator.run.pose_checks import place_poses, read_poses
 from coordinator.run.run_context import RunContext
 from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
 from schema.experiment.plugin_source import plugins_of
 from schema.parts import Vector
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
-from schema.tables.columns import read_columns
-from schema.wire.arena import Advance
+from schema.wire.arena import Advance, Changes
 from schema.wire.arena_codec import (
     AdvanceRequest,
     PastAdvance,
@@ -55,8 +58,9 @@ class _Past:
 
     Its state at ``step`` is that of the newest snapshot, at ``base`` (0 is the empty
     arena), after ``history``. ``platform`` is that of the last advance, empty before
-    the first; ``places`` are those of the robots that lived after it. The requested
-    advance may have a snapshot in the store if ``may_be_kept``, as in any replay.
+    the first; ``places`` are those of the robots that lived after it, and ``born`` the
+    steps at which they were inserted. The requested advance may have a snapshot in the
+    store if ``may_be_kept``, as in any replay.
     """
 
     step: int = 0
@@ -68,6 +72,13 @@ class _Past:
     requested: AdvanceShard | None = None
     wants_snapshot: bool = False
     may_be_kept: bool = True
+    born: dict[BirthId, int] = field(default_factory=dict)
+
+    def born_after(self, changes: Changes) -> dict[BirthId, int]:
+        """Return the robots that live after changes, and their steps of insertion."""
+        gone = set(changes.removals)
+        born = {birth: at for birth, at in self.born.items() if birth not in gone}
+        return born | {each.birth: self.step for each in changes.insertions}
 
     def drifts_to(self, platform: str) -> bool:
         """Return whether a platform differs from that of the last advance."""
@@ -172,6 +183,9 @@ class ShardRequests:
         if requested is None or requested.number != event.number:
             raise UnexpectedEvent(f"no such advance was requested: {event}")
         past.requested = None
+        born = past.born_after(requested.changes)
+        living = {one.birth for one in advance.judgements}
+        past.born = {birth: at for birth, at in born.items() if birth in living}
         past.step, past.digest = advance.step, advance.digest
         agent, platform = event.provenance.agent, event.provenance.platform
         drift: Drift | None = None
@@ -239,8 +253,15 @@ class ShardRequests:
             )
         read = partial(
             _read_answer,
-            requested=past.requested,
-            expected=(request.epoch, request.number),
+            request=request,
+            advance_number=requested.number,
+            expected=ExpectedAdvance(
+                past.step,
+                requested.until,
+                past.born_after(requested.changes),
+                self._context.experiments[shard],
+                wants_snapshot,
+            ),
             provenance=Provenance(command.agent, command.platform),
             complete=complete,
         )
@@ -250,8 +271,9 @@ class ShardRequests:
 def _read_answer(
     data: bytes,
     *,
-    requested: AdvanceShard,
-    expected: tuple[int, int],
+    request: AdvanceRequest,
+    advance_number: int,
+    expected: ExpectedAdvance,
     provenance: Provenance,
     complete: Callable[[Advance], Advance] | None,
 ) -> Reached | None:
@@ -259,62 +281,37 @@ def _read_answer(
 
     Args:
         data: bytes of the answer.
-        requested: the arena's command.
-        expected: epoch and number of the request.
+        request: that it answers.
+        advance_number: number of the arena's command.
+        expected: what a correct answer has.
         provenance: of the answer, but for the time that it took.
         complete: adds what a drift between platforms lost; None without a drift.
 
     Raises:
-        MalformedMessage: no answer, or the answer to another request.
+        MalformedMessage: no answer, the answer to another request, or one that
+            contradicts the request or the state of the arena.
     """
-    answer = decode_advance_answer(data)
-    if (answer.epoch, answer.number) != expected:
-        raise MalformedMessage(
-            f"answer must be to (epoch, job) {expected}, got "
-            f"{(answer.epoch, answer.number)}"
-        )
-    advance, island = answer.advance, requested.island
+    answer = decode_advance_answer(data, expected.most_bytes)
+    check_job(answer.epoch, answer.number, (request.epoch, request.number))
+    advance = answer.advance
     if advance is None:
+        if request.rebuild is not None:
+            raise MalformedMessage(
+                "answer: lacks the state that came with the request", "impossible"
+            )
         return None
-    if advance.step != requested.until:
-        raise MalformedMessage(
-            f"advance: must reach step {requested.until}, got {advance.step}"
-        )
-    if requested.wants_snapshot and not answer.snapshot:
-        raise MalformedMessage("advance: a snapshot was wanted, got none")
-    poses, rows = place_poses(advance.poses, island)
-    advance = replace(advance, poses=poses)
+    check_snapshot(answer, expected)
     if complete is not None:
         advance = complete(advance)
+    check_advance(advance, expected)
+    rows = read_poses(advance.poses, advance, expected)
+    poses = place_poses(advance.poses, rows, request.shard)
     signed = replace(provenance, wall_s=answer.wall_s)
-    event = Advanced(island, requested.number, advance, rows, signed)
+    event = Advanced(
+        request.shard,
+        advance_number,
+        replace(advance, poses=poses),
+        rows.num_rows,
+        signed,
+    )
     return Reached(event, answer.snapshot)
-
-
-def place_poses(columns: bytes, island: int) -> tuple[bytes, int]:
-    """Return the poses of an arena as the table has them, and their number.
-
-    Args:
-        columns: Arrow IPC stream; ``island`` is where each robot was born.
-        island: where the robots live; ``birth_island`` is set for immigrants only.
-
-    Raises:
-        MalformedMessage: the columns are not those of poses.
-    """
-    poses = read_columns("poses", columns)
-    born = poses["island"]
-    if pa.compute.all(pa.compute.equal(born, island), min_count=0).as_py():
-        return columns, poses.num_rows
-    is_immigrant = pa.compute.not_equal(born, island)
-    absent = pa.scalar(None, pa.int32())
-    schema = poses.schema
-    here = pa.repeat(pa.scalar(island, pa.int32()), poses.num_rows)
-    poses = poses.set_column(
-        schema.get_field_index("birth_island"),
-        schema.field("birth_island"),
-        pa.compute.if_else(is_immigrant, born, absent),
-    ).set_column(schema.get_field_index("island"), schema.field("island"), here)
-    sink = pa.BufferOutputStream()
-    with pa.ipc.new_stream(sink, schema) as writer:
-        writer.write_table(poses)
-    return bytes(sink.getvalue().to_pybytes()), poses.num_rows

@@ -18,6 +18,7 @@ from coordinator.islands.events import (
     VettingFailed,
 )
 from schema.errors import MalformedMessage
+from schema.limits import ADVANCE_BYTES
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.wire import revolve_pb2 as pb
@@ -40,8 +41,8 @@ from schema.wire.messages import (
     finite,
     genome_from_message,
     genome_to_message,
-    parsed,
 )
+from schema.wire.parsing import parsed
 
 
 def encode_entry(event: JournalledEvent) -> bytes:
@@ -72,7 +73,7 @@ def decode_entry(data: bytes) -> JournalledEvent:
     Raises:
         MalformedMessage: the bytes are no entry, or it holds no event.
     """
-    return _journalled(parsed(data, pb.Entry()))
+    return _journalled(parsed(data, pb.Entry(), ADVANCE_BYTES))
 
 
 def _journalled(entry: pb.Entry) -> JournalledEvent:

@@ -5,6 +5,7 @@ from typing import Annotated
 from msgspec import Meta
 from msgspec.msgpack import Decoder, encode
 
+from schema.limits import LONGEST_NAME, OPERATOR_REPLY_BYTES, OPERATOR_REQUEST_BYTES
 from schema.robot.ids import BirthId, IslandNumber
 from schema.wire.codec import decode_robot
 from schema.wire.packing import Finite, Message, unpack
@@ -84,10 +85,10 @@ class OperatorRequest(Message, frozen=True):
         run: last part of the run folder's path, which selects one of several runs.
     """
 
-    request_id: Annotated[str, Meta(min_length=1)]
+    request_id: Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
     island: IslandNumber
     action: OperatorAction
-    run: str = ""
+    run: Annotated[str, Meta(max_length=LONGEST_NAME)] = ""
 
 
 class OperatorReply(Message, frozen=True):
@@ -114,7 +115,7 @@ def decode_operator_request(data: bytes) -> OperatorRequest:
         MalformedMessage: not a request's bytes, an empty request_id, an unknown
             action, a robot that breaks its rules, a place that is not finite.
     """
-    request = unpack(_REQUEST, data)
+    request = unpack(_REQUEST, data, OPERATOR_REQUEST_BYTES)
     if isinstance(request.action, InsertRobot | SetBrain):
         decode_robot(request.action.robot)
     return request
@@ -131,4 +132,4 @@ def decode_operator_reply(data: bytes) -> OperatorReply:
     Raises:
         MalformedMessage: not a reply's bytes, or a number that is not finite.
     """
-    return unpack(_REPLY, data)
+    return unpack(_REPLY, data, OPERATOR_REPLY_BYTES)

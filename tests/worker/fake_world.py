@@ -10,7 +10,7 @@ from typing import Self
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Casualty, Changes, Judgement
-from tests.coordinator.arena_world import DT, MATURE, poses
+from tests.coordinator.arena_world import DT, MATURE, POSE_STEPS, poses
 
 
 class FakeWorld:
@@ -49,6 +49,7 @@ class FakeWorld:
     def advance(self, until: int) -> Advance:
         assert until > self.step
         assert not self.is_closed
+        samples = range(self.step // POSE_STEPS + 1, until // POSE_STEPS + 1)
         self.step = until
         self._record(str(until))
         lost = [one for one in sorted(self.born) if self._chance(one) < 0.01]
@@ -61,7 +62,7 @@ class FakeWorld:
             judgements=tuple(map(self._judgement, living)),
             casualties=tuple(Casualty(o, until, "fell", (0.0, 0.0, 0.1)) for o in lost),
             touches=(),
-            poses=poses(living, until * DT),
+            poses=poses(living, *(one * POSE_STEPS * DT for one in samples)),
         )
 
     def snapshot(self) -> bytes:
@@ -85,7 +86,8 @@ class FakeWorld:
         age = self.step - self.born[birth]
         fitness = self._chance(birth)
         place = (fitness, -fitness, 0.02)
-        return Judgement(birth, age * DT, 0.0, fitness, fitness, age >= MATURE, place)
+        is_mature = age >= MATURE
+        return Judgement(birth, age * DT, fitness, fitness, fitness, is_mature, place)
 
 
 class OddWorld(FakeWorld):
