@@ -84,6 +84,11 @@ LONGEST_WALL_S = 1e9
 """Duration of a job by the clock [s]."""
 
 
+def printable_lines(text: str) -> str:
+    """Return a text with ``?`` in place of control characters other than line ends."""
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
+
+
 def printable(text: str, most: int) -> str:
     """Return a text as one line without control characters, cut at a length.
 

@@ -137,6 +137,13 @@ class LiveView:
             self.has_ended = self.has_ended or isinstance(each, Ended)
 
     def _move(self, arena: int, poses: pa.Table, *, has_all: bool) -> None:
-        """Record poses; keep those of unknown robots for later."""
-        if (unknown := self._show.move(arena, poses, has_all=has_all)) is not None:
+        """Record poses; keep those of unknown robots for later.
+
+        Poses that do not fit their robots are dropped.
+        """
+        try:
+            unknown = self._show.move(arena, poses, has_all=has_all)
+        except MalformedMessage:
+            return
+        if unknown is not None:
             self._unknown.append((arena, unknown))

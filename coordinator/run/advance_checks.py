@@ -22,8 +22,9 @@ from schema.limits import (
     SNAPSHOT_SAMPLE_BYTES,
     TOUCH_BYTES,
 )
-from schema.parts import Vector
+from schema.parts import BodySpace, Vector
 from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
 from schema.wire.arena import Advance, Casualty, Judgement, Touch
 from schema.wire.arena_codec import AdvanceAnswer
 
@@ -33,20 +34,33 @@ _ROUNDING_S = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
+class Inserted:
+    """A living robot of an arena: its step of insertion, and its number of joints."""
+
+    step: int
+    joints: int
+
+
+def inserted(robot: Robot, space: BodySpace, step: int) -> Inserted:
+    """Return what advances are checked against for a robot inserted at a step."""
+    shapes = (space[part.kind].shape(part.parameters) for part in robot.parts)
+    return Inserted(step, sum(shape.joint is not None for shape in shapes))
+
+
+@dataclass(frozen=True, slots=True)
 class ExpectedAdvance:
     """What a correct answer to a request to advance an arena has.
 
     Attributes:
         from_step, until: of the request.
-        born: robots that live after the requested changes, with the step at which
-            each was inserted.
+        born: robots that live after the requested changes.
         experiment: of the island.
         wants_snapshot: the answer must hold the state at the end.
     """
 
     from_step: int
     until: int
-    born: Mapping[BirthId, int]
+    born: Mapping[BirthId, Inserted]
     experiment: Experiment
     wants_snapshot: bool
 
@@ -71,8 +85,9 @@ class ExpectedAdvance:
     @property
     def most_pose_bytes(self) -> int:
         """Length of columns with as many poses."""
-        angles = self.experiment.space.max_parts
-        return COLUMNS_BYTES + self.most_rows * (POSE_BYTES + angles * ANGLE_BYTES)
+        joints = sum(robot.joints for robot in self.born.values())
+        a_sample = len(self.born) * POSE_BYTES + joints * ANGLE_BYTES
+        return COLUMNS_BYTES + len(self.samples) * a_sample
 
     @property
     def most_bytes(self) -> int:
@@ -132,7 +147,7 @@ def check_advance(advance: Advance, expected: ExpectedAdvance) -> None:
     _check_touches(advance.touches, expected)
 
 
-def _check_robots(advance: Advance, born: Mapping[BirthId, int]) -> None:
+def _check_robots(advance: Advance, born: Mapping[BirthId, Inserted]) -> None:
     """Raise unless exactly the living robots are reported, each once."""
     judged = [one.birth for one in advance.judgements]
     if any(a >= b for a, b in pairwise(judged)):
@@ -152,7 +167,7 @@ def _check_robots(advance: Advance, born: Mapping[BirthId, int]) -> None:
 
 
 def _check_judgement(one: Judgement, expected: ExpectedAdvance) -> None:
-    name, born = names([one.birth]), expected.born[one.birth]
+    name, born = names([one.birth]), expected.born[one.birth].step
     simulation = expected.experiment.simulation
     age_s = (expected.until - born) * simulation.timestep_s
     if one.age_s != age_s:

@@ -11,6 +11,7 @@ from schema.robot.ids import BirthId
 from schema.tables.received import received_columns
 from schema.wire.arena import Advance
 
+_NO_POSES = (0, 0, 0)
 _UNIT = 0.01
 """Greatest difference of a quaternion's length from 1."""
 
@@ -28,36 +29,59 @@ def read_poses(columns: bytes, advance: Advance, expected: ExpectedAdvance) -> p
         most_bytes=expected.most_pose_bytes,
         most_rows=expected.most_rows,
     )
-    _check_numbers(rows, expected.experiment.space.max_parts)
+    _check_numbers(rows)
     samples = _sample_of_row(rows, expected)
-    keys = np.stack(
-        [rows["island"].to_numpy().astype(np.int64), rows["birth"].to_numpy(), samples],
-        axis=1,
-    )
-    poses = np.unique(keys, axis=0)
-    if len(poses) < len(keys):
-        raise impossible("poses: must have one row per robot and time")
-    robots, counts = np.unique(poses[:, :2], axis=0, return_counts=True)
-    found = {
-        BirthId(island, number): count
-        for (island, number), count in zip(
-            robots.tolist(), counts.tolist(), strict=True
-        )
-    }
+    found = _poses_of_robots(rows, samples)
+    for birth, (_, least, most) in found.items():
+        robot = expected.born.get(birth)
+        if robot is not None and (least, most) != (robot.joints, robot.joints):
+            raise impossible(
+                f"poses: robot {names([birth])} must have {robot.joints} angles"
+            )
     for one in advance.judgements:
-        if found.pop(one.birth, 0) != len(expected.samples):
+        if found.pop(one.birth, _NO_POSES)[0] != len(expected.samples):
             raise impossible(
                 f"poses: robot {names([one.birth])} must have {len(expected.samples)}"
             )
     for fallen in advance.casualties:
         before = sum(step <= fallen.step for step in expected.samples)
-        if found.pop(fallen.birth, 0) > before:
+        if found.pop(fallen.birth, _NO_POSES)[0] > before:
             raise impossible(
                 f"poses: robot {names([fallen.birth])} must have <= {before}"
             )
     if found:
         raise impossible(f"poses: robots {names(found)} do not live here")
     return rows
+
+
+def _poses_of_robots(
+    rows: pa.Table, samples: npt.NDArray[np.int64]
+) -> dict[BirthId, tuple[int, int, int]]:
+    """Return each robot's number of poses, and the least and most angles of one.
+
+    Raises:
+        MalformedMessage: two poses of one robot in one sample.
+    """
+    islands, numbers = rows["island"].to_numpy(), rows["birth"].to_numpy()
+    order = np.lexsort((samples, numbers, islands))
+    keys = [column[order] for column in (islands, numbers, samples)]
+    is_other = [column[1:] != column[:-1] for column in keys]
+    is_new = is_other[0] | is_other[1]
+    if not (is_new | is_other[2]).all():
+        raise impossible("poses: must have one row per robot and time")
+    if not len(order):
+        return {}
+    starts = np.concatenate([[0], np.flatnonzero(is_new) + 1])
+    counts = np.diff(starts, append=len(order))
+    angles = pyarrow.compute.list_value_length(rows["angles"]).to_numpy()[order]
+    births = zip(keys[0][starts].tolist(), keys[1][starts].tolist(), strict=True)
+    facts = zip(
+        counts.tolist(),
+        np.minimum.reduceat(angles, starts).tolist(),
+        np.maximum.reduceat(angles, starts).tolist(),
+        strict=True,
+    )
+    return {BirthId(*birth): fact for birth, fact in zip(births, facts, strict=True)}
 
 
 def _sample_of_row(rows: pa.Table, expected: ExpectedAdvance) -> npt.NDArray[np.int64]:
@@ -81,7 +105,7 @@ def _sample_of_row(rows: pa.Table, expected: ExpectedAdvance) -> npt.NDArray[np.
     return samples
 
 
-def _check_numbers(rows: pa.Table, most_angles: int) -> None:
+def _check_numbers(rows: pa.Table) -> None:
     if rows["birth_island"].null_count < rows.num_rows:
         raise impossible("poses: birth_island must be null")
     columns = [rows[name].to_numpy() for name in ("x", "y", "z")]
@@ -92,10 +116,6 @@ def _check_numbers(rows: pa.Table, most_angles: int) -> None:
         raise impossible("poses: must be finite")
     if (np.abs(lengths - 1.0) > _UNIT).any():
         raise impossible("poses: quaternions must have the length 1")
-    counts = pyarrow.compute.list_value_length(rows["angles"])
-    most = pyarrow.compute.max(counts).as_py() or 0
-    if most > most_angles:
-        raise impossible(f"poses: must have <= {most_angles} angles, got {most}")
 
 
 def place_poses(columns: bytes, poses: pa.Table, island: int) -> bytes:

@@ -14,16 +14,19 @@ from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Advanced, AdvanceShard
 from coordinator.run.advance_checks import (
     ExpectedAdvance,
+    Inserted,
     check_advance,
     check_snapshot,
+    inserted,
 )
 from coordinator.run.answer_checks import check_job
 from coordinator.run.drift import Drift, with_losses
 from coordinator.run.pose_checks import place_poses, read_poses
 from coordinator.run.run_context import RunContext
 from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
+from schema.experiment.document import body_space
 from schema.experiment.plugin_source import plugins_of
-from schema.parts import Vector
+from schema.parts import BodySpace, Vector
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.wire.arena import Advance, Changes
@@ -58,8 +61,8 @@ class _Past:
 
     Its state at ``step`` is that of the newest snapshot, at ``base`` (0 is the empty
     arena), after ``history``. ``platform`` is that of the last advance, empty before
-    the first; ``places`` are those of the robots that lived after it, and ``born`` the
-    steps at which they were inserted. The requested advance may have a snapshot in the
+    the first; ``places`` are those of the robots that lived after it, and ``born``
+    their steps of insertion. The requested advance may have a snapshot in the
     store if ``may_be_kept``, as in any replay.
     """
 
@@ -72,13 +75,16 @@ class _Past:
     requested: AdvanceShard | None = None
     wants_snapshot: bool = False
     may_be_kept: bool = True
-    born: dict[BirthId, int] = field(default_factory=dict)
+    born: dict[BirthId, Inserted] = field(default_factory=dict)
 
-    def born_after(self, changes: Changes) -> dict[BirthId, int]:
-        """Return the robots that live after changes, and their steps of insertion."""
+    def born_after(self, changes: Changes, space: BodySpace) -> dict[BirthId, Inserted]:
+        """Return the robots that live after changes."""
         gone = set(changes.removals)
         born = {birth: at for birth, at in self.born.items() if birth not in gone}
-        return born | {each.birth: self.step for each in changes.insertions}
+        return born | {
+            each.birth: inserted(each.robot, space, self.step)
+            for each in changes.insertions
+        }
 
     def drifts_to(self, platform: str) -> bool:
         """Return whether a platform differs from that of the last advance."""
@@ -183,7 +189,7 @@ class ShardRequests:
         if requested is None or requested.number != event.number:
             raise UnexpectedEvent(f"no such advance was requested: {event}")
         past.requested = None
-        born = past.born_after(requested.changes)
+        born = past.born_after(requested.changes, self._space(event.island))
         living = {one.birth for one in advance.judgements}
         past.born = {birth: at for birth, at in born.items() if birth in living}
         past.step, past.digest = advance.step, advance.digest
@@ -210,6 +216,9 @@ class ShardRequests:
             f"arena {self._islands[end.shard]}: several workers cannot advance it, the "
             f"last of them {end.agent}: {end.reason}; fix that and resume"
         )
+
+    def _space(self, shard: int) -> BodySpace:
+        return body_space(self._context.experiments[shard].space)
 
     def _past(self, shard: int) -> _Past:
         return self._pasts.setdefault(shard, _Past())
@@ -258,7 +267,7 @@ class ShardRequests:
             expected=ExpectedAdvance(
                 past.step,
                 requested.until,
-                past.born_after(requested.changes),
+                past.born_after(requested.changes, self._space(shard)),
                 self._context.experiments[shard],
                 wants_snapshot,
             ),

@@ -4,8 +4,14 @@ from typing import Annotated
 
 from msgspec import Meta
 from msgspec.msgpack import Decoder, encode
+from msgspec.structs import replace
 
-from schema.limits import LONGEST_NAME, OPERATOR_REPLY_BYTES, OPERATOR_REQUEST_BYTES
+from schema.limits import (
+    LONGEST_NAME,
+    OPERATOR_REPLY_BYTES,
+    OPERATOR_REQUEST_BYTES,
+    printable_lines,
+)
 from schema.robot.ids import BirthId, IslandNumber
 from schema.wire.codec import decode_robot
 from schema.wire.packing import Finite, Message, unpack
@@ -127,9 +133,11 @@ def encode_operator_reply(reply: OperatorReply) -> bytes:
 
 
 def decode_operator_reply(data: bytes) -> OperatorReply:
-    """Return the reply of some bytes.
+    """Return the reply of some bytes; its text is safe to print.
 
     Raises:
-        MalformedMessage: not a reply's bytes, or a number that is not finite.
+        MalformedMessage: not a reply's bytes, too many of them, or a number that is
+            not finite.
     """
-    return unpack(_REPLY, data, OPERATOR_REPLY_BYTES)
+    reply = unpack(_REPLY, data, OPERATOR_REPLY_BYTES)
+    return replace(reply, text=printable_lines(reply.text))

@@ -8,6 +8,7 @@ import json
 from typing import Self
 
 from schema.experiment.settings import ArenaSettings
+from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Casualty, Changes, Judgement
 from tests.coordinator.arena_world import DT, MATURE, POSE_STEPS, poses
@@ -25,6 +26,7 @@ class FakeWorld:
         type(self).made += 1
         self.step = 0
         self.born: dict[BirthId, int] = {}
+        self.joints: dict[BirthId, int] = {}
         self.past = "begun"
         self.is_closed = False
 
@@ -32,7 +34,9 @@ class FakeWorld:
     def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> Self:
         world = cls(settings, threads)
         world.step, born, world.past = json.loads(data)
-        world.born = {BirthId(*name): step for *name, step in born}
+        for island, number, step, joints in born:
+            world.born[BirthId(island, number)] = step
+            world.joints[BirthId(island, number)] = joints
         return world
 
     @property
@@ -44,6 +48,10 @@ class FakeWorld:
             del self.born[birth]
         for each in changes.insertions:
             self.born[each.birth] = self.step
+            self.joints[each.birth] = sum(
+                BUILT_IN[part.kind].shape(part.parameters).joint is not None
+                for part in each.robot.parts
+            )
         self._record(repr((changes.removals, [i.place for i in changes.insertions])))
 
     def advance(self, until: int) -> Advance:
@@ -62,11 +70,15 @@ class FakeWorld:
             judgements=tuple(map(self._judgement, living)),
             casualties=tuple(Casualty(o, until, "fell", (0.0, 0.0, 0.1)) for o in lost),
             touches=(),
-            poses=poses(living, *(one * POSE_STEPS * DT for one in samples)),
+            poses=poses(
+                living,
+                *(one * POSE_STEPS * DT for one in samples),
+                joints=self.joints,
+            ),
         )
 
     def snapshot(self) -> bytes:
-        born = [(*name, step) for name, step in sorted(self.born.items())]
+        born = [(*b, step, self.joints[b]) for b, step in sorted(self.born.items())]
         return json.dumps([self.step, born, self.past]).encode()
 
     def digest(self) -> bytes:

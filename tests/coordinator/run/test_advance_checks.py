@@ -259,7 +259,8 @@ LIES: dict[str, AnswerChange] = {
     "a pose not finite": column("y", math.inf),
     "an attitude that is none": column("qw", 0.5),
     "an angle not a number": column("angles", [math.nan]),
-    "too many angles": column("angles", [0.5] * 31),
+    "an angle too many": column("angles", [0.5] * 2),
+    "an angle too few": column("angles", []),
     "damaged poses": in_advance(poses=b"\xff" * 100),
 }  # fmt: skip
 
