@@ -20,7 +20,7 @@ from coordinator.storage.campaign import (
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import holds_run, read_details
 from coordinator.storage.hints import stopped
-from schema.agent.address import user_hub
+from schema.agent.address import HUB, listen_address
 from schema.agent.command import access_of, connect_of, tls_of
 from schema.agent.service import tell_user
 from schema.agent.supervisor import cores
@@ -117,7 +117,9 @@ def _deployment(
         raise NetworkError("--listen and --connect exclude each other")
     if options.view and options.in_process:
         raise NetworkError("--view needs a network, but --in-process has none")
-    is_hub = options.command == "coordinator" and not options.connect
+    listen = options.listen
+    if options.command == "coordinator" and not options.connect:
+        listen = listen or HUB
     workers: int | None = options.workers
     if workers is None:
         workers = 0 if options.connect else cores()
@@ -135,7 +137,7 @@ def _deployment(
             "worker": worker.serve.service.process,
         },
         answers=answers if options.in_process else None,
-        listen=options.listen or (user_hub() if is_hub else None),
+        listen=listen_address(listen) if listen else None,
         connect=connect_of(options) if options.connect else None,
         fleet=options.fleet,
         tls=tls_of(options),

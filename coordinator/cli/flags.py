@@ -116,7 +116,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
             action="store_true",
             help="run everything in one process without network; slower, for debugging",
         )
-    listen = "this user's hub" if command == "coordinator" else "only this user's own"
+    listen = "hub" if command == "coordinator" else "only a socket of its own"
     flags.add_argument(
         "--listen",
         metavar="ADDRESS",

@@ -4,7 +4,7 @@ Coordinators connect to it like workers, and may come and go.
 """
 
 from coordinator.network.hub_service import serve_hub
-from schema.agent.address import FORMS, parse_address, user_hub
+from schema.agent.address import FORMS, HUB, listen_address, parse_address
 from schema.agent.command import access_of, add_access, add_network_flags, tls_of
 from schema.agent.network import hub_config
 from schema.agent.service import tell_user
@@ -23,7 +23,7 @@ def main(arguments: list[str]) -> int:
     """
     options = _flags().parse_args(arguments[1:])
     tls, certificates = tls_of(options), access_of(options)
-    addresses = tuple(options.listen or [user_hub()])
+    addresses = tuple(map(listen_address, options.listen or [HUB]))
     config = hub_config(addresses, tls, certificates)
     if options.print_config:
         print(config)

@@ -23,7 +23,9 @@ UNIX = "unixsock-stream"
 """Protocol of Unix sockets."""
 CONNECT_VARIABLE = "REVOLVE_CONNECT"
 """Environment variable with the default of ``--connect``."""
-FORMS = "tcp/HOST:PORT, tls/HOST:PORT or unixsock-stream/PATH"
+HUB = "hub"
+"""Short form of the address of this user's hub on this machine."""
+FORMS = "tcp/HOST:PORT, tls/HOST:PORT, unixsock-stream/PATH or hub"
 
 _ADDRESS = re.compile(r"(tcp|tls)/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):(\d{1,5})")
 _SOCKET = re.compile(rf"{UNIX}/(/[!-~]+)")
@@ -137,15 +139,29 @@ def runtime_directory() -> Path:
     return place
 
 
+def listen_address(place: str) -> str:
+    """Return the address that a user wants to listen on.
+
+    Args:
+        place: an address, or "hub" for this user's hub.
+
+    Raises:
+        NetworkError: there is no directory that only this user can enter.
+    """
+    return user_hub() if place == HUB else place
+
+
 def hub_of(place: str) -> str:
     """Return the address that a user means: an address, or a run folder's.
 
     Args:
-        place: an address, or a folder of a run or campaign that is active.
+        place: an address, "hub", or a folder of a run or campaign that is active.
 
     Raises:
         NetworkError: neither; or the folder's file is missing or damaged.
     """
+    if place == HUB:
+        return user_hub()
     folder = Path(place)
     if "/" not in place or folder.is_dir():
         return read_address(folder)

@@ -117,7 +117,7 @@ def test_certificates_act_in_their_role_only(lab: Lab, undisturbed: Path) -> Non
         }  # fmt: skip
         assert members(head, "analyzer") == []
         assert members(operator, "coordinator") == [chief]
-        kept[-1].undeclare()
+        kept[-1].undeclare()  # type: ignore[no-untyped-call]
         assert replies(spy, good.jobs) == []
         assert replies(spy, chief.command) == []
         assert replies(spy, chief.state) == []
@@ -127,8 +127,8 @@ def test_certificates_act_in_their_role_only(lab: Lab, undisturbed: Path) -> Non
         assert len(replies(operator, chief.command)) == 1
         lab.start("judge", "analyzer")
         wait_until(lambda: coordinator.poll() is not None, "the run ends")
-        stolen.undeclare()
-        ears.undeclare()
+        stolen.undeclare()  # type: ignore[no-untyped-call]
+        ears.undeclare()  # type: ignore[no-untyped-call]
         assert heard == []
     assert coordinator.returncode == 0
     assert compare(lab.folder, undisturbed) == []
@@ -148,8 +148,8 @@ def test_strangers_do_not_connect(lab: Lab) -> None:
             token = known.liveliness().declare_token("revolve/default/w/bad-0.1/alive")
             wait_until(lambda: bool(members(head, "worker")), "the known one's token")
             assert [each.name for each in members(head, "worker")] == ["bad-0.1"]
-            token.undeclare()
-        nobody_token.undeclare()
+            token.undeclare()  # type: ignore[no-untyped-call]
+        nobody_token.undeclare()  # type: ignore[no-untyped-call]
 
 
 def test_three_commands_of_one_user_need_no_address(
