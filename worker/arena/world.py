@@ -19,7 +19,7 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.wire.arena import Advance, Casualty, Changes, Insertion, Judgement
 from worker.arena.batched_control import BatchedControllers, BatchedIO
-from worker.arena.births import check_changes, newborn, replace_brain
+from worker.arena.births import check_changes, newborn
 from worker.arena.divergence import diverged
 from worker.arena.light import read_light
 from worker.arena.records import Contacts, Poses
@@ -107,7 +107,7 @@ class World:
             robot = self.population.find(change.birth)
             start = self._schedule.next_tick(self.step)
             width = self.population.model_cache.width
-            replace_brain(robot, change.brain, width, start)
+            robot.set_brain(change.brain, width, start)
         if changes.removals or changes.insertions or changes.brains:
             self._controllers.gather(self.population.robots)
 

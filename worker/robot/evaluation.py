@@ -9,6 +9,7 @@ from functools import lru_cache
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from schema.errors import SimulationDiverged, one_line
 from schema.experiment.document import Simulation, Space, body_space
@@ -194,12 +195,16 @@ class _ControlLoop:
 
 
 def _raise_diverged(data: mujoco.MjData, time_s: float) -> None:
-    names = [
-        mujoco.mjtWarning(index).name.removeprefix("mjWARN_")
-        for index in data.warning.number.nonzero()[0].tolist()
-    ]
-    reason = ", ".join(names) or "state not finite"
+    reason = warning_names(data.warning.number) or "state not finite"
     raise SimulationDiverged(f"physics diverged by {time_s:.3f} s: {reason}")
+
+
+def warning_names(counts: npt.NDArray[np.integer]) -> str:
+    """Return the names of the engine's warnings whose counts are not 0."""
+    return ", ".join(
+        mujoco.mjtWarning(index).name.removeprefix("mjWARN_")
+        for index in counts.nonzero()[0].tolist()
+    )
 
 
 @lru_cache(maxsize=1)
