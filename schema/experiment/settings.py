@@ -87,9 +87,7 @@ def arena_settings(experiment: Experiment, origin: Origin) -> bytes:
     Raises:
         ExperimentError: the experiment has no arena.
     """
-    return msgspec.json.encode(
-        replace(arena_settings_of(experiment), origin=origin)
-    )
+    return msgspec.json.encode(replace(arena_settings_of(experiment), origin=origin))
 
 
 def _sections(experiment: Experiment, kind: type[T]) -> T:

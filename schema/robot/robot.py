@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from schema.errors import InvalidRobot
 from schema.parts import BodySpace, PartType
-from schema.robot.brain import Brain, Layer, check_brain
+from schema.robot.brain import Brain, check_brain
 
 ORIENTATIONS = (0, 90, 180, 270)
 GENES = 2**64
@@ -225,14 +225,11 @@ def _check_order(parts: Sequence[Part]) -> None:
 def _check_wiring(robot: Robot, space: BodySpace) -> None:
     """Raise unless inputs and outputs match the sensors and motors."""
     kinds = [space[part.kind] for part in robot.parts]
-    _check_owners(robot, "input", [kind.inputs for kind in kinds])
-    _check_owners(robot, "output", [kind.outputs for kind in kinds])
-
-
-def _check_owners(robot: Robot, layer: Layer, counts: Sequence[int]) -> None:
-    expected = [index for index, count in enumerate(counts) for _ in range(count)]
-    owners = [n.part for n in robot.brain.neurons if n.layer == layer]
-    if owners != expected:
-        raise InvalidRobot(
-            f"brain: {layer} neurons must belong to parts {expected}, got {owners}"
-        )
+    inputs, outputs = [kind.inputs for kind in kinds], [kind.outputs for kind in kinds]
+    for layer, counts in (("input", inputs), ("output", outputs)):
+        expected = [part for part, count in enumerate(counts) for _ in range(count)]
+        owners = [n.part for n in robot.brain.neurons if n.layer == layer]
+        if owners != expected:
+            raise InvalidRobot(
+                f"brain: {layer} neurons must belong to parts {expected}, got {owners}"
+            )

@@ -96,11 +96,7 @@ def _commands(robot: Robot, settings: EvaluationSettings) -> list[Floats]:
     """Return the controls of each tick of a robot's evaluation."""
     found: list[Floats] = []
     evaluation.simulate(
-        robot,
-        settings.space,
-        settings.simulation,
-        settings.environment,
-        watch=lambda data: found.append(data.ctrl.copy()),
+        robot, settings, watch=lambda data: found.append(data.ctrl.copy())
     )
     return found
 

@@ -52,9 +52,7 @@ class ModelCache:
         self._simulation = replace(settings.simulation, drop_m=settings.arena.drop_m)
         self.width = widths(settings.space)
         self._types = body_space(settings.space)
-        self._furnish = partial(
-            add_ring_wall, arena=settings.arena, simulation=self._simulation
-        )
+        self._furnish = partial(add_ring_wall, arena=settings.arena)
         self._clusters: OrderedDict[tuple[BirthId, ...], Cluster] = OrderedDict()
         self._specs: dict[BirthId, mujoco.MjSpec] = {}
 
