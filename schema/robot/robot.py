@@ -154,20 +154,15 @@ def check_body(parts: Sequence[Part], space: BodySpace) -> None:
         _check_part(part, index, space)
         if index == 0:
             continue
-        parent = parts[part.parent]
-        if part.parent_slot >= space[parent.kind].arity:
-            raise _no_slot(index, "parent_slot", parent, part.parent_slot, space)
-        if part.slot >= space[part.kind].arity:
-            raise _no_slot(index, "slot", part, part.slot, space)
-
-
-def _no_slot(
-    index: int, name: str, owner: Part, slot: int, space: BodySpace
-) -> InvalidRobot:
-    return InvalidRobot(
-        f"body.parts[{index}].{name}: {owner.kind} has slots "
-        f"0..{space[owner.kind].arity - 1}, got {slot}"
-    )
+        for name, slot, kind in (
+            ("parent_slot", part.parent_slot, space[parts[part.parent].kind]),
+            ("slot", part.slot, space[part.kind]),
+        ):
+            if slot >= kind.arity:
+                raise InvalidRobot(
+                    f"body.parts[{index}].{name}: {kind.name} has slots "
+                    f"0..{kind.arity - 1}, got {slot}"
+                )
 
 
 def _check_part(part: Part, index: int, space: BodySpace) -> None:

@@ -186,7 +186,10 @@ class World:
         is_merge = on.is_merge(step)
         if not (is_tick or is_sample or is_merge):
             return
-        self._remove_diverged(rollout)
+        reads_warnings = on.is_split(step)
+        self._remove(
+            diverged(self.population, rollout, step, reads_warnings=reads_warnings)
+        )
         if is_tick:
             self._tick(rollout.state)
         if is_sample:
@@ -231,11 +234,6 @@ class World:
             self._controllers.first_tick(self.step, robot)
         self.population.kinematics()
         self.population.merge()
-
-    def _remove_diverged(self, rollout: Rollout) -> None:
-        is_split = self._schedule.is_split(self.step)
-        found = diverged(self.population, rollout, self.step, reads_warnings=is_split)
-        self._remove(found)
 
     def _remove(self, casualties: Sequence[Casualty]) -> None:
         """Remove robots, to be reported by the present advance."""

@@ -54,12 +54,9 @@ def read_population(folder: Path) -> Population:
     genomes = {
         (row["island"], row["birth"]): row["genome"] for row in births.to_pylist()
     }
+    evaluations = read_table(folder, "evaluations")
     columns = ["island", "birth", "fitness"]
-    evaluated = [
-        row
-        for row in read_table(folder, "evaluations").select(columns).to_pylist()
-        if row["fitness"] is not None
-    ]
+    evaluated = evaluations.select(columns).drop_null().to_pylist()
     return Population(
         experiment,
         tuple(
