@@ -156,7 +156,8 @@ POPULATION = _table(
     "population",
     _ISLAND,
     _columns("births", pa.int64()),
-    _BIRTH_ID,
+    _columns("birth_island", pa.int32(), is_nullable=True),
+    _columns("birth", pa.int64()),
     _columns("fitness", pa.float64(), is_nullable=True),
 )
 """One row per individual alive when ``births`` individuals had been born.
