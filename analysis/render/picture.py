@@ -89,12 +89,12 @@ class RobotRenderer:
         choose_engine()
         import mujoco  # noqa: PLC0415 - after its engine is chosen
 
-        from schema.mjcf.model import solo_model  # noqa: PLC0415 - the same
+        from schema.mjcf.model import solo_spec  # noqa: PLC0415 - the same
 
         self._mujoco: Any = mujoco
-        self.model = solo_model(
+        self.model = solo_spec(
             robot, space, simulation, environment, furnish=_furnish(*size)
-        )
+        ).compile()
         self._data = mujoco.MjData(self.model)
         try:
             self._renderer = mujoco.Renderer(self.model, size[1], size[0])

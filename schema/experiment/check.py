@@ -65,7 +65,7 @@ def _island_problems(experiment: Experiment) -> Iterator[str]:
     yield from _selection_problems(experiment)
     yield from _culling_problems(experiment)
     yield from _reevaluation_problems(experiment)
-    yield from _clock_problems(experiment)
+    yield from _pose_problems(experiment.simulation, "window_steps")
     yield from _duration_problems(experiment)
     yield from _environment_problems(experiment)
     if experiment.arena is not None:
@@ -126,12 +126,13 @@ def _selection_problems(experiment: Experiment) -> Iterator[str]:
         )
 
 
-def _clock_problems(experiment: Experiment) -> Iterator[str]:
-    clock = experiment.simulation
-    if clock.window_steps % clock.pose_steps:
+def _pose_problems(clock: Simulation, name: str) -> Iterator[str]:
+    """Yield whether a number of steps does not end on a pose."""
+    steps = getattr(clock, name)
+    if steps % clock.pose_steps:
         yield (
-            "simulation.window_steps: must be a multiple of simulation.pose_steps = "
-            f"{clock.pose_steps}, got {clock.window_steps}"
+            f"simulation.{name}: must be a multiple of simulation.pose_steps = "
+            f"{clock.pose_steps}, got {steps}"
         )
 
 
@@ -181,11 +182,7 @@ def _arena_clock_problems(arena: Arena, clock: Simulation) -> Iterator[str]:
                 f"{tick * clock.timestep_s:g} s, the common multiple of "
                 f"simulation.brain_steps and pose_steps, got {seconds:g}"
             )
-    if clock.warmup_steps % clock.pose_steps:
-        yield (
-            "simulation.warmup_steps: must be a multiple of simulation.pose_steps = "
-            f"{clock.pose_steps}, got {clock.warmup_steps}"
-        )
+    yield from _pose_problems(clock, "warmup_steps")
 
 
 def _culling_problems(experiment: Experiment) -> Iterator[str]:

@@ -18,7 +18,7 @@ from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
 from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
 from schema.formats.files import read_text
-from schema.mjcf.model import solo_model, solo_spec
+from schema.mjcf.model import solo_spec
 from schema.robot.robot import Robot, check_robot
 from schema.wire.codec import decode_robot, encode_robot
 
@@ -81,7 +81,7 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
         check_robot(robot, space)
     except (MalformedMessage, ExperimentError, InvalidRobot) as error:
         raise InvalidRobot(f"{where}: {error}") from None
-    built = solo_model(robot, space, settings.simulation, settings.environment)
+    built = solo_spec(robot, space, settings.simulation, settings.environment).compile()
     _check_body(model, built, where)
     return robot, settings
 

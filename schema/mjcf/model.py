@@ -104,19 +104,6 @@ def solo_spec(
     return spec
 
 
-def solo_model(
-    robot: Robot,
-    space: BodySpace,
-    simulation: Simulation,
-    environment: Environment,
-    *,
-    furnish: Furnish | None = None,
-) -> mujoco.MjModel:
-    """Return the compiled ``solo_spec``."""
-    spec = solo_spec(robot, space, simulation, environment, furnish=furnish)
-    return spec.compile()
-
-
 def shared_model(
     robots: Sequence[tuple[str, mujoco.MjSpec]],
     simulation: Simulation,

@@ -81,7 +81,7 @@ class World:
         """Return the present poses: Arrow IPC of ``columns.POSES``."""
         now = Poses(self._settings.simulation.timestep_s)
         now.add(self.step, self.population.layout, self.population.layout.read())
-        return now.columns()
+        return now.take()
 
     def apply(self, changes: Changes) -> None:
         """Remove robots, insert robots, replace brains, in this order.
@@ -246,12 +246,11 @@ class World:
         found = [r.judgement(self.step, self._settings) for r in self.population.robots]
         self._remove([each for each in found if isinstance(each, Casualty)])
         casualties, self._casualties = tuple(self._casualties), []
-        poses, self._poses = self._poses, Poses(self._settings.simulation.timestep_s)
         return Advance(
             step=self.step,
             digest=self.digest(),
             judgements=tuple(each for each in found if isinstance(each, Judgement)),
             casualties=casualties,
             touches=() if self._contacts is None else self._contacts.take(),
-            poses=poses.columns(),
+            poses=self._poses.take(),
         )

@@ -22,7 +22,7 @@ from schema.experiment.document import Experiment, Simulation, body_space
 from schema.experiment.file import parse_experiment, read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.flags import Flags, add_count
-from schema.mjcf.model import solo_model
+from schema.mjcf.model import solo_spec
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.bench import arena_bench, fidelity
@@ -107,7 +107,7 @@ def _replay(
     """Return the time of the engine's steps under recorded controls [s]."""
     clock = settings.simulation
     space = body_space(settings.space)
-    model = solo_model(robot, space, clock, settings.environment)
+    model = solo_spec(robot, space, clock, settings.environment).compile()
     data = mujoco.MjData(model)
     left = clock.warmup_steps + clock.window_steps
     start = time.thread_time()

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
 from schema.mjcf.footing import footprint, standing_height
-from schema.mjcf.model import robot_spec, shared_model, solo_model
+from schema.mjcf.model import robot_spec, shared_model, solo_spec
 from schema.mjcf.world import add_ring_wall
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
@@ -63,13 +63,13 @@ class ModelCache:
             ValueError: the engine cannot build it.
             ExperimentError: a sensor that has no stimulus in the arena.
         """
-        model = solo_model(
+        model = solo_spec(
             robot,
             self._types,
             self._simulation,
             self.settings.environment,
             furnish=self._furnish,
-        )
+        ).compile()
         solo = Cluster((birth,), [Member("", robot, model)], model, self.settings)
         return Body(robot, bounding_spheres(model), solo)
 

@@ -15,7 +15,7 @@ from schema.errors import SimulationDiverged, one_line
 from schema.experiment.document import body_space
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
-from schema.mjcf.model import solo_model
+from schema.mjcf.model import solo_spec
 from schema.robot.results import Evaluation, Track
 from schema.robot.robot import Robot
 from worker.fitness import fitness_of, path_velocity, straight_velocity
@@ -82,7 +82,7 @@ def simulate(
     silence_engine()
     clock, space = settings.simulation, body_space(settings.space)
     try:
-        model = solo_model(robot, space, clock, settings.environment)
+        model = solo_spec(robot, space, clock, settings.environment).compile()
     except ValueError as error:
         raise SimulationDiverged(f"cannot be built: {one_line(error)}") from None
     loop = _ControlLoop(robot, settings, model, identity)
