@@ -73,7 +73,7 @@ def arena_settings_of(experiment: Experiment) -> ArenaSettings:
         ExperimentError: the experiment has no arena.
     """
     if experiment.arena is None:
-        raise ExperimentError(f"{experiment.name}: has no arena")
+        raise ExperimentError(f"{experiment.name}: has no [arena]")
     return _sections(experiment, ArenaSettings)
 
 
