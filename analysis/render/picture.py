@@ -16,9 +16,10 @@ import numpy.typing as npt
 from PIL import Image
 
 from schema.errors import RevolveError
-from schema.experiment.document import Simulation, Space
+from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.identity import NO_IDENTITY, Identity
+from schema.experiment.settings import EvaluationSettings
 from schema.parts import BodySpace
 from schema.robot.results import Floats, Track
 from schema.robot.robot import Robot
@@ -264,9 +265,7 @@ class Simulate(Protocol):
     def __call__(
         self,
         robot: Robot,
-        space: Space,
-        simulation: Simulation,
-        environment: Environment,
+        settings: EvaluationSettings,
         *,
         identity: Identity = NO_IDENTITY,
         watch: Callable[[Any], None],
