@@ -7,7 +7,11 @@ import pyarrow as pa
 
 from analysis.measures.distance import tree_distances
 from analysis.measures.outputs import run_schema
-from analysis.measures.population_table import Numbers, PopulationTable
+from analysis.measures.population_table import (
+    Numbers,
+    PopulationTable,
+    is_last_of_each,
+)
 from analysis.measures.trees import Integers, Trees
 
 _BLOCK = 2_000_000
@@ -82,32 +86,20 @@ def mean_distances(table: PopulationTable, trees: Trees, step: int = 15) -> pa.T
     """
     within = diversity(table, trees)
     rows = []
-    last = int(table.births.max(initial=0))
-    for births in range(step, last + 1, step):
+    for births in range(step, int(table.births.max(initial=0)) + 1, step):
         latest = _latest(table, births)
-        living = [
-            trees.tree_of[table.members[table.starts[g] : table.starts[g + 1]]]
-            for g in latest
-        ]
-        grids = [
-            np.meshgrid(one, other, indexing="ij")
-            for index, one in enumerate(living)
-            for other in living[index + 1 :]
-        ]
-        between = None
-        if grids:
-            first, second = (
-                np.concatenate([grid[side].ravel() for grid in grids])
-                for side in (0, 1)
-            )
-            between = float(distances_of(trees, first, second).mean())
+        is_shown = np.isin(table.group_of, latest)
+        living = trees.tree_of[table.members[is_shown]]
+        homes = table.group_of[is_shown]
+        first, second = np.nonzero(homes[:, None] < homes)
+        distances = distances_of(trees, living[first], living[second])
         known = within[latest][~np.isnan(within[latest])]
         rows.append(
             {
                 "births": births,
                 "islands": len(latest),
                 "within": float(known.mean()) if len(known) else None,
-                "between": between,
+                "between": float(distances.mean()) if len(distances) else None,
             }
         )
     return pa.Table.from_pylist(rows, run_schema("between"))
@@ -116,7 +108,5 @@ def mean_distances(table: PopulationTable, trees: Trees, step: int = 15) -> pa.T
 def _latest(table: PopulationTable, births: int) -> Integers:
     """Return each island's last population at or before a number of births."""
     before = np.flatnonzero(table.births <= births)
-    islands = table.islands[before]
-    is_last = np.append(islands[1:] != islands[:-1], True)[: len(islands)]
-    latest: Integers = before[is_last]
+    latest: Integers = before[is_last_of_each(table.islands[before])]
     return latest

@@ -6,6 +6,7 @@ import pyarrow as pa
 from analysis.measures.population_table import (
     Numbers,
     individual_ids,
+    is_last_of_each,
     residence_columns,
     residence_ids,
 )
@@ -89,6 +90,5 @@ def last_fitness(fitness: pa.Table) -> tuple[Integers, Numbers]:
     robots = individual_ids(mature)
     times = np.asarray(mature["sim_time_s"], np.float64)
     order = np.lexsort((times, robots))
-    is_last = np.append(robots[order][1:] != robots[order][:-1], True)[: len(order)]
-    chosen = order[is_last]
+    chosen = order[is_last_of_each(robots[order])]
     return robots[chosen], np.asarray(mature["fitness"], np.float64)[chosen]
