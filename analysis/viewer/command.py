@@ -4,8 +4,6 @@ import argparse
 import re
 from pathlib import Path
 
-from rich.progress import Progress
-
 from analysis.progress import bars
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
@@ -21,7 +19,6 @@ from analysis.viewer.output import HOST, PORT, Output, Window, keep_serving
 from analysis.viewer.recording import Recording, ViewerError
 from analysis.viewer.replay import (
     CHUNK_S,
-    Span,
     last_time,
     read_experiment,
     read_news,
@@ -96,7 +93,11 @@ def _replay(
             show.tell(news)
             bar.remove_task(task)
             if span is not None:
-                _replay_poses(folder, span, show, bar)
+                chunks = (span[1] - span[0]) / CHUNK_S
+                pieces = read_poses(folder, *span)
+                shown = bar.track(pieces, chunks, description="recording poses")
+                for arena, poses in shown:
+                    show.move(arena, poses)
         bodies = {one.birth: one.body for one in news.births}
         recording.upright("motion")
         recording.ground("motion", scene.below(moving))
@@ -148,7 +149,7 @@ def _wanted(options: argparse.Namespace) -> list[BirthId]:
     return [best if birth is None else birth for birth in options.robot]
 
 
-def _span(options: argparse.Namespace, folder: Path) -> Span:
+def _span(options: argparse.Namespace, folder: Path) -> tuple[float, float]:
     """Return the simulated time to show; print it if it is not the whole run."""
     end_s = last_time(folder) if options.until is None else options.until
     start_s = max(0.0, end_s - LAST_S) if options.start is None else options.start
@@ -159,14 +160,7 @@ def _span(options: argparse.Namespace, folder: Path) -> Span:
             f"showing poses from {start_s:g} s to {end_s:g} s; use --from and --until "
             "for others"
         )
-    return Span(start_s, end_s)
-
-
-def _replay_poses(folder: Path, span: Span, show: Show, bar: Progress) -> None:
-    chunks = (span.end_s - span.start_s) / CHUNK_S
-    pieces = read_poses(folder, span)
-    for arena, poses in bar.track(pieces, chunks, description="recording poses"):
-        show.move(arena, poses)
+    return start_s, end_s
 
 
 def _robot_name(text: str) -> BirthId:

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,14 +28,6 @@ CHUNK_S = 20.0
 
 _DETAILS = "run.json"
 _BORN = ("island", "birth", "parents", "rank", "body", "sim_time_s")
-
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """Interval of simulated time whose poses are shown [s]."""
-
-    start_s: float
-    end_s: float
 
 
 def read_news(folder: Path) -> Update:
@@ -97,12 +88,15 @@ def last_time(folder: Path) -> float:
     return float(max(times))
 
 
-def read_poses(folder: Path, span: Span) -> Iterator[tuple[int, pa.Table]]:
+def read_poses(
+    folder: Path, start_s: float, end_s: float
+) -> Iterator[tuple[int, pa.Table]]:
     """Yield the poses of a span, in pieces of ``CHUNK_S``.
 
     Args:
         folder: the run folder.
-        span: interval of simulated time.
+        start_s: simulated time of the span's start [s].
+        end_s: simulated time of its end [s].
 
     Yields:
         Number of an island, and its rows by time.
@@ -110,9 +104,9 @@ def read_poses(folder: Path, span: Span) -> Iterator[tuple[int, pa.Table]]:
     Raises:
         RunFolderError: the table cannot be read.
     """
-    poses = _within(folder, span)
+    poses = _within(folder, start_s, end_s)
     times = poses["sim_time_s"].to_numpy()
-    chunks = np.floor((times - span.start_s) / CHUNK_S).astype(np.int64)
+    chunks = np.floor((times - start_s) / CHUNK_S).astype(np.int64)
     for chunk in np.unique(chunks).tolist():
         now = poses.filter(pa.array(chunks == chunk))
         for island in sorted(pc.unique(now["island"]).to_pylist()):
@@ -125,15 +119,13 @@ def rows_by_robot(poses: pa.Table) -> Iterator[tuple[BirthId, pa.Table]]:
     born = poses["island"]
     if "birth_island" in poses.column_names:
         born = pc.coalesce(poses["birth_island"], born)
-    islands, numbers = born.to_numpy(), poses["birth"].to_numpy()
-    order = np.lexsort((numbers, islands))
-    poses = poses.take(order)
-    islands, numbers = islands[order], numbers[order]
-    is_new = (np.diff(islands) != 0) | (np.diff(numbers) != 0)
-    starts = [0, *(np.flatnonzero(is_new) + 1).tolist()] if len(order) else []
-    for start, end in zip(starts, [*starts[1:], len(order)], strict=True):
-        birth = BirthId(int(islands[start]), int(numbers[start]))
-        yield birth, poses.slice(start, end - start)
+    ids = np.stack([born.to_numpy(), poses["birth"].to_numpy()], axis=1)
+    robots, robot_of = np.unique(ids, axis=0, return_inverse=True)
+    order = np.argsort(robot_of, kind="stable")
+    counts = np.bincount(robot_of, minlength=len(robots))
+    ends = np.cumsum(counts)
+    for robot, start, count in zip(robots.tolist(), ends - counts, counts, strict=True):
+        yield BirthId(*robot), poses.take(order[start : start + count])
 
 
 def _details(folder: Path) -> dict[str, Any]:
@@ -153,10 +145,10 @@ def _details(folder: Path) -> dict[str, Any]:
     raise RunFolderError(f"{folder}: no run found: {why}")
 
 
-def _within(folder: Path, span: Span) -> pa.Table:
+def _within(folder: Path, start_s: float, end_s: float) -> pa.Table:
     """Return the poses of a span, reading no more than needed."""
     time = pc.field("sim_time_s")
-    is_in = (time >= span.start_s) & (time <= span.end_s)
+    is_in = (time >= start_s) & (time <= end_s)
     if (folder / FINISHED).is_dir():
         return campaign(folder, "poses").to_table(filter=is_in)
     return read_table(folder, "poses").filter(is_in)

@@ -88,12 +88,10 @@ def resimulate(
         ViewerError: no evaluation or pose of a robot is recorded.
         RevolveError: the journal cannot be read, or a robot cannot be simulated.
     """
-    arenas = [
-        birth
-        for birth in births
-        if island_experiment(experiment, birth.island).arena is not None
-    ]
-    moved = {each.birth: each for each in _together(folder, arenas, simulators, report)}
+    moved: dict[BirthId, Motion] = {}
+    for island in sorted({birth.island for birth in births}):
+        if island_experiment(experiment, island).arena is not None:
+            moved |= _in_arena(folder, island, births, simulators, report)
     for number, birth in enumerate(births, start=1):
         if birth not in moved:
             moved[birth] = _alone(folder, experiment, birth, simulators)
@@ -127,34 +125,19 @@ def _alone(
     return Motion(birth, poses, _verdict(birth, differing, recorded["platform"]))
 
 
-def _together(
-    folder: Path,
-    births: list[BirthId],
-    simulators: Simulators,
-    report: Callable[[float], None],
-) -> list[Motion]:
-    """Return the motions of robots in the arenas that they were born in."""
-    motions: list[Motion] = []
-    for island in sorted({birth.island for birth in births}):
-        recorded = {
-            birth: _rows_of(folder, "poses", birth)
-            for birth in births
-            if birth.island == island
-        }
-        for birth, rows in recorded.items():
-            if not rows.num_rows:
-                raise ViewerError(f"robot {name_of(birth)}: no pose is recorded")
-        motions += _in_arena(folder, island, recorded, simulators, report)
-    return motions
-
-
 def _in_arena(
     folder: Path,
     island: int,
-    recorded: dict[BirthId, pa.Table],
+    births: list[BirthId],
     simulators: Simulators,
     report: Callable[[float], None],
-) -> list[Motion]:
+) -> dict[BirthId, Motion]:
+    """Return the motions of the robots that were born in one arena."""
+    here = [birth for birth in births if birth.island == island]
+    recorded = {birth: _rows_of(folder, "poses", birth) for birth in here}
+    for birth, rows in recorded.items():
+        if not rows.num_rows:
+            raise ViewerError(f"robot {name_of(birth)}: no pose is recorded")
     spans = [pc.min_max(rows["sim_time_s"]).as_py() for rows in recorded.values()]
     start_s = min(span["min"] for span in spans)
     end_s = max(span["max"] for span in spans)
@@ -172,11 +155,11 @@ def _in_arena(
             break
     replayed, frames = pa.concat_tables(samples), pa.concat_tables(motion)
     platform = next(iter(read_table(folder, "runs")["platform"].to_pylist()), "")
-    motions = []
+    motions = {}
     for birth, rows in recorded.items():
         differing = _differences(rows, _only(replayed, birth), is_equal=is_equal)
         verdict = _verdict(birth, differing, platform)
-        motions.append(Motion(birth, _only(frames, birth), verdict))
+        motions[birth] = Motion(birth, _only(frames, birth), verdict)
     return motions
 
 

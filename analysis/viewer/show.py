@@ -4,15 +4,17 @@
 pose and disappear at its death. Data that arrives twice is recorded once.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache, partial
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from analysis.viewer.body import Float32s, place_rows
-from analysis.viewer.entities import PoseBatch, TimePoint, name_of, robot_path
-from analysis.viewer.gallery import BoxModels, Gallery
+from analysis.viewer.body import BoxModel, Float32s, box_model, place_rows
+from analysis.viewer.entities import TimePoint, name_of, robot_path
+from analysis.viewer.gallery import Gallery
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.recording import Recording
 from analysis.viewer.replay import rows_by_robot
@@ -80,7 +82,9 @@ class Show:
         self._recording = recording
         self._lineage = Lineage(recording)
         self._gallery = Gallery(recording)
-        self._models = BoxModels(space)
+        self._space = space
+        # Each model is made at the first call.
+        self._models: dict[BirthId, Callable[[], BoxModel]] = {}
         self._clocks: dict[int, _Clock] = {}
         self._shown: dict[tuple[int, BirthId], _ShownRobot] = {}
         self._gone: dict[tuple[int, BirthId], Death] = {}
@@ -127,12 +131,10 @@ class Show:
                 continue
             times = rows["sim_time_s"].to_numpy()
             path = self._settle(arena, birth, times)
-            centres, attitudes = place_rows(self._models[birth], rows)
+            centres, attitudes = place_rows(self._models[birth](), rows)
             births = self._clock(arena).births_at(times)
-            moves = PoseBatch(
-                times, births, _coarse(centres, _PER_M), _coarse(attitudes, _PER_TURN)
-            )
-            self._recording.log_poses(path, moves)
+            coarse = _coarse(centres, _PER_M), _coarse(attitudes, _PER_TURN)
+            self._recording.log_poses(path, times, births, *coarse)
         if has_all:
             self._remove_absent(arena, shown)
         return pa.concat_tables(unknown) if unknown else None
@@ -154,7 +156,7 @@ class Show:
         robot = self._shown.get(key)
         if robot is None or first_s - robot.drawn_s >= _REPEAT_S:
             when = self._at(arena, first_s)
-            self._recording.log_boxes(path, self._models[birth], when)
+            self._recording.log_boxes(path, self._models[birth](), when)
             was_gone = robot is not None and robot.is_gone
             self._shown[key] = _ShownRobot(path, first_s, last_s, was_gone)
         self._shown[key].seen_s = last_s
@@ -185,7 +187,9 @@ class Show:
 
     def _born(self, one: Birth) -> None:
         if one.body is not None:
-            self._models.add(one.birth, decode_body(one.body))
+            body = decode_body(one.body)
+            model = cache(partial(box_model, body, self._space, is_plain=True))
+            self._models.setdefault(one.birth, model)
         if not self._lineage.add(one):
             return
         clock = self._clock(one.birth.island)
