@@ -62,8 +62,7 @@ def over_runs(tables: Tables, *panels: Panel) -> p9.ggplot:
         raise NothingToDraw(f"no finished run has a value of {panels[0].measure}")
     experiments = in_order(runs["experiment"])
     figure = p9.ggplot(runs, p9.aes("experiment", "value"))
-    for layer in (*_violins(tables, panels, experiments), *_summaries(runs)):
-        figure += layer
+    figure += [*_violins(tables, panels, experiments), *_summaries(runs)]
     figure = figure + scales(experiments) + p9.expand_limits(y=0)
     # An invisible layer extends panels of zeros from 0 to 1.
     flat = runs[runs.groupby("panel", observed=True)["value"].transform("max") == 0]

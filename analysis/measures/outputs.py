@@ -7,15 +7,10 @@ experiment's run 0, with different seeds. Births are counted per island.
 import pyarrow as pa
 
 _KINDS = {
-    "folder": pa.string(),
-    "experiment": pa.string(),
     "run": pa.int32(),
     "seed": pa.uint64(),
-    "state": pa.string(),
     "island": pa.int32(),
-    "births": pa.int64(),
     "birth_island": pa.int32(),
-    "birth": pa.int64(),
     "is_last": pa.bool_(),
 }
 _RUN = {
@@ -213,9 +208,10 @@ OUTPUTS: dict[str, dict[str, str]] = {
 
 _INTEGERS = {"size", "judged", "ancestors", "planned", "islands", "robots", "samples",
              "pairs", "epoch", "to", "descendants", "living", "reached", "runs",
-             "runs_a", "runs_b", "finding"}  # fmt: skip
-_TEXTS = {"population", "by", "measure", "a", "b", "figure", "claim", "expected",
-          "verdict", "why", "what", "differs"}  # fmt: skip
+             "runs_a", "runs_b", "finding", "births", "birth"}  # fmt: skip
+_TEXTS = {"folder", "experiment", "state", "population", "by", "measure", "a", "b",
+          "figure", "claim", "expected", "verdict", "why", "what",
+          "differs"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 
@@ -241,7 +237,7 @@ def run_schema(table: str) -> pa.Schema:
 def _kind(table: str, name: str) -> pa.DataType:
     if name in _TEXTS:
         return pa.string()
-    if table == "outcomes" and name not in {"births", *_RUN}:
+    if table == "outcomes" and name != "births":
         return pa.float64()
     if name in _INTEGERS or name in _COUNTS.get(table, ()):
         return pa.int64()

@@ -5,8 +5,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from multiprocessing import get_context
 
-import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from analysis.measures.load import TABLE, LeftOut, Run, read_tables
 from analysis.measures.measures import measure
@@ -81,9 +81,7 @@ def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
     if any(island.is_online and not island.records_touches for island in run.islands):
         why = "contacts are not recorded (arena.record_touches is false)"
         left_out.append(LeftOut(folder, "interactions", why))
-    left_out += [
-        LeftOut(folder, f"measure {name}", problems[name]) for name in problems
-    ]
+    left_out += [LeftOut(folder, f"measure {one}", problems[one]) for one in problems]
     if not run.is_finished:
         born, planned = tables["births"].num_rows, planned_births(run)
         why = f"the run is not finished: {born} of {planned} births are recorded"
@@ -144,12 +142,6 @@ def concatenated(measured: Sequence[MeasuredRun]) -> dict[str, pa.Table]:
 
 def reach(measured: MeasuredRun) -> int:
     """Return the number of births that every island of a run reaches."""
-    table = measured.tables["populations"].filter(
-        measured.tables["populations"]["judged"].is_valid()
-    )
-    islands = np.asarray(table["island"], np.int64)
-    births = np.asarray(table["births"], np.int64)
-    return min(
-        (int(births[islands == island].max()) for island in np.unique(islands)),
-        default=0,
-    )
+    judged = measured.tables["populations"].filter(pc.field("judged").is_valid())
+    last = judged.group_by("island").aggregate([("births", "max")])
+    return min(last["births_max"].to_pylist(), default=0)

@@ -124,16 +124,13 @@ def _depth_and_size(
     above: Integers, is_core: npt.NDArray[np.bool_]
 ) -> tuple[Integers, Integers]:
     """Return each part's depth and the size of its subtree, itself included."""
-    depth = np.zeros(len(above), np.int64)
-    size = np.ones(len(above), np.int64)
-    walkers = np.flatnonzero(~is_core)
-    ancestors = above[walkers]
-    while len(walkers):
-        depth[walkers] += 1
-        size += np.bincount(ancestors, minlength=len(size))
-        is_below = ~is_core[ancestors]
-        walkers, ancestors = walkers[is_below], above[ancestors[is_below]]
-    return depth, size
+    parents, others = above.tolist(), np.flatnonzero(~is_core).tolist()
+    depth, size = [0] * len(parents), [1] * len(parents)
+    for part in others:  # parents come before their children
+        depth[part] = depth[parents[part]] + 1
+    for part in reversed(others):
+        size[parents[part]] += size[part]
+    return np.array(depth, np.int64), np.array(size, np.int64)
 
 
 def _check(body: Integers, is_wrong: npt.NDArray[np.bool_], rule: str) -> None:

@@ -207,13 +207,10 @@ def gait_strip(pictures: Sequence[Picture], *, columns: int = 5) -> Picture:
     height, width, _ = pictures[0].shape
     columns = min(columns, len(pictures))
     rows = -(-len(pictures) // columns)
-    strip = np.full((rows * height, columns * width, 3), 255, np.uint8)
-    for number, picture in enumerate(pictures):
-        top, left = divmod(number, columns)
-        strip[top * height : (top + 1) * height, left * width : (left + 1) * width] = (
-            picture
-        )
-    return strip
+    cells = np.full((rows * columns, height, width, 3), 255, np.uint8)
+    cells[: len(pictures)] = pictures
+    strip = cells.reshape(rows, columns, height, width, 3).swapaxes(1, 2)
+    return strip.reshape(rows * height, columns * width, 3)
 
 
 def save_picture(picture: Picture, path: Path) -> None:
