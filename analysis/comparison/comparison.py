@@ -7,7 +7,7 @@ their founders; treating them as independent, as is done here, is conservative.
 import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pyarrow as pa
@@ -31,6 +31,20 @@ NEGLIGIBLE, LARGE = 0.147, 0.474
 """Bounds of Cliff's delta. Source: Romano et al., 2006, after Cohen's d."""
 
 Row = dict[str, Any]
+
+
+class RunOutcomes(Protocol):
+    """Outcomes of the finished runs of experiments."""
+
+    @property
+    def experiments(self) -> list[str]:
+        """Experiments with finished runs, by name."""
+
+    def births(self, *experiments: str) -> int:
+        """Return the most births that all runs of some experiments reach."""
+
+    def values(self, experiment: str, measure: str, births: int) -> Numbers:
+        """Return the runs' values of a measure; runs without a value are skipped."""
 
 
 class Outcomes:
@@ -78,7 +92,7 @@ class Outcomes:
         return pa.Table.from_pylist(rows, schema("outcomes"))
 
 
-def comparison(outcomes: Outcomes) -> pa.Table:
+def comparison(outcomes: RunOutcomes) -> pa.Table:
     """Return the comparison of every pair of experiments by every measure.
 
     Args:
@@ -99,7 +113,7 @@ def comparison(outcomes: Outcomes) -> pa.Table:
     return pa.Table.from_pylist(_corrected(rows), schema("comparison"))
 
 
-def findings(outcomes: Outcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
+def findings(outcomes: RunOutcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
     """Return the test of each finding of the thesis.
 
     Args:
@@ -128,7 +142,7 @@ def findings(outcomes: Outcomes, claims: Sequence[Claim] = CLAIMS) -> pa.Table:
     return pa.Table.from_pylist(rows, schema("findings"))
 
 
-def _tested(outcomes: Outcomes, claim: Claim) -> Row:
+def _tested(outcomes: RunOutcomes, claim: Claim) -> Row:
     """Return the numbers of a claim, or the reason why it cannot be tested."""
     names = [name for name in (claim.a, claim.b) if name is not None]
     for name in names:

@@ -34,14 +34,8 @@ BODY = {
 
 PER_PART = {
     f"{name}_per_part": f"{name} divided by parts"
-    for name in (
-        "active_joints",
-        "passive_joints",
-        "joints",
-        "extremities",
-        "hidden",
-        "connections",
-    )
+    for name in BODY
+    if name not in {"parts", "touch_sensors"}
 }
 """Sizes of a robot divided by its number of parts."""
 
@@ -80,13 +74,6 @@ OUTCOME = {
 }
 """Outcome of a run: one number per measure, by which experiments are compared."""
 
-_SPREAD = {
-    "low": "lower end of the mean's 95 % interval (Student's t over runs)",
-    "high": "upper end of that interval",
-    "least": "minimum over runs",
-    "greatest": "maximum over runs",
-    "runs": "number of runs with a value at these births",
-}
 _TWO_SAMPLES = {
     "runs_a": "number of runs of a",
     "runs_b": "number of runs of b",
@@ -175,7 +162,11 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "measure": "column of populations",
         "births": "births on each island",
         "mean": "mean over runs",
-        **_SPREAD,
+        "low": "lower end of the mean's 95 % interval (Student's t over runs)",
+        "high": "upper end of that interval",
+        "least": "minimum over runs",
+        "greatest": "maximum over runs",
+        "runs": "number of runs with a value at these births",
     },
     "outcomes": {**_RUN, **OUTCOME},
     "comparison": {

@@ -1,8 +1,9 @@
 """Measures of many runs, computed in parallel processes."""
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import repeat
 from multiprocessing import get_context
 
 import pyarrow as pa
@@ -38,32 +39,20 @@ def measure_runs(
     *,
     slots: SlotRule = "parent",
     processes: int = 1,
-    on_measured: Callable[[], None] = lambda: None,
-) -> list[MeasuredRun]:
-    """Return the measures of runs, in their order.
+) -> Iterator[MeasuredRun]:
+    """Yield the measures of runs, in their order.
 
     Args:
         runs: the runs.
         slots: slot that labels a part in tree edit distance.
         processes: number of runs measured in parallel.
-        on_measured: called after each run.
     """
     if processes == 1 or len(runs) <= _FEW:
-        found = []
-        for run in runs:
-            found.append(measure_run(run, slots))
-            on_measured()
-        return found
+        yield from map(measure_run, runs, repeat(slots))
+        return
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
-        futures = [pool.submit(measure_run, run, slots) for run in runs]
-        try:
-            for future in as_completed(futures):
-                future.result()
-                on_measured()
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-        return [future.result() for future in futures]
+        # Cancels the other runs if one cannot be measured.
+        yield from pool.map(measure_run, runs, repeat(slots))
 
 
 def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
