@@ -100,7 +100,7 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
     left_out: list[LeftOut] = []
     for folder in sorted(folders):
         try:
-            runs.append(_read_run(folder))
+            runs.append(read_run(folder))
         except RunFolderError as error:
             left_out.append(LeftOut(str(folder), "run", str(error)))
     if not runs:
@@ -138,7 +138,12 @@ def _flaws(run: Run) -> tuple[int, bool, int]:
     return len(unread), not run.is_finished, -tables["births"].num_rows
 
 
-def _read_run(folder: Path) -> Run:
+def read_run(folder: Path) -> Run:
+    """Return the run in a folder.
+
+    Raises:
+        RunFolderError: the folder has no run, or not the tables of a finished one.
+    """
     details = _details(folder)
     try:
         document = json.loads(details["document"])

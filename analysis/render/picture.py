@@ -235,7 +235,7 @@ def save_animation(pictures: Sequence[Picture], path: Path, interval_s: float) -
     _save(first, path, save_all=True, append_images=others, duration=pause_ms, loop=0)
 
 
-def _save(image: Image.Image, path: Path, **options: object) -> None:
+def _save(image: Image.Image, path: Path, **options: Any) -> None:  # noqa: ANN401 - Pillow's
     try:
         image.save(path, **options)
     except OSError as error:

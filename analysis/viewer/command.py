@@ -4,6 +4,7 @@ import argparse
 import re
 from pathlib import Path
 
+from analysis.measures.load import Run
 from analysis.progress import bars
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
@@ -20,9 +21,9 @@ from analysis.viewer.recording import Recording, ViewerError
 from analysis.viewer.replay import (
     CHUNK_S,
     last_time,
-    read_experiment,
     read_news,
     read_poses,
+    shown_run,
 )
 from analysis.viewer.resimulate import Simulators, resimulate
 from analysis.viewer.scene import scene_of
@@ -31,6 +32,7 @@ from analysis.viewer.watch import watch
 from schema.agent.command import add_network_flags, tls_of
 from schema.agent.service import tell_user
 from schema.agent.supervisor import stop_on_signals
+from schema.experiment.file import experiment_from_text
 from schema.flags import Flags, number
 from schema.robot.ids import BirthId
 from schema.wire.codec import decode_body
@@ -76,11 +78,12 @@ def _replay(
 ) -> None:
     """Record a run from its tables, and keep serving the recording."""
     folder: Path = options.run
-    scene = scene_of(read_experiment(folder))
-    news = read_news(folder)
+    run = shown_run(folder)
+    scene = scene_of(experiment_from_text(run.document))
+    news = read_news(run)
     born = {one.birth for one in news.births}
     _check(options, born, is_online=bool(scene.arenas))
-    motions = _motions(options, simulators)
+    motions = _motions(options, run, simulators)
     moving = [each.birth for each in motions]
     blueprint = layout(scene, follow=options.follow, motions=moving)
     name = f"{news.experiment}-{folder.name}"
@@ -120,20 +123,18 @@ def _check(options: argparse.Namespace, born: set[BirthId], *, is_online: bool) 
         raise ViewerError(f"--follow {name}: no robot of that name was born")
 
 
-def _motions(options: argparse.Namespace, simulators: Simulators) -> list[Motion]:
+def _motions(
+    options: argparse.Namespace, run: Run, simulators: Simulators
+) -> list[Motion]:
     """Return the motion of the robots of ``--robot``; print if it is as recorded."""
-    folder: Path = options.run
-    births = selected_robots(folder, _wanted(options), has_ancestry=options.ancestry)
+    wanted = _wanted(options)
+    births = selected_robots(run.folder, wanted, has_ancestry=options.ancestry)
     if not births:
         return []
     with bars(f"re-simulating robots: {len(births)}") as bar:
         task = bar.add_task("re-simulating", total=1.0)
         motions = resimulate(
-            folder,
-            read_experiment(folder),
-            births,
-            simulators,
-            lambda share: bar.update(task, completed=share),
+            run, births, simulators, lambda share: bar.update(task, completed=share)
         )
     for motion in motions:
         tell_user(motion.verdict)

@@ -1,18 +1,14 @@
 """Reads the tables of a run, in the form of the messages of a live run."""
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from analysis.measures.load import Run, read_run
 from schema.errors import RunFolderError
-from schema.experiment.document import Experiment
-from schema.experiment.file import experiment_from_text
-from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
 from schema.tables.files import FINISHED, campaign, read_table
 from schema.wire.updates import (
@@ -26,17 +22,28 @@ from schema.wire.updates import (
 CHUNK_S = 20.0
 """Simulated time of the poses that are read and shown at once [s]."""
 
-_DETAILS = "run.json"
 _BORN = ("island", "birth", "parents", "rank", "body", "sim_time_s")
 
 
-def read_news(folder: Path) -> Update:
+def shown_run(folder: Path) -> Run:
+    """Return the run in a folder.
+
+    Raises:
+        RunFolderError: the folder has no run.
+    """
+    try:
+        return read_run(folder)
+    except RunFolderError as error:
+        raise RunFolderError(f"{folder}: no run found: {error}") from None
+
+
+def read_news(run: Run) -> Update:
     """Return the contents of a run's tables, except poses.
 
     Raises:
-        RunFolderError: the folder has no run, or a table cannot be read.
+        RunFolderError: a table cannot be read, or no robot has been born.
     """
-    details = _details(folder)
+    folder = run.folder
     counts: dict[int, int] = {}
     births = []
     for row in read_table(folder, "births").select(_BORN).to_pylist():
@@ -50,33 +57,13 @@ def read_news(folder: Path) -> Update:
         epoch=0,
         sequence=0,
         is_whole=True,
-        experiment=details["name"],
+        experiment=run.experiment,
         births=tuple(births),
         deaths=tuple(map(read_death, read_table(folder, "deaths").to_pylist())),
         levels=tuple(read_levels(population)),
         migrants=tuple(map(read_migrant, read_table(folder, "migrations").to_pylist())),
-        document=details["document"],
+        document=run.document,
     )
-
-
-def read_experiment(folder: Path) -> Experiment:
-    """Return the experiment of a run.
-
-    Raises:
-        RunFolderError: the folder has no run.
-        ExperimentError: its document has another version.
-    """
-    return experiment_from_text(_details(folder)["document"])
-
-
-def read_origin(folder: Path) -> Origin:
-    """Return seed and number of a run, which determine its noise, for island 0.
-
-    Raises:
-        RunFolderError: the folder has no run.
-    """
-    details = _details(folder)
-    return Origin(seed=details["seed"], run=details["run"])
 
 
 def last_time(folder: Path) -> float:
@@ -126,23 +113,6 @@ def rows_by_robot(poses: pa.Table) -> Iterator[tuple[BirthId, pa.Table]]:
     ends = np.cumsum(counts)
     for robot, start, count in zip(robots.tolist(), ends - counts, counts, strict=True):
         yield BirthId(*robot), poses.take(order[start : start + count])
-
-
-def _details(folder: Path) -> dict[str, Any]:
-    """Return the description of a run.
-
-    Raises:
-        RunFolderError: the folder has no run.
-    """
-    try:
-        details: dict[str, Any] = json.loads((folder / _DETAILS).read_text("utf-8"))
-        texts = {key: str(details[key]) for key in ("name", "document")}
-        return {**texts, **{key: int(details[key]) for key in ("seed", "run")}}
-    except OSError as error:
-        why = f"{_DETAILS}: {error.strerror}"
-    except (ValueError, KeyError, TypeError) as error:
-        why = f"{_DETAILS}: {error}"
-    raise RunFolderError(f"{folder}: no run found: {why}")
 
 
 def _within(folder: Path, start_s: float, end_s: float) -> pa.Table:

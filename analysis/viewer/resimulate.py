@@ -10,15 +10,15 @@ from typing import Protocol
 
 import pyarrow as pa
 import pyarrow.compute as pc
-from msgspec.structs import replace
 
+from analysis.measures.load import Run
 from analysis.viewer.entities import name_of
 from analysis.viewer.motion import Motion
 from analysis.viewer.recording import ViewerError
-from analysis.viewer.replay import read_origin
 from schema.agent.platform_tag import platform_tag
 from schema.experiment.document import Experiment, body_space, island_experiment
-from schema.experiment.identity import Identity
+from schema.experiment.file import experiment_from_text
+from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import (
     EvaluationSettings,
     evaluation_settings,
@@ -69,8 +69,7 @@ class Simulators:
 
 
 def resimulate(
-    folder: Path,
-    experiment: Experiment,
+    run: Run,
     births: list[BirthId],
     simulators: Simulators,
     report: Callable[[float], None],
@@ -78,8 +77,7 @@ def resimulate(
     """Return the motions of robots, in their order.
 
     Args:
-        folder: the run folder.
-        experiment: experiment of the run.
+        run: the run.
         births: the robots.
         simulators: functions that simulate.
         report: called with the progress, 0 to 1.
@@ -88,33 +86,32 @@ def resimulate(
         ViewerError: no evaluation or pose of a robot is recorded.
         RevolveError: the journal cannot be read, or a robot cannot be simulated.
     """
+    experiment = experiment_from_text(run.document)
     moved: dict[BirthId, Motion] = {}
     for island in sorted({birth.island for birth in births}):
         if island_experiment(experiment, island).arena is not None:
-            moved |= _in_arena(folder, island, births, simulators, report)
+            moved |= _in_arena(run.folder, island, births, simulators, report)
     for number, birth in enumerate(births, start=1):
         if birth not in moved:
-            moved[birth] = _alone(folder, experiment, birth, simulators)
+            own = island_experiment(experiment, birth.island)
+            moved[birth] = _alone(run, own, birth, simulators)
             report(number / len(births))
     return [moved[birth] for birth in births]
 
 
-def _alone(
-    folder: Path, experiment: Experiment, birth: BirthId, simulators: Simulators
-) -> Motion:
-    """Return the motion of a robot that was evaluated alone."""
-    own = island_experiment(experiment, birth.island)
+def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) -> Motion:
+    """Return the motion of a robot that was evaluated alone on its island."""
     settings = read_evaluation_settings(evaluation_settings(own))
-    rows = _rows_of(folder, "evaluations", birth).to_pylist()
+    rows = _rows_of(run.folder, "evaluations", birth).to_pylist()
     if not rows:
         raise ViewerError(f"robot {name_of(birth)}: no evaluation is recorded")
     recorded = rows[0]
     if recorded["simulated_s"] is not None:
         steps = round(recorded["simulated_s"] / settings.simulation.timestep_s)
         settings = lasting(settings, steps)
-    genome = _rows_of(folder, "births", birth)["genome"][0].as_py()
+    genome = _rows_of(run.folder, "births", birth)["genome"][0].as_py()
     robot = develop(decode_genome(genome), body_space(own.space))
-    origin = replace(read_origin(folder), island=birth.island)
+    origin = Origin(seed=run.seed, run=run.number, island=birth.island)
     identity = Identity(origin, birth, recorded["trial"])
     evaluation, poses = simulators.alone(robot, settings, identity)
     differing = [
