@@ -66,14 +66,14 @@ def best_robots(robots: pa.Table) -> list[Best]:
         robots: with the columns of ``outputs``; the first of equally fit robots is
             the best.
     """
-    found: dict[str, Best] = {}
     columns = ["experiment", "folder", "birth_island", "birth", "fitness"]
     last = robots.filter(pc.field("is_last")).select(columns)
-    for row in last.to_pylist():
-        known = found.get(row["experiment"])
-        if known is None or row["fitness"] > known.fitness:
-            found[row["experiment"]] = Best(**{**row, "folder": Path(row["folder"])})
-    return [found[name] for name in sorted(found)]
+    fittest = last.sort_by([("experiment", "ascending"), ("fitness", "descending")])
+    found: dict[str, Best] = {}
+    for row in fittest.to_pylist():
+        row["folder"] = Path(row["folder"])
+        found.setdefault(row["experiment"], Best(**row))
+    return list(found.values())
 
 
 def row_of(best: Best, births: pa.Table) -> int:

@@ -84,10 +84,11 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
         raise NothingToDraw("no robot was evaluated")
     keys = ["experiment", "population", "bin"]
     totals = [("fitness", "mean"), ("fitness", "stddev"), ("fitness", "count")]
-    shown = rows.group_by(keys).aggregate(totals).to_pandas()
-    runs, mean = shown["fitness_count"], shown["fitness_mean"]
-    half = half_interval(shown["fitness_stddev"].to_numpy(), runs.to_numpy())
-    half[runs < BAND_RUNS] = np.nan
+    made = rows.group_by(keys).aggregate(totals)
+    shown = made.rename_columns([*keys, "fitness", "sd", "runs"]).to_pandas()
+    mean = shown["fitness"]
+    half = half_interval(shown["sd"].to_numpy(), shown["runs"].to_numpy())
+    half[shown["runs"] < BAND_RUNS] = np.nan
     shown["low"], shown["high"] = (mean - half).clip(lower=0.0), mean + half
     width, start, axis = _BINS[by]
     experiments = shown["experiment"]
@@ -98,7 +99,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     panels = shown["population"].astype("category").cat.set_categories([*_POPULATIONS])
     shown["panel"] = panels.cat.rename_categories(_POPULATIONS)
     return (
-        p9.ggplot(shown, p9.aes("at", "fitness_mean"))
+        p9.ggplot(shown, p9.aes("at", "fitness"))
         + p9.geom_linerange(
             p9.aes(ymin="low", ymax="high", colour="experiment"),
             na_rm=True,

@@ -1,7 +1,5 @@
 """Diversity: mean distance of the bodies of a population."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pyarrow as pa
 
@@ -30,18 +28,7 @@ def diversity(table: PopulationTable, trees: Trees) -> Numbers:
 
     Source: Hupkes 2016, section 6.2.1 and figure 6.5.
     """
-    found = np.full(len(table), np.nan)
-    for groups, first, second in _pairs(table, trees):
-        distances = distances_of(trees, first.ravel(), second.ravel())
-        found[groups] = distances.reshape(first.shape).mean(axis=1)
-    return found
-
-
-def _pairs(
-    table: PopulationTable, trees: Trees
-) -> Iterator[tuple[Integers, Integers, Integers]]:
-    """Yield populations of one size, and the trees of all their pairs, (g, pairs)."""
-    sizes = table.sizes
+    found, sizes = np.full(len(table), np.nan), table.sizes
     for size in np.unique(sizes[sizes > 1]).tolist():
         first, second = np.triu_indices(size, 1)
         step = max(1, _BLOCK // len(first))
@@ -50,7 +37,10 @@ def _pairs(
             groups = every[begin : begin + step]
             rows = table.starts[groups][:, None] + np.arange(size)
             living = trees.tree_of[table.members[rows]]
-            yield groups, living[:, first], living[:, second]
+            pairs = living[:, first].ravel(), living[:, second].ravel()
+            distances = distances_of(trees, *pairs).reshape(len(groups), -1)
+            found[groups] = distances.mean(axis=1)
+    return found
 
 
 def distances_of(trees: Trees, first: Integers, second: Integers) -> Integers:

@@ -70,10 +70,11 @@ def variability(fitness: pa.Table) -> pa.Table:
 
 def _moments(times: Numbers, values: Numbers) -> tuple[Numbers, Numbers, Numbers]:
     """Return the sample times, and the least and greatest fitness at each of them."""
-    clock, where = np.unique(times, return_inverse=True)
-    least, greatest = np.full(len(clock), np.inf), np.full(len(clock), -np.inf)
-    np.minimum.at(least, where, values)
-    np.maximum.at(greatest, where, values)
+    order = np.argsort(times)
+    clock, starts = np.unique(times[order], return_index=True)
+    least, greatest = (
+        extreme.reduceat(values[order], starts) for extreme in (np.minimum, np.maximum)
+    )
     return clock, least, greatest
 
 

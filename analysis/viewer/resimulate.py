@@ -135,10 +135,8 @@ def _in_arena(
     for birth, rows in recorded.items():
         if not rows.num_rows:
             raise ViewerError(f"robot {name_of(birth)}: no pose is recorded")
-    spans = [pc.min_max(rows["sim_time_s"]).as_py() for rows in recorded.values()]
-    start_s = min(span["min"] for span in spans)
-    end_s = max(span["max"] for span in spans)
-    settings, past = simulators.history(folder, island, start_s)
+    span = pc.min_max(pa.concat_tables(recorded.values())["sim_time_s"]).as_py()
+    settings, past = simulators.history(folder, island, span["min"])
     samples, motion = [], []
     is_equal = True
     steps = simulators.together(settings, past, frozenset(recorded))
@@ -148,7 +146,7 @@ def _in_arena(
         samples.append(step.samples)
         motion.append(step.motion)
         times = step.samples["sim_time_s"]
-        if len(times) and pc.max(times).as_py() >= end_s:
+        if len(times) and pc.max(times).as_py() >= span["max"]:
             break
     replayed, frames = pa.concat_tables(samples), pa.concat_tables(motion)
     platform = next(iter(read_table(folder, "runs")["platform"].to_pylist()), "")
