@@ -134,13 +134,11 @@ def lineage(births: pa.Table, experiment: str, row: int) -> pa.Table:
     parents = parents_of(births)
     line = ancestors(parents)[row] | 1 << row
     rows = [order for order in parents_first(parents) if line >> order & 1]
-    known = births.select(["birth", "rank"]).take(pa.array(rows)).to_pylist()
-    members = [
-        {"experiment": experiment, "order": order, "number": one["birth"],
-         "rank": one["rank"], "parents": parents[order]}
-        for order, one in zip(rows, known, strict=True)
-    ]  # fmt: skip
-    return pa.Table.from_pylist(members, LINEAGE)
+    known = births.take(pa.array(rows))
+    names = [experiment] * len(rows)
+    above = [parents[order] for order in rows]
+    columns = [names, rows, known["birth"], known["rank"], above]
+    return pa.table(dict(zip(LINEAGE.names, columns, strict=True)), LINEAGE)
 
 
 def ordered(

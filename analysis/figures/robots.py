@@ -131,13 +131,12 @@ def lineages(tables: Tables) -> p9.ggplot:
     rows = tables.get("lineage")
     if not rows or not any(rows["parents"].to_pylist()):
         raise NothingToDraw("no best robot has parents")
-    lines: list[dict[str, object]] = []
     known = {(row["experiment"], row["order"]): row for row in rows.to_pylist()}
-    for row in known.values():
-        for parent in row["parents"]:
-            above = known[row["experiment"], parent]
-            ends = {"to": above["number"], "to_rank": above["rank"]}
-            lines.append({**row, **ends})
+    lines = [
+        {**row, "to": above["number"], "to_rank": above["rank"]}
+        for row in known.values()
+        for above in (known[row["experiment"], parent] for parent in row["parents"])
+    ]
     names = [label(name) for name in in_order(rows["experiment"].to_pylist())]
     return (
         p9.ggplot(rows.select(["experiment", "number", "rank"]).to_pandas())

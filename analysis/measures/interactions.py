@@ -37,25 +37,24 @@ def interactions(
     pairs = np.unique(np.stack([first, second], axis=1), axis=0)
     both = np.concatenate([first, second])
     time = np.tile(np.asarray(touches["duration_s"], np.float64), 2)
+    ids = (robots, both, pairs[:, 0])
+    homes, at, by = (np.asarray(residence_columns(each)["island"]) for each in ids)
     rows = []
-    homes, at, by = (
-        np.asarray(residence_columns(each)["island"])
-        for each in (robots, both, pairs[:, 0])
-    )
     for island in np.unique(homes).tolist():
         here = homes == island
         count, seconds = int(here.sum()), float(lived[here].sum())
         touched = int(np.isin(robots[here], both).sum())
         contact_s = float(time[at == island].sum())
-        row = {
-            "island": island,
-            "robots": count,
-            "lived_s": seconds,
-            "pairs": int((by == island).sum()),
-            "touched": touched / count,
-            "touching": contact_s / seconds if seconds else None,
-        }
-        rows.append(row)
+        rows.append(
+            {
+                "island": island,
+                "robots": count,
+                "lived_s": seconds,
+                "pairs": int((by == island).sum()),
+                "touched": touched / count,
+                "touching": contact_s / seconds if seconds else None,
+            }
+        )
     return pa.Table.from_pylist(rows, run_schema("interactions"))
 
 

@@ -111,10 +111,8 @@ def _summary(run: Run, births: pa.Table) -> pa.Table:
 
 def _named(table: pa.Table, name: str, run: Run) -> pa.Table:
     """Return a table with the columns that name the run, in the types of the output."""
-    columns = {"experiment": run.experiment, "folder": str(run.folder)}
-    for column, value in columns.items():
-        repeated = pa.repeat(pa.scalar(value), table.num_rows)
-        table = table.append_column(column, repeated)
+    for column, value in (("experiment", run.experiment), ("folder", str(run.folder))):
+        table = table.append_column(column, pa.repeat(value, table.num_rows))
     return table.select(schema(name).names).cast(schema(name))
 
 

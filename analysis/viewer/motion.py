@@ -45,10 +45,8 @@ def selected_robots(
         ViewerError: no robot of that name was born.
     """
     births = read_table(folder, "births").select(["island", "birth", "parents"])
-    parents = {
-        BirthId(row["island"], row["birth"]): row["parents"]
-        for row in births.to_pylist()
-    }
+    rows = (row.values() for row in births.to_pylist())
+    parents = {BirthId(island, birth): couple for island, birth, couple in rows}
     found: dict[BirthId, None] = {}
     for birth in wanted:
         if birth not in parents:
