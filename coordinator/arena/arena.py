@@ -26,9 +26,8 @@ from coordinator.islands.events import (
     MigrationEvent,
     Record,
     Started,
+    Verdict,
     Vet,
-    Vetted,
-    VettingFailed,
 )
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import birth_record, population_records
@@ -117,20 +116,18 @@ class Arena:
         if isinstance(event, Started) == self._has_started:
             why = "it has started before" if self._has_started else "it has not started"
             raise self._unexpected(event, why)
-        match event:
-            case Started():
-                self._has_started = True
-                return [*self._vetting_queue.begin_founders()]
-            case Vetted() | VettingFailed():
-                return self._vetted(event)
-            case Advanced():
-                return self._advanced(event) if self._is_awaited(event) else []
-            case Commanded():
-                return self._commanded(event)
-            case _:
-                return self._migrated(event)
+        if isinstance(event, Started):
+            self._has_started = True
+            return [*self._vetting_queue.begin_founders()]
+        if isinstance(event, Verdict):
+            return self._vetted(event)
+        if isinstance(event, Advanced):
+            return self._advanced(event) if self._is_awaited(event) else []
+        if isinstance(event, Commanded):
+            return self._commanded(event)
+        return self._migrated(event)
 
-    def _vetted(self, event: Vetted | VettingFailed) -> list[ArenaCommand]:
+    def _vetted(self, event: Verdict) -> list[ArenaCommand]:
         was_busy = self._vetting_queue.is_busy
         vets = self._vetting_queue.take(event)
         if not was_busy or self._vetting_queue.is_busy:

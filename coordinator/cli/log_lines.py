@@ -12,10 +12,12 @@ from coordinator.islands.events import (
     Insert,
     JournalledEvent,
     Order,
+    Outcome,
     Pause,
     Remove,
     ReplaceBrain,
     Resume,
+    Verdict,
     Vetted,
     VettingFailed,
 )

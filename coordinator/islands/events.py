@@ -5,7 +5,7 @@ Events are past participles, commands imperatives; all are immutable.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from coordinator.evolution.selection import Individual
 from schema.robot.brain import Brain
@@ -31,6 +31,16 @@ class Vetted:
     attempt: int
     report: Report
 
+    @property
+    def is_viable(self) -> bool:
+        """The body can be built and simulated."""
+        return self.report.is_viable
+
+    @property
+    def reason(self) -> str:
+        """Reason why it cannot; empty if viable."""
+        return self.report.reason
+
 
 @dataclass(frozen=True, slots=True)
 class VettingFailed:
@@ -39,6 +49,11 @@ class VettingFailed:
     birth: BirthId
     attempt: int
     reason: str
+    is_viable: ClassVar[bool] = False
+
+
+Verdict = Vetted | VettingFailed
+"""Answers to a request to vet a candidate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +73,7 @@ class Evaluated:
     provenance: Provenance
     trial: int = 0
     requester: int | None = None
+    reason: ClassVar[str] = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +92,11 @@ class EvaluationFailed:
     provenance: Provenance
     trial: int = 0
     requester: int | None = None
+    evaluation: ClassVar[None] = None
+
+
+Outcome = Evaluated | EvaluationFailed
+"""Answers to a request to evaluate a robot: either a reason or an evaluation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,21 +216,17 @@ MigrationEvent = Immigrated | NeighbourClosed
 class Audited:
     """The same evaluation was done twice, by two workers if there are two."""
 
-    first: Evaluated | EvaluationFailed
-    second: Evaluated | EvaluationFailed
+    first: Outcome
+    second: Outcome
 
     @property
     def agrees(self) -> bool:
         """Both outcomes are equal to the last bit."""
-        match self.first, self.second:
-            case Evaluated(evaluation=one), Evaluated(evaluation=other):
-                return one == other
-            case EvaluationFailed(reason=one), EvaluationFailed(reason=other):
-                return one == other
-        return False
+        one, other = self.first, self.second
+        return (one.evaluation, one.reason) == (other.evaluation, other.reason)
 
 
-Answered = Vetted | VettingFailed | Evaluated | EvaluationFailed
+Answered = Verdict | Outcome
 """Events that answer a request of an off-line island."""
 
 ExternalEvent = Answered | Advanced | Commanded
@@ -220,7 +237,7 @@ JournalledEvent = ExternalEvent | Audited
 
 IslandEvent = Started | Answered | MigrationEvent
 
-ArenaEvent = Started | Vetted | VettingFailed | Advanced | Commanded | MigrationEvent
+ArenaEvent = Started | Verdict | Advanced | Commanded | MigrationEvent
 
 # --- Commands ------------------------------------------------------
 
@@ -326,6 +343,6 @@ IslandCommand = Vet | Evaluate | Record | Emigrate | Finish
 ArenaCommand = Vet | AdvanceShard | Record | Append | Emigrate | Finish
 
 
-def fitness_of(outcome: Evaluated | EvaluationFailed) -> float | None:
+def fitness_of(outcome: Outcome) -> float | None:
     """Return the fitness of an outcome; None if the evaluation failed."""
-    return outcome.evaluation.fitness if isinstance(outcome, Evaluated) else None
+    return outcome.evaluation and outcome.evaluation.fitness

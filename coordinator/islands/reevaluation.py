@@ -14,9 +14,8 @@ from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import (
     Evaluate,
-    Evaluated,
-    EvaluationFailed,
     IslandCommand,
+    Outcome,
     Record,
     fitness_of,
 )
@@ -25,8 +24,6 @@ from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, Simulation, body_space, steps_of
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
-
-Outcome = Evaluated | EvaluationFailed
 
 
 def with_durations(
