@@ -39,6 +39,8 @@ class Arena:
     """One world and its living robots.
 
     Attributes:
+        experiment: its settings.
+        clock: its intervals.
         births: number of births, founders included.
         step: physics step of the last decision.
         is_finished: all births of the experiment are done, or ``is_extinct``.
@@ -65,9 +67,9 @@ class Arena:
         self.births = 0
         self.step = 0
         self.is_finished = self.is_extinct = False
-        self._experiment = experiment
+        self.experiment = experiment
         self._rules = rules
-        self._clock = ArenaClock(rules, experiment.simulation)
+        self.clock = ArenaClock(rules, experiment.simulation)
         self._space = body_space(experiment.space)
         self._parents_needed = experiment.selection.parents_needed
         self._number = number
@@ -159,7 +161,7 @@ class Arena:
     def _advanced(self, event: Advanced) -> list[ArenaCommand]:
         """Record the result of an advance, and decide."""
         advance = event.advance
-        over_s = self._clock.seconds(advance.step - self.step)
+        over_s = self.clock.seconds(advance.step - self.step)
         self._awaited = None
         self._advances += 1
         self.step = advance.step
@@ -168,7 +170,7 @@ class Arena:
             commands.append(Append("poses", event.pose_rows, advance.poses))
         commands += touch_records(advance.touches, self._moment, over_s)
         for casualty in advance.casualties:
-            died_s = self._clock.seconds(casualty.step)
+            died_s = self.clock.seconds(casualty.step)
             moment = self._moment._replace(sim_time_s=died_s)
             commands.append(death_record(casualty, "diverged", moment))
         self._living.update(advance)
@@ -179,9 +181,9 @@ class Arena:
         if self._founders:
             return [*self._insert(self._founders.pop()), *self._conclude()]
         commands: list[ArenaCommand] = []
-        if self.step % self._clock.sample == 0:
+        if self.step % self.clock.sample == 0:
             commands += sample_records(self._living, self._moment)
-        if self.step % self._clock.birth == 0:
+        if self.step % self.clock.birth == 0:
             self.is_extinct = not self._orders.insertions and (
                 len(self._living) < self._parents_needed
             )
@@ -189,10 +191,10 @@ class Arena:
             if migration is not None:
                 migration.is_starving = self.is_extinct and migration.may_bring_robots
                 self.is_extinct = self.is_extinct and not migration.is_starving
-            if self.is_extinct or self.births >= self._experiment.births:
+            if self.is_extinct or self.births >= self.experiment.births:
                 return [*commands, self._finish()]
             commands += self._mate()
-        if self.step % self._clock.cull == 0:
+        if self.step % self.clock.cull == 0:
             reason, culled = select_culled(self._living.mature(), self._rules)
             commands += [
                 death_record(self._living.remove(one.birth), reason, self._moment)
@@ -256,7 +258,7 @@ class Arena:
         return self._conclude() if self._is_held else []
 
     def _advance(self) -> AdvanceShard:
-        clock, step = self._clock, self.step
+        clock, step = self.clock, self.step
         until = clock.next_decision(step, is_founding=bool(self._founders))
         self._awaited = AdvanceShard(
             self._number,
@@ -287,11 +289,11 @@ class Arena:
 
     @property
     def _moment(self) -> Moment:
-        return Moment(self._number, self.births, self._clock.seconds(self.step))
+        return Moment(self._number, self.births, self.clock.seconds(self.step))
 
     def _unexpected(self, event: ArenaEvent, why: str) -> UnexpectedEvent:
         return UnexpectedEvent(
             f"arena {self._number} at step {self.step}, {self.births} of "
-            f"{self._experiment.births} born, {len(self._living)} alive, "
+            f"{self.experiment.births} born, {len(self._living)} alive, "
             f"{self._advances} advances done: {why}, got {event}"
         )

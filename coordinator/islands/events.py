@@ -345,4 +345,4 @@ ArenaCommand = Vet | AdvanceShard | Record | Append | Emigrate | Finish
 
 def fitness_of(outcome: Outcome) -> float | None:
     """Return the fitness of an outcome; None if the evaluation failed."""
-    return outcome.evaluation and outcome.evaluation.fitness
+    return outcome.evaluation.fitness if outcome.evaluation else None

@@ -58,6 +58,7 @@ class Island:
     """One population and its births.
 
     Attributes:
+        experiment: its settings.
         births: number of recorded births.
         population: living individuals, in birth order.
     """
@@ -83,7 +84,7 @@ class Island:
         selection = experiment.selection
         self.births = 0
         self.population: tuple[Individual, ...] = ()
-        self._experiment = experiment
+        self.experiment = experiment
         self._seed, self._run, self._number = seed, run, number
         self._space = body_space(experiment.space)
         self._breeder = Breeder(experiment, seed, run)
@@ -108,7 +109,7 @@ class Island:
     @property
     def is_finished(self) -> bool:
         """All births of the experiment are recorded, and no re-evaluation is open."""
-        return self.births == self._experiment.births and not (
+        return self.births == self.experiment.births and not (
             self._reevaluations and self._reevaluations.is_open
         )
 
@@ -140,7 +141,7 @@ class Island:
             commands = self._proceed()
         else:
             commands = self._answered(event)
-        simulation = self._experiment.simulation
+        simulation = self.experiment.simulation
         if simulation.evaluation_s is None:
             return commands
         return with_durations(commands, simulation, self._seed, self._run)
@@ -184,7 +185,7 @@ class Island:
 
     def _unexpected(self, event: IslandEvent, why: str) -> UnexpectedEvent:
         return UnexpectedEvent(
-            f"island {self._number}, {self.births} of {self._experiment.births} born, "
+            f"island {self._number}, {self.births} of {self.experiment.births} born, "
             f"{self._begun} begun, brood {self._generation} ends at "
             f"{self._brood_end}: {why}, got {event}"
         )
@@ -277,7 +278,7 @@ class Island:
             migration = self._migration
             neighbours = migration.epochs.links.neighbours if migration else ()
             return [*commands, Finish(self._number, neighbours)]
-        selection = self._experiment.selection
+        selection = self.experiment.selection
         children = selection.children
         if selection.culling is not None:
             # A brood keeps within the population limit, but has at least one child.
@@ -285,5 +286,5 @@ class Island:
             children = min(children, max(1, room))
         self._generation += 1
         self._window = self._brood_window
-        self._brood_end = min(self.births + children, self._experiment.births)
+        self._brood_end = min(self.births + children, self.experiment.births)
         return commands

@@ -19,8 +19,7 @@ from coordinator.run.loop import Loop
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from schema.errors import MalformedMessage, RevolveError
-from schema.experiment.document import Experiment, body_space, island_experiment
-from schema.robot.ids import BirthId
+from schema.experiment.document import Experiment, body_space
 from schema.robot.inverse_development import genome_of
 from schema.robot.robot import check_robot
 from schema.wire.codec import decode_robot
@@ -61,28 +60,22 @@ class RunOperator:
         Raises:
             RunFolderError: the disk is full or failed.
         """
-        event = None
-        assert not isinstance(request.action, GetStatus)  # OperatorServer replies
+        island, action = request.island, request.action
+        assert not isinstance(action, GetStatus)  # OperatorServer replies
         try:
-            arena = self._arena(request.island)
-            match request.action:
-                case ListRobots():
-                    text = self._list(arena, request.island)
-                case SaveSnapshot():
-                    self._loop.shard_requests.request_snapshot(request.island)
-                    text = "the state is saved at the end of the next advance"
-                case action:
-                    order = self._order(action, arena)
-                    event = Commanded(
-                        request.island, request.request_id, arena.next_step, order
-                    )
-                    step_s = self._own(request.island).simulation.timestep_s
-                    text = f"takes effect at {event.step * step_s:g} s"
+            arena = self._arena(island)
+            if isinstance(action, ListRobots):
+                return OperatorReply(_list(arena))
+            if isinstance(action, SaveSnapshot):
+                self._loop.shard_requests.request_snapshot(island)
+                return OperatorReply(
+                    "the state is saved at the end of the next advance"
+                )
+            step, order = arena.next_step, self._order(action, arena)
         except RevolveError as error:
             return OperatorReply(str(error), is_refused=True)
-        if event is not None:
-            self._loop.order(event)
-        return OperatorReply(text)
+        self._loop.order(Commanded(island, request.request_id, step, order))
+        return OperatorReply(f"takes effect at {arena.clock.seconds(step):g} s")
 
     def _arena(self, number: int) -> Arena:
         arena = self._loop.islands.get(number)
@@ -103,47 +96,40 @@ class RunOperator:
             Refused: no living robot has the given birth number.
             InvalidRobot: a robot that breaks the rules of the experiment.
         """
-        order: Order
         match action:
             case PauseArena():
-                order = Pause()
+                return Pause()
             case ResumeArena():
-                order = Resume()
+                return Resume()
             case InsertRobot():
                 robot = decode_robot(action.robot)
                 check_robot(robot, body_space(self._experiment.space))
-                order = Insert(genome_of(robot), action.place)
-            case RemoveRobot():
-                _check_lives(action.birth, arena)
-                order = Remove(action.birth)
-            case SetBrain():
-                _check_lives(action.birth, arena)
-                order = ReplaceBrain(action.birth, decode_robot(action.robot).brain)
-        check_order(order, self._experiment)
-        return order
-
-    def _own(self, island: int) -> Experiment:
-        return island_experiment(self._experiment, island)
-
-    def _list(self, arena: Arena, island: int) -> str:
-        """Return a line about the arena and one about each living robot."""
-        state = "paused" if arena.is_paused else "running"
-        own = self._own(island)
-        now_s, births = arena.step * own.simulation.timestep_s, own.births
-        about = f"{arena.births} of {births} born, {len(arena.population)} alive"
-        lines = [f"{state} at {now_s:g} s, {about}", "birth  rank  fitness"]
-        lines += [
-            f"{one.birth.number:5}  {one.rank:4}  {one.fitness:7.4f}"
-            for one in arena.population
-        ]
-        return "\n".join(lines)
+                insert = Insert(genome_of(robot), action.place)
+                check_order(insert, self._experiment)
+                return insert
+        living = [one.birth for one in arena.population]
+        if action.birth not in living:
+            alive = ", ".join(str(each.number) for each in living) or "none"
+            number = action.birth.number
+            raise Refused(f"birth {number}: is not alive; alive are {alive}")
+        if isinstance(action, RemoveRobot):
+            return Remove(action.birth)
+        return ReplaceBrain(action.birth, decode_robot(action.robot).brain)
 
 
-def _check_lives(birth: BirthId, arena: Arena) -> None:
-    living = [one.birth for one in arena.population]
-    if birth not in living:
-        numbers = ", ".join(str(each.number) for each in living) or "none"
-        raise Refused(f"birth {birth.number}: is not alive; alive are {numbers}")
+def _list(arena: Arena) -> str:
+    """Return a line about the arena and one about each living robot."""
+    state = "paused" if arena.is_paused else "running"
+    about = f"{arena.births} of {arena.experiment.births} born, {len(arena.population)} alive"
+    lines = [
+        f"{state} at {arena.clock.seconds(arena.step):g} s, {about}",
+        "birth  rank  fitness",
+    ]
+    lines += [
+        f"{one.birth.number:5}  {one.rank:4}  {one.fitness:7.4f}"
+        for one in arena.population
+    ]
+    return "\n".join(lines)
 
 
 class OperatorServer:
