@@ -120,11 +120,9 @@ class RunOperator:
 def _list(arena: Arena) -> str:
     """Return a line about the arena and one about each living robot."""
     state = "paused" if arena.is_paused else "running"
-    about = f"{arena.births} of {arena.experiment.births} born, {len(arena.population)} alive"
-    lines = [
-        f"{state} at {arena.clock.seconds(arena.step):g} s, {about}",
-        "birth  rank  fitness",
-    ]
+    now_s, wanted = arena.clock.seconds(arena.step), arena.experiment.births
+    about = f"{arena.births} of {wanted} born, {len(arena.population)} alive"
+    lines = [f"{state} at {now_s:g} s, {about}", "birth  rank  fitness"]
     lines += [
         f"{one.birth.number:5}  {one.rank:4}  {one.fitness:7.4f}"
         for one in arena.population
