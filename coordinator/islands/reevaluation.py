@@ -7,8 +7,10 @@ Source: Hupkes 2016, section 8.2, on scenarios between his 2 and 3.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import fsum
+
+from msgspec.structs import replace
 
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import Individual

@@ -16,13 +16,13 @@ from coordinator.dispatch.fleet import End, Fleet
 from coordinator.islands.events import (
     Advanced,
     AdvanceShard,
+    Answered,
     Append,
     ArenaCommand,
     Audited,
     Commanded,
     Emigrate,
     Evaluate,
-    Evaluated,
     EvaluationFailed,
     ExternalEvent,
     Finish,
@@ -31,6 +31,7 @@ from coordinator.islands.events import (
     JournalledEvent,
     MigrationEvent,
     NeighbourClosed,
+    Outcome,
     Record,
     Started,
     Vet,
@@ -156,12 +157,9 @@ class Loop:
         for number in sorted(self.islands):
             note(self._tell(number, Started()))
         for event in history:
-            if isinstance(event, Audited):
-                self._note_audit(event)
-                continue
-            if not isinstance(event, Advanced | Commanded):
+            if isinstance(event, Answered):
                 unanswered.pop(key_of(event), None)
-            note(self._tell(island_of(event), event))
+            note(self._act_on(event))
         for request in unanswered.values():
             self._requests.send(request)
         self.shard_requests.send_noted()
@@ -226,19 +224,20 @@ class Loop:
                 self._rows.store(Append("poses", event.pose_rows, poses))
         self._log.append(events)
         for event in events:
-            if isinstance(event, Audited):
-                self._note_audit(event)
-                continue
-            for request in self._tell(island_of(event), event):
+            for request in self._act_on(event):
                 if isinstance(request, AdvanceShard):
                     self._advance(request)
                 else:
                     self._requests.send(request)
         self._warn(events)
 
-    def _note_audit(self, event: Audited) -> None:
+    def _act_on(self, event: JournalledEvent) -> list[Request]:
+        """Act on an event that the journal holds; return the requests to send."""
+        if not isinstance(event, Audited):
+            return self._tell(island_of(event), event)
         for record in audit_records(event):
             self._rows.write(record)
+        return []
 
     def _warn(self, events: Sequence[JournalledEvent]) -> None:
         """Warn the user about cross-checks that failed and robots that crash workers.
@@ -285,9 +284,8 @@ class Loop:
                     case Emigrate(island, to, epoch, migrants):
                         events.append((to, Immigrated(to, island, epoch, migrants)))
                     case Finish(island, neighbours):
-                        events += [
-                            (to, NeighbourClosed(to, island)) for to in neighbours
-                        ]
+                        for to in neighbours:
+                            events.append((to, NeighbourClosed(to, island)))
         return requests
 
     def _write(self, record: Record) -> None:
@@ -310,7 +308,7 @@ class Loop:
             ):
                 _LOG.warning("%s", drift)
                 self._write(drift.record)
-            if not isinstance(event, Evaluated | EvaluationFailed):
+            if not isinstance(event, Outcome):
                 return machine.handle(event)
         elif machine is not None and not isinstance(event, Advanced | Commanded):
             return machine.handle(event)

@@ -226,8 +226,8 @@ def _island_status(island: Island | Arena) -> IslandStatus:
         wanted=island.births if island.is_finished else island.experiment.births,
         best=max((one.fitness for one in island.judged), default=None),
         alive=len(island.population),
-        simulated_s=arena and arena.clock.seconds(arena.step),
-        is_paused=arena is not None and arena.is_paused,
+        simulated_s=arena.clock.seconds(arena.step) if arena else None,
+        is_paused=bool(arena and arena.is_paused),
     )
 
 
