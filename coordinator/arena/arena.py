@@ -27,7 +27,6 @@ from coordinator.islands.events import (
     Record,
     Started,
     Verdict,
-    Vet,
 )
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import birth_record, population_records
@@ -193,7 +192,9 @@ class Arena:
                 self.is_extinct = self.is_extinct and not migration.is_starving
             if self.is_extinct or self.births >= self.experiment.births:
                 return [*commands, self._finish()]
-            commands += self._mate()
+            mature = self._living.mature()
+            if self._living.has_room and len(mature) >= self._parents_needed:
+                commands += self._vetting_queue.begin_child(mature)
         if self.step % self.clock.cull == 0:
             reason, culled = select_culled(self._living.mature(), self._rules)
             commands += [
@@ -201,14 +202,6 @@ class Arena:
                 for one in culled
             ]
         return commands if self._vetting_queue.is_busy else commands + self._conclude()
-
-    def _mate(self) -> list[Vet]:
-        """Begin a birth if there is room and there are parents."""
-        mature = self._living.mature()
-        needed = self._parents_needed
-        if not self._living.has_room or len(mature) < needed:
-            return []
-        return self._vetting_queue.begin_child(mature)
 
     def _conclude(self) -> list[ArenaCommand]:
         """Insert viable robots, carry out orders, and advance unless paused."""

@@ -64,19 +64,14 @@ def _results(
 ) -> list[str]:
     """Describe the last population; write its best robot to a file."""
     births = sum(island.births for island in islands.values())
-    extinct = [
-        number
-        for number, island in sorted(islands.items())
-        if isinstance(island, Arena) and island.is_extinct
+    alive = [
+        island
+        for island in islands.values()
+        if not (isinstance(island, Arena) and island.is_extinct)
     ]
-    if len(extinct) == len(islands):
+    if not alive:
         return [f"extinct after {births} births: too few robots are left to mate"]
-    judged = [
-        one
-        for number, island in sorted(islands.items())
-        if number not in extinct
-        for one in island.judged
-    ]
+    judged = [one for island in alive for one in island.judged]
     if not judged:
         return [f"{births} births; no robot of the last population has a fitness"]
     best = fittest_first(judged)[0]

@@ -92,12 +92,10 @@ class Island:
             Reevaluations(experiment, number) if selection.reevaluation else None
         )
         self._migration = IslandMigration(experiment, epochs) if epochs else None
-        self._has_started = False
         self._generation = 0
         self._begun = 0
         # Founders have no parents: all of them are in flight together.
         self._window = self._brood_end = selection.population
-        self._brood_window = experiment.window
         self._in_flight: dict[int, _Birth] = {}
         self._brood: list[Individual] = []
 
@@ -126,9 +124,8 @@ class Island:
         if isinstance(event, Evaluated) and not isfinite(event.evaluation.fitness):
             raise self._unexpected(event, "fitness must be finite")
         if isinstance(event, Started):
-            if self._has_started:
+            if self._begun:
                 raise self._unexpected(event, "it has started before")
-            self._has_started = True
             commands = self._proceed()
         elif isinstance(event, MigrationEvent) or (
             isinstance(event, Outcome) and event.requester is not None
@@ -285,6 +282,6 @@ class Island:
             room = selection.culling.population_limit - len(self.population)
             children = min(children, max(1, room))
         self._generation += 1
-        self._window = self._brood_window
+        self._window = self.experiment.window
         self._brood_end = min(self.births + children, self.experiment.births)
         return commands

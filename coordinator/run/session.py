@@ -4,6 +4,7 @@ import json
 from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -125,7 +126,7 @@ class RunSession:
                 throttle=RealTimeThrottle(speed, timestep_s) if speed else None,
                 checks=checks,
                 confirm=held.confirm,
-                watch=self.feed.unread.append if self.feed else None,
+                watch=self.feed.unread.append if self.feed else lambda _record: None,
             )
             self._births, self._simulated = RateMeter(), RateMeter()
             self._opened = stack.pop_all()
@@ -233,15 +234,11 @@ def _island_status(island: Island | Arena) -> IslandStatus:
 
 def _runs_row(held: RunFolder) -> Record:
     """Return the one row of the runs table."""
-    details = held.details
     began = (held.path / DETAILS).stat().st_mtime
     versions = {name: metadata.version(name) for name in _LIBRARIES}
     versions["revolve-islands"] = our_version()
     row = {
-        "name": details.name,
-        "run": details.run,
-        "seed": details.seed,
-        "document": details.document,
+        **asdict(held.details),
         "state": "finished",
         "versions": json.dumps(versions),
         "platform": platform_tag(),
