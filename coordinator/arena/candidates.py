@@ -38,16 +38,13 @@ class VettingQueue:
 
     def begin_founders(self) -> list[Vet]:
         """Generate the founders; return their vettings."""
-        vets: list[Vet] = []
-        for number in range(self._next):
-            vets += self._try(number, 0, None, "")
-        return vets
+        return [vet for number in range(self._next) for vet in self._try(number, 0)]
 
     def begin_child(self, mature: Sequence[Individual]) -> list[Vet]:
         """Mate two of the mature; return the vetting, if there is a candidate."""
         self._mature = tuple(mature)
         self._end = self._failed + self._attempts
-        return self._try(self._next, self._failed, None, "")
+        return self._try(self._next, self._failed)
 
     def take_viable(self) -> list[Candidate]:
         """Return the viable candidates by birth id, and remove them."""
@@ -93,7 +90,7 @@ class VettingQueue:
         return not 0 <= number < self._next
 
     def _try(
-        self, number: int, attempt: int, couple: Couple | None, why: str
+        self, number: int, attempt: int, couple: Couple | None = None, why: str = ""
     ) -> list[Vet]:
         """Return the vetting of the first candidate from an attempt on, if any."""
         birth = BirthId(self._island, number)

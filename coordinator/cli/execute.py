@@ -108,7 +108,7 @@ def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:
                 folder,
                 [Planned(status, lambda: held)],
                 deployment,
-                lambda run: conclusions.append(_conclude(run)),
+                lambda run: conclusions.append(conclude(run)),
                 lambda _status, _error: None,  # raised below
             )
         except NetworkError:
@@ -178,7 +178,7 @@ def _execute_campaign(
         tell_user(f"{finished} of {len(planned)} runs are already finished")
 
     def conclude_run(run: RunSession) -> None:
-        conclusion = _conclude(run)
+        conclusion = conclude(run)
         if conclusion.failures:
             tell_user(f"{run.held.path}: {conclusion.failures}")
         if not conclusion.has_evaluated:
@@ -198,10 +198,6 @@ def _execute_campaign(
         f"{len(planned)} runs are finished\ntry next:\n  {command('analyze', folder)}"
     )
     return 1 if failed else 0
-
-
-def _conclude(run: RunSession) -> Conclusion:
-    return conclude(run.held.path, run.experiment, run.loop.islands)
 
 
 def _report(status: RunStatus, error: RevolveError) -> None:

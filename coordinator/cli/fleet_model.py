@@ -148,6 +148,7 @@ class FleetModel:
         began_s = time.thread_time()
         commands = self._dispatch.handle(event)
         self._totals.dispatch_s += time.thread_time() - began_s
+        self._totals.handled += isinstance(event, Returned)
         for command in commands:
             if isinstance(command, Assign):
                 self._evaluate(command.agent, command.job.number)
@@ -198,11 +199,7 @@ class FleetModel:
         if returned.agent in self._workers_end_s:
             begin_s = max(self._now_s, self._coordinator_end_s)
             self._coordinator_end_s = begin_s + self._setting.coordinator_s
-            self._at(self._coordinator_end_s, self._handle, returned)
-
-    def _handle(self, returned: Returned) -> None:
-        self._totals.handled += 1
-        self._tell(returned)
+            self._at(self._coordinator_end_s, self._tell, returned)
 
 
 def most_workers(setting: Setting) -> tuple[int, Outcome]:

@@ -124,13 +124,13 @@ class MigrationEpochs:
         if is_moved:
             count = min(count * len(targets), max(0, spare))
         chosen = self._choose(candidates, min(count, len(candidates)))
-        shares = dict.fromkeys(targets, chosen)
-        if is_moved:
-            # The first target changes, or a single migrant would always go there.
-            shares = {
-                to: chosen[(place - self.epoch) % len(targets) :: len(targets)]
-                for place, to in enumerate(targets)
-            }
+        # Each target gets all that are copied, or a share of those that are moved. The
+        # first target changes, or a single migrant would always go there.
+        step = len(targets) if is_moved else 1
+        shares = {
+            to: chosen[(place - self.epoch) % step :: step]
+            for place, to in enumerate(targets)
+        }
         sent = [
             Emigrate(self.island, to, self.epoch, tuple(shares.get(to, ())))
             for to in self._active
