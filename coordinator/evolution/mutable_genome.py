@@ -240,3 +240,12 @@ def subtree_sizes(branches: Sequence[MutableGenome]) -> dict[MutableGenome, Size
             hidden += below.hidden
         sums[branch] = SizeCounts(parts, inputs, outputs, hidden)
     return dict(reversed(sums.items()))
+
+
+def fitting_subtrees(
+    sizes: dict[MutableGenome, SizeCounts], room: SizeCounts
+) -> list[MutableGenome]:
+    """Return the subtrees, except the whole tree, that exceed no count of ``room``."""
+    return [
+        branch for branch, size in sizes.items() if branch.parent and size.fits(room)
+    ]
