@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 from coordinator.dispatch.events import AgentKind, Joined
 from coordinator.islands.events import Advanced, JournalledEvent
@@ -85,7 +86,7 @@ def journalled(path: Path) -> list[JournalledEvent]:
     """Return the events of a journal in any order, without durations of answers."""
     with Journal.open(path) as journal:
         events = [
-            replace(each, provenance=replace(each.provenance, wall_s=0.0))
+            structs.replace(each, provenance=replace(each.provenance, wall_s=0.0))
             if isinstance(each, Advanced)
             else each
             for each in journal.replay()
