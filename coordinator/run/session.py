@@ -109,7 +109,9 @@ class RunSession:
                     f"{held.path}: journal: dropped a cut record of "
                     f"{self._journal.dropped} bytes at its end"
                 )
-            self._recorder = Recorder(held.path, details, fsync=fsync)
+            self._recorder = Recorder(
+                held.path, details, fsync=fsync, seal=held.seal
+            )
             stack.callback(self._recorder.close)
             self.experiment = experiment_from_text(details.document)
             self.feed = Feed(held.name, held.epoch, details) if is_watched else None

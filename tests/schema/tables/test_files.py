@@ -9,7 +9,8 @@ import pytest
 
 from schema.errors import RunFolderError
 from schema.tables.columns import EVALUATIONS, TABLES
-from schema.tables.files import parquet_path, read_table, segment_path
+from schema.tables.files import parquet_path, read_table
+from schema.tables.segments import segment_path
 
 ROW = {
     "record": 0,
