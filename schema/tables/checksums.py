@@ -1,4 +1,4 @@
-"""Checksums of a run's tables: of segments in a file beside each, of Parquet in run.json.
+"""Checksums of tables: of segments in a file beside each, of Parquet in run.json.
 
 A segment ``births-000.arrows`` has the file ``births-000.sums`` beside it: ``MAGIC``,
 then one record per Arrow message of the segment, that of the schema included. A record

@@ -22,7 +22,6 @@ from schema.errors import RunFolderError
 from schema.tables.checksums import digest_of, read_seal
 from schema.tables.columns import TABLES, completed
 from schema.tables.segments import (
-    SEGMENTS,
     Batch,
     note_unchecked,
     read_segment,

@@ -1,7 +1,7 @@
 """Segments of a table: Arrow streams of an unfinished run, checked before parsing.
 
 The first damaged batch of a segment ends its sound part. What is damaged is named once
-per process; the rows before it are read, and resuming the run computes the others again.
+per process; the rows before it are read. Resuming the run computes the others again.
 """
 
 import contextlib
