@@ -8,6 +8,7 @@ from pathlib import Path
 
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import (
+    Advanced,
     AdvanceShard,
     Append,
     JournalledEvent,
@@ -16,7 +17,6 @@ from coordinator.islands.events import (
 from coordinator.network.local import LocalAgents
 from coordinator.run.archipelago import archipelago
 from coordinator.run.loop import Loop
-from coordinator.run.requests import island_of
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import SnapshotStore
 from coordinator.storage.folder import RunDetails, read_details
@@ -65,7 +65,7 @@ def replayed(
     events: Iterable[JournalledEvent],
     *,
     store: SnapshotStore | None = None,
-    note: Callable[[JournalledEvent, AdvanceShard | None], None] = lambda *_: None,
+    note: Callable[[Advanced, AdvanceShard | None], None] = lambda *_: None,
 ) -> Loop:
     """Return the islands of a run after a journal, without any effect.
 
@@ -74,7 +74,7 @@ def replayed(
         context: what all requests have in common.
         events: content of the journal.
         store: snapshots on disk, None: without any.
-        note: called with each event and the advance that its island then requested.
+        note: called with each advance and the command that it answers.
 
     Raises:
         UnexpectedEvent: the journal of another kind of run.
@@ -90,7 +90,8 @@ def replayed(
 
     def noted() -> Iterator[JournalledEvent]:
         for event in events:
-            note(event, loop.shard_requests.requested(island_of(event)))
+            if isinstance(event, Advanced):
+                note(event, loop.shard_requests.requested(event.island))
             yield event
 
     loop.start(noted())

@@ -208,8 +208,8 @@ def _advances(
     """
     advances: dict[int, list[tuple[AdvanceShard, Advanced]]] = {}
 
-    def note(event: JournalledEvent, command: AdvanceShard | None) -> None:
-        if isinstance(event, Advanced) and command is not None:
+    def note(event: Advanced, command: AdvanceShard | None) -> None:
+        if command is not None:  # otherwise the replay raises
             advances.setdefault(event.island, []).append((command, event))
 
     replayed(details, context, events, note=note)
