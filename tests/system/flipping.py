@@ -1,9 +1,10 @@
 """Program that flips random bits in the tables of runs and reads them again.
 
-Arguments: a number of flips, a seed and run folders. Each read is a fork of this process,
-so that a crash is counted. Prints one line of JSON: how many reads gave the rows that
-were there before ("same"), named the damage ("named"), gave anything else without a word
-("silent") or died ("crashed"), and what was flipped in the last two cases.
+Arguments: a number of flips, a seed and run folders. Each read is a fork of this
+process, so that a crash is counted. Prints one line of JSON: how many reads gave the
+rows that were there before ("same"), named the damage ("named"), gave anything else
+without a word ("silent") or died ("crashed"), and what was flipped in the last two
+cases.
 """
 
 import json
