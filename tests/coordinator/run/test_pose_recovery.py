@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 import analyzer.report
-from coordinator.dispatch.events import AgentKind
+from coordinator.dispatch.events import AgentKind, Joined
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.run.session import RunSession
@@ -20,7 +21,7 @@ from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.folder_status import table_damages
 from schema.errors import JobRefused
 from schema.experiment.document import Experiment
-from schema.experiment.file import experiment_text
+from schema.experiment.file import experiment_text, read_experiment
 from schema.tables.columns import TABLES
 from schema.tables.files import parquet_path, read_table
 from schema.tables.segments import segment_path, segments_of
@@ -41,18 +42,26 @@ def execute(
     path: Path,
     most: int | None = None,
     *,
+    document: Experiment = ARENA,
     world: type = FakeWorld,
-    platform: str = "any",
+    platforms: tuple[str, ...] = ("any",),
     watch: Callable[[RunSession], None] = lambda _: None,
 ) -> bool:
-    """Start or resume a run; stop it after some turns. Return whether it finished."""
-    held = RunFolder(path, None if path.exists() else details_of(ARENA))
+    """Start or resume a run; stop it after some turns. Return whether it finished.
+
+    There is one worker of each platform. An arena drifts if its own is not there.
+    """
+    held = RunFolder(path, None if path.exists() else details_of(document))
     shards = Shards(world)
     agents: dict[AgentKind, Callable[[bytes], bytes]] = {
         "analyzer": analyzer.report.answer,
         "worker": shards.answer,
     }
-    fleet = Fleet(LocalAgents(agents, platform))
+    local = LocalAgents(agents, platforms[0])
+    fleet = Fleet(local, allows_drift=True)
+    for other in platforms[1:]:
+        local._answers[f"worker-{other}"] = Shards(world).answer
+        fleet.tell(Joined(f"worker-{other}", "worker", 1, other))
     run = RunSession(held, fleet)
     try:
         run.start()
@@ -209,9 +218,9 @@ def test_recovery_waits_for_a_worker_of_the_platform(
     flip(segment_path(copy, "poses", 0), 0.5)
     waiting: list[dict[int, str]] = []
     assert not execute(
-        copy, 10, platform="other", watch=lambda run: waiting.append(run.waiting)
+        copy, 60, platforms=("other",), watch=lambda run: waiting.append(run.waiting)
     )
-    assert waiting[1:] == [{0: "any"}] * 9
+    assert waiting[1:] == [{0: "any"}] * 59
     assert execute(copy)
     assert compare(finished, copy) == []
 
@@ -235,3 +244,34 @@ def test_random_flips_in_all_segments(
         flip(path / "segments" / files[rng.integers(len(files))].name, rng.random())
         assert execute(path)
         assert compare(finished, path) == []
+
+
+def test_several_arenas_recover_in_the_order_of_the_journal(tmp_path: Path) -> None:
+    document = structs.replace(read_experiment("archipelago-arenas"), births=30)
+    whole, path = tmp_path / "whole", tmp_path / "run"
+    assert execute(whole, document=document)
+    assert not execute(path, 150, document=document)
+    first = read_table(path, "poses")
+    assert len(set(first["island"].to_pylist())) == 4
+    flip(segment_path(path, "poses", 0), 0.3)
+    assert not execute(path, 100)
+    assert execute(path)
+    assert compare(whole, path) == []
+    parquet_path(path, document.name, 0, "poses").unlink()
+    assert execute(path)
+    assert compare(whole, path) == []
+
+
+def test_poses_from_before_and_after_a_drift_are_computed_again(
+    tmp_path: Path,
+) -> None:
+    path, drifted = tmp_path / "run", tmp_path / "drifted"
+    assert not execute(path, 90)
+    assert execute(path, platforms=("other",))
+    assert read_table(path, "drifts").num_rows == 1
+    shutil.copytree(path, drifted)
+    parquet_path(path, ARENA.name, 0, "poses").unlink()
+    # Each part needs a worker of its own platform.
+    assert not execute(path, 200, platforms=("other",))
+    assert execute(path, platforms=("any", "other"))
+    assert compare(drifted, path) == []
