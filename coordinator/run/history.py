@@ -3,7 +3,6 @@
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from coordinator.dispatch.fleet import Fleet
@@ -48,14 +47,12 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
     context = RunContext.of(str(folder), 0, experiment, details.origin)
     if island not in context.arena:
         raise RunFolderError(f"{folder}: island {island} has no arena")
-    snapshot_store = _SnapshotStore(
-        Snapshots(folder), steps_of(from_s, experiment.simulation)
-    )
+    store = Snapshots(folder, until=steps_of(from_s, experiment.simulation))
     with tempfile.TemporaryDirectory() as place:
         # A copy: opening a journal repairs it, and its run may be active.
         shutil.copy(folder / NAME, place)
         with Journal.open(Path(place)) as journal:
-            loop = replayed(details, context, journal.replay(), store=snapshot_store)
+            loop = replayed(details, context, journal.replay(), store=store)
     return context.arena[island], loop.shard_requests.past(island)
 
 
@@ -64,7 +61,7 @@ def replayed(
     context: RunContext,
     events: Iterable[JournalledEvent],
     *,
-    store: SnapshotStore | None = None,
+    store: SnapshotStore,
     note: Callable[[Advanced, AdvanceShard | None], None] = lambda *_: None,
 ) -> Loop:
     """Return the islands of a run after a journal, without any effect.
@@ -73,7 +70,7 @@ def replayed(
         details: description of the run.
         context: what all requests have in common.
         events: content of the journal.
-        store: snapshots on disk, None: without any.
+        store: snapshots on disk, read-only.
         note: called with each advance and the command that it answers.
 
     Raises:
@@ -85,7 +82,7 @@ def replayed(
         fleet=Fleet(LocalAgents({}, "")),
         log=_Nothing(),
         rows=_Nothing(),
-        snapshot_store=store or _NoSnapshots(),
+        snapshot_store=store,
     )
 
     def noted() -> Iterator[JournalledEvent]:
@@ -96,42 +93,6 @@ def replayed(
 
     loop.start(noted())
     return loop
-
-
-class _NoSnapshots:
-    """Store without snapshots: histories begin at the start of an arena."""
-
-    def has(self, _shard: int, _step: int, _digest: bytes) -> bool:
-        return False
-
-    def write(self, shard: int, step: int, data: bytes) -> None:
-        """Keep nothing."""
-
-    def read(self, _shard: int, _step: int) -> bytes:
-        return b""
-
-    def drop_before(self, shard: int, step: int) -> None:
-        """Remove nothing."""
-
-
-@dataclass(frozen=True, slots=True)
-class _SnapshotStore:
-    """Snapshots of a run up to a step, read-only."""
-
-    kept: Snapshots
-    until: int
-
-    def has(self, shard: int, step: int, digest: bytes) -> bool:
-        return step <= self.until and self.kept.has(shard, step, digest)
-
-    def write(self, shard: int, step: int, data: bytes) -> None:
-        """Keep nothing."""
-
-    def read(self, shard: int, step: int) -> bytes:
-        return self.kept.read(shard, step)
-
-    def drop_before(self, shard: int, step: int) -> None:
-        """Remove nothing."""
 
 
 class _Nothing:

@@ -8,6 +8,7 @@ reach the state whose digest the journal holds.
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from coordinator.dispatch.events import Deliver, ShardFailed
 from coordinator.dispatch.fleet import End, Fleet
@@ -212,5 +213,6 @@ def _advances(
         if command is not None:  # otherwise the replay raises
             advances.setdefault(event.island, []).append((command, event))
 
-    replayed(details, context, events, note=note)
+    # Without snapshots: all advances are wanted, from the first.
+    replayed(details, context, events, store=Snapshots(Path(), until=-1), note=note)
     return advances
