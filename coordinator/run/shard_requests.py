@@ -64,8 +64,9 @@ class _Past:
     Its state at ``step`` is that of the newest snapshot, at ``base`` (0 is the empty
     arena), after ``history``. ``platform`` is that of the last advance, empty before
     the first; ``places`` are those of the robots that lived after it, and ``born``
-    their steps of insertion. The requested advance may have a snapshot in the
-    store if ``may_be_kept``, as in any replay.
+    their steps of insertion. The requested advance may have a snapshot in the store if
+    ``may_be_kept``, as in any replay. It must have the result of ``repeats``, if there
+    is one.
     """
 
     step: int = 0
@@ -75,6 +76,7 @@ class _Past:
     history: list[PastAdvance] = field(default_factory=list)
     places: dict[BirthId, Vector] = field(default_factory=dict)
     requested: AdvanceShard | None = None
+    repeats: Advanced | None = None
     wants_snapshot: bool = False
     may_be_kept: bool = True
     born: dict[BirthId, Inserted] = field(default_factory=dict)
@@ -126,6 +128,7 @@ class ShardRequests:
         # A shard has its island's number here and another one in the fleet.
         self._numbers: dict[int, int] = {}
         self._islands: dict[int, int] = {}
+        self._repeated_on: dict[int, str] = {}
 
     @property
     def waiting(self) -> dict[int, str]:
@@ -145,6 +148,17 @@ class ShardRequests:
         """Return the step that a shard has reached."""
         return self._past(shard).step
 
+    def requested(self, shard: int) -> AdvanceShard | None:
+        """Return the advance of a shard that is requested, or noted."""
+        return self._past(shard).requested
+
+    def begin_at(self, event: Advanced) -> None:
+        """Let a shard begin with the snapshot of an advance, which the store has."""
+        past, advance = self._past(event.island), event.advance
+        past.step = past.base = advance.step
+        past.digest, past.platform = advance.digest, event.provenance.platform
+        past.places = {one.birth: one.place for one in advance.judgements}
+
     def past(self, shard: int) -> Rebuild:
         """Return what a worker needs to rebuild a shard's state."""
         past = self._past(shard)
@@ -161,14 +175,26 @@ class ShardRequests:
             if past.requested is not None:
                 self.send(past.requested)
 
-    def send(self, command: AdvanceShard) -> None:
-        """Request an advance."""
+    def send(self, command: AdvanceShard, repeats: Advanced | None = None) -> None:
+        """Request an advance.
+
+        Args:
+            command: the advance.
+            repeats: past result of this advance, to be computed again on the same
+                platform; another result is the worker's error.
+        """
         shard = command.island
         past = self._past(shard)
-        past.requested = command
+        past.requested, past.repeats = command, repeats
+        platform = past.platform
+        if repeats is not None:
+            platform = repeats.provenance.platform
+            if self._repeated_on.setdefault(shard, platform) != platform:
+                self._repeated_on[shard] = platform
+                self._fleet.release(self._numbers.pop(shard))
         if shard not in self._numbers:
             number = self._fleet.new_shard(
-                self._context.client, self._encode, past.platform
+                self._context.client, self._encode, platform, may_drift=repeats is None
             )
             self._numbers[shard], self._islands[number] = number, shard
         self._fleet.advance(self._numbers[shard])
@@ -266,6 +292,7 @@ class ShardRequests:
             _read_answer,
             request=request,
             advance_number=requested.number,
+            repeats=past.repeats,
             expected=ExpectedAdvance(
                 past.step,
                 requested.until,
@@ -284,6 +311,7 @@ def _read_answer(
     *,
     request: AdvanceRequest,
     advance_number: int,
+    repeats: Advanced | None,
     expected: ExpectedAdvance,
     provenance: Provenance,
     complete: Callable[[Advance], Advance] | None,
@@ -294,6 +322,7 @@ def _read_answer(
         data: bytes of the answer.
         request: that it answers.
         advance_number: number of the arena's command.
+        repeats: past result that the answer must have; None for a new advance.
         expected: what a correct answer has.
         provenance: of the answer, but for the time that it took.
         complete: adds what a drift between platforms lost; None without a drift.
@@ -316,6 +345,8 @@ def _read_answer(
         advance = complete(advance)
     check_advance(advance, expected)
     rows = read_poses(advance.poses, advance, expected)
+    if repeats is not None:
+        _check_repeated(advance, rows.num_rows, repeats)
     poses = place_poses(advance.poses, rows, request.shard)
     signed = replace(provenance, wall_s=answer.wall_s)
     event = Advanced(
@@ -326,3 +357,19 @@ def _read_answer(
         signed,
     )
     return Reached(event, answer.snapshot)
+
+
+def _check_repeated(advance: Advance, rows: int, repeats: Advanced) -> None:
+    """Raise unless an advance has a past result.
+
+    Raises:
+        MalformedMessage: another digest or number of poses.
+    """
+    got, must = (advance.digest, rows), (repeats.advance.digest, repeats.pose_rows)
+    if got != must:
+        raise MalformedMessage(
+            f"advance to step {advance.step}: the digest of its state and its "
+            f"number of poses must be {must[0].hex()[:16]}... and {must[1]}, got "
+            f"{got[0].hex()[:16]}... and {got[1]}: this machine's results differ",
+            "differs",
+        )
