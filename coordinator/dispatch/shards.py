@@ -206,7 +206,7 @@ class ShardDispatch:
             shard.lost = (*shard.lost, event.number)
         shard.avoid = (*shard.avoid, agent)
         shard.rests_until_s = self._now_s + min(
-            REST_S * 2**shard.failures, LONGEST_REST_S
+            REST_S * 2 ** min(shard.failures, 10), LONGEST_REST_S
         )
         shard.failures += 1
         # A malformed answer is a fault of its worker alone.
