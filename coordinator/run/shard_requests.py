@@ -158,6 +158,11 @@ class ShardRequests:
         past.step = past.base = advance.step
         past.digest, past.platform = advance.digest, event.provenance.platform
         past.places = {one.birth: one.place for one in advance.judgements}
+        timestep_s = self._context.experiments[event.island].simulation.timestep_s
+        past.born = {
+            one.birth: Inserted(advance.step - round(one.age_s / timestep_s), None)
+            for one in advance.judgements
+        }
 
     def past(self, shard: int) -> Rebuild:
         """Return what a worker needs to rebuild a shard's state."""
