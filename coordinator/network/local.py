@@ -30,6 +30,9 @@ class LocalAgents:
     def cancel(self, _agent: str, _payload: bytes) -> None:
         """Do nothing: one worker's jobs have no copies to cancel."""
 
+    def ask(self, _agent: str, /) -> None:
+        """Do nothing: no job is on its way between two calls of ``receive``."""
+
     def receive(
         self, timeout_s: float, _pause_s: float = 0.0, /
     ) -> Sequence[DispatchEvent]:

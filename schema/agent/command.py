@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config
-from schema.agent.supervision import CPU_LIMIT_S, Death, ProcessSlot
+from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, Death, ProcessSlot
 from schema.agent.supervisor import ProcessPool, stop_on_signals, stop_with_input
 from schema.agent.topics import Role, check_name
 from schema.errors import NetworkError, RevolveError
@@ -36,14 +36,22 @@ def add_network_flags(flags: argparse.ArgumentParser) -> None:
     flags.add_argument("--tls-key", metavar="FILE", help="private key (PEM, PKCS#8)")
 
 
-def add_cpu_limit(flags: argparse.ArgumentParser) -> None:
-    """Add the flag for the CPU time limit of a job."""
+def add_job_limits(flags: argparse.ArgumentParser) -> None:
+    """Add the flags for the time limits of a job."""
     flags.add_argument(
         "--cpu-limit",
         type=positive_number,
         default=CPU_LIMIT_S,
         metavar="S",
         help=f"CPU time limit of one job in seconds (default: {CPU_LIMIT_S:.0f})",
+    )
+    flags.add_argument(
+        "--wait-limit",
+        type=positive_number,
+        default=WAIT_LIMIT_S,
+        metavar="S",
+        help="time that one job may wait without using CPU time in seconds (default: "
+        f"{WAIT_LIMIT_S:.0f})",
     )
 
 
@@ -98,6 +106,8 @@ def run_pool(
             tls=tls_of(options),
             threads=options.threads,
             cpu_limit_s=options.cpu_limit,
+            wait_limit_s=options.wait_limit,
+            processes=options.processes,
         )
         client_config(agent.connect, agent.tls)
     except RevolveError as error:
@@ -159,7 +169,7 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
         action="store_true",
         help="stop when standard input is closed, too",
     )
-    add_cpu_limit(flags)
+    add_job_limits(flags)
     flags.set_defaults(threads=1)
     if role == "worker":
         flags.add_argument(

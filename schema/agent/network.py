@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from ipaddress import ip_address
 from typing import Any
 
-from schema.agent.supervision import CPU_LIMIT_S
+from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S
 from schema.agent.topics import Role
 from schema.errors import NetworkError
 
@@ -62,6 +62,9 @@ class Agent:
         version: of Revolve Islands.
         threads: that advance one arena together.
         cpu_limit_s: CPU time limit of a job [s].
+        wait_limit_s: time that a job may wait without using CPU time [s].
+        processes: that share the memory of this machine.
+        shards: arenas whose state the process keeps.
     """
 
     role: Role
@@ -74,6 +77,9 @@ class Agent:
     version: str = ""
     threads: int = 1
     cpu_limit_s: float = CPU_LIMIT_S
+    wait_limit_s: float = WAIT_LIMIT_S
+    processes: int = 1
+    shards: int = 1
 
 
 def parse_address(address: str) -> tuple[str, str, int]:

@@ -37,6 +37,8 @@ def main(address: str, behaviour: str) -> None:
         slots=1,
         platform=platform_tag(),
         version=agent.version,
+        shards=1,
+        cores=1,
     ).SerializeToString()
     inbox: SimpleQueue[zenoh.Query] = SimpleQueue()
     count = 0

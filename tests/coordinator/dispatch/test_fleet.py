@@ -40,6 +40,7 @@ class Agents:
     def __init__(self) -> None:
         self.sent: list[tuple[int, str, bytes]] = []
         self.cancelled: list[tuple[str, bytes]] = []
+        self.asked: list[str] = []
         self.pauses_s: list[float] = []
         self.news: list[DispatchEvent] = [
             Joined("one", "worker", 1, "p"),
@@ -51,6 +52,9 @@ class Agents:
 
     def cancel(self, agent: str, payload: bytes, /) -> None:
         self.cancelled.append((agent, payload))
+
+    def ask(self, agent: str, /) -> None:
+        self.asked.append(agent)
 
     def receive(
         self, _timeout_s: float, pause_s: float = 0.0, /

@@ -15,12 +15,14 @@ import zenoh
 
 from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
+    Ask,
     Assign,
     Deliver,
     DispatchEvent,
     Job,
     Joined,
     Left,
+    Overdue,
     Requested,
     Returned,
     Ticked,
@@ -100,6 +102,8 @@ class Driver:
 
     def tell(self, event: DispatchEvent) -> None:
         for command in self.dispatch.handle(event):
+            if isinstance(command, Ask | Overdue):
+                continue
             job = command.job
             if isinstance(command, Assign):
                 self.network.send(job.number, command.agent, job.payload)
