@@ -203,10 +203,14 @@ class Dispatch:
         pool = self._pools[kind]
         agent = pool.agents[event.agent]
         agent.is_heard()
-        held = agent.advances if event.number in agent.advances else agent.held
-        if event.number not in held:
+        is_advance = event.number in agent.advances
+        if is_advance:
+            del agent.advances[event.number]
+            agent.occupy()
+        elif event.number in agent.held:
+            del agent.held[event.number]
+        else:
             return
-        del held[event.number]
         # A late copy only shows that the agent is free.
         if pending := self._jobs.get(event.number):
             answer, reason = self._read(pending.job, event)
@@ -219,7 +223,7 @@ class Dispatch:
             else:
                 yield from self._fail(pending, event, reason)
                 pool.rest(event.agent, self._now_s or 0.0)
-        elif event.outcome == "ok" and held is agent.held:
+        elif event.outcome == "ok" and not is_advance:
             self.late += 1
         pool.offer(event.agent)
         yield from self._assign(pool)
@@ -299,26 +303,38 @@ class Dispatch:
         yield from ()
 
     def _look(self, now_s: float) -> Iterator[DispatchCommand]:
-        """Duplicate overdue jobs on idle agents, oldest first."""
-        idle = {kind: pool.idle() for kind, pool in self._pools.items()}
-        # Without idle agents there is nothing to do but to find silent ones.
+        """Duplicate overdue jobs on idle agents, oldest first; find silent agents."""
+        limits_s = {kind: self._deadlines.limit_s(kind) for kind in AGENT_OF}
         is_check = now_s >= self._next_check_s
         if is_check:
             self._next_check_s = now_s + REPLY_S
-        elif not any(idle.values()):
-            return
-        for pending in list(self._jobs.values()):
-            kind = AGENT_OF[pending.job.kind]
-            if pending.holders and (idle[kind] or is_check):
-                yield from self._copy(pending, self._pools[kind], idle[kind], now_s)
+        for kind, pool in self._pools.items():
+            idle = pool.idle()
+            if idle:
+                jobs = [j for j in self._jobs.values() if AGENT_OF[j.job.kind] == kind]
+            elif is_check:
+                jobs = self._oldest(pool)
+            else:
+                continue
+            for pending in jobs:
+                limit_s = limits_s[pending.job.kind]
+                if pending.holders and now_s - pending.since_s > limit_s:
+                    yield from self._copy(pending, pool, idle, limit_s)
+
+    def _oldest(self, pool: Pool) -> list[Pending]:
+        """Return the oldest job of each agent that is not delivered."""
+        jobs = self._jobs
+        numbers = (
+            next((number for number in agent.held if number in jobs), -1)
+            for agent in pool.agents.values()
+        )
+        return [jobs[number] for number in numbers if number >= 0]
 
     def _copy(
-        self, pending: Pending, pool: Pool, idle: list[str], now_s: float
+        self, pending: Pending, pool: Pool, idle: list[str], limit_s: float
     ) -> Iterator[DispatchCommand]:
         """Give an overdue job to an idle agent, which is removed from the list."""
-        limit_s = self._deadlines.limit_s(pending.job.kind)
-        if now_s - pending.since_s <= limit_s:
-            return
+        now_s = self._now_s or 0.0
         avoid = {*self._pairs.avoided(pending), *pending.holders}
         name = next((each for each in idle if each not in avoid), "")
         copies = len(pending.holders)

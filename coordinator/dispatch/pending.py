@@ -11,8 +11,8 @@ class Pending:
 
     Attributes:
         job: the job.
-        holders: agents that have it, several if the first is late: time of assignment
-            [s], and its place in the queue of a slot (1.0 is first).
+        holders: agents that have it, several if the first is late, in order: time of
+            assignment [s], and its place in the queue of a slot (1.0 is first).
         errors: number of agents that could not do it.
         avoid: agents that failed at it.
         killed: processes that it crashed, with the causes.
@@ -27,7 +27,7 @@ class Pending:
     @property
     def since_s(self) -> float:
         """Time of the first assignment that still holds [s]."""
-        return min(since_s for since_s, _ in self.holders.values())
+        return next(iter(self.holders.values()))[0]
 
 
 class PairedJobs:

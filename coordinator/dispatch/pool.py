@@ -39,6 +39,7 @@ class AgentState:
         joined: its properties.
         held: numbers of its jobs, oldest first.
         advances: numbers of its advances of arenas.
+        busy: slots that these occupy; jobs get the next one, so that they never starve.
         job_s: typical time that a slot takes for a job [s]; 0 before the first.
         failures: errors and losses since its last answer.
         rests: it gets no jobs until its backoff ends.
@@ -52,6 +53,7 @@ class AgentState:
     joined: Joined
     held: dict[int, None] = field(default_factory=dict)
     advances: dict[int, None] = field(default_factory=dict)
+    busy: int = 0
     job_s: float = 0.0
     failures: int = 0
     rests: bool = False
@@ -61,17 +63,13 @@ class AgentState:
     is_silent: bool = False
     is_told: bool = False
 
+    def occupy(self) -> None:
+        """Update the number of slots that its advances occupy."""
+        self.busy = min(len(self.advances), self.joined.slots)
+
     def is_heard(self) -> None:
         """Note an answer or a report of progress."""
         self.is_silent = self.is_told = False
-
-    @property
-    def load(self) -> int:
-        """Number of its jobs; its advances count as one per slot at most.
-
-        Jobs therefore never starve, however many arenas it holds.
-        """
-        return len(self.held) + min(len(self.advances), self.joined.slots)
 
     def learn(self, duration_s: float) -> None:
         """Note the time that a slot took for a job [s]."""
@@ -180,7 +178,7 @@ class Pool:
         """
         spare = self._spare(agent)
         if spare < 0:
-            return agent.load / agent.joined.slots
+            return (len(agent.held) + agent.busy) / agent.joined.slots
         return _PROVIDED + (spare / agent.most_ahead if agent.most_ahead else inf)
 
     def best(self) -> str:
@@ -200,7 +198,7 @@ class Pool:
 
     def _spare(self, agent: AgentState) -> int:
         """Return how many jobs an agent has beyond those it must hold."""
-        return agent.load - agent.joined.slots - self.at_hand
+        return len(agent.held) + agent.busy - agent.joined.slots - self.at_hand
 
     def _ahead(self, agent: AgentState) -> int:
         """Return how many jobs beyond that an agent may have: fewer near the end.
@@ -234,7 +232,7 @@ class Pool:
         return sorted(
             name
             for name, agent in self.agents.items()
-            if not agent.load and not agent.rests
+            if not (agent.held or agent.advances or agent.rests)
         )
 
     def _is_live(self, entry: tuple[float, str, int]) -> bool:

@@ -350,6 +350,7 @@ class ShardDispatch:
         self.rebuilt += shard.is_whole and bool(shard.platform)
         self._out[shard.number] = number
         worker.advances[shard.number] = None
+        worker.occupy()
         self._workers.offer(shard.holder)
         platform = worker.joined.platform
         return AssignShard(shard.number, number, shard.holder, platform, shard.is_whole)
