@@ -341,4 +341,19 @@ class CancelShard:
     agent: str
 
 
-ShardCommand = AssignShard | ShardDone | ShardFailed | CancelShard | Ask | Overdue
+@dataclass(frozen=True, slots=True)
+class Crowded:
+    """Tell the user that there are more shards than the workers keep.
+
+    Attributes:
+        shards: number of shards.
+        kept: number of states that all workers keep.
+    """
+
+    shards: int
+    kept: int
+
+
+ShardCommand = (
+    AssignShard | ShardDone | ShardFailed | CancelShard | Ask | Overdue | Crowded
+)

@@ -17,6 +17,7 @@ from coordinator.dispatch.events import (
     Cancel,
     CancelShard,
     Client,
+    Crowded,
     Deliver,
     Died,
     DispatchCommand,
@@ -234,13 +235,23 @@ class Fleet:
                     self._ends.setdefault(client, []).append(command)
                 case Ask(agent):
                     self._agents.ask(agent)
-                case Overdue(agent, waited_s, to):
-                    then = f"{to} takes" if to else "no other agent can take"
-                    self._warn(
-                        f"{agent} has not answered for {waited_s:.0f} s and reports "
-                        f"no progress: {then} its job"
-                    )
+                case Crowded() | Overdue():
+                    self._warn(_line(command))
 
     def _move(self, event: ShardEvent) -> None:
         """Pass an event to ``shards``, and carry out its commands."""
         self._obey(self.shards.handle(event))
+
+
+def _line(command: Crowded | Overdue) -> str:
+    """Return what the user is told."""
+    if isinstance(command, Crowded):
+        return (
+            f"the workers keep {command.kept} arenas and have {command.shards}: those "
+            "in excess are rebuilt each time; start more workers"
+        )
+    then = f"{command.to} takes" if command.to else "no other agent can take"
+    return (
+        f"{command.agent} has not answered for {command.waited_s:.0f} s and reports no "
+        f"progress: {then} its job"
+    )

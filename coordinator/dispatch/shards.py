@@ -20,6 +20,7 @@ from coordinator.dispatch.events import (
     Ask,
     AssignShard,
     CancelShard,
+    Crowded,
     Joined,
     Killed,
     Left,
@@ -107,6 +108,7 @@ class ShardDispatch:
         self._deadlines = Deadlines(LEAST_S)
         self._out: dict[int, int] = {}
         self._now_s = self._next_look_s = 0.0
+        self._is_crowded = False
 
     @property
     def wake_s(self) -> float | None:
@@ -338,8 +340,19 @@ class ShardDispatch:
                 continue
             if not shard.holder:
                 shard.holder = self._choice(shard)
+                yield from self._count()
             if shard.holder:
                 yield self._assign(number, shard)
+
+    def _count(self) -> Iterator[ShardCommand]:
+        """Tell the user, once, if the workers cannot keep all shards."""
+        kept = sum(a.joined.shards for a in self._workers.agents.values())
+        bound = sum(bool(shard.holder) for shard in self._shards.values())
+        if bound <= kept:
+            self._is_crowded = False
+        elif not self._is_crowded:
+            self._is_crowded = True
+            yield Crowded(bound, kept)
 
     def _assign(self, number: int, shard: _Shard) -> AssignShard:
         """Send a shard's advance to its holder."""

@@ -55,14 +55,15 @@ def main(address: str, behaviour: str) -> None:
         with query:
             query.reply(member.info, info)
 
+    def note_cancelled(_: zenoh.Sample) -> None:
+        is_cancelled.set()
+
     with zenoh.open(zenoh.Config.from_json5(client_config(address))) as session:
         on_job = zenoh.handlers.Callback(inbox.put, indirect=False)
         on_info = zenoh.handlers.Callback(reply_info)
         _jobs = session.declare_queryable(member.jobs, on_job, complete=True)
         _info = session.declare_queryable(member.info, on_info, complete=True)
-        _cancelled = session.declare_subscriber(
-            member.cancelled, zenoh.handlers.Callback(lambda _: is_cancelled.set())
-        )
+        _cancelled = session.declare_subscriber(member.cancelled, note_cancelled)
         token = session.liveliness().declare_token(member.alive)
         while not stop.is_set():
             try:

@@ -13,7 +13,8 @@ import pytest
 
 import analyzer.service
 import worker.serve.service
-from coordinator.cli.dispatch_bench import real_fleet
+from coordinator.cli.dispatch_bench import Body, real_fleet
+from coordinator.dispatch.events import AgentKind
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Advanced
 from coordinator.run.session import RunSession
@@ -110,7 +111,7 @@ def test_forty_arenas_on_two_workers_are_never_rebuilt(tmp_path: Path) -> None:
     (tmp_path / "forty.toml").write_text(FORTY)
     experiment = read_experiment(str(tmp_path / "forty.toml"))
     details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
-    bodies = {
+    bodies: dict[AgentKind, tuple[Body, int]] = {
         "worker": (worker.serve.service.process, 2),
         "analyzer": (analyzer.service.process, 1),
     }

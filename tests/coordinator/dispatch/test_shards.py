@@ -11,6 +11,7 @@ from coordinator.dispatch.events import (
     Ask,
     AssignShard,
     CancelShard,
+    Crowded,
     Joined,
     Killed,
     Left,
@@ -204,8 +205,9 @@ def test_errors_of_several_workers_end_an_advance_and_losses_do_not() -> None:
         assert isinstance(hand, AssignShard)
         number += 1
         assert hand.number == number
+    agent = dispatch.holder(0)
     given_up = dispatch.handle(ShardReturned(number, "error", "no"))
-    assert given_up == [ShardFailed(0, hand.agent, "no")]
+    assert given_up == [ShardFailed(0, agent, "no")]
 
 
 def test_only_a_worker_of_an_equal_platform_continues_a_shard() -> None:
@@ -442,10 +444,12 @@ def test_full_worker_gets_a_shard_only_if_all_are_full() -> None:
     dispatch.handle(Joined("a", "worker", 1, "p", shards=2))
     dispatch.handle(Joined("b", "worker", 1, "p", shards=5))
     for shard in range(7):
-        dispatch.handle(ShardRequested(shard))
+        assert len(dispatch.handle(ShardRequested(shard))) == 1
     assert spread(dispatch, 7) == {"a": 2, "b": 5}
-    dispatch.handle(ShardRequested(7))
-    assert spread(dispatch, 8).total() == 8
+    (told, hand) = dispatch.handle(ShardRequested(7))
+    assert told == Crowded(8, 7)
+    assert isinstance(hand, AssignShard)
+    assert len(dispatch.handle(ShardRequested(8))) == 1
 
 
 def test_shards_spread_by_cores() -> None:

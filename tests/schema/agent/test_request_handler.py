@@ -129,7 +129,7 @@ def test_job_that_waits_too_long_loses_its_process(
         nonlocal now_s
         if is_cancelled:
             made.cancel(request(1))
-        for _ in range(waited_s):
+        for _second in range(waited_s):
             assert sent == []
             now_s += 1.0
             made.look()
