@@ -12,6 +12,8 @@ COMMANDS = {
     "run": (_COORDINATOR, "evolve experiments on this machine"),
     "resume": (_COORDINATOR, "resume a run or campaign after a stop or crash"),
     "coordinator": (_COORDINATOR, "run experiments for remote workers"),
+    "hub": ("coordinator.cli.hub", "connect coordinators, workers and viewers"),
+    "cluster": ("coordinator.cluster.command", "make certificates for a lab"),
     "status": ("coordinator.cli.status", "show the progress of runs"),
     "log": ("coordinator.cli.log", "print the journal of a run"),
     "arena": ("coordinator.cli.arena", "inspect and control a running arena"),
@@ -148,16 +150,11 @@ def _lines(names: Iterable[str]) -> str:
 
 
 def _overview() -> str:
-    return "\n".join(
-        [
-            "Evolve the bodies and brains of robots, on one machine or on many.",
-            "",
-            "usage: revolve COMMAND ...    (help: revolve COMMAND --help)",
-            "",
-            _lines(COMMANDS),
-            "",
-            "example: revolve run scenario1 --seed 1 --births 600",
-        ]
+    return (
+        "Evolve the bodies and brains of robots, on one machine or on many.\n\n"
+        "usage: revolve COMMAND ...    (help: revolve COMMAND --help)\n\n"
+        f"{_lines(COMMANDS)}\n\n"
+        "example: revolve run scenario1 --seed 1 --births 600"
     )
 
 

@@ -53,17 +53,15 @@ def main(arguments: list[str], simulate: Simulate) -> int:
         raise NoPictures(f"{out}: --gait needs a {PICTURE_ENDING} file")
     named = options.experiment
     settings = settings_of(read_experiment(named) if named else None)
-    space, world = body_space(settings.space), settings.simulation
+    world = settings.simulation
     _check_gait(options.gait, world)
-    robot = read_robot(options.file, space)
+    robot = read_robot(options.file, body_space(settings.space))
     size = (options.width, options.width * 3 // 4)
-    with RobotRenderer(
-        robot, space, world, settings.environment, size=size
-    ) as renderer:
+    with RobotRenderer(robot, settings, size=size) as renderer:
         if not is_film and not options.gait:
             save_picture(renderer.picture(), out)
         else:
-            live = partial(simulate, robot, settings.space, world, settings.environment)
+            live = partial(simulate, robot, settings)
             tick_s = world.brain_steps * world.timestep_s
             _draw_motion(renderer, live, options.gait, out, tick_s)
     print(f"{out}: written")
