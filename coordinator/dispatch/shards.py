@@ -70,6 +70,7 @@ class _Shard:
     heir: str = ""
     has_state: bool = False
     is_wanted: bool = False
+    may_drift: bool = True
     number: int = -1
     is_whole: bool = False
     since_s: float = 0.0
@@ -163,7 +164,8 @@ class ShardDispatch:
             case Ticked():
                 return [*self._tick(event.now_s), *self._assignments()]
             case ShardSeen():
-                self._shard(event.shard).platform = event.platform
+                shard = self._shard(event.shard)
+                shard.platform, shard.may_drift = event.platform, event.may_drift
             case ShardRequested():
                 self._want(event.shard)
             case ShardReturned():
@@ -200,8 +202,8 @@ class ShardDispatch:
 
     def _tick(self, now_s: float) -> Iterator[ShardCommand]:
         self._now_s = now_s
-        if self._allows_drift:
-            for shard in self._shards.values():
+        for shard in self._shards.values():
+            if self._allows_drift and shard.may_drift:
                 self._wait(shard)
         if now_s >= self._next_look_s:
             self._next_look_s = now_s + LOOK_S
