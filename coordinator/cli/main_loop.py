@@ -1,5 +1,6 @@
 """Main loop of a coordinator process: runs, operators, viewers, display."""
 
+import logging
 import math
 import resource
 import time
@@ -19,6 +20,7 @@ from schema.agent.supervisor import stop_on_signals
 from schema.errors import RevolveError
 from schema.wire.status import RunStatus
 
+_LOG = logging.getLogger(__name__)
 _TURN_S = 0.2
 _CHORES_S = 1.0
 # Journal, lock and table segments of a run; and what the process itself needs.
@@ -51,7 +53,7 @@ def execute_runs(
         network = agents if isinstance(agents, Network) else None
         scheduler = RunScheduler(
             planned,
-            Fleet(agents, allows_drift=deployment.allows_drift),
+            Fleet(agents, allows_drift=deployment.allows_drift, warn=_LOG.warning),
             open_run=lambda held, is_watched: RunSession(
                 held,
                 scheduler.fleet,

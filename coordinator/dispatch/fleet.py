@@ -5,15 +5,19 @@ machines. Runs are therefore independent of each other, and none can take all wo
 An answer is returned to the client that requested the job, which interprets it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 from typing import Literal, Protocol
 
 from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
+    Ask,
     Assign,
     AssignShard,
+    Cancel,
+    CancelShard,
     Client,
+    Crowded,
     Deliver,
     Died,
     DispatchCommand,
@@ -22,10 +26,12 @@ from coordinator.dispatch.events import (
     Joined,
     Killed,
     Left,
+    Overdue,
     Read,
     Released,
     Requested,
     Returned,
+    ShardCommand,
     ShardDone,
     ShardEvent,
     ShardFailed,
@@ -37,6 +43,7 @@ from coordinator.dispatch.events import (
 )
 from coordinator.dispatch.shards import ShardDispatch
 from schema.errors import MalformedMessage
+from schema.wire.codec import encode_job_name
 
 
 class Agents(Protocol):
@@ -47,6 +54,9 @@ class Agents(Protocol):
 
     def cancel(self, _agent: str, _payload: bytes, /) -> None:
         """Tell an agent, by the job's request, that a job is no longer wanted."""
+
+    def ask(self, agent: str, /) -> None:
+        """Ask an agent for its progress; ``receive`` returns a report, if any."""
 
     def receive(
         self, timeout_s: float, pause_s: float = 0.0, /
@@ -69,17 +79,27 @@ class Fleet:
         shards: assigns arena shards; their numbers are unique within this process.
     """
 
-    def __init__(self, agents: Agents, *, allows_drift: bool = False) -> None:
+    def __init__(
+        self,
+        agents: Agents,
+        *,
+        allows_drift: bool = False,
+        warn: Callable[[str], None] = lambda _line: None,
+    ) -> None:
         """Connect to agents.
 
         Args:
             agents: the connection to them.
             allows_drift: an arena may move to another platform if its own is gone.
+            warn: called with each line for the user.
         """
+        self._warn = warn
         self._numbers = count(1)
         self.dispatch = Dispatch()
-        self.shards = ShardDispatch(self._numbers, allows_drift=allows_drift)
-        self._malformed = 0
+        self.shards = ShardDispatch(
+            self._numbers, self.dispatch.workers, allows_drift=allows_drift
+        )
+        self._malformed = self._late = 0
         self._agents = agents
         self._shard_numbers = count()
         self._shard_clients: dict[int, tuple[Client, Encode]] = {}
@@ -91,6 +111,11 @@ class Fleet:
     def malformed(self) -> int:
         """Answers that did not decode or did not fit their request."""
         return self._malformed + self.dispatch.malformed
+
+    @property
+    def late(self) -> int:
+        """Answers that came after another agent's, or after their run had ended."""
+        return self._late + self.dispatch.late
 
     @property
     def open(self) -> int:
@@ -163,23 +188,24 @@ class Fleet:
 
     def tell(self, event: DispatchEvent) -> None:
         """Handle an event of agents, of jobs or of time."""
-        if isinstance(event, Returned):
-            read = self._advance_reads.pop(event.number, None)
-            if read is not None:
-                self._move(self._read_advance(event, read))
-                return
-        elif isinstance(event, Died):
+        if isinstance(event, Died):
             shard = self.shards.shard_that_lost(event.number)
             if shard is not None:
                 if self._shard_clients[shard][0] == (event.run, event.epoch):
                     self._move(Killed(event.number, event.agent, event.cause))
                 return
+        if isinstance(event, Returned) and event.number in self._advance_reads:
+            read = self._advance_reads.pop(event.number)
+            if self.shards.awaits(event.number):
+                self._move(self._read_advance(event, read))
+            else:
+                self._late += event.outcome == "ok"
+        self._obey(self.dispatch.handle(event))
         # Without shards time changes nothing for them.
-        elif isinstance(event, Joined | Left) or (
+        if isinstance(event, Joined | Left) or (
             self._shard_clients and isinstance(event, Ticked)
         ):
             self._move(event)
-        self._obey(self.dispatch.handle(event))
 
     def _read_advance(self, event: Returned, read: Read) -> ShardReturned:
         """Return the outcome of an advance."""
@@ -197,24 +223,45 @@ class Fleet:
             return ShardReturned(event.number, "stateless")
         return ShardReturned(event.number, "done", answer=answer)
 
-    def _obey(self, commands: Sequence[DispatchCommand]) -> None:
+    def _obey(self, commands: Iterable[DispatchCommand | ShardCommand]) -> None:
         for command in commands:
-            job = command.job
-            if isinstance(command, Assign):
-                self._agents.send(job.number, command.agent, job.payload)
-            elif isinstance(command, Deliver):
-                self._ends.setdefault(job.client, []).append(command)
-            else:
-                self._agents.cancel(command.agent, job.payload)
+            match command:
+                case Assign(job, agent):
+                    self._agents.send(job.number, agent, job.payload)
+                case Cancel(job, agent):
+                    self._agents.cancel(agent, job.payload)
+                case Deliver(job):
+                    self._ends.setdefault(job.client, []).append(command)
+                case AssignShard(number, shard, agent):
+                    payload, read = self._shard_clients[shard][1](command)
+                    self._advance_reads[number] = read
+                    self._agents.send(number, agent, payload)
+                case CancelShard(number, shard, agent):
+                    run, epoch = self._shard_clients[shard][0]
+                    self._agents.cancel(agent, encode_job_name(run, epoch, number))
+                case ShardDone(shard) | ShardFailed(shard):
+                    self._advancing.discard(shard)
+                    client = self._shard_clients[shard][0]
+                    self._ends.setdefault(client, []).append(command)
+                case Ask(agent):
+                    self._agents.ask(agent)
+                case Crowded() | Overdue():
+                    self._warn(_line(command))
 
     def _move(self, event: ShardEvent) -> None:
         """Pass an event to ``shards``, and carry out its commands."""
-        for command in self.shards.handle(event):
-            client, encode = self._shard_clients[command.shard]
-            if isinstance(command, AssignShard):
-                payload, read = encode(command)
-                self._advance_reads[command.number] = read
-                self._agents.send(command.number, command.agent, payload)
-            else:
-                self._advancing.discard(command.shard)
-                self._ends.setdefault(client, []).append(command)
+        self._obey(self.shards.handle(event))
+
+
+def _line(command: Crowded | Overdue) -> str:
+    """Return what the user is told."""
+    if isinstance(command, Crowded):
+        return (
+            f"the workers keep {command.kept} arenas and have {command.shards}: those "
+            "in excess are rebuilt each time; start more workers"
+        )
+    then = f"{command.to} takes" if command.to else "no other agent can take"
+    return (
+        f"{command.agent} has not answered for {command.waited_s:.0f} s and reports no "
+        f"progress: {then} its job"
+    )

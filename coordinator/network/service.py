@@ -213,6 +213,10 @@ class Network:
         if member := self._membership.members.get(agent):
             self._session.put(member.cancelled, payload)
 
+    def ask(self, agent: str, /) -> None:
+        """Ask an agent for its progress; ``receive`` returns a report, if any."""
+        self._ask_info(agent)
+
     def _ask(
         self, asked: _Asked, key: str, payload: bytes | None, timeout_s: float
     ) -> None:
@@ -305,10 +309,16 @@ class Network:
             self._ask(asked, member.info, None, ASK_TIMEOUT_S)
 
     def _introduced(self, asked: _Asked) -> Sequence[DispatchEvent]:
-        """Let an agent join if its properties are valid and its version is equal."""
+        """Let an agent join if its properties are valid and its version is equal.
+
+        If it has joined already, it was asked for its progress.
+        """
         agent, reply = asked.agent, asked.reply
         if not self._membership.is_stranger(agent):
-            return []
+            if reply is None or reply.ok is None:
+                return []
+            event = self._membership.progress(agent, reply.ok.payload.to_bytes())
+            return [event] if event else []
         if reply is None or reply.ok is None:
             # It is alive but does not answer (yet).
             self._ask_again.append((time.monotonic() + _ASK_AGAIN_S, agent))

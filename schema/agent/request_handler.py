@@ -4,11 +4,13 @@ Requests of replaced coordinators, requests that need other plug-ins and cancell
 are refused and counted. Any bytes from a peer and any error of a plug-in get a reply.
 """
 
+import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
+from schema.agent.job_watch import JobWatch, thread_clock
 from schema.agent.network import FENCED, UNFIT, Agent
 from schema.agent.supervision import ProcessSlot, Task
 from schema.errors import MalformedMessage, PluginDiffers, RevolveError, UnknownPlugin
@@ -18,6 +20,8 @@ from schema.wire import revolve_pb2 as pb
 from schema.wire.parsing import parsed, require_most
 
 _MOST_CANCELLED = 1000
+_CANCELLED_S = 10.0
+"""Time after which a cancelled job that waits loses its process [s]."""
 
 T = TypeVar("T")
 
@@ -111,18 +115,24 @@ class Reply:
 class Server:
     """Answers single requests; knows the newest coordinator of each run.
 
+    The thread that makes it does the jobs.
+
     Attributes:
         compute: bytes of a ``Request`` to bytes of an ``Answer``; it raises if the
             request is bad.
         agent: this agent.
         slot: its slot in a pool.
         counts: counts of its replies.
+        watch: over the current job.
     """
 
     compute: Callable[[bytes], bytes]
     agent: Agent
     slot: ProcessSlot = field(default_factory=ProcessSlot)
     counts: ReplyCounts = field(default_factory=ReplyCounts)
+    watch: JobWatch = field(
+        default_factory=lambda: JobWatch(thread_clock(threading.get_ident()))
+    )
     _epochs: dict[str, int] = field(default_factory=dict)
     _cancelled: dict[Task, None] = field(default_factory=dict)
 
@@ -136,6 +146,9 @@ class Server:
             slots=agent.slots,
             platform=agent.platform,
             version=agent.version,
+            shards=agent.shards,
+            cores=agent.threads,
+            quiet_s=self.watch.quiet_s,
         )
         for death in self.slot.deaths:
             task = death.task
@@ -172,6 +185,7 @@ class Server:
                 del self._cancelled[task]
                 self.counts.skipped += 1
                 return Reply(reason="the job was cancelled")
+            self.watch.begin(task)
             with self.slot.doing(task, self.agent.cpu_limit_s):
                 answer = self.compute(data)
         except (UnknownPlugin, PluginDiffers) as error:
@@ -185,8 +199,25 @@ class Server:
             self.counts.refused += 1
             why = f"{type(error).__name__}: {error}"
             return Reply(reason=printable(why, LONGEST_REASON))
+        finally:
+            self.watch.end()
         self.counts.answered += 1
         return Reply(answer)
+
+    def look(self) -> None:
+        """End this process if its job waits for too long; call it regularly.
+
+        A job that was cancelled has less time and is not blamed: another process may
+        have done it.
+        """
+        self.watch.measure()
+        task, quiet_s = self.watch.task, self.watch.quiet_s
+        if task is None or quiet_s is None:
+            return
+        if task in self._cancelled and quiet_s > _CANCELLED_S:
+            self.slot.end_process(is_blamed=False)
+        elif quiet_s > self.agent.wait_limit_s:
+            self.slot.end_process(is_blamed=True)
 
     def _task(self, request: pb.Request) -> Task:
         return Task(self.agent.name, request.run, request.epoch, request.number)

@@ -74,6 +74,9 @@ class SentRequests:
         asked = decode_request(payload, decode_body)
         self.cancelled.append((asked.number, agent))
 
+    def ask(self, agent: str) -> None:
+        raise AssertionError(agent)
+
     def receive(
         self, _timeout_s: float, _pause_s: float = 0.0, /
     ) -> list[DispatchEvent]:

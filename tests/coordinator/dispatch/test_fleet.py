@@ -2,6 +2,7 @@
 
 import pytest
 
+from coordinator.dispatch.deadlines import FIRST_S
 from coordinator.dispatch.events import (
     AssignShard,
     Client,
@@ -18,7 +19,9 @@ from coordinator.dispatch.events import (
     Ticked,
 )
 from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.pool import REPLY_S
 from schema.errors import MalformedMessage
+from schema.wire.codec import encode_job_name
 
 CLIENT, OTHER, ARENA = Client("run", 1), Client("other", 1), Client("arena", 1)
 
@@ -40,6 +43,7 @@ class Agents:
     def __init__(self) -> None:
         self.sent: list[tuple[int, str, bytes]] = []
         self.cancelled: list[tuple[str, bytes]] = []
+        self.asked: list[str] = []
         self.pauses_s: list[float] = []
         self.news: list[DispatchEvent] = [
             Joined("one", "worker", 1, "p"),
@@ -51,6 +55,9 @@ class Agents:
 
     def cancel(self, agent: str, payload: bytes, /) -> None:
         self.cancelled.append((agent, payload))
+
+    def ask(self, agent: str, /) -> None:
+        self.asked.append(agent)
 
     def receive(
         self, _timeout_s: float, pause_s: float = 0.0, /
@@ -254,3 +261,46 @@ def test_fleet_pauses_while_all_workers_have_spare_jobs(
     fleet.advance(new_shard(fleet))
     fleet.listen(0.2, 0.05)
     assert agents.pauses_s[-1] == 0.0  # an arena waits for each answer
+
+
+def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
+    agents: Agents,
+) -> None:
+    lines: list[str] = []
+    fleet = Fleet(agents, warn=lines.append)
+    fleet.listen(0.0, 0.0)
+    fleet.advance(new_shard(fleet))
+    ((number, agent, _),) = agents.sent
+    assert agent == "one"
+    fleet.tell(Ticked(FIRST_S))
+    assert agents.asked == ["one"]
+    fleet.tell(Ticked(FIRST_S + REPLY_S))
+    assert agents.cancelled == [("one", encode_job_name(*ARENA, number))]
+    assert lines == [
+        "one has not answered for 65 s and reports no progress: two takes its job"
+    ]
+    (moved, other, payload) = agents.sent[1]
+    assert (other, payload) == ("two", b"whole True")
+    fleet.tell(Returned(number, "one", "ok", b"bad"))
+    assert (fleet.late, fleet.malformed, fleet.open) == (1, 0, 1)
+    agents.news = [Returned(moved, "two", "ok", b"x")]
+    assert fleet.listen(0.0, 100.0) == {ARENA: [ShardDone(0, "two", b"x")]}
+
+
+def test_jobs_and_advances_share_one_account_of_load(
+    fleet: Fleet, agents: Agents
+) -> None:
+    fleet.advance(new_shard(fleet))
+    assert [agent for _, agent, _ in agents.sent] == ["one"]
+    for _ in range(3):
+        request(fleet)
+    # The advance counts as a job of the first: the second gets more.
+    assert [agent for _, agent, _ in agents.sent[1:]] == ["two", "two", "one"]
+    # A worker with many arenas has a job at hand nevertheless.
+    for _ in range(6):
+        fleet.advance(new_shard(fleet))
+    fleet.tell(Returned(agents.sent[3][0], "one", "ok", b""))
+    before = len(agents.sent)
+    for _ in range(2):
+        request(fleet)
+    assert "one" in {agent for _, agent, _ in agents.sent[before:]}

@@ -4,8 +4,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.dispatch.events import Died, Joined, Left
-from coordinator.network.membership import Membership
+from coordinator.dispatch.events import Died, Joined, Left, Progressed
+from coordinator.network.membership import (
+    LONGEST_QUIET_S,
+    MOST_CORES,
+    MOST_SHARDS,
+    MOST_SLOTS,
+    Membership,
+)
 from schema.agent.topics import Member
 from schema.errors import MalformedMessage
 from schema.wire import revolve_pb2 as pb
@@ -14,11 +20,19 @@ WORKER = Member("f", "worker", "w")
 
 
 def info(
-    agent: str = "w", kind: str = "worker", slots: int = 2, version: str = "1"
+    agent: str = "w",
+    kind: str = "worker",
+    slots: int = 2,
+    version: str = "1",
+    *,
+    shards: int = 3,
+    cores: int = 4,
+    quiet_s: float | None = None,
 ) -> bytes:
     message = pb.AgentInfo(
-        agent=agent, kind=kind, slots=slots, platform="p", version=version
-    )
+        agent=agent, kind=kind, slots=slots, platform="p", version=version,
+        shards=shards, cores=cores, quiet_s=quiet_s,
+    )  # fmt: skip
     return message.SerializeToString()
 
 
@@ -31,7 +45,7 @@ def membership() -> Membership:
 
 def test_agent_joins_with_its_info_and_leaves(membership: Membership) -> None:
     assert membership.is_stranger("w")
-    assert membership.introduce("w", info()) == [Joined("w", "worker", 2, "p")]
+    assert membership.introduce("w", info()) == [Joined("w", "worker", 2, "p", 3, 4)]
     assert not membership.is_stranger("w")
     assert membership.appear(WORKER.alive) is None
     assert membership.vanish(WORKER.alive) == Left("w")
@@ -74,7 +88,7 @@ def test_each_death_is_reported_once_and_before_the_successor_joins(
 ) -> None:
     message = pb.AgentInfo.FromString(info())
     message.deaths.add(agent="v", run="r", epoch=3, number=7, cause="SIGSEGV")
-    joined = Joined("w", "worker", 2, "p")
+    joined = Joined("w", "worker", 2, "p", 3, 4)
     told = membership.introduce("w", message.SerializeToString())
     assert told == [Died("r", 3, 7, "v", "SIGSEGV"), joined]
     membership.vanish(WORKER.alive)
@@ -85,7 +99,19 @@ def test_each_death_is_reported_once_and_before_the_successor_joins(
 
 
 @pytest.mark.parametrize(
-    "data", [b"", b"\xff", info(agent="x"), info(kind="analyzer"), info(slots=0)]
+    "data",
+    [
+        b"",
+        b"\xff",
+        info(agent="x"),
+        info(kind="analyzer"),
+        info(slots=0),
+        info(slots=MOST_SLOTS + 1),
+        info(shards=0),
+        info(shards=MOST_SHARDS + 1),
+        info(cores=0),
+        info(cores=MOST_CORES + 1),
+    ],
 )
 def test_false_info_is_malformed_and_changes_nothing(
     membership: Membership, data: bytes
@@ -111,3 +137,28 @@ def test_other_keys_are_malformed(membership: Membership, key: str) -> None:
     for take in (membership.appear, membership.vanish):
         with pytest.raises(MalformedMessage):
             take(key)
+
+
+@pytest.mark.parametrize(
+    ("quiet_s", "works"),
+    [
+        (0.0, True),
+        (LONGEST_QUIET_S, True),
+        (LONGEST_QUIET_S + 0.1, False),
+        (None, False),
+        (-1.0, False),
+        (float("nan"), False),
+    ],
+)
+def test_agent_reports_progress_if_its_job_used_cpu_lately(
+    membership: Membership, quiet_s: float | None, works: object
+) -> None:
+    data = info(quiet_s=quiet_s)
+    assert membership.progress("w", data) is None
+    membership.introduce("w", info())
+    expected = Progressed("w") if works else None
+    assert membership.progress("w", data) == expected
+    with pytest.raises(MalformedMessage):
+        membership.progress("w", info(agent="x", quiet_s=0.0))
+    membership.vanish(WORKER.alive)
+    assert membership.progress("w", data) is None

@@ -1,14 +1,17 @@
 """Every request gets one reply; an invalid request gets the reason."""
 
+import os
+import signal
 from collections.abc import Callable
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from schema.agent.job_watch import JobWatch
 from schema.agent.network import FENCED, UNFIT, Agent
 from schema.agent.request_handler import MOST_SOURCES, FairQueue, Reply, Server
-from schema.agent.supervision import Death, ProcessSlot, Task
+from schema.agent.supervision import CurrentJob, Death, ProcessSlot, Task
 from schema.errors import InvalidRobot, UnknownPlugin
 from schema.experiment.plugin_source import check_plugins, plugins_of
 from schema.limits import LONGEST_REASON
@@ -115,6 +118,60 @@ def test_agent_info_holds_the_deaths() -> None:
     (told,) = info.deaths
     assert (told.agent, told.run, told.epoch, told.number) == ("v", "r", 3, 7)
     assert told.cause == "SIGSEGV"
+
+
+@pytest.mark.parametrize(
+    ("is_cancelled", "waited_s", "signals"),
+    [
+        (False, 60, []),
+        (False, 61, [signal.SIGVTALRM]),
+        (True, 10, []),
+        # Another process may have done the job: it is not to blame.
+        (True, 11, [signal.SIGKILL]),
+    ],
+)
+def test_job_that_waits_too_long_loses_its_process(
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    is_cancelled: bool,
+    waited_s: int,
+    signals: list[int],
+) -> None:
+    sent: list[int] = []
+    monkeypatch.setattr(os, "kill", lambda _, number: sent.append(number))
+    now_s = 0.0
+    slot = ProcessSlot(0, CurrentJob())
+    noted: list[Task | None] = []
+
+    def compute(_: bytes) -> bytes:
+        nonlocal now_s
+        if is_cancelled:
+            made.cancel(request(1))
+        for _second in range(waited_s):
+            assert sent == []
+            now_s += 1.0
+            made.look()
+        assert slot.note is not None
+        noted.append(slot.note.read())
+        told = pb.AgentInfo.FromString(made.info)
+        assert told.quiet_s == waited_s
+        return b"answer"
+
+    agent = Agent(
+        "worker", "w", "tcp/h:1", threads=3, shards=9, wait_limit_s=60.0, version="1"
+    )
+    watch = JobWatch(lambda: 0.0, lambda: now_s)
+    made = Server(compute, agent, slot, watch=watch)
+    made.reply(request(1))
+    assert sent == signals
+    is_blamed = sent != [signal.SIGKILL]
+    assert noted == [Task("w", "r", 1, 1) if is_blamed else None]
+    now_s += 1000.0
+    made.look()
+    assert sent == signals
+    told = pb.AgentInfo.FromString(made.info)
+    assert not told.HasField("quiet_s")
+    assert (told.shards, told.cores) == (9, 3)
 
 
 def test_plugins_are_identified_by_their_source(
