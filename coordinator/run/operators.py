@@ -18,8 +18,9 @@ from coordinator.islands.events import (
 from coordinator.run.loop import Loop
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
-from schema.errors import MalformedMessage, RevolveError
+from schema.errors import MalformedMessage, RevolveError, printable
 from schema.experiment.document import Experiment, body_space, island_experiment
+from schema.limits import MOST_REASON
 from schema.robot.ids import BirthId
 from schema.robot.inverse_development import genome_of
 from schema.robot.robot import check_robot
@@ -165,7 +166,10 @@ class OperatorServer:
                 reply = OperatorReply("", status=self._scheduler.status(now_s))
             else:
                 reply = self._carry_out(request, self._run(request.run))
-        except (MalformedMessage, Refused) as error:
+        except MalformedMessage as error:
+            self._scheduler.fleet.faults.note("malformed", "operators", str(error))
+            reply = OperatorReply(printable(str(error), MOST_REASON), is_refused=True)
+        except Refused as error:
             reply = OperatorReply(str(error), is_refused=True)
         return encode_operator_reply(reply)
 

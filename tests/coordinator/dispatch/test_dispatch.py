@@ -26,6 +26,7 @@ from coordinator.dispatch.events import (
     Ticked,
     Withdrawn,
 )
+from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pool import (
     LEAST_S,
     LONGEST_REST_S,
@@ -61,8 +62,8 @@ def died(number: int, agent: str, cause: str = "SIGSEGV") -> Died:
     return Died("run", 1, number, agent, cause)
 
 
-def told(*events: DispatchEvent) -> Dispatch:
-    dispatch = Dispatch()
+def told(*events: DispatchEvent, faults: PeerFaults | None = None) -> Dispatch:
+    dispatch = Dispatch(faults)
     for event in events:
         dispatch.handle(event)
     return dispatch
@@ -383,8 +384,29 @@ def test_job_that_crashed_three_processes_is_given_up() -> None:
     assert dispatch.handle(died(0, "d")) == []
 
 
+def test_deaths_of_agents_that_did_not_lose_the_job_do_not_count() -> None:
+    faults = PeerFaults()
+    dispatch = told(worker("a"), worker("b"), *requests(0), faults=faults)
+    # "a" has the job and is there, "b" and "x" never had it.
+    for name in ("a", "b", "x", "y", "z"):
+        assert dispatch.handle(died(0, name)) == []
+    assert faults.total("death") == 5
+    assert dispatch.handle(ok(0, "a")) == [Deliver(job(0), "a", "p", b"a0")]
+
+
+def test_late_and_second_answers_are_counted_as_late() -> None:
+    faults = PeerFaults()
+    answers = (ok(0, "a"), ok(0, "a"), ok(7, "a"))
+    told(worker("a"), *requests(0), *answers, faults=faults)
+    assert (faults.total("late"), faults.total("malformed")) == (2, 0)
+
+
 def test_deadly_job_is_cancelled_where_it_still_runs() -> None:
-    dispatch = told(worker("z"), *requests(0))
+    dispatch = told(*requests(0))
+    for name in ("a", "b", "c", "z"):
+        dispatch.handle(worker(name))
+        if name != "z":
+            dispatch.handle(Left(name))
     commands = [dispatch.handle(died(0, name)) for name in ("a", "b", "c")]
     assert commands[2][1:] == [Cancel(job(0), "z")]
 
