@@ -6,9 +6,9 @@ next one is ready, and more of them while many short jobs wait. Jobs with lower 
 go first, so a lost job is repeated first. The least busy agent gets the job; ties break
 on its name.
 
-An agent that fails at a job, or loses one without leaving, or declines the same one
-twice, gets no job until a backoff ends. The backoff grows with consecutive failures, so that a broken agent cannot empty
-the queue.
+An agent that fails at a job, loses one without leaving, or declines the same one twice
+gets no job until a backoff ends. The backoff grows with consecutive failures, so that a
+broken agent cannot empty the queue.
 
 Overdue jobs are duplicated on idle agents; the first answer counts. A job that crashed
 several processes is given up.
