@@ -46,6 +46,7 @@ from coordinator.dispatch.pool import (
     Stragglers,
 )
 from schema.errors import MalformedMessage, UnexpectedEvent
+from schema.wire.packing import fingerprint
 
 AGENT_OF: dict[JobKind, AgentKind] = {"vet": "analyzer", "evaluate": "worker"}
 MAX_ERRORS = 3
@@ -288,8 +289,10 @@ class Dispatch:
         pending = self._jobs.get(event.number)
         if pending is None or pending.job.client != (event.run, event.epoch):
             return
-        if event.agent not in pending.lost:
-            # A job crashes only a process that had it.
+        is_same = event.request == fingerprint(pending.job.payload)
+        if event.agent not in pending.lost or not is_same:
+            # A job crashes only a process that had it. That process may have died of
+            # another one's request with the name of this job.
             self._faults.note("death", event.agent, f"job {event.number}")
             return
         pending.killed[event.agent] = event.cause

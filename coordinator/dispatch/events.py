@@ -113,6 +113,7 @@ class Died:
         number: of the job.
         agent: name of the process, which is never used again.
         cause: such as "SIGSEGV".
+        request: fingerprint of the request that it did.
     """
 
     run: str
@@ -120,6 +121,7 @@ class Died:
     number: int
     agent: str
     cause: str
+    request: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,6 +39,7 @@ from coordinator.dispatch.events import (
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.shards import ShardDispatch
 from schema.errors import MalformedMessage
+from schema.wire.packing import fingerprint
 
 
 class Agents(Protocol):
@@ -104,6 +105,8 @@ class Fleet:
         self._shard_numbers = count()
         self._shard_clients: dict[int, tuple[Client, Encode]] = {}
         self._advance_reads: dict[int, Read] = {}
+        # Shard and request of each job of an advance that has not ended.
+        self._advances: dict[int, tuple[int, bytes]] = {}
         self._ends: dict[Client, list[End]] = {}
         self._advancing: set[int] = set()
 
@@ -151,6 +154,7 @@ class Fleet:
             if owner == client:
                 del self._shard_clients[shard]
                 self._advancing.discard(shard)
+                self._forget_advances(shard)
                 self._move(Released(shard))
 
     def listen(self, timeout_s: float, now_s: float) -> dict[Client, list[End]]:
@@ -188,8 +192,7 @@ class Fleet:
         elif isinstance(event, Died):
             shard = self.shards.shard_that_lost(event.number)
             if shard is not None:
-                if self._shard_clients[shard][0] == (event.run, event.epoch):
-                    self._move(Killed(event.number, event.agent, event.cause))
+                self._advance_killed(event, shard)
                 return
         # Without shards time changes nothing for them.
         elif isinstance(event, Joined | Left) or (
@@ -197,6 +200,16 @@ class Fleet:
         ):
             self._move(event)
         self._obey(self.dispatch.handle(event))
+
+    def _advance_killed(self, event: Died, shard: int) -> None:
+        """Pass on that an advance crashed its worker, if it was this client's."""
+        client, _ = self._shard_clients[shard]
+        if client != (event.run, event.epoch):
+            return
+        if self._advances.get(event.number) == (shard, event.request):
+            self._move(Killed(event.number, event.agent, event.cause))
+        else:
+            self.faults.note("death", event.agent, f"job {event.number}")
 
     def fenced(self) -> list[Fenced]:
         """Return the jobs refused since the last call as of replaced coordinators."""
@@ -250,7 +263,13 @@ class Fleet:
             if isinstance(command, AssignShard):
                 payload, read = encode(command)
                 self._advance_reads[command.number] = read
+                self._advances[command.number] = (command.shard, fingerprint(payload))
                 self._agents.send(command.number, command.agent, payload)
             else:
                 self._advancing.discard(command.shard)
+                self._forget_advances(command.shard)
                 self._ends.setdefault(client, []).append(command)
+
+    def _forget_advances(self, shard: int) -> None:
+        for number in [n for n, (of, _) in self._advances.items() if of == shard]:
+            del self._advances[number]

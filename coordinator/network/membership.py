@@ -178,9 +178,8 @@ class Membership:
             elif death.agent in self._gone:
                 del self._gone[death.agent]
                 cause = printable(death.cause, _CAUSE_LENGTH)
-                died.append(
-                    Died(death.run, death.epoch, death.number, death.agent, cause)
-                )
+                job = (death.run, death.epoch, death.number)
+                died.append(Died(*job, death.agent, cause, death.request))
         return died
 
 

@@ -244,7 +244,7 @@ class Network:
 
         Args:
             agent: that was given the job, and may have left.
-            payload: an encoded request, of which only the name of the job is needed.
+            payload: the encoded request.
         """
         if member := self._membership.member(agent):
             self._session.put(member.cancelled, payload)

@@ -22,6 +22,7 @@ from schema.errors import MalformedMessage, PluginDiffers, RevolveError, Unknown
 from schema.experiment.plugin_source import check_plugins
 from schema.limits import MOST_EPOCH, MOST_RUN_NAME
 from schema.wire import revolve_pb2 as pb
+from schema.wire.packing import fingerprint
 
 _MOST_REMEMBERED = 1000
 
@@ -155,6 +156,7 @@ class Server:
                 epoch=task.epoch,
                 number=task.number,
                 cause=death.cause,
+                request=task.request,
             )
         return info.SerializeToString()
 
@@ -162,10 +164,10 @@ class Server:
         """Note that a job is cancelled; may be called from any thread.
 
         Args:
-            data: bytes of a ``Request``, of which only the name of the job is needed.
+            data: bytes of the job's ``Request``.
         """
         try:
-            task = self._task(_parsed(data))
+            task = self._task(_parsed(data), data)
         except MalformedMessage:
             self.counts.malformed += 1
             return
@@ -175,7 +177,7 @@ class Server:
         """Return the reply to any bytes."""
         try:
             request = self._checked(data)
-            task = self._task(request)
+            task = self._task(request, data)
             # A job that comes again is wanted, whatever cancelled it before.
             if task in self._cancelled and task not in self._skipped:
                 _remember(task, None, self._skipped)
@@ -196,8 +198,9 @@ class Server:
         self.counts.answered += 1
         return Reply(answer)
 
-    def _task(self, request: pb.Request) -> Task:
-        return Task(self.agent.name, request.run, request.epoch, request.number)
+    def _task(self, request: pb.Request, data: bytes) -> Task:
+        name = (request.run, request.epoch, request.number)
+        return Task(self.agent.name, *name, fingerprint(data))
 
     def _checked(self, data: bytes) -> pb.Request:
         """Return the fields that requests of all kinds share.

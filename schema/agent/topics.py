@@ -64,7 +64,7 @@ class Member:
 
     @property
     def cancelled(self) -> str:
-        """Key that takes a ``Request`` of which only the job's name is needed."""
+        """Key that takes the ``Request`` of a job that is no longer wanted."""
         return f"{self._prefix}/cancelled"
 
     @property

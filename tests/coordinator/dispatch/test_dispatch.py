@@ -36,6 +36,7 @@ from coordinator.dispatch.pool import (
     REST_S,
 )
 from schema.errors import UnexpectedEvent
+from schema.wire.packing import fingerprint
 
 
 def job(number: int, kind: JobKind = "evaluate") -> Job:
@@ -59,7 +60,7 @@ def lost(number: int, agent: str) -> Returned:
 
 
 def died(number: int, agent: str, cause: str = "SIGSEGV") -> Died:
-    return Died("run", 1, number, agent, cause)
+    return Died("run", 1, number, agent, cause, fingerprint(b"%d" % number))
 
 
 def told(*events: DispatchEvent, faults: PeerFaults | None = None) -> Dispatch:
@@ -392,6 +393,18 @@ def test_deaths_of_agents_that_did_not_lose_the_job_do_not_count() -> None:
         assert dispatch.handle(died(0, name)) == []
     assert faults.total("death") == 5
     assert dispatch.handle(ok(0, "a")) == [Deliver(job(0), "a", "p", b"a0")]
+
+
+def test_a_death_by_another_request_with_the_jobs_name_does_not_count() -> None:
+    faults = PeerFaults()
+    dispatch = told(*requests(0), faults=faults)
+    for name in ("a", "b", "c", "d"):
+        dispatch.handle(worker(name))
+        dispatch.handle(Left(name))
+        event = Died("run", 1, 0, name, "SIGSEGV", fingerprint(b"deadly"))
+        assert dispatch.handle(event) == []
+    assert faults.total("death") == 4
+    assert dispatch.pending == 1
 
 
 def test_late_and_second_answers_are_counted_as_late() -> None:

@@ -21,8 +21,10 @@ from coordinator.dispatch.events import (
 )
 from coordinator.dispatch.fleet import Fleet
 from schema.errors import MalformedMessage
+from schema.wire.packing import fingerprint
 
 CLIENT, OTHER, ARENA = Client("run", 1), Client("other", 1), Client("arena", 1)
+EMPTY = fingerprint(b"")
 
 
 def read(data: bytes) -> object:
@@ -129,7 +131,7 @@ def test_a_deadly_job_of_a_client_that_left_is_not_repeated(
     fleet.leave(CLIENT)
     (number, agent, _), *rest = agents.sent
     fleet.tell(Left(agent))
-    fleet.tell(Died("run", 1, number, agent, "SIGSEGV"))
+    fleet.tell(Died("run", 1, number, agent, "SIGSEGV", EMPTY))
     fleet.tell(Joined("three", "worker", 9, "p"))
     again = [each for each, _, _ in agents.sent[1 + len(rest) :]]
     assert number not in again
@@ -148,10 +150,10 @@ def test_deaths_by_jobs_of_other_coordinators_do_not_count(
     fleet.tell(Left("x"))
     assert [agent for _, agent, _ in agents.sent] == names
     for name in names:
-        fleet.tell(Died("another run", 1, number, name, "SIGSEGV"))
+        fleet.tell(Died("another run", 1, number, name, "SIGSEGV", EMPTY))
     assert fleet.listen(0.0, 1.0) == {}
     for name in names:
-        fleet.tell(Died("run", 1, number, name, "SIGSEGV"))
+        fleet.tell(Died("run", 1, number, name, "SIGSEGV", EMPTY))
     (end,) = fleet.listen(0.0, 1.0)[CLIENT]
     assert isinstance(end, Deliver)
     assert end.is_deadly
@@ -251,14 +253,18 @@ def test_an_advance_that_crashes_three_workers_is_given_up(
     shard = new_shard(fleet)
     fleet.advance(shard)
     for name in ("three", "four", "five"):
-        number, agent, _ = agents.sent[-1]
+        number, agent, payload = agents.sent[-1]
         fleet.tell(Joined(name, "worker", 1, "p"))
         fleet.tell(Left(agent))
-        fleet.tell(Died("another run", 1, number, agent, "SIGSEGV"))
-        # It did not have the advance.
-        fleet.tell(Died("arena", 1, number, f"not {agent}", "SIGSEGV"))
+        same = fingerprint(payload)
+        for died in (
+            Died("another run", 1, number, agent, "SIGSEGV", same),
+            Died("arena", 1, number, f"not {agent}", "SIGSEGV", same),
+            Died("arena", 1, number, agent, "SIGSEGV", EMPTY),
+        ):
+            fleet.tell(died)
         assert fleet.listen(0.0, 1.0) == {}
-        fleet.tell(Died("arena", 1, number, agent, "SIGSEGV"))
+        fleet.tell(Died("arena", 1, number, agent, "SIGSEGV", same))
     (end,) = fleet.listen(0.0, 1.0)[ARENA]
     assert isinstance(end, ShardFailed)
     assert (end.shard, end.agent) == (shard, agent)

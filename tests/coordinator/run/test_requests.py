@@ -44,6 +44,7 @@ from schema.wire.codec import (
     encode_body,
     encode_robot,
 )
+from schema.wire.packing import fingerprint
 
 EPOCH = 3
 CLIENT = Client("run", EPOCH)
@@ -224,10 +225,11 @@ def test_robot_that_crashes_three_processes_is_quarantined(
         if name != "d":
             sent_requests.tell(Left(sent_requests.sent[-1][1]))
     killed = [agent for _, agent, _ in sent_requests.sent[:3]]
-    agent = sent_requests.sent[3][1]
-    of_others = [Died("another", EPOCH, number, "x", "SIGBUS")]
-    of_others += [Died("run", EPOCH - 1, number, "x", "SIGBUS")]
-    own = [Died("run", EPOCH, number, each, "SIGSEGV") for each in killed]
+    _, agent, payload = sent_requests.sent[3]
+    same = fingerprint(payload)
+    of_others = [Died("another", EPOCH, number, killed[0], "SIGBUS", same)]
+    of_others += [Died("run", EPOCH - 1, number, killed[0], "SIGBUS", same)]
+    own = [Died("run", EPOCH, number, each, "SIGSEGV", same) for each in killed]
     told = [sent_requests.tell(event) for event in (*of_others, *own)]
     assert told[:-1] == [[]] * 4
     ((event,),) = told[-1:]

@@ -93,6 +93,12 @@ def test_cancelled_job_is_skipped_once() -> None:
     assert (made.counts.skipped, made.counts.malformed) == (1, 1)
 
 
+def test_a_cancellation_needs_the_request_of_the_job() -> None:
+    made = server()
+    made.cancel(request(7, plugins="x"))
+    assert made.reply(request(7)) == Reply(b"answer")
+
+
 def test_number_of_cancelled_jobs_is_limited() -> None:
     made = server()
     for number in range(3000):
@@ -135,14 +141,14 @@ def test_any_bytes_get_a_reply(data: bytes) -> None:
 
 
 def test_agent_info_holds_the_deaths() -> None:
-    death = Death(Task("v", "r", 3, 7), "SIGSEGV")
+    death = Death(Task("v", "r", 3, 7, b"12345678"), "SIGSEGV")
     agent = Agent("worker", "w", "tcp/h:1", version="1", platform="p")
     info = pb.AgentInfo.FromString(
         Server(bytes, agent, ProcessSlot(0, None, (death,))).info
     )
     (told,) = info.deaths
     assert (told.agent, told.run, told.epoch, told.number) == ("v", "r", 3, 7)
-    assert told.cause == "SIGSEGV"
+    assert (told.cause, told.request) == ("SIGSEGV", b"12345678")
 
 
 def test_plugins_are_identified_by_their_source(
