@@ -2,7 +2,7 @@
 
 import json
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from schema.agent.topics import Member, Role, agents_alive, member_of
 from schema.wire import revolve_pb2 as pb
 
 _NOW = zenoh.ConsolidationMode.NONE
+_ENDLESS = 10**9
 
 
 def run_name(folder: Path) -> str:
@@ -47,13 +48,55 @@ class Attacker:
             for member in self.agents(role):
                 self.session.get(member.jobs, payload=data, consolidation=_NOW)
 
-    def cancel(self, numbers: range) -> None:
-        """Cancel jobs at all agents."""
-        for role in ("worker", "analyzer"):
-            for member in self.agents(role):
-                for number in numbers:
-                    job = pb.Request(run=self.run, epoch=1, number=number)
-                    self.session.put(member.cancelled, job.SerializeToString())
+    def overhear(self, act: Callable[[str, bytes], None]) -> None:
+        """Call a function with the key and the request of each job that is sent."""
+
+        def hear(query: zenoh.Query) -> None:
+            with query:
+                assert query.payload is not None
+                act(str(query.key_expr), query.payload.to_bytes())
+
+        self.serve("revolve/**/jobs", zenoh.handlers.Callback(hear))
+
+    def cancel(self) -> None:
+        """Cancel each job when it is sent."""
+
+        def act(key: str, data: bytes) -> None:
+            self.session.put(key.replace("/jobs", "/cancelled"), data)
+
+        self.overhear(act)
+
+    def claim_as(self, epoch: int) -> None:
+        """Claim to be the run's coordinator of an epoch whenever a job is sent."""
+        data = pb.Request(run=self.run, epoch=epoch, number=1).SerializeToString()
+
+        def act(key: str, seen: bytes) -> None:
+            if seen != data:
+                self.session.get(key, payload=data, consolidation=_NOW)
+
+        self.overhear(act)
+
+    def replace_by_deadly(self, first: int, times: int) -> None:
+        """Send endless requests in the name of one evaluation to its workers.
+
+        Args:
+            first: the first evaluation with at least this number is chosen.
+            times: how often, each time that the job is given to a worker.
+        """
+        chosen: list[int] = []
+
+        def act(key: str, data: bytes) -> None:
+            request = pb.Request.FromString(data)
+            if "/w/" not in key or request.number < first or request.steps >= _ENDLESS:
+                return
+            if request.number in chosen[:1] or not chosen:
+                chosen.append(request.number)
+                if len(chosen) <= times:
+                    request.steps = _ENDLESS
+                    endless = request.SerializeToString()
+                    self.session.get(key, payload=endless, consolidation=_NOW)
+
+        self.overhear(act)
 
     def answer_for(self, key: str, answer: bytes, error: str) -> None:
         """Reply to all jobs of a key expression in the agents' names."""
@@ -65,12 +108,14 @@ class Attacker:
                 else:
                     query.reply(query.key_expr, answer)
 
-        handler = zenoh.handlers.Callback(reply)
-        self._held.append(self.session.declare_queryable(key, handler, complete=True))
+        self.serve(key, zenoh.handlers.Callback(reply))
 
     def keep_silent_for(self, key: str) -> None:
         """Take all queries of a key expression and never reply."""
-        handler = zenoh.handlers.Callback(self._held.append, indirect=False)
+        self.serve(key, zenoh.handlers.Callback(self._held.append, indirect=False))
+
+    def serve(self, key: str, handler: Any) -> None:  # noqa: ANN401 - of Zenoh
+        """Declare a queryable that claims to be complete."""
         self._held.append(self.session.declare_queryable(key, handler, complete=True))
 
     def declare(self, key: str) -> None:

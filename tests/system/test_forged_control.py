@@ -52,9 +52,10 @@ FORGERIES: dict[str, tuple[Forge, str]] = {
     "answers": (lambda a: a.answer_for(ALL_JOBS, FORGED_ANSWER, ""), "foreign"),
     "infos": (lambda a: a.answer_for("revolve/**/info", b"\xff", ""), ""),
     "silence": (lambda a: a.keep_silent_for("revolve/**"), ""),
-    "cancelled": (lambda a: a.cancel(range(1, 500)), "cancelled"),
+    "cancelled": (lambda a: a.cancel(), "cancelled"),
     "role": (role_tokens, ""),
     "tokens": (tokens, ""),
+    "deadly": (lambda a: a.replace_by_deadly(20, times=4), "death"),
     "deaths": (lambda a: a.report_deaths(range(1, 4)), "death"),
 }
 
@@ -67,10 +68,15 @@ def test_a_run_beside_a_forger_equals_an_undisturbed_one(
     forge, kind = FORGERIES[name]
     folder = workspace.folder / "run"
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
-    process = workspace.start("run", *words, "--workers", "2", "--out", "run")
+    # A single worker: no other one gets a copy of the job that takes long.
+    workers = 1 if name == "deadly" else 2
+    flags = ("--workers", str(workers), "--out", "run", "--cpu-limit", "1")
+    process = workspace.start("run", *words, *flags)
     wait_until((folder / "address").exists, "the coordinator listens")
     with attacker_at(folder) as attacker:
-        wait_until(lambda: len(attacker.agents("worker")) == 2, "the workers are there")
+        wait_until(
+            lambda: len(attacker.agents("worker")) == workers, "the workers are there"
+        )
         forge(attacker)
         while name.startswith("epoch") and process.poll() is None:
             forge(attacker)
@@ -83,3 +89,23 @@ def test_a_run_beside_a_forger_equals_an_undisturbed_one(
     assert "\x1b" not in out + err
     if kind:
         assert f" {kind}: " in err.partition("not used: ")[2], err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["cancelled", "fenced"])
+def test_an_arena_beside_a_forger_equals_an_undisturbed_one(
+    small_arena_workspace: Workspace, small_arena_run: Path, name: str
+) -> None:
+    folder = small_arena_workspace.folder / "run"
+    words = ("hamlet.toml", "--seed", "4", "--quiet", "--workers", "2", "--out", "run")
+    process = small_arena_workspace.start("run", *words)
+    wait_until((folder / "address").exists, "the coordinator listens")
+    with attacker_at(folder) as attacker:
+        if name == "cancelled":
+            attacker.cancel()
+        else:
+            attacker.claim_as(MOST_EPOCH)
+        _, err = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0, err
+    assert compare(small_arena_run, folder) == []
+    assert f" {name}: " in err.partition("not used: ")[2], err
