@@ -14,6 +14,8 @@ MOST_MEMBERS = 10_000
 """Agents whose tokens a coordinator keeps; a hub has no more connections."""
 MOST_ASKED_INFOS = 1000
 """Open queries of a coordinator for properties of agents."""
+MOST_QUERIES = 1000
+"""Queries of operators, and of viewers, that wait for a coordinator's reply."""
 MOST_SLOTS = 1024
 """Jobs that an agent does at a time."""
 MOST_PLATFORM = 300

@@ -19,7 +19,7 @@ MEANINGS: Mapping[FaultKind, str] = {
     "fenced": "jobs refused for a forged epoch; no other coordinator has the run",
     "cancelled": "jobs cancelled by another process",
     "death": "crashes reported that did not happen, dropped",
-    "crowd": "agents beyond the limit, dropped",
+    "crowd": "tokens or queries beyond the limit, dropped",
 }
 OTHERS = "other peers"
 

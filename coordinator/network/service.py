@@ -36,7 +36,7 @@ from schema.agent.platform_tag import wire_version
 from schema.agent.service import Outlet, log_engine, session_config
 from schema.agent.topics import Member, agents_alive, check_name
 from schema.errors import MalformedMessage, NetworkError, printable
-from schema.limits import MOST_ASKED_INFOS, MOST_REASON
+from schema.limits import MOST_ASKED_INFOS, MOST_QUERIES, MOST_REASON
 
 _KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 _NOW = zenoh.ConsolidationMode.NONE
@@ -309,9 +309,14 @@ class Network:
     def _understand(self, news: _News) -> Sequence[DispatchEvent]:
         """Return the dispatch events of a message, if any."""
         if isinstance(news, zenoh.Query):
-            data = b"" if news.payload is None else news.payload.to_bytes()
             is_onlooker = str(news.key_expr) == self._me.state
             asked = self._onlookers if is_onlooker else self._orders
+            if len(asked) >= MOST_QUERIES:
+                peers = "viewers" if is_onlooker else "operators"
+                self.faults.note("crowd", peers, f"{MOST_QUERIES} queries wait")
+                news.drop()
+                return []
+            data = b"" if news.payload is None else news.payload.to_bytes()
             key = self._me.state if is_onlooker else self._me.command
             asked.append(Order(data, news, key))
             return []
