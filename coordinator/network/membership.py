@@ -46,6 +46,10 @@ class Membership:
         """Return the number of agents whose token exists."""
         return len(self._alive)
 
+    def __contains__(self, member: Member) -> bool:
+        """Return whether the token of an agent exists."""
+        return member in self._alive
+
     def member(self, agent: str) -> Member | None:
         """Return an agent that has joined; None if none of that name has."""
         return self._joined.get(agent)

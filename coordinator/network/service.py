@@ -9,8 +9,6 @@ import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from heapq import heappop, heappush
-from itertools import count
 from queue import Empty, SimpleQueue
 from typing import Literal, Self
 
@@ -18,6 +16,7 @@ import zenoh
 
 from coordinator.dispatch.events import AgentKind, DispatchEvent, Returned
 from coordinator.dispatch.faults import FaultKind, PeerFaults
+from coordinator.network.info_queue import InfoQueue
 from coordinator.network.membership import Membership
 from schema.agent.network import (
     ASK_TIMEOUT_S,
@@ -42,8 +41,8 @@ _KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 _NOW = zenoh.ConsolidationMode.NONE
 _MOST_EVENTS = 1000
 _MOST_NEWS = 10_000
-_ASK_AGAIN_S = 1.0
-_LONGEST_PAUSE_S = 32.0
+# Properties that are malformed are hardly better after a second.
+_MALFORMED_SILENCES = 5
 
 
 @dataclass(slots=True)
@@ -152,8 +151,7 @@ class Network:
         self._is_hub = not connect
         self._inbox: SimpleQueue[_News] = SimpleQueue()
         self._membership = Membership(wire_version(), self.faults)
-        self._ask_again: list[tuple[float, int, Member]] = []
-        self._order = count()
+        self._info_queue = InfoQueue()
         self._asked_infos: set[Member] = set()
         self._orders: list[Order] = []
         self._onlookers: list[Order] = []
@@ -270,9 +268,9 @@ class Network:
             timeout_s: how long to wait for the first event, after the pause [s].
             pause_s: how long to let events collect first [s].
         """
-        now_s = time.monotonic()
-        while self._ask_again and self._ask_again[0][0] <= now_s:
-            self._ask_info(heappop(self._ask_again)[2])
+        while member := self._info_queue.take(began_s := time.monotonic()):
+            self._ask_info(member)
+            self._info_queue.spent(began_s, time.monotonic())
         events: list[DispatchEvent] = []
         time.sleep(pause_s)
         try:
@@ -309,16 +307,7 @@ class Network:
     def _understand(self, news: _News) -> Sequence[DispatchEvent]:
         """Return the dispatch events of a message, if any."""
         if isinstance(news, zenoh.Query):
-            is_onlooker = str(news.key_expr) == self._me.state
-            asked = self._onlookers if is_onlooker else self._orders
-            if len(asked) >= MOST_QUERIES:
-                peers = "viewers" if is_onlooker else "operators"
-                self.faults.note("crowd", peers, f"{MOST_QUERIES} queries wait")
-                news.drop()
-                return []
-            data = b"" if news.payload is None else news.payload.to_bytes()
-            key = self._me.state if is_onlooker else self._me.command
-            asked.append(Order(data, news, key))
+            self._queried(news)
             return []
         if isinstance(news, _Stray):
             about = "properties" if news.number < 0 else f"job {news.number}"
@@ -335,29 +324,38 @@ class Network:
             self.faults.note("malformed", peer, str(error))
             return []
 
+    def _queried(self, query: zenoh.Query) -> None:
+        """Keep a query of an operator or a viewer until it is asked for."""
+        is_onlooker = str(query.key_expr) == self._me.state
+        asked = self._onlookers if is_onlooker else self._orders
+        if len(asked) >= MOST_QUERIES:
+            peers = "viewers" if is_onlooker else "operators"
+            self.faults.note("crowd", peers, f"{MOST_QUERIES} queries wait")
+            query.drop()
+            return
+        data = b"" if query.payload is None else query.payload.to_bytes()
+        key = self._me.state if is_onlooker else self._me.command
+        asked.append(Order(data, query, key))
+
     def _token_changed(self, sample: zenoh.Sample) -> list[DispatchEvent]:
         key = str(sample.key_expr)
         if sample.kind != zenoh.SampleKind.PUT:
             left = self._membership.vanish(key)
             return [left] if left else []
         if member := self._membership.appear(key):
-            self._ask_info(member)
+            self._info_queue.add(member)
         return []
 
     def _ask_info(self, member: Member) -> None:
         """Ask an agent for its properties, later if too many are asked."""
-        if member in self._asked_infos:
+        if member in self._asked_infos or member not in self._membership:
             return
         if len(self._asked_infos) >= MOST_ASKED_INFOS:
-            self._ask_later(member, _ASK_AGAIN_S)
+            self._info_queue.add_again(member, 1, time.monotonic())
             return
         self._asked_infos.add(member)
         asked = _Asked(member, -1, self._inbox)
         self._ask(asked, member.info, None, ASK_TIMEOUT_S)
-
-    def _ask_later(self, member: Member, pause_s: float) -> None:
-        due_s = time.monotonic() + pause_s
-        heappush(self._ask_again, (due_s, next(self._order), member))
 
     def _introduced(self, asked: _Asked) -> Sequence[DispatchEvent]:
         """Let an agent join if its properties are valid and its version is equal."""
@@ -367,8 +365,8 @@ class Network:
             # It is alive but does not answer (yet).
             left = membership.note_silence(member)
             if membership.is_stranger(member):
-                pause_s = _ASK_AGAIN_S * 2.0 ** min(membership.silences(member) - 1, 9)
-                self._ask_later(member, min(pause_s, _LONGEST_PAUSE_S))
+                silences = membership.silences(member)
+                self._info_queue.add_again(member, silences, time.monotonic())
             return [left] if left else []
         if not membership.is_stranger(member):
             return []
@@ -376,7 +374,8 @@ class Network:
             events = membership.introduce(member, reply.ok.payload.to_bytes())
         except MalformedMessage:
             membership.note_silence(member)
-            self._ask_later(member, _LONGEST_PAUSE_S)
+            silences = membership.silences(member) + _MALFORMED_SILENCES
+            self._info_queue.add_again(member, silences, time.monotonic())
             raise
         if member.name in self.refused:
             self._note_refused(member.name)
@@ -391,7 +390,7 @@ class Network:
             if self._membership.member(agent):
                 # It may be gone although its token is not: another process can
                 # declare the same one.
-                self._ask_info(asked.member)
+                self._info_queue.add(asked.member)
             return [Returned(number, agent, "lost")]
         if reply.ok is not None:
             return [Returned(number, agent, "ok", reply.ok.payload.to_bytes())]
