@@ -13,7 +13,7 @@ FaultKind = Literal[
 
 MEANINGS: Mapping[FaultKind, str] = {
     "malformed": "malformed messages, dropped",
-    "refused": "jobs or coordinators refused",
+    "refused": "cannot do jobs, or may not take part",
     "late": "late or second answers, dropped",
     "foreign": "replies by another process in the agent's name, dropped",
     "fenced": "jobs refused for a forged epoch; no other coordinator has the run",
@@ -82,4 +82,4 @@ class PeerFaults:
 def _first_line(key: tuple[FaultKind, str], detail: str) -> str:
     kind, peer = key
     cause = f" ({printable(detail, MOST_REASON)})" if detail else ""
-    return f"{peer}: {MEANINGS[kind]}{cause}; more of them are only counted"
+    return f"{kind}: {peer}: {MEANINGS[kind]}{cause}; more of them are only counted"

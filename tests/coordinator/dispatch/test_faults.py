@@ -16,7 +16,11 @@ def test_faults_are_counted_by_kind_and_peer_and_told_once() -> None:
     )
     assert (faults.total("late"), faults.total("refused")) == (3, 0)
     lines = faults.lines()
-    assert [line.partition(":")[0] for line in lines] == ["a", "a", "b"]
+    assert [line.split(": ")[:2] for line in lines] == [
+        ["late", "a"],
+        ["malformed", "a"],
+        ["late", "b"],
+    ]
     assert "(job 7)" in lines[0]
     faults.note("late", "a")
     assert faults.lines() == []
