@@ -28,6 +28,7 @@ from coordinator.storage.folder import (
 from coordinator.storage.folder_status import (
     check_rewritable,
     folder_status,
+    table_damages,
     unbegun_status,
 )
 from coordinator.storage.hints import command, stopped
@@ -36,7 +37,7 @@ from schema.agent.service import tell_user
 from schema.errors import NetworkError, RevolveError
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text, experiment_text
-from schema.tables.files import has_rows
+from schema.wire.status import RunStatus
 
 
 def start(
@@ -88,12 +89,9 @@ def resume(folder: Path, deployment: Deployment) -> int:
         with FolderLock(folder):
             planned, failed = _plan(folder, read_campaign(folder))
             return _execute_campaign(folder, planned, failed, deployment)
-    if read_state(folder) == "finished":
-        if has_rows(folder, "births"):
-            tell_user(f"{folder}: already finished")
-            return 0 if has_evaluated(folder) else 1
-        check_rewritable(folder, read_details(folder))
-        tell_user(f"{folder}: tables are missing; writing them again from the journal")
+    if read_state(folder) == "finished" and not _is_to_be_rewritten(folder):
+        tell_user(f"{folder}: already finished")
+        return 0 if has_evaluated(folder) else 1
     return _execute_run(folder, RunFolder(folder), deployment)
 
 
@@ -105,10 +103,10 @@ def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:
         try:
             scheduler = execute_runs(
                 folder,
-                [Planned(held.details, status, lambda: held)],
+                [Planned(status, lambda: held)],
                 deployment,
-                lambda run: conclusions.append(_conclude(run)),
-                lambda _details, _error: None,  # raised below
+                lambda run: conclusions.append(conclude(run)),
+                lambda _status, _error: None,  # raised below
             )
         except NetworkError:
             held.forget()
@@ -138,15 +136,19 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
         status = unbegun_status(path, details)
         try:
             if not holds_run(path):
-                take = partial(RunFolder, path, details)
-                planned.append(Planned(details, status, take))
+                planned.append(Planned(status, partial(RunFolder, path, details)))
                 continue
-            found, status = read_details(path), folder_status(path)
+            found = read_details(path)
+            status = (
+                unbegun_status(path, found)
+                if _is_to_be_rewritten(path)
+                else folder_status(path)
+            )
             if status.state == "finished" and not has_evaluated(path):
                 failed.append(path)
         except RevolveError as error:
             # The damaged run fails when the scheduler opens it; the others continue.
-            planned.append(Planned(details, status, partial(_raise, error)))
+            planned.append(Planned(status, partial(_raise, error)))
             continue
         check_adopted(path, found, details)
         theirs, ours = (
@@ -154,8 +156,25 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
         )
         if theirs != ours:
             tell_user(f"{path}: keeps its own number of births, {theirs} (not {ours})")
-        planned.append(Planned(found, status, partial(RunFolder, path)))
+        planned.append(Planned(status, partial(RunFolder, path)))
     return planned, failed
+
+
+def _is_to_be_rewritten(folder: Path) -> bool:
+    """Return whether a run is finished, but a table is damaged; tell the user so.
+
+    Raises:
+        RunFolderError: such a table cannot be written again.
+    """
+    if read_state(folder) != "finished":
+        return False
+    damages = table_damages(folder)
+    for damage in damages:
+        tell_user(damage)
+    if damages:
+        check_rewritable(folder)
+        tell_user(f"{folder}: writing such tables again from the journal")
+    return bool(damages)
 
 
 def _raise(error: RevolveError) -> RunFolder:
@@ -173,12 +192,12 @@ def _execute_campaign(
         failed: folders of finished runs in which all evaluations failed.
         deployment: processes and network.
     """
-    finished = sum(one.status.state == "finished" for one in planned)
+    finished = sum(one.is_finished for one in planned)
     if finished:
         tell_user(f"{finished} of {len(planned)} runs are already finished")
 
     def conclude_run(run: RunSession) -> None:
-        conclusion = _conclude(run)
+        conclusion = conclude(run)
         if conclusion.failures:
             tell_user(f"{run.held.path}: {conclusion.failures}")
         if not conclusion.has_evaluated:
@@ -200,9 +219,5 @@ def _execute_campaign(
     return 1 if failed else 0
 
 
-def _conclude(run: RunSession) -> Conclusion:
-    return conclude(run.held.path, run.experiment, run.loop.islands)
-
-
-def _report(details: RunDetails, error: RevolveError) -> None:
-    tell_user(f"{details.name}-{details.run} failed: {error}")
+def _report(status: RunStatus, error: RevolveError) -> None:
+    tell_user(f"{status.name}-{status.run} failed: {error}")

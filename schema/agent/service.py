@@ -32,7 +32,9 @@ UNSUPERVISED = ProcessSlot()
 """Slot of a process without a supervisor."""
 
 
-_ENGINE_LOG = "warn,zenoh::net::runtime::orchestrator=error"
+_ENGINE_LOG = (
+    "warn,zenoh::net::runtime::orchestrator=error,zenoh_link_unixsock_stream=error"
+)
 """Levels of Zenoh's log; the commands themselves tell of a hub that is missing."""
 
 

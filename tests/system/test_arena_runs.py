@@ -22,7 +22,8 @@ from coordinator.storage.compare import compare
 from coordinator.storage.folder import EPOCH
 from coordinator.storage.journal import NAME, Journal
 from schema.tables.columns import TABLES
-from schema.tables.files import read_table, segments_of
+from schema.tables.files import read_table
+from schema.tables.segments import segments_of
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 
@@ -107,7 +108,7 @@ class Fleet:
         paced = (*words("run"), "--speed", "20")
         self.coordinator = workspace.start("coordinator", *paced, *listen)
         until((self.folder / "address").exists, "the coordinator listens")
-        self.address = (self.folder / "address").read_text().strip()
+        self.address = (self.folder / "address").read_text().split()[0]
         self.analyzer = workspace.start("analyzer", "--connect", self.address)
         self.workers: dict[str, Process] = {}
 

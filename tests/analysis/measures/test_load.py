@@ -13,7 +13,8 @@ import pytest
 from analysis.measures.load import Run, read_runs, read_tables
 from analysis.measures.study import MeasuredRun, measure_run, measure_runs
 from schema.errors import RunFolderError
-from schema.tables.files import parquet_path, segment_path
+from schema.tables.files import parquet_path
+from schema.tables.segments import segment_path
 from tests.analysis.tables import births, population, table
 
 A, B, C = ((0, number) for number in range(3))
@@ -323,8 +324,7 @@ def test_several_processes_give_the_same_measures_as_one(
     for number in range(4):
         made(f"run-{number}", seed=number)
     runs, _ = read_runs([tmp_path])
-    done: list[int] = []
-    alone = measure_runs(runs, on_measured=lambda: done.append(1))
-    together = measure_runs(runs, processes=2, on_measured=lambda: done.append(1))
-    assert len(done) == 8
+    alone = list(measure_runs(runs))
+    together = list(measure_runs(runs, processes=2))
+    assert [one.run for one in alone] == runs
     assert together == alone
