@@ -10,6 +10,8 @@ MIB = 1024 * KIB
 
 # Texts in characters
 
+MOST_SHOWN = 80
+"""Names and other foreign texts in a message to the user."""
 LONGEST_REASON = 1000
 """Reasons of failures, refusals and deaths; longer ones are cut."""
 LONGEST_NAME = 1000
@@ -72,6 +74,32 @@ MOST_SUBMESSAGES = 500_000
 MOST_FIELDS = 4_000_000
 """Fields of a message, those of submessages included."""
 
+# Agents and what they say
+
+MOST_EPOCH = 2**32
+"""Greatest epoch: a run is never resumed more often."""
+MOST_RUN_NAME = 5000
+"""Characters of a run's name: host, nonce and absolute path."""
+MOST_PEERS = 20
+"""Peers that are named for each kind of fault; the others are counted together."""
+MOST_MEMBERS = 10_000
+"""Agents whose tokens a coordinator keeps; a hub has no more connections."""
+MOST_ASKED_INFOS = 1000
+"""Open queries of a coordinator for properties of agents."""
+MOST_QUERIES = 1000
+"""Queries of operators, and of viewers, that wait for a coordinator's reply."""
+MOST_SLOTS = 1024
+"""Jobs that an agent does at a time."""
+MOST_PLATFORM = 300
+"""Characters of a platform tag."""
+MOST_DEATHS = 8
+"""Crashed predecessors that an agent reports."""
+MOST_SHARDS = 10_000
+MOST_CORES = 4096
+"""Arenas that an agent keeps, and cores that it uses for one."""
+LONGEST_QUIET_S = 5.0
+"""A job that used CPU time within this time makes progress [s]."""
+
 # Numbers
 
 GREATEST_COORDINATE = 1e10
@@ -89,7 +117,7 @@ def printable_lines(text: str) -> str:
     return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
 
 
-def printable(text: str, most: int) -> str:
+def printable(text: str, most: int = MOST_SHOWN) -> str:
     """Return a text as one line without control characters, cut at a length.
 
     Each run of white space becomes a space; a character that is not printable becomes

@@ -7,7 +7,7 @@ from uuid import uuid4
 from rich.console import Console
 from rich.table import Table
 
-from coordinator.cli.format import duration, run_details
+from coordinator.cli.format import duration, fault_lines, run_details
 from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, read_campaign
 from coordinator.storage.folder import DETAILS, EPOCH, RunDetails, holds_run
@@ -19,6 +19,7 @@ from schema.agent.command import add_connect, add_network_flags, connect_of, tls
 from schema.agent.service import tell_user
 from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.flags import Flags
+from schema.limits import printable
 from schema.tables.files import FINISHED
 from schema.tables.segments import SEGMENTS
 from schema.wire.operator import (
@@ -186,6 +187,7 @@ def _show(status: Status, title: str, root: Path | None = None) -> None:
         )
     elif done < len(status.runs):
         lines.append("no coordinator is running, or it has no workers and analyzers")
+    lines += [printable(line, _WIDEST) for line in fault_lines(status.faults)]
     # Wide: a narrow terminal wraps lines, but none is cut.
     console = Console(width=_WIDEST, highlight=False, markup=False)
     for line in lines:

@@ -6,9 +6,9 @@ next one is ready, and more of them while many short jobs wait. Jobs with lower 
 go first, so a lost job is repeated first. The least busy agent gets the job; ties break
 on its name.
 
-An agent that fails at a job, or loses one without leaving, gets no job until a backoff
-ends. The backoff grows with consecutive failures, so that a broken agent cannot empty
-the queue.
+An agent that fails at a job, loses one without leaving, or declines the same one twice
+gets no job until a backoff ends. The backoff grows with consecutive failures, so that a
+broken agent cannot empty the queue.
 
 Overdue jobs are duplicated on idle agents; the first answer counts. If all agents that
 have a copy are silent, too, another one gets it, each time after twice the time. A job
@@ -39,9 +39,11 @@ from coordinator.dispatch.events import (
     Ticked,
     Withdrawn,
 )
+from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pending import PairedJobs, Pending
 from coordinator.dispatch.pool import REPLY_S, AgentState, Pool
 from schema.errors import MalformedMessage, UnexpectedEvent
+from schema.wire.packing import fingerprint
 
 AGENT_OF: dict[JobKind, AgentKind] = {"vet": "analyzer", "evaluate": "worker"}
 MAX_ERRORS = 3
@@ -56,15 +58,17 @@ class Dispatch:
     """State machine of jobs; events enter only through ``handle``.
 
     Attributes:
-        malformed: answers that did not decode or did not fit their job.
-        late: answers to jobs that had ended or had gone to another agent.
         workers: the workers and their load, which the arenas share.
     """
 
-    def __init__(self) -> None:
-        self.malformed = 0
+    def __init__(self, faults: PeerFaults | None = None) -> None:
+        """Initialise without agents and jobs.
+
+        Args:
+            faults: counts unfit and late answers; None: counts of its own.
+        """
+        self._faults = faults or PeerFaults()
         self._jobs: dict[int, Pending] = {}
-        self.late = 0
         self.workers = Pool()
         self._pools: dict[AgentKind, Pool] = {
             "worker": self.workers,
@@ -88,9 +92,19 @@ class Dispatch:
         }
 
     @property
+    def malformed(self) -> int:
+        """Answers that did not decode or did not fit their job."""
+        return self._faults.total("malformed")
+
+    @property
     def pending(self) -> int:
         """Number of jobs that are requested and not delivered."""
         return len(self._jobs)
+
+    def client(self, number: int) -> Client | None:
+        """Return the client of a job; None if the job has ended."""
+        pending = self._jobs.get(number)
+        return pending.job.client if pending else None
 
     def jobs_of(self, client: Client) -> list[int]:
         """Return the numbers of a client's jobs that are not delivered."""
@@ -164,6 +178,7 @@ class Dispatch:
         pool = self._pools[kind]
         for number in pool.agents.pop(event.agent).held:
             if pending := self._jobs.get(number):
+                pending.lost[event.agent] = None
                 self._put_back(pending, event.agent)
         yield from self._assign(pool)
 
@@ -210,6 +225,7 @@ class Dispatch:
         elif event.number in agent.held:
             del agent.held[event.number]
         else:
+            self._note_late(event)
             return
         # A late copy only shows that the agent is free.
         if pending := self._jobs.get(event.number):
@@ -221,21 +237,30 @@ class Dispatch:
                 yield Deliver(pending.job, event.agent, platform, answer)
                 yield from self._close(pending)
             else:
+                is_declined = event.outcome in ("fenced", "cancelled")
+                is_fault = not is_declined or event.agent in pending.avoid
                 yield from self._fail(pending, event, reason)
-                pool.rest(event.agent, self._now_s or 0.0)
-        elif event.outcome == "ok" and not is_advance:
-            self.late += 1
+                if is_fault:
+                    pool.rest(event.agent, self._now_s or 0.0)
+        elif not is_advance:
+            self._note_late(event)
         pool.offer(event.agent)
         yield from self._assign(pool)
+
+    def _note_late(self, event: Returned) -> None:
+        if event.outcome == "ok":
+            self._faults.note("late", event.agent, f"job {event.number}")
 
     def _read(self, job: Job, event: Returned) -> tuple[object, str]:
         """Return the decoded answer, or the reason why there is none."""
         if event.outcome != "ok":
+            if event.outcome == "error":
+                self._faults.note("refused", event.agent, event.reason)
             return None, event.reason
         try:
             return job.read(event.answer), ""
         except MalformedMessage as error:
-            self.malformed += 1
+            self._faults.note("malformed", event.agent, str(error))
             return None, str(error)
 
     def _learn(self, pending: Pending, agent: AgentState) -> None:
@@ -253,6 +278,8 @@ class Dispatch:
 
         A malformed answer is a fault of its agent alone, so it is no such error.
         """
+        if event.outcome == "lost":
+            pending.lost[event.agent] = None
         pending.errors += event.outcome == "error"
         if pending.errors == MAX_ERRORS:
             del pending.holders[event.agent]
@@ -275,6 +302,12 @@ class Dispatch:
     def _died(self, event: Died) -> Iterator[DispatchCommand]:
         pending = self._jobs.get(event.number)
         if pending is None or pending.job.client != (event.run, event.epoch):
+            return
+        is_same = event.request == fingerprint(pending.job.payload)
+        if event.agent not in pending.lost or not is_same:
+            # A job crashes only a process that had it. That process may have died of
+            # another one's request with the name of this job.
+            self._faults.note("death", event.agent, f"job {event.number}")
             return
         pending.killed[event.agent] = event.cause
         if len(pending.killed) < MAX_DEATHS:

@@ -6,6 +6,7 @@ An answer is returned to the client that requested the job, which interprets it.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from itertools import count
 from typing import Literal, Protocol
 
@@ -41,9 +42,10 @@ from coordinator.dispatch.events import (
     Ticked,
     Withdrawn,
 )
+from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.shards import ShardDispatch
 from schema.errors import MalformedMessage
-from schema.wire.codec import encode_job_name
+from schema.wire.packing import fingerprint
 
 
 class Agents(Protocol):
@@ -71,12 +73,22 @@ End = Deliver | ShardDone | ShardFailed
 """Result of a job or an advance, as its client receives it."""
 
 
+@dataclass(frozen=True, slots=True)
+class Fenced:
+    """An agent refused a client's job as that of a replaced coordinator."""
+
+    client: Client
+    agent: str
+    reason: str
+
+
 class Fleet:
     """Workers and analyzers, the jobs of all runs, and the routing between them.
 
     Attributes:
         dispatch: assigns jobs about single robots.
         shards: assigns arena shards; their numbers are unique within this process.
+        faults: counts of what agents sent and nothing used.
     """
 
     def __init__(
@@ -85,6 +97,7 @@ class Fleet:
         *,
         allows_drift: bool = False,
         warn: Callable[[str], None] = lambda _line: None,
+        faults: PeerFaults | None = None,
     ) -> None:
         """Connect to agents.
 
@@ -92,30 +105,34 @@ class Fleet:
             agents: the connection to them.
             allows_drift: an arena may move to another platform if its own is gone.
             warn: called with each line for the user.
+            faults: counts that the connection shares; None: counts of its own.
         """
         self._warn = warn
         self._numbers = count(1)
-        self.dispatch = Dispatch()
+        self.faults = faults or PeerFaults()
+        self.dispatch = Dispatch(self.faults)
         self.shards = ShardDispatch(
             self._numbers, self.dispatch.workers, allows_drift=allows_drift
         )
-        self._malformed = self._late = 0
+        self._fenced: list[Fenced] = []
         self._agents = agents
         self._shard_numbers = count()
         self._shard_clients: dict[int, tuple[Client, Encode]] = {}
         self._advance_reads: dict[int, Read] = {}
+        # Shard and request of each job of an advance that has not ended.
+        self._advances: dict[int, tuple[int, bytes]] = {}
         self._ends: dict[Client, list[End]] = {}
         self._advancing: set[int] = set()
 
     @property
     def malformed(self) -> int:
         """Answers that did not decode or did not fit their request."""
-        return self._malformed + self.dispatch.malformed
+        return self.faults.total("malformed")
 
     @property
     def late(self) -> int:
         """Answers that came after another agent's, or after their run had ended."""
-        return self._late + self.dispatch.late
+        return self.faults.total("late")
 
     @property
     def open(self) -> int:
@@ -163,6 +180,7 @@ class Fleet:
         """Drop a shard, and its advance if one is requested."""
         del self._shard_clients[shard]
         self._advancing.discard(shard)
+        self._forget_advances(shard)
         self._move(Released(shard))
 
     def listen(self, timeout_s: float, now_s: float) -> dict[Client, list[End]]:
@@ -188,18 +206,19 @@ class Fleet:
 
     def tell(self, event: DispatchEvent) -> None:
         """Handle an event of agents, of jobs or of time."""
+        if isinstance(event, Returned) and event.outcome in ("fenced", "cancelled"):
+            self._note_declined(event)
         if isinstance(event, Died):
             shard = self.shards.shard_that_lost(event.number)
             if shard is not None:
-                if self._shard_clients[shard][0] == (event.run, event.epoch):
-                    self._move(Killed(event.number, event.agent, event.cause))
+                self._advance_killed(event, shard)
                 return
         if isinstance(event, Returned) and event.number in self._advance_reads:
             read = self._advance_reads.pop(event.number)
-            if self.shards.awaits(event.number):
+            if self.shards.shard_of(event.number) is not None:
                 self._move(self._read_advance(event, read))
-            else:
-                self._late += event.outcome == "ok"
+            elif event.outcome == "ok":
+                self.faults.note("late", event.agent, f"job {event.number}")
         self._obey(self.dispatch.handle(event))
         # Without shards time changes nothing for them.
         if isinstance(event, Joined | Left) or (
@@ -207,14 +226,47 @@ class Fleet:
         ):
             self._move(event)
 
+    def _advance_killed(self, event: Died, shard: int) -> None:
+        """Pass on that an advance crashed its worker, if it was this client's."""
+        client, _ = self._shard_clients[shard]
+        if client != (event.run, event.epoch):
+            return
+        of, payload = self._advances.get(event.number, (-1, b""))
+        if (of, fingerprint(payload)) == (shard, event.request):
+            self._move(Killed(event.number, event.agent, event.cause))
+        else:
+            self.faults.note("death", event.agent, f"job {event.number}")
+
+    def fenced(self) -> list[Fenced]:
+        """Return the jobs refused since the last call as of replaced coordinators."""
+        fenced, self._fenced = self._fenced, []
+        return fenced
+
+    def _note_declined(self, event: Returned) -> None:
+        """Note a job that its agent did not try, if the job is still wanted."""
+        shard = self.shards.shard_of(event.number)
+        if shard is None:
+            client = self.dispatch.client(event.number)
+        else:
+            client, _ = self._shard_clients[shard]
+        if client is None:
+            return
+        if event.outcome == "fenced":
+            self._fenced.append(Fenced(client, event.agent, event.reason))
+        else:
+            self.faults.note("cancelled", event.agent, f"job {event.number}")
+
     def _read_advance(self, event: Returned, read: Read) -> ShardReturned:
         """Return the outcome of an advance."""
         if event.outcome != "ok":
-            return ShardReturned(event.number, event.outcome, event.reason)
+            if event.outcome != "error":
+                return ShardReturned(event.number, "lost")
+            self.faults.note("refused", event.agent, event.reason)
+            return ShardReturned(event.number, "error", event.reason)
         try:
             answer = read(event.answer)
         except MalformedMessage as error:
-            self._malformed += 1
+            self.faults.note("malformed", event.agent, str(error))
             # A machine that computes differently lies no more than one that fails.
             differs = error.kind == "differs"
             outcome: Literal["error", "malformed"] = "error" if differs else "malformed"
@@ -235,12 +287,13 @@ class Fleet:
                 case AssignShard(number, shard, agent):
                     payload, read = self._shard_clients[shard][1](command)
                     self._advance_reads[number] = read
+                    self._advances[number] = (shard, payload)
                     self._agents.send(number, agent, payload)
-                case CancelShard(number, shard, agent):
-                    run, epoch = self._shard_clients[shard][0]
-                    self._agents.cancel(agent, encode_job_name(run, epoch, number))
+                case CancelShard(number, _, agent):
+                    self._agents.cancel(agent, self._advances[number][1])
                 case ShardDone(shard) | ShardFailed(shard):
                     self._advancing.discard(shard)
+                    self._forget_advances(shard)
                     client = self._shard_clients[shard][0]
                     self._ends.setdefault(client, []).append(command)
                 case Ask(agent):
@@ -251,6 +304,10 @@ class Fleet:
     def _move(self, event: ShardEvent) -> None:
         """Pass an event to ``shards``, and carry out its commands."""
         self._obey(self.shards.handle(event))
+
+    def _forget_advances(self, shard: int) -> None:
+        for number in [n for n, (of, _) in self._advances.items() if of == shard]:
+            del self._advances[number]
 
 
 def _line(command: Crowded | Overdue) -> str:

@@ -60,7 +60,7 @@ class _Shard:
         misses: deadlines that the advance has passed.
         errors: number of workers that could not make the advance.
         avoid: workers that failed at the advance.
-        lost: numbers of its jobs that got no reply.
+        lost: numbers of its jobs that got no reply, with the workers that had them.
         killed: workers that it crashed, with the causes.
         drifts_at_s: when it may drift to another platform [s].
     """
@@ -77,7 +77,7 @@ class _Shard:
     misses: int = 0
     errors: int = 0
     avoid: tuple[str, ...] = ()
-    lost: tuple[int, ...] = ()
+    lost: dict[int, str] = field(default_factory=dict)
     killed: dict[str, str] = field(default_factory=dict)
     drifts_at_s: float | None = None
 
@@ -135,9 +135,9 @@ class ShardDispatch:
         known = self._shards.get(shard)
         return known.holder if known else ""
 
-    def awaits(self, number: int) -> bool:
-        """Return whether the answer to an assigned advance is still of use."""
-        return number in self._out
+    def shard_of(self, number: int) -> int | None:
+        """Return the shard that a job advances at present."""
+        return self._out.get(number)
 
     def shard_that_lost(self, number: int) -> int | None:
         """Return the shard whose present advance lost a job without reply."""
@@ -196,7 +196,7 @@ class ShardDispatch:
 
     def _unbind(self, shard: _Shard) -> None:
         if self._out.pop(shard.number, None) is not None:
-            shard.lost = (*shard.lost, shard.number)
+            shard.lost[shard.number] = shard.holder
         shard.holder, shard.heir = shard.heir, ""
         shard.has_state, shard.number = False, -1
 
@@ -301,7 +301,7 @@ class ShardDispatch:
             return []
         self._unbind(shard)
         if event.outcome == "lost":
-            shard.lost = (*shard.lost, event.number)
+            shard.lost[event.number] = agent
         shard.avoid = (*shard.avoid, agent)
         self._workers.rest(agent, self._now_s)
         # A malformed answer is a fault of its worker alone.
@@ -314,6 +314,9 @@ class ShardDispatch:
     def _killed(self, event: Killed) -> list[ShardCommand]:
         number = self.shard_that_lost(event.number)
         if number is None:
+            return []
+        if self._shards[number].lost[event.number] != event.agent:
+            # A job crashes only a process that had it.
             return []
         killed = self._shards[number].killed
         killed[event.agent] = event.cause
@@ -333,7 +336,7 @@ class ShardDispatch:
 
     def _forgive(self, shard: _Shard) -> None:
         """Forget the failures at an advance that has ended."""
-        shard.errors, shard.avoid, shard.lost, shard.killed = 0, (), (), {}
+        shard.errors, shard.avoid, shard.lost, shard.killed = 0, (), {}, {}
         shard.misses = 0
 
     def _assignments(self) -> Iterator[ShardCommand]:

@@ -1,12 +1,17 @@
 """Queries to coordinators: for operators and for the status command."""
 
+from contextlib import suppress
+from threading import Event
+
 import zenoh
 
 from schema.agent.network import ASK_TIMEOUT_S, DEFAULT_FLEET, Tls, client_config
-from schema.agent.topics import agents_alive, check_name, member_of
-from schema.errors import NetworkError
+from schema.agent.service import log_engine
+from schema.agent.topics import Member, agents_alive, check_name, member_of
+from schema.errors import MalformedMessage, NetworkError
 
 _NOW = zenoh.ConsolidationMode.NONE
+_MOST_COORDINATORS = 1000
 
 
 def ask_coordinators(
@@ -31,29 +36,61 @@ def ask_coordinators(
     """
     config = client_config(connect, tls)
     check_name(fleet, "fleet")
-    zenoh.init_log_from_env_or("error")
+    log_engine()
     try:
         session = zenoh.open(zenoh.Config.from_json5(config))
     except zenoh.ZError:
         raise NetworkError(f"no coordinator at {connect}") from None
     replies_of: dict[str, bytes] = {}
     with session:
-        tokens = session.liveliness().get(agents_alive(fleet, "coordinator"))
-        there = [member_of(str(each.ok.key_expr)) for each in tokens if each.ok]
+        there = _coordinators(session, fleet)
         for member in sorted(there, key=lambda each: each.name):
-            if only not in ("", member.name):
-                continue
-            replies = session.get(
-                member.command,
-                payload=data,
-                timeout=ASK_TIMEOUT_S,
-                consolidation=_NOW,
-            )
-            for reply in replies:
-                if reply.ok is not None:
-                    replies_of[member.name] = reply.ok.payload.to_bytes()
+            if only in ("", member.name):
+                reply = _reply_of(member, session, data)
+                if reply is not None:
+                    replies_of[member.name] = reply
     if not replies_of:
         raise NetworkError(
             f"{connect}: none of {len(there)} coordinators of fleet {fleet} replies"
         )
     return replies_of
+
+
+def _coordinators(session: zenoh.Session, fleet: str) -> set[Member]:
+    """Return the coordinators whose token exists, up to a limit."""
+    # Not by a channel: a full one blocks the session, or loses what is not read yet.
+    keys: list[str] = []
+    is_done = Event()
+
+    def take(reply: zenoh.Reply) -> None:
+        if reply.ok is not None and len(keys) < _MOST_COORDINATORS:
+            keys.append(str(reply.ok.key_expr))
+
+    session.liveliness().get(
+        agents_alive(fleet, "coordinator"),
+        zenoh.handlers.Callback(take, is_done.set, indirect=False),
+        timeout=ASK_TIMEOUT_S,
+    )
+    is_done.wait()
+    there = set()
+    for key in keys:
+        with suppress(MalformedMessage):
+            there.add(member_of(key))
+    return there
+
+
+def _reply_of(member: Member, session: zenoh.Session, data: bytes) -> bytes | None:
+    """Return a coordinator's own reply; None without one."""
+    replies = session.get(
+        member.command,
+        payload=data,
+        timeout=ASK_TIMEOUT_S,
+        target=zenoh.QueryTarget.ALL,
+        consolidation=_NOW,
+    )
+    for reply in replies:
+        replier = reply.replier_id
+        is_own = replier is not None and str(replier.zid) == member.session
+        if is_own and reply.ok is not None:
+            return reply.ok.payload.to_bytes()
+    return None

@@ -2,6 +2,11 @@
 
 Requests of replaced coordinators, requests that need other plug-ins and cancelled jobs
 are refused and counted. Any bytes from a peer and any error of a plug-in get a reply.
+
+Any process that reaches the hub may claim to be a newer coordinator of a run, or cancel
+a job. Neither can stop a run: a coordinator is refused once, and a job is cancelled
+once. A coordinator that was really replaced finds that in its run folder and stops; one
+that was not repeats the job.
 """
 
 import threading
@@ -11,19 +16,28 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from schema.agent.job_watch import JobWatch, thread_clock
-from schema.agent.network import FENCED, UNFIT, Agent
+from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.supervision import ProcessSlot, Task
 from schema.errors import MalformedMessage, PluginDiffers, RevolveError, UnknownPlugin
 from schema.experiment.plugin_source import check_plugins
-from schema.limits import ADVANCE_REQUEST_BYTES, LONGEST_NAME, LONGEST_REASON, printable
+from schema.limits import (
+    ADVANCE_REQUEST_BYTES,
+    LONGEST_REASON,
+    MOST_EPOCH,
+    MOST_RUN_NAME,
+    printable,
+)
 from schema.wire import revolve_pb2 as pb
+from schema.wire.packing import fingerprint
 from schema.wire.parsing import parsed, require_most
 
-_MOST_CANCELLED = 1000
+_MOST_REMEMBERED = 1000
 _CANCELLED_S = 10.0
 """Time after which a cancelled job that waits loses its process [s]."""
 
+K = TypeVar("K")
 T = TypeVar("T")
+V = TypeVar("V")
 
 MOST_SOURCES = 1000
 """Most accounts that are kept of sources without waiting items."""
@@ -134,7 +148,9 @@ class Server:
         default_factory=lambda: JobWatch(thread_clock(threading.get_ident()))
     )
     _epochs: dict[str, int] = field(default_factory=dict)
+    _fenced: dict[tuple[str, int], None] = field(default_factory=dict)
     _cancelled: dict[Task, None] = field(default_factory=dict)
+    _skipped: dict[Task, None] = field(default_factory=dict)
 
     @property
     def info(self) -> bytes:
@@ -158,6 +174,7 @@ class Server:
                 epoch=task.epoch,
                 number=task.number,
                 cause=death.cause,
+                request=task.request,
             )
         return info.SerializeToString()
 
@@ -165,26 +182,25 @@ class Server:
         """Note that a job is cancelled; may be called from any thread.
 
         Args:
-            data: bytes of a ``Request``, of which only the name of the job is needed.
+            data: bytes of the job's ``Request``.
         """
         try:
-            task = self._task(_parsed(data))
+            task = self._task(_parsed(data), data)
         except MalformedMessage:
             self.counts.malformed += 1
             return
-        self._cancelled[task] = None
-        if len(self._cancelled) > _MOST_CANCELLED:
-            del self._cancelled[next(iter(self._cancelled))]
+        _remember(task, None, self._cancelled)
 
     def reply(self, data: bytes) -> Reply:
         """Return the reply to any bytes."""
         try:
             request = self._checked(data)
-            task = self._task(request)
-            if task in self._cancelled:
-                del self._cancelled[task]
+            task = self._task(request, data)
+            # A job that comes again is wanted, whatever cancelled it before.
+            if task in self._cancelled and task not in self._skipped:
+                _remember(task, None, self._skipped)
                 self.counts.skipped += 1
-                return Reply(reason="the job was cancelled")
+                return Reply(reason=CANCELLED)
             self.watch.begin(task)
             with self.slot.doing(task, self.agent.cpu_limit_s):
                 answer = self.compute(data)
@@ -219,28 +235,28 @@ class Server:
         elif quiet_s > self.agent.wait_limit_s:
             self.slot.end_process(is_blamed=True)
 
-    def _task(self, request: pb.Request) -> Task:
-        return Task(self.agent.name, request.run, request.epoch, request.number)
+    def _task(self, request: pb.Request, data: bytes) -> Task:
+        name = (request.run, request.epoch, request.number)
+        return Task(self.agent.name, *name, fingerprint(data))
 
     def _checked(self, data: bytes) -> pb.Request:
         """Return the fields that requests of all kinds share.
 
         Raises:
-            MalformedMessage: not the bytes of a request, or one without a run or with
-                a name that is too long.
+            MalformedMessage: see ``_parsed``.
             PluginDiffers: a plug-in that is missing or has another source here.
             RevolveError: an older epoch than the newest one of its run.
         """
         request = _parsed(data)
-        if not request.run:
-            raise MalformedMessage("Request: names no run")
-        newest = self._epochs.get(request.run, 0)
-        if request.epoch < newest:
+        newest = max(self._epochs.pop(request.run, 0), request.epoch)
+        _remember(request.run, newest, self._epochs)
+        coordinator = (request.run, request.epoch)
+        if request.epoch < newest and coordinator not in self._fenced:
+            _remember(coordinator, None, self._fenced)
             raise RevolveError(
                 f"{FENCED}epoch {request.epoch} of run {request.run} is over: "
                 f"epoch {newest} has begun"
             )
-        self._epochs[request.run] = request.epoch
         check_plugins(request.plugins)
         return request
 
@@ -249,9 +265,19 @@ def _parsed(data: bytes) -> pb.Request:
     """Return the fields that requests of all kinds share.
 
     Raises:
-        MalformedMessage: not the bytes of a request, or too long a name, of which this
-            process would keep many.
+        MalformedMessage: not the bytes of a request, no run, or a run's name or an
+            epoch beyond its limit.
     """
     request = parsed(data, pb.Request(), ADVANCE_REQUEST_BYTES)
-    require_most(len(request.run), LONGEST_NAME, "characters of Request.run")
+    if not request.run:
+        raise MalformedMessage("Request: names no run")
+    require_most(len(request.run), MOST_RUN_NAME, "characters of Request.run")
+    require_most(request.epoch, MOST_EPOCH, "as Request.epoch")
     return request
+
+
+def _remember(key: K, value: V, known: dict[K, V]) -> None:
+    """Add an entry to a limited number of them; the oldest is forgotten."""
+    known[key] = value
+    if len(known) > _MOST_REMEMBERED:
+        del known[next(iter(known))]

@@ -167,11 +167,6 @@ def encode_request(
     return message.SerializeToString(deterministic=True)
 
 
-def encode_job_name(run: str, epoch: int, number: int) -> bytes:
-    """Return the bytes of a request that only names a job, to cancel it."""
-    return pb.Request(run=run, epoch=epoch, number=number).SerializeToString()
-
-
 def decode_request(
     data: bytes, read: Callable[[bytes], Robot] = decode_robot
 ) -> Request:

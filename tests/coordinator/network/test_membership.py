@@ -5,67 +5,81 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordinator.dispatch.events import Died, Joined, Left, Progressed
-from coordinator.network.membership import (
-    LONGEST_QUIET_S,
-    MOST_CORES,
-    MOST_SHARDS,
-    MOST_SLOTS,
-    Membership,
-)
+from coordinator.dispatch.faults import PeerFaults
+from coordinator.network.membership import Membership
 from schema.agent.topics import Member
 from schema.errors import MalformedMessage
+from schema.limits import (
+    LONGEST_QUIET_S,
+    MOST_CORES,
+    MOST_MEMBERS,
+    MOST_PEERS,
+    MOST_SHARDS,
+    MOST_SLOTS,
+)
 from schema.wire import revolve_pb2 as pb
 
-WORKER = Member("f", "worker", "w")
+WORKER = Member("f", "worker", "host-0.w")
+NAME = WORKER.name
 
 
 def info(
-    agent: str = "w",
+    agent: str = NAME,
     kind: str = "worker",
     slots: int = 2,
     version: str = "1",
     *,
+    platform: str = "p",
     shards: int = 3,
     cores: int = 4,
     quiet_s: float | None = None,
 ) -> bytes:
     message = pb.AgentInfo(
-        agent=agent, kind=kind, slots=slots, platform="p", version=version,
+        agent=agent, kind=kind, slots=slots, platform=platform, version=version,
         shards=shards, cores=cores, quiet_s=quiet_s,
     )  # fmt: skip
     return message.SerializeToString()
 
 
+def joined(name: str) -> Joined:
+    return Joined(name, "worker", 2, "p", 3, 4)
+
+
 @pytest.fixture
-def membership() -> Membership:
-    membership = Membership("1")
+def faults() -> PeerFaults:
+    return PeerFaults()
+
+
+@pytest.fixture
+def membership(faults: PeerFaults) -> Membership:
+    membership = Membership("1", faults)
     assert membership.appear(WORKER.alive) == WORKER
     return membership
 
 
 def test_agent_joins_with_its_info_and_leaves(membership: Membership) -> None:
-    assert membership.is_stranger("w")
-    assert membership.introduce("w", info()) == [Joined("w", "worker", 2, "p", 3, 4)]
-    assert not membership.is_stranger("w")
+    assert membership.is_stranger(WORKER)
+    assert membership.introduce(WORKER, info()) == [joined(NAME)]
+    assert not membership.is_stranger(WORKER)
     assert membership.appear(WORKER.alive) is None
-    assert membership.vanish(WORKER.alive) == Left("w")
-    assert "w" not in membership.members
+    assert membership.vanish(WORKER.alive) == Left(NAME)
+    assert membership.member(NAME) is None
 
 
 def test_unknown_agent_that_vanishes_gives_no_event(membership: Membership) -> None:
     assert membership.vanish(WORKER.alive) is None
-    assert not membership.is_stranger("w")
+    assert not membership.is_stranger(WORKER)
     # A thawed one stands there again under the same token.
     assert membership.appear(WORKER.alive) == WORKER
-    assert membership.introduce("w", info()) != []
+    assert membership.introduce(WORKER, info()) != []
 
 
 def test_agent_of_another_version_is_refused_until_it_vanishes(
     membership: Membership,
 ) -> None:
-    assert membership.introduce("w", info(version="2")) == []
-    assert membership.refused == {"w": "is of version '2', the coordinator of '1'"}
-    assert not membership.is_stranger("w")
+    assert membership.introduce(WORKER, info(version="2")) == []
+    assert membership.refused == {NAME: "is of version '2', the coordinator of '1'"}
+    assert not membership.is_stranger(WORKER)
     assert membership.vanish(WORKER.alive) is None
     assert membership.refused == {}
 
@@ -73,29 +87,112 @@ def test_agent_of_another_version_is_refused_until_it_vanishes(
 def test_refused_agent_joins_again_only_after_it_vanished(
     membership: Membership,
 ) -> None:
-    assert membership.refuse("w", "too early") is None
-    membership.introduce("w", info())
-    assert membership.refuse("w", "has no plug-in") == Left("w")
-    assert membership.refused == {"w": "has no plug-in"}
-    assert membership.refuse("w", "told twice") is None
-    assert not membership.is_stranger("w")
+    assert membership.refuse(NAME, "too early") is None
+    membership.introduce(WORKER, info())
+    assert membership.refuse(NAME, "has no plug-in") == Left(NAME)
+    assert membership.refused == {NAME: "has no plug-in"}
+    assert membership.refuse(NAME, "told twice") is None
+    assert not membership.is_stranger(WORKER)
     assert membership.vanish(WORKER.alive) is None
-    assert (membership.refused, membership.members) == ({}, {})
+    assert (membership.refused, len(membership)) == ({}, 0)
+
+
+def with_death(member: Member, of: str, cause: str = "SIGSEGV") -> bytes:
+    message = pb.AgentInfo.FromString(info(agent=member.name, kind=member.role))
+    message.deaths.add(agent=of, run="r", epoch=3, number=7, cause=cause)
+    return message.SerializeToString()
+
+
+def successor(member: Member, letter: str) -> Member:
+    return Member("f", member.role, f"host-0.{letter}")
 
 
 def test_each_death_is_reported_once_and_before_the_successor_joins(
     membership: Membership,
 ) -> None:
-    message = pb.AgentInfo.FromString(info())
-    message.deaths.add(agent="v", run="r", epoch=3, number=7, cause="SIGSEGV")
-    joined = Joined("w", "worker", 2, "p", 3, 4)
-    told = membership.introduce("w", message.SerializeToString())
-    assert told == [Died("r", 3, 7, "v", "SIGSEGV"), joined]
+    membership.introduce(WORKER, info())
     membership.vanish(WORKER.alive)
-    membership.appear(WORKER.alive)
-    message.deaths.add(agent="u", run="r", epoch=3, number=7, cause="x" * 999)
-    told = membership.introduce("w", message.SerializeToString())
-    assert told == [Died("r", 3, 7, "u", "x" * 100), joined]
+    second, third = successor(WORKER, "x"), successor(WORKER, "y")
+    for member in (second, third):
+        membership.appear(member.alive)
+    cause = "SIG\x1b[31m" + "x" * 999
+    (died, after) = membership.introduce(second, with_death(second, NAME, cause))
+    assert isinstance(died, Died)
+    assert (died.run, died.epoch, died.number, died.agent) == ("r", 3, 7, NAME)
+    assert len(died.cause) == 100
+    assert died.cause.isprintable()
+    assert after == joined(second.name)
+    assert membership.introduce(third, with_death(third, NAME)) == [joined(third.name)]
+
+
+@pytest.mark.parametrize("state", ["unknown", "alive", "of another slot"])
+def test_a_death_that_did_not_happen_is_dropped(
+    membership: Membership, faults: PeerFaults, state: str
+) -> None:
+    if state != "unknown":
+        membership.introduce(WORKER, info())
+    if state == "of another slot":
+        membership.vanish(WORKER.alive)
+        liar = Member("f", "worker", "host-1.x")
+    else:
+        liar = successor(WORKER, "x")
+    membership.appear(liar.alive)
+    events = membership.introduce(liar, with_death(liar, NAME))
+    assert events == [joined(liar.name)]
+    # An earlier coordinator may have known an unknown one.
+    assert faults.total("death") == (state != "unknown")
+
+
+def test_a_token_counts_only_under_its_own_roles_prefix(membership: Membership) -> None:
+    forged = Member("f", "analyzer", NAME)
+    membership.introduce(WORKER, info())
+    assert membership.appear(forged.alive) == forged
+    assert membership.vanish(forged.alive) is None
+    assert membership.member(NAME) == WORKER
+    membership.appear(forged.alive)
+    with pytest.raises(MalformedMessage, match="another agent's name"):
+        membership.introduce(forged, info(kind="analyzer"))
+    assert membership.vanish(forged.alive) is None
+    assert membership.vanish(WORKER.alive) == Left(NAME)
+
+
+def test_a_forged_token_that_came_first_does_not_keep_the_worker_out(
+    faults: PeerFaults,
+) -> None:
+    membership = Membership("1", faults)
+    membership.appear(Member("f", "analyzer", NAME).alive)
+    assert membership.appear(WORKER.alive) == WORKER
+    assert membership.introduce(WORKER, info()) == [joined(NAME)]
+
+
+def test_agents_that_do_not_answer_make_room_for_others(
+    membership: Membership, faults: PeerFaults
+) -> None:
+    membership.introduce(WORKER, info())
+    for number in range(3 * MOST_MEMBERS):
+        fake = Member("f", "worker", f"fake{number}")
+        assert membership.appear(fake.alive) == fake
+        membership.note_silence(fake)
+    assert len(membership) == MOST_MEMBERS
+    assert faults.total("crowd") == 2 * MOST_MEMBERS + 1
+    assert len(faults.counts) <= MOST_PEERS + 1
+    late = Member("f", "worker", "host-0.late")
+    assert membership.appear(late.alive) == late
+    data = info(agent=late.name)
+    assert membership.introduce(late, data) == [joined(late.name)]
+    assert membership.member(NAME) == WORKER
+
+
+def test_an_agent_that_stops_answering_leaves_and_may_join_again(
+    membership: Membership,
+) -> None:
+    """A token stays while another process declares the same one."""
+    membership.introduce(WORKER, info())
+    assert membership.note_silence(WORKER) == Left(NAME)
+    assert membership.note_silence(WORKER) is None
+    assert membership.silences(WORKER) == 2
+    assert membership.introduce(WORKER, info()) == [joined(NAME)]
+    assert membership.silences(WORKER) == 0
 
 
 @pytest.mark.parametrize(
@@ -111,14 +208,20 @@ def test_each_death_is_reported_once_and_before_the_successor_joins(
         info(shards=MOST_SHARDS + 1),
         info(cores=0),
         info(cores=MOST_CORES + 1),
+        info(slots=2**32 - 1),
+        info(platform="p" * 1000),
+        info(platform="\x1b[2J"),
+        pb.AgentInfo(
+            agent=NAME, kind="worker", slots=1, version="1", deaths=[pb.Death()] * 9
+        ).SerializeToString(),
     ],
 )
 def test_false_info_is_malformed_and_changes_nothing(
     membership: Membership, data: bytes
 ) -> None:
     with pytest.raises(MalformedMessage):
-        membership.introduce("w", data)
-    assert membership.is_stranger("w")
+        membership.introduce(WORKER, data)
+    assert membership.is_stranger(WORKER)
 
 
 @settings(derandomize=True)
@@ -127,9 +230,9 @@ def test_any_bytes_introduce_or_are_malformed(data: bytes) -> None:
     membership = Membership("1")
     membership.appear(WORKER.alive)
     try:
-        membership.introduce("w", data)
+        membership.introduce(WORKER, data)
     except MalformedMessage:
-        assert membership.is_stranger("w")
+        assert membership.is_stranger(WORKER)
 
 
 @pytest.mark.parametrize("key", ["", "revolve/f/w/alive", "revolve/f/x/w/alive"])
@@ -154,11 +257,11 @@ def test_agent_reports_progress_if_its_job_used_cpu_lately(
     membership: Membership, quiet_s: float | None, works: object
 ) -> None:
     data = info(quiet_s=quiet_s)
-    assert membership.progress("w", data) is None
-    membership.introduce("w", info())
-    expected = Progressed("w") if works else None
-    assert membership.progress("w", data) == expected
+    assert membership.progress(WORKER, data) is None
+    membership.introduce(WORKER, info())
+    expected = Progressed(NAME) if works else None
+    assert membership.progress(WORKER, data) == expected
     with pytest.raises(MalformedMessage):
-        membership.progress("w", info(agent="x", quiet_s=0.0))
+        membership.progress(WORKER, info(agent="x", quiet_s=0.0))
     membership.vanish(WORKER.alive)
-    assert membership.progress("w", data) is None
+    assert membership.progress(WORKER, data) is None
