@@ -17,7 +17,7 @@ from analysis.figures.style import PICTURE_ENDING, in_order, label, save
 from analysis.measures.load import LeftOut, Run
 from analysis.render.picture import Simulate
 from schema.errors import RevolveError
-from schema.experiment.file import experiment_from_text
+from schema.experiment.file import own_experiment
 from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
@@ -151,7 +151,7 @@ def _robot_picture(
     return robot_picture(
         best,
         read_table(best.folder, "births"),
-        experiment_from_text(run.document),
+        own_experiment(run.document),
         simulate,
         FOUNDERS,
         origin=Origin(seed=run.seed, run=run.number),

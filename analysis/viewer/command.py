@@ -34,7 +34,8 @@ from analysis.viewer.watch import watch
 from schema.agent.command import add_network_flags, tls_of
 from schema.agent.service import tell_user
 from schema.agent.supervisor import stop_on_signals
-from schema.flags import Flags, number
+from schema.experiment.plugin_access import allow
+from schema.flags import Flags, add_plugins, number
 from schema.robot.ids import BirthId
 from schema.wire.codec import decode_body
 
@@ -58,6 +59,7 @@ def main(arguments: list[str], simulators: Simulators) -> int:
         ViewerError: the viewer cannot be opened, or the flags conflict.
     """
     options = _flags().parse_args(arguments[1:])
+    allow(options.plugins)
     output = Output.of(options.save, options.serve)
     if (options.run is None) == (options.connect is None):
         raise ViewerError("give either a run folder or --connect ADDRESS")
@@ -231,4 +233,5 @@ def _flags() -> Flags:
         "--until", type=number, metavar="S", help="replay poses up to this time [s]"
     )
     add_network_flags(flags)
+    add_plugins(flags)
     return flags

@@ -12,7 +12,7 @@ import pyarrow.compute as pc
 
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment
-from schema.experiment.file import experiment_from_text
+from schema.experiment.file import own_experiment
 from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
 from schema.tables.files import FINISHED, campaign, read_table
@@ -75,7 +75,7 @@ def read_experiment(folder: Path) -> Experiment:
         RunFolderError: the folder has no run.
         ExperimentError: its document has another version.
     """
-    return experiment_from_text(_details(folder)["document"])
+    return own_experiment(_details(folder)["document"])
 
 
 def read_origin(folder: Path) -> Origin:

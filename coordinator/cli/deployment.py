@@ -18,6 +18,7 @@ from schema.agent.service import tell_user
 from schema.agent.supervision import CPU_LIMIT_S, ProcessSlot
 from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name
+from schema.experiment.plugin_access import allowed
 
 ADDRESS = "address"
 """File of a run or campaign folder that holds the hub's address while it runs."""
@@ -101,7 +102,7 @@ def connected_agents(
             agent = Agent(
                 kind, f"own-{kind}", network.address, deployment.fleet,
                 tls=deployment.tls, threads=deployment.threads,
-                cpu_limit_s=deployment.cpu_limit_s,
+                cpu_limit_s=deployment.cpu_limit_s, plugins=allowed(),
             )  # fmt: skip
             pool = ProcessPool(deployment.bodies[kind], (agent,), size=size)
             pools.append(stack.enter_context(pool))

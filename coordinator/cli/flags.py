@@ -5,7 +5,14 @@ import argparse
 from coordinator.storage.campaign import shipped_campaigns
 from schema.agent.command import add_cpu_limit, add_network_flags
 from schema.experiment.file import shipped_experiments
-from schema.flags import Flags, add_count, positive_number, share, whole_number
+from schema.flags import (
+    Flags,
+    add_count,
+    add_plugins,
+    positive_number,
+    share,
+    whole_number,
+)
 
 LISTEN = "tcp/127.0.0.1:7447"
 """Default address of ``revolve coordinator``."""
@@ -141,6 +148,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         "--view", action="store_true", help="open a viewer, as revolve view does"
     )
     add_cpu_limit(flags)
+    add_plugins(flags)
     flags.add_argument(
         "--audit",
         type=share,

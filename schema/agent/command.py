@@ -17,7 +17,8 @@ from schema.agent.supervision import CPU_LIMIT_S, Death, ProcessSlot
 from schema.agent.supervisor import ProcessPool, stop_on_signals, stop_with_input
 from schema.agent.topics import Role, check_name
 from schema.errors import NetworkError, RevolveError
-from schema.flags import Flags, positive_number, whole_number
+from schema.experiment.plugin_access import allow, allowed
+from schema.flags import Flags, add_plugins, positive_number, whole_number
 
 _POLL_S = 0.5
 
@@ -90,6 +91,7 @@ def run_pool(
     flags = _flags(role, processes)
     options = flags.parse_args(arguments)
     try:
+        allow(options.plugins)
         agent = Agent(
             role,
             check_name(options.name, "--name"),
@@ -98,6 +100,7 @@ def run_pool(
             tls=tls_of(options),
             threads=options.threads,
             cpu_limit_s=options.cpu_limit,
+            plugins=allowed(),
         )
         client_config(agent.connect, agent.tls)
     except RevolveError as error:
@@ -160,6 +163,7 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
         help="stop when standard input is closed, too",
     )
     add_cpu_limit(flags)
+    add_plugins(flags)
     flags.set_defaults(threads=1)
     if role == "worker":
         flags.add_argument(

@@ -62,6 +62,7 @@ class Agent:
         version: of Revolve Islands.
         threads: that advance one arena together.
         cpu_limit_s: CPU time limit of a job [s].
+        plugins: modules and files that it may import, for ``plugin_access.allow``.
     """
 
     role: Role
@@ -74,6 +75,7 @@ class Agent:
     version: str = ""
     threads: int = 1
     cpu_limit_s: float = CPU_LIMIT_S
+    plugins: tuple[str, ...] = ()
 
 
 def parse_address(address: str) -> tuple[str, str, int]:

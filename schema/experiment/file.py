@@ -12,8 +12,9 @@ from msgspec import Struct
 
 from schema.errors import ExperimentError, nearest
 from schema.experiment.check import check_experiment
-from schema.experiment.document import Experiment
+from schema.experiment.document import Experiment, references
 from schema.experiment.environment import is_mjcf
+from schema.experiment.plugin_access import allow_references
 
 
 def read_experiment(source: str) -> Experiment:
@@ -61,11 +62,13 @@ def shipped_experiments() -> list[str]:
 
 
 def parse_experiment(text: str, where: str) -> Experiment:
-    """Return the experiment of a TOML text.
+    """Return the experiment of a TOML text of the user.
+
+    The modules that it names may be imported by this process from now on.
 
     Args:
         text: the document.
-        where: its path, for messages and for relative paths of scenery.
+        where: its path, for messages, and for relative paths of scenery and plug-ins.
 
     Raises:
         ExperimentError: not TOML; an unknown key (the nearest is named); a value of a
@@ -82,7 +85,21 @@ def parse_experiment(text: str, where: str) -> Experiment:
         experiment = msgspec.convert(document, type=Experiment)
     except msgspec.ValidationError as error:
         raise ExperimentError(f"{where}: {_explain(error, document)}") from None
+    allow_references(references(experiment), Path(where).parent)
     check_experiment(experiment, where)
+    return experiment
+
+
+def own_experiment(text: str) -> Experiment:
+    """Return the experiment of a run folder that the user named on the command line.
+
+    Installed modules that it names may be imported by this process from now on.
+
+    Raises:
+        ExperimentError: not a text of ``experiment_text``.
+    """
+    experiment = experiment_from_text(text)
+    allow_references(references(experiment))
     return experiment
 
 

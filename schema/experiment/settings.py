@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TypeVar, cast
+from typing import TypeVar
 
 import msgspec
 
@@ -17,7 +17,7 @@ from schema.experiment.document import (
 )
 from schema.experiment.environment import FLAT, Environment
 from schema.experiment.identity import Origin
-from schema.experiment.plugin import load
+from schema.experiment.plugin import load_function
 from schema.experiment.section import Section
 
 T = TypeVar("T")
@@ -163,12 +163,7 @@ def fitness_function(fitness: Fitness) -> Callable[..., float]:
     """Return the fitness function that an experiment names.
 
     Raises:
-        UnknownPlugin: no such module or attribute.
-        ExperimentError: not a function.
+        UnknownPlugin: no such module or attribute, or a module that is not allowed.
+        ExperimentError: not a function of a track and a fitness section.
     """
-    function = load(fitness.function, "fitness.function")
-    if not callable(function):
-        raise ExperimentError(
-            f"fitness.function: {fitness.function!r} is not a function"
-        )
-    return cast("Callable[..., float]", function)
+    return load_function(fitness.function, "fitness.function", 2)

@@ -150,8 +150,12 @@ def test_workers_with_a_missing_or_different_plug_in_are_refused(
     nowhere.mkdir()
     fleet.join("judge", "analyzer")
     lines: list[str] = []
-    for name, folder in (("without", nowhere), ("another", elsewhere)):
-        fleet.join(name, "worker", folder=folder)
+    allows = ("--plugins", "plugged.py")
+    for name, folder, flags in (
+        ("without", nowhere, ()),
+        ("another", elsewhere, allows),
+    ):
+        fleet.join(name, "worker", *flags, folder=folder)
         lines.append("")
         while "refused" not in lines[-1]:
             lines.append(fleet.coordinator.stderr.readline())
@@ -159,7 +163,9 @@ def test_workers_with_a_missing_or_different_plug_in_are_refused(
         assert f"refused: {name}-0." in lines[-1]
     assert "has no plug-in 'plugged'" in "".join(lines)
     assert "its plug-in 'plugged' differs from the coordinator's" in lines[-1]
-    fleet.join("good")
+    log = fleet.agents["without"].stderr
+    assert "refused a run: has no plug-in 'plugged' among" in log.readline()
+    fleet.join("good", "worker", *allows)
     fleet.finish()
     assert compare(workspace.folder / "calm", fleet.folder) == []
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from schema.agent.network import FENCED, UNFIT, Agent
 from schema.agent.request_handler import MOST_SOURCES, FairQueue, Reply, Server
 from schema.agent.supervision import Death, ProcessSlot, Task
-from schema.errors import InvalidRobot, UnknownPlugin
+from schema.errors import InvalidRobot, PluginDiffers, UnknownPlugin
+from schema.experiment.plugin_access import allow
 from schema.experiment.plugin_source import check_plugins, plugins_of
 from schema.wire import revolve_pb2 as pb
 
@@ -78,7 +79,8 @@ def test_error_is_the_reason_of_the_reply(error: Exception, reason: str) -> None
 
 def test_agent_without_a_plugin_is_unfit() -> None:
     reply = server().reply(request(plugins="nowhere_to_be_found=abc"))
-    assert reply.reason == f"{UNFIT}has no plug-in 'nowhere_to_be_found'"
+    assert reply.reason.startswith(f"{UNFIT}has no plug-in 'nowhere_to_be_found' among")
+    assert reply.reason.endswith("add --plugins nowhere_to_be_found")
 
 
 @settings(derandomize=True, deadline=None)
@@ -113,6 +115,9 @@ def test_plugins_are_identified_by_their_source(
     one, two = wanted.split()
     assert one.startswith("plugged_one=")
     assert two.startswith("plugged_two=")
+    with pytest.raises(PluginDiffers, match="has no plug-in 'plugged_two' among"):
+        check_plugins(two)
+    allow(["plugged_one", "plugged_two"])
     check_plugins(wanted)
     reply = server().reply(request(plugins=f"plugged_one=0 {two}"))
     digest = one.partition("=")[2]
