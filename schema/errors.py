@@ -77,6 +77,11 @@ def shown(value: object) -> str:
     except ValueError:
         # Python writes no integer of more than 4300 digits.
         return f"a {type(value).__name__} that is too long to show"
+    return cut(text)
+
+
+def cut(text: str) -> str:
+    """Return a text for a message, cut if it is long."""
     return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
 
 

@@ -15,10 +15,11 @@ from schema.experiment.document import (
     Space,
     Vetting,
 )
-from schema.experiment.environment import FLAT, Environment
+from schema.experiment.environment import FLAT, Environment, ground_problem
 from schema.experiment.identity import Origin
 from schema.experiment.plugin import load_function
 from schema.experiment.section import Section
+from schema.limits import MOST_SETTINGS_BYTES
 
 T = TypeVar("T")
 
@@ -127,10 +128,20 @@ def read_evaluation_settings(settings: bytes) -> EvaluationSettings:
 
 
 def _from_json(settings: bytes, kind: type[T]) -> T:
+    """Return settings; what an experiment may not have is refused here, too."""
+    where = "settings of a request"
+    if len(settings) > MOST_SETTINGS_BYTES:
+        raise ExperimentError(
+            f"{where}: must have <= {MOST_SETTINGS_BYTES} bytes, got {len(settings)}"
+        )
     try:
-        return msgspec.json.decode(settings, type=kind)
-    except msgspec.MsgspecError as error:
-        raise ExperimentError(f"settings of a request: {error}") from None
+        found = msgspec.json.decode(settings, type=kind)
+    except (msgspec.MsgspecError, RecursionError) as error:
+        raise ExperimentError(f"{where}: {error}") from None
+    environment = getattr(found, "environment", FLAT)
+    if problem := ground_problem(environment):
+        raise ExperimentError(f"{where}: {problem}")
+    return found
 
 
 def lasting(settings: EvaluationSettings, steps: int) -> EvaluationSettings:

@@ -8,6 +8,7 @@ read. RoboGen's text (.txt) and JSON (.json) are read, not written.
 from pathlib import Path
 
 from schema.errors import InvalidRobot, MalformedMessage
+from schema.experiment.bounded import read_bytes
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.formats.robogen_json import robot_from_robogen_json
@@ -16,7 +17,7 @@ from schema.formats.yaml import Reader, robot_to_yaml
 from schema.formats.yaml_2016 import RevolveReader, is_of_revolve
 from schema.formats.yaml_node import compose
 from schema.parts import BUILT_IN, BodySpace
-from schema.robot.robot import Robot, check_robot
+from schema.robot.robot import Robot, check_number, check_robot
 from schema.wire.codec import decode_robot, encode_robot
 
 
@@ -84,7 +85,7 @@ def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
         _check(robot, space, path)
         return robot
     try:
-        data = path.read_bytes()
+        data = read_bytes(path)
         text = data.decode() if ending in _TEXTS else ""
     except OSError as error:
         raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
@@ -141,6 +142,7 @@ def write_robot(
 
 def _check(robot: Robot, space: BodySpace, path: Path) -> None:
     try:
+        check_number(robot)
         check_robot(robot, space)
     except InvalidRobot as error:
         raise InvalidRobot(f"{path}: {error}") from None
