@@ -11,12 +11,14 @@ MOST_SETTINGS_BYTES = 4_000_000
 """Size of the settings in a request: they hold the scenery of an island as JSON."""
 MOST_NODES = 100_000
 """Values in a YAML document, elements in an XML one."""
-MOST_XML_ATTRIBUTES = 400_000
+MOST_XML_ATTRIBUTES = 200_000
 """Attributes in an XML document."""
 MOST_DEPTH = 400
 """Levels of nesting in YAML and XML."""
 MOST_BRACKETS = 20_000
 """Opening square brackets, of tables and lists, in TOML."""
+MOST_DIGITS = 1000
+"""Digits of a number in TOML."""
 MOST_KEY_PARTS = 16
 """Parts of a dotted key in TOML; ``tomllib`` takes quadratic memory for them."""
 MOST_PARTS = 1000

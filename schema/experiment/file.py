@@ -19,6 +19,7 @@ from schema.experiment.environment import is_mjcf
 from schema.experiment.plugin_access import allow_references
 from schema.limits import (
     MOST_BRACKETS,
+    MOST_DIGITS,
     MOST_ISLAND_TABLES,
     MOST_ISLANDS,
     MOST_KEY_PARTS,
@@ -27,6 +28,7 @@ from schema.limits import (
 
 # ``tomllib`` stores all beginnings of a dotted key. Possessive: without backtracking.
 _KEY_PART = r"""(?:[\w-]++|"(?:[^"\\\n]++|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_LONG_NUMBER = re.compile(rf"(?<!\w)[0-9][0-9A-Fa-f_xob]{{{MOST_DIGITS}}}")
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:{_KEY_PART}){{{MOST_KEY_PARTS}}}")
 
 
@@ -131,6 +133,8 @@ def _parse_toml(text: str, where: str) -> dict[str, Any]:
         )
     if _LONG_KEY.search(text):
         raise ExperimentError(f"{where}: a key must have <= {MOST_KEY_PARTS} parts")
+    if _LONG_NUMBER.search(text):
+        raise ExperimentError(f"{where}: a number must have <= {MOST_DIGITS} digits")
     try:
         return tomllib.loads(text)
     except RecursionError:

@@ -5,6 +5,7 @@ limits is not parsed to its end. Aliases are refused: no document contains itsel
 """
 
 from collections.abc import Iterator
+from typing import cast
 
 import yaml
 
@@ -53,15 +54,20 @@ class _Composer:
         if isinstance(event, yaml.AliasEvent):
             raise _refusal("aliases are not allowed", event)
         if isinstance(event, yaml.ScalarEvent):
-            return yaml.ScalarNode("", event.value, event.start_mark)
+            return yaml.ScalarNode("", event.value, _mark(event))
         items = []
         while not isinstance(inner := next(self._events), yaml.CollectionEndEvent):
             items.append(self._node(inner, depth + 1))
         if isinstance(event, yaml.SequenceStartEvent):
-            return yaml.SequenceNode("", items, event.start_mark)
+            return yaml.SequenceNode("", items, _mark(event))
         pairs = list(zip(items[::2], items[1::2], strict=True))
-        return yaml.MappingNode("", pairs, event.start_mark)
+        return yaml.MappingNode("", pairs, _mark(event))
+
+
+def _mark(event: yaml.Event) -> yaml.error.Mark | None:
+    # The types know only the marks of the parser in Python.
+    return cast("yaml.error.Mark | None", event.start_mark)
 
 
 def _refusal(problem: str, event: yaml.Event) -> yaml.YAMLError:
-    return yaml.composer.ComposerError(None, None, problem, event.start_mark)
+    return yaml.composer.ComposerError(None, None, problem, _mark(event))
