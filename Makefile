@@ -92,6 +92,6 @@ $(STAMP): pyproject.toml constraints.txt
 	@echo 'Making $(VENV): about 1.7 GB on disk, a minute or two ...'
 	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check \
-		-c constraints.txt -e '.[view,analysis,dev]'
+		-c constraints.txt -e '.[view,analysis,cluster,dev]'
 	@echo '$(VENV) is ready.'
 	@touch $@

@@ -16,6 +16,7 @@ from schema.formats.robogen_text import robot_from_robogen_text
 from schema.formats.yaml import Reader, robot_to_yaml
 from schema.formats.yaml_2016 import RevolveReader, is_of_revolve
 from schema.formats.yaml_node import compose
+from schema.limits import MOST_TEXT_BYTES
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot.robot import Robot, check_number, check_robot
 from schema.wire.codec import decode_robot, encode_robot
@@ -77,28 +78,47 @@ def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
         MalformedMessage: a .pb file that does not hold a robot.
     """
     ending = _ending(path, _READ)
+    if ending in _TEXTS:
+        return _TEXTS[ending](read_text(path), str(path), space)
     if ending == MJCF_ENDING:
         # MuJoCo is imported only if needed: it is slow to load.
         from schema.formats.mjcf import read_mjcf  # noqa: PLC0415
 
         robot, _ = read_mjcf(path)
-        _check(robot, space, path)
-        return robot
+    else:
+        try:
+            robot = decode_robot(_read(path))
+        except MalformedMessage as error:
+            raise MalformedMessage(f"{path}: {error}") from None
     try:
-        data = read_bytes(path)
-        text = data.decode() if ending in _TEXTS else ""
-    except OSError as error:
-        raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
+        check_number(robot)
+        check_robot(robot, space)
+    except InvalidRobot as error:
+        raise InvalidRobot(f"{path}: {error}") from None
+    return robot
+
+
+def read_text(path: Path, most: int = MOST_TEXT_BYTES) -> str:
+    """Return the text of a file.
+
+    Args:
+        path: of the file.
+        most: greatest allowed size [bytes].
+
+    Raises:
+        InvalidRobot: a file that cannot be read, is larger, or is not UTF-8.
+    """
+    try:
+        return _read(path, most).decode()
     except UnicodeDecodeError as error:
         raise InvalidRobot(f"{path}: not UTF-8 text (byte {error.start})") from None
-    if ending in _TEXTS:
-        return _TEXTS[ending](text, str(path), space)
+
+
+def _read(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
     try:
-        robot = decode_robot(data)
-    except MalformedMessage as error:
-        raise MalformedMessage(f"{path}: {error}") from None
-    _check(robot, space, path)
-    return robot
+        return read_bytes(path, most)
+    except OSError as error:
+        raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
 
 
 def write_robot(
@@ -138,14 +158,6 @@ def write_robot(
         path.write_bytes(data)
     except OSError as error:
         raise InvalidRobot(f"{path}: cannot be written: {error.strerror}") from None
-
-
-def _check(robot: Robot, space: BodySpace, path: Path) -> None:
-    try:
-        check_number(robot)
-        check_robot(robot, space)
-    except InvalidRobot as error:
-        raise InvalidRobot(f"{path}: {error}") from None
 
 
 def _ending(path: Path, endings: tuple[str, ...]) -> str:

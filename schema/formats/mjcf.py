@@ -23,12 +23,13 @@ from schema.errors import (
     one_line,
     shown,
 )
-from schema.experiment.bounded import parse_xml, read_bytes
+from schema.experiment.bounded import parse_xml
 from schema.experiment.document import body_space
 from schema.experiment.environment import MOST_PATCHES
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
+from schema.formats.files import read_text
 from schema.limits import MOST_MJCF_BYTES, MOST_OTHERS
-from schema.mjcf.model import solo_model, solo_spec
+from schema.mjcf.model import solo_spec
 from schema.robot.robot import Robot, check_number, check_robot
 from schema.wire.codec import decode_robot, encode_robot
 
@@ -102,7 +103,9 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
         space = body_space(settings.space)
         check_number(robot)
         check_robot(robot, space)
-        built = solo_model(robot, space, settings.simulation, settings.environment)
+        built = solo_spec(
+            robot, space, settings.simulation, settings.environment
+        ).compile()
     except (MalformedMessage, ExperimentError, InvalidRobot, ValueError) as error:
         raise InvalidRobot(f"{where}: {one_line(error)}") from None
     _check_counts(root, built, where)
@@ -175,13 +178,7 @@ def read_mjcf(path: Path) -> tuple[Robot, EvaluationSettings]:
     Raises:
         InvalidRobot: as ``robot_from_mjcf``, or the file cannot be read.
     """
-    try:
-        text = read_bytes(path, MOST_MJCF_BYTES).decode()
-        return robot_from_mjcf(text, str(path))
-    except OSError as error:
-        raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise InvalidRobot(f"{path}: not UTF-8 text (byte {error.start})") from None
+    return robot_from_mjcf(read_text(path, MOST_MJCF_BYTES), str(path))
 
 
 def _bytes(held: dict[str, str], name: str) -> bytes:

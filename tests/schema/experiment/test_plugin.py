@@ -103,6 +103,17 @@ def test_request_names_a_module_that_nobody_allowed(path: str) -> None:
         body_space(read_vetting_settings(bodies).space)
 
 
+def test_settings_of_a_request_are_within_the_limits_of_an_experiment() -> None:
+    settings = evaluation_settings(read_experiment("scenario1"))
+    ground = b'"roughness_m":0.1,"patch_m":1e-9'
+    rough = settings.replace(b'"roughness_m":0.0,"patch_m":0.1', ground)
+    assert rough != settings
+    with pytest.raises(ExperimentError, match=r"of a request: .*patch_m: must"):
+        read_evaluation_settings(rough)
+    with pytest.raises(ExperimentError, match="must have <= 4000000 bytes"):
+        read_evaluation_settings(settings + b" " * 4_000_000)
+
+
 def test_module_that_is_not_allowed_is_not_imported(folder: Path) -> None:
     (folder / "parent_pkg").mkdir()
     mark = "open(__file__ + '.ran', 'w').close()\n"

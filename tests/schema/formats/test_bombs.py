@@ -225,6 +225,13 @@ BOMBS: dict[str, tuple[Callable[[], str], str]] = {
         lambda: scenery("<body>" * 200 + GEOM + "</body>" * 200),
         "<= 100 levels",
     ),
+    "ground.toml": (
+        lambda: (
+            "name = 'x'\n[environment]\nroughness_m = 1.0\n"
+            "extent_m = 1e300\npatch_m = 1e-300"
+        ),
+        "patch_m: must be >=",
+    ),
     "user.toml": (
         lambda: scenery(f'<geom size="1" user="{"1 " * 400_000}"/>'),
         "user=...> is not allowed",
