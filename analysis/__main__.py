@@ -2,7 +2,8 @@
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,20 @@ from schema.flags import Flags, add_plugins, whole_number
 
 class MissingExtra(RevolveError):  # noqa: N818 - names what is missing
     """A library that only analysis needs is not installed."""
+
+
+@contextmanager
+def _extra(what: str, extra: str) -> Iterator[None]:
+    """Name the extra of the package with a library that cannot be imported.
+
+    Raises:
+        MissingExtra: a library is not installed.
+    """
+    try:
+        yield
+    except ImportError as error:
+        install = f"pip install 'revolve-islands[{extra}]'"
+        raise MissingExtra(f"{what} {error.name}: {install}") from None
 
 
 def main(arguments: list[str]) -> int:
@@ -37,12 +52,8 @@ def main(arguments: list[str]) -> int:
         return _view(arguments)
     options = _flags().parse_args(arguments[1:])
     allow(options.plugins)
-    try:
+    with _extra("analysis needs", "analysis"):
         from analysis.analyze_command import analyze
-    except ImportError as error:
-        raise MissingExtra(
-            f"analysis needs {error.name}: pip install 'revolve-islands[analysis]'"
-        ) from None
     return analyze(options, arguments, _simulation)
 
 
@@ -88,27 +99,19 @@ def _simulation() -> Callable[..., Any]:
         MissingExtra: a library for rendering is not installed.
         NoPictures: this machine cannot render.
     """
-    try:
+    with _extra("pictures need", "view"):
         from analysis.render.picture import choose_engine
 
         # Before MuJoCo is imported.
         choose_engine()
         from worker.robot.evaluation import simulate
-    except ImportError as error:
-        raise MissingExtra(
-            f"pictures need {error.name}: pip install 'revolve-islands[view]'"
-        ) from None
     return simulate
 
 
 def _view(arguments: list[str]) -> int:
     """Show a run; robots are re-simulated by the worker from the run's journal."""
-    try:
+    with _extra("the viewer needs", "view"):
         from analysis.viewer.command import main as view
-    except ImportError as error:
-        raise MissingExtra(
-            f"the viewer needs {error.name}: pip install 'revolve-islands[view]'"
-        ) from None
     from analysis.viewer.resimulate import Simulators
     from coordinator.run.history import arena_history
     from worker.arena.replay import alone, together

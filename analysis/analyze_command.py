@@ -17,12 +17,13 @@ from analysis.comparison.comparison import Outcomes, comparison, findings
 from analysis.comparison.progression import progression
 from analysis.figures.catalogue import DrawnFigure
 from analysis.figures.figure_writer import draw_figures
-from analysis.figures.report import Provenance, report
+from analysis.figures.report import report
 from analysis.measures.benchmarks import read_benchmarks
 from analysis.measures.distinct_names import with_distinct_names
 from analysis.measures.load import LeftOut, Run, read_runs
 from analysis.measures.outputs import OUTPUTS, schema
 from analysis.measures.study import concatenated, measure_runs
+from analysis.measures.trees import SlotRule
 from analysis.progress import bars
 from analysis.render.picture import Simulate
 from analysis.summary import show
@@ -82,7 +83,8 @@ def analyze(
             (options.out / MEASURES / f"{name}.parquet").unlink(missing_ok=True)
     for name, table in tables.items():
         pq.write_table(table, options.out / MEASURES / f"{name}.parquet")
-    page = report(tables, drawn, _provenance(words))
+    command = shlex.join(["revolve", *words])
+    page = report(tables, drawn, command, datetime.now(UTC), _versions())
     (options.out / REPORT).write_text(page, encoding="utf-8")
     show(tables, Console())
     print(f"{options.out / MEASURES}: {len(tables)} tables, {', '.join(tables)}")
@@ -95,13 +97,9 @@ def _measured(
     runs: list[Run], options: argparse.Namespace, bar: Progress
 ) -> tuple[dict[str, pa.Table], list[LeftOut]]:
     """Return the tables of all runs, and what was left out."""
-    task = bar.add_task("measuring runs", total=len(runs))
-    measured = measure_runs(
-        runs,
-        slots="own" if options.slots == "own" else "parent",
-        processes=options.processes,
-        on_measured=lambda: bar.advance(task),
-    )
+    slots: SlotRule = "own" if options.slots == "own" else "parent"
+    measuring = measure_runs(runs, slots=slots, processes=options.processes)
+    measured = list(bar.track(measuring, len(runs), description="measuring runs"))
     comparing = bar.add_task("comparing experiments", total=None)
     empty = {name: schema(name).empty_table() for name in _ALWAYS}
     tables = {**empty, **concatenated(measured)}
@@ -122,12 +120,12 @@ def _listed(figures: Sequence[DrawnFigure]) -> str:
     return f"figures {numbers} as PDF and PNG"
 
 
-def _provenance(words: Sequence[str]) -> Provenance:
+def _versions() -> dict[str, str]:
+    """Return the versions of the software."""
     versions = {"python": platform.python_version(), "system": platform.platform()}
     for name in _LIBRARIES:
         try:
             versions[name] = version(name)
         except PackageNotFoundError:
             versions[name] = "not installed as a package"
-    now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    return Provenance(shlex.join(["revolve", *words]), now, versions)
+    return versions

@@ -35,8 +35,10 @@ def show(tables: dict[str, pa.Table], console: Console) -> None:
     if findings := _findings(tables["findings"]):
         heads = ("figure", "finding of the thesis", "a", "b", "q", "verdict")
         _print_table(console, heads, findings, words={1, 5})
-    for name, differs in _renamed(tables["runs"]).items():
-        print_line(console, f"{name}: {differs}")
+    renamed = tables["runs"].filter(pc.field("differs") != "")
+    keys = ["experiment", "differs"]
+    for row in renamed.group_by(keys, use_threads=False).aggregate([]).to_pylist():
+        print_line(console, f"{row['experiment']}: {row['differs']}")
     for row in tables["left_out"].to_pylist():
         folder = f"{row['folder']}: " if row["folder"] else ""
         print_line(console, f"left out: {folder}{row['what']}: {row['why']}")
@@ -106,9 +108,3 @@ def _findings(findings: pa.Table) -> list[tuple[str, ...]]:
         )
         for row in compared.to_pylist()
     ]
-
-
-def _renamed(runs: pa.Table) -> dict[str, str]:
-    """Return renamed experiments and their differing settings."""
-    rows = runs.filter(pc.not_equal(runs["differs"], "")).to_pylist()
-    return {row["experiment"]: row["differs"] for row in rows}

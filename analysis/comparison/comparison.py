@@ -7,7 +7,7 @@ their founders; treating them as independent, as is done here, is conservative.
 import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import pyarrow as pa
@@ -30,7 +30,7 @@ SURE = 0.05
 NEGLIGIBLE, LARGE = 0.147, 0.474
 """Bounds of Cliff's delta. Source: Romano et al., 2006, after Cohen's d."""
 
-Row = dict[str, object]
+Row = dict[str, Any]
 
 
 class RunOutcomes(Protocol):
@@ -68,18 +68,15 @@ class Outcomes:
 
     def at(self, experiment: str, births: int) -> list[dict[str, float]]:
         """Return each run's outcomes at a number of births, in the runs' order."""
-        key = (experiment, births)
+        key, runs = (experiment, births), self._runs[experiment]
         if key not in self._known:
-            self._known[key] = [
-                outcome(one.tables, births) for one in self._runs[experiment]
-            ]
+            self._known[key] = [outcome(one.tables, births) for one in runs]
         return self._known[key]
 
     def values(self, experiment: str, measure: str, births: int) -> Numbers:
         """Return the runs' values of a measure; runs without a value are skipped."""
-        found = np.array(
-            [run.get(measure, math.nan) for run in self.at(experiment, births)]
-        )
+        runs = self.at(experiment, births)
+        found = np.array([run.get(measure, math.nan) for run in runs])
         known: Numbers = found[~np.isnan(found)]
         return known
 
@@ -206,24 +203,24 @@ def _corrected(rows: list[Row]) -> list[Row]:
     return rows
 
 
-def verdict(expected: str, row: Mapping[str, object]) -> tuple[str, str]:
+def verdict(expected: str, row: Mapping[str, Any]) -> tuple[str, str]:
     """Return whether a finding is reproduced, and the rule of the verdict.
 
     Args:
         expected: ">" or "<" for the side of a, "=" for no large difference.
         row: ``effect``, ``q`` and, for two experiments, the effect's interval.
     """
-    effect, q = float(str(row["effect"])), float(str(row["q"]))
-    low, high = (row.get(f"effect_{end}") for end in ("low", "high"))
-    ends = None if low is None else (float(str(low)), float(str(high)))
+    effect, q = row["effect"], row["q"]
+    # Unknown ends are as far apart as possible.
+    ends = row.get("effect_low", -1.0), row.get("effect_high", 1.0)
     if expected == "=":
-        return _alike(effect, q, ends or (-1.0, 1.0))
+        return _alike(effect, q, ends)
     sign = 1 if expected == ">" else -1
     if q < SURE:
         if effect * sign > 0:
             return "reproduced", f"q < {SURE}, and the effect is as expected"
         return "not reproduced", f"q < {SURE}, and the effect has the opposite sign"
-    if ends is not None and max(sign * end for end in ends) < NEGLIGIBLE:
+    if max(sign * end for end in ends) < NEGLIGIBLE:
         why = f"at most negligible as expected: the interval ends below {NEGLIGIBLE}"
         return "not reproduced", why
     return "undecided", f"q >= {SURE}: no significant difference"

@@ -5,10 +5,11 @@ from collections.abc import Mapping
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from analysis.comparison.statistics import ranks
-from analysis.measures.outputs import BODY, POPULATION
-from analysis.measures.population_table import Booleans, Numbers
+from analysis.measures.outputs import POPULATION
+from analysis.measures.population_table import Numbers
 
 FOUNDERS = 15
 """Number of founders in the thesis's experiments."""
@@ -77,42 +78,31 @@ def _share(values: Numbers, counts: Numbers, middle: float, *, is_late: bool) ->
 def _of_robots(
     robots: pa.Table, last: dict[str, float], births: int
 ) -> dict[str, float]:
-    is_born = np.asarray(robots["birth"], np.int64) < births
-    found = _changes(robots, last, is_born)
+    born = robots.filter(pc.field("birth") < births)
+    random = born.filter(pc.field("ancestors") == 0)
+    found = {}
+    for name in ("parts", "touch_sensors", "hidden"):
+        change = last.get(name, math.nan) - _mean(_column(random, name))
+        found[f"{name}_change"] = change
     for name in ("extremities", "extremities_per_part"):
-        values, fitness = (_column(robots, key)[is_born] for key in (name, "fitness"))
-        found[f"{name}_fitness"] = _correlation(values, fitness)
+        correlation = _correlation(_column(born, name), _column(born, "fitness"))
+        found[f"{name}_fitness"] = correlation
     return found
-
-
-def _changes(
-    robots: pa.Table, last: dict[str, float], is_born: Booleans
-) -> dict[str, float]:
-    """Return the differences of the last population and robots without parents."""
-    is_random = is_born & (_column(robots, "ancestors") == 0)
-    return {
-        f"{name}_change": last.get(name, math.nan)
-        - _mean(_column(robots, name)[is_random])
-        for name in BODY
-        if name in {"parts", "touch_sensors", "hidden"}
-    }
 
 
 def _of_arena(tables: Mapping[str, pa.Table], births: int) -> dict[str, float]:
     found = dict.fromkeys(("variability", "touched", "between"), math.nan)
     if "variability" in tables:
-        table = tables["variability"]
-        values = _column(table, "variability")
-        values = values[np.asarray(table["birth"], np.int64) < births]
+        born = tables["variability"].filter(pc.field("birth") < births)
+        values = _column(born, "variability")
         values = values[~np.isnan(values)]
         found["variability"] = float(np.median(values)) if len(values) else math.nan
     if "interactions" in tables:
         found["touched"] = _mean(_column(tables["interactions"], "touched"))
     if "between" in tables:
-        table = tables["between"]
-        values = _column(table, "between")
-        values = values[np.asarray(table["births"], np.int64) <= births]
-        found["between"] = float(values[-1]) if len(values) else math.nan
+        until = tables["between"].filter(pc.field("births") <= births)
+        if until.num_rows:
+            found["between"] = float(_column(until, "between")[-1])
     return found
 
 

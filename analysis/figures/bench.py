@@ -29,8 +29,7 @@ def arena_speed(tables: Tables) -> p9.ggplot:
     line = np.linspace(sizes.min(), max(sizes.max(), sizes.min() + 1), 100)
     a, b, c = _THESIS
     fit = pa.table({"population": line, "factor": a + b / line + c / line**2})
-    named = fit.append_column("of", pa.repeat(pa.scalar(_THEIRS), fit.num_rows))
-    dashes = p9.geom_line(data=named.to_pandas(), size=0.7)
+    dashes = p9.geom_line(data=fit.to_pandas().assign(of=_THEIRS), size=0.7)
     return _speed(rows) + dashes
 
 
@@ -62,14 +61,9 @@ def _rows(tables: Tables, kind: str) -> pa.Table:
 
 def _speed(rows: pa.Table) -> p9.ggplot:
     means = rows.group_by("population").aggregate([("factor", "mean")])
-    named = means.rename_columns(["population", "factor"]).append_column(
-        "of", pa.repeat(pa.scalar(_OURS), means.num_rows)
-    )
+    line = means.rename_columns(["population", "factor"]).to_pandas().assign(of=_OURS)
     return (
-        p9.ggplot(
-            named.to_pandas(),
-            p9.aes("population", "factor", colour="of", linetype="of"),
-        )
+        p9.ggplot(line, p9.aes("population", "factor", colour="of", linetype="of"))
         + p9.geom_hline(yintercept=1.0, colour="#999999", size=0.5)
         + p9.geom_line(size=0.9)
         + p9.geom_point(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.figures.bench import arena_speed, spider_speed
-from analysis.figures.forms import Panel, Tables, over_births, over_runs
+from analysis.figures.forms import Panels, Tables, over_births, over_runs
 from analysis.figures.islands import between, fitness_by_island, migration_graph
 from analysis.figures.robots import (
     effects,
@@ -56,13 +56,13 @@ class DrawnFigure:
     picture: Path
 
 
-def _spread(number: str, title: str, *panels: Panel) -> Figure:
+def _spread(number: str, title: str, panels: Panels) -> Figure:
     return Figure(
         number,
         title,
         _SPREAD,
         ("outcomes", "robots"),
-        lambda tables: over_runs(tables, *panels),
+        partial(over_runs, panels=panels),
     )
 
 
@@ -78,31 +78,31 @@ FIGURES: tuple[Figure, ...] = (
            "dashed line is the thesis's fit for its own machine. Values above the thin "
            "line are faster than real time.",
            (_BENCHMARK,), arena_speed),
-    _spread("6.2", "Fitness at the end", Panel("fitness", "fitness [m/s]")),
+    _spread("6.2", "Fitness at the end", {"fitness": "fitness [m/s]"}),
     _course("6.3", "Fitness over births", "fitness", "mean fitness [m/s]"),
     _spread("6.4", "Unique ancestors per robot of the last population",
-            Panel("ancestors_per_robot", "unique ancestors per robot")),
+            {"ancestors_per_robot": "unique ancestors per robot"}),
     _course("6.5a", "Diversity over births", "diversity", "mean tree edit distance"),
     _spread("6.5b", "Diversity at the end",
-            Panel("diversity", "mean tree edit distance")),
-    _spread("6.6", "Rank at the end", Panel("rank", "rank")),
+            {"diversity": "mean tree edit distance"}),
+    _spread("6.6", "Rank at the end", {"rank": "rank"}),
     _course("6.7", "Retention over births", "retention",
             "share alive 120 births later"),
     Figure("6.8", "Variability of fitness on-line",
            "Density over robots of the range of a robot's fitness divided by the range "
            "of fitness in the population during its life. Thin lines are single runs.",
            ("variability",), variability),
-    _spread("6.9", "Parts at the end", Panel("parts", "parts")),
+    _spread("6.9", "Parts at the end", {"parts": "parts"}),
     _spread("6.11", "Joints at the end",
-            Panel("active_joints", "active joints"),
-            Panel("passive_joints", "passive joints"), Panel("joints", "all joints")),
+            {"active_joints": "active joints",
+             "passive_joints": "passive joints", "joints": "all joints"}),
     _spread("6.12", "Joints per part at the end",
-            Panel("active_joints_per_part", "active joints per part"),
-            Panel("passive_joints_per_part", "passive joints per part"),
-            Panel("joints_per_part", "all joints per part")),
+            {"active_joints_per_part": "active joints per part",
+             "passive_joints_per_part": "passive joints per part",
+             "joints_per_part": "all joints per part"}),
     _spread("6.13", "Extremities at the end",
-            Panel("extremities", "extremities"),
-            Panel("extremities_per_part", "extremities per part")),
+            {"extremities": "extremities",
+             "extremities_per_part": "extremities per part"}),
     Figure("6.14a", "Fitness by the number of extremities",
            "Points are means over the runs that have such robots. Bars are 95 % "
            "intervals of the mean, shown for three or more runs and clipped at the "
@@ -112,11 +112,11 @@ FIGURES: tuple[Figure, ...] = (
            "As figure 6.14a, in bins of 0.1; each point is at the middle of its bin.",
            ("extremities",), partial(extremities_and_fitness, by="per_part")),
     _spread("6.15", "Touch sensors at the end",
-            Panel("touch_sensors", "touch sensors"),
-            Panel("without_touch", "share of robots without any")),
+            {"touch_sensors": "touch sensors",
+             "without_touch": "share of robots without any"}),
     _spread("6.16", "Hidden neurons at the end",
-            Panel("hidden", "hidden neurons"),
-            Panel("hidden_per_part", "hidden neurons per part")),
+            {"hidden": "hidden neurons",
+             "hidden_per_part": "hidden neurons per part"}),
     Figure("6.17", "All ancestors of the best robots",
            "Each point is an ancestor of the fittest robot of an experiment's last "
            "populations; the horizontal axis is its number of birth on its island. "
@@ -127,8 +127,8 @@ FIGURES: tuple[Figure, ...] = (
            "on a grid. Points are repetitions, the line joins their means.",
            (_BENCHMARK,), spider_speed),
     _spread("A", "Connections at the end",
-            Panel("connections", "connections"),
-            Panel("connections_per_part", "connections per part")),
+            {"connections": "connections",
+             "connections_per_part": "connections per part"}),
     Figure("B", "Fitness of islands",
            "Each line is the mean fitness of one island, for all runs with several "
            "islands.",
@@ -143,7 +143,7 @@ FIGURES: tuple[Figure, ...] = (
            ("between",), between),
     Figure("E", "Robots that touched another robot",
            _SPREAD, ("outcomes",),
-           lambda tables: over_runs(tables, Panel("touched", "share of robots"))),
+           partial(over_runs, panels={"touched": "share of robots"})),
     Figure("F", "The thesis's findings as effects",
            "Cliff's delta of a over b with its 95 % interval, or the rank-biserial "
            "correlation where an experiment is compared with a number. In brackets: "

@@ -1,6 +1,7 @@
 """The best robots, their ancestors, and the founders of their parts."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -49,7 +50,7 @@ class Family:
         edges: (child, parent) of those.
         founders: robots without parents whose parts survive in any of them, the
             founder with the most parts first.
-        founder_of: founder of each gene that a founder has.
+        founder_of: first founder that has a gene, by gene.
     """
 
     levels: tuple[tuple[int, ...], ...]
@@ -65,14 +66,14 @@ def best_robots(robots: pa.Table) -> list[Best]:
         robots: with the columns of ``outputs``; the first of equally fit robots is
             the best.
     """
-    found: dict[str, Best] = {}
     columns = ["experiment", "folder", "birth_island", "birth", "fitness"]
     last = robots.filter(pc.field("is_last")).select(columns)
-    for row in last.to_pylist():
-        known = found.get(row["experiment"])
-        if known is None or row["fitness"] > known.fitness:
-            found[row["experiment"]] = Best(**{**row, "folder": Path(row["folder"])})
-    return [found[name] for name in sorted(found)]
+    fittest = last.sort_by([("experiment", "ascending"), ("fitness", "descending")])
+    found: dict[str, Best] = {}
+    for row in fittest.to_pylist():
+        row["folder"] = Path(row["folder"])
+        found.setdefault(row["experiment"], Best(**row))
+    return list(found.values())
 
 
 def row_of(best: Best, births: pa.Table) -> int:
@@ -103,28 +104,23 @@ def family(births: pa.Table, row: int, levels: int = LEVELS) -> Family:
         shown.append(nearest)
     edges = [(down, up) for level in shown for down in level for up in parents[down]]
     bodies = births["body"].combine_chunks()
-    founder_of = _founders(bodies, parents)
-    counts: dict[int, int] = {}
-    for member in sorted(known):
-        for gene in bodies[member].values.field("gene").to_pylist():
-            if gene in founder_of:
-                counts[founder_of[gene]] = counts.get(founder_of[gene], 0) + 1
+
+    def genes(member: int) -> list[int]:
+        found: list[int] = bodies[member].values.field("gene").to_pylist()
+        return found
+
+    founder_of: dict[int, int] = {}
+    for founder in (row for row, couple in enumerate(parents) if not couple):
+        for gene in genes(founder):
+            founder_of.setdefault(gene, founder)
+    inherited = [gene for member in known for gene in genes(member)]
+    counts = Counter(founder_of[gene] for gene in inherited if gene in founder_of)
     return Family(
         tuple(map(tuple, shown)),
         tuple((down, up) for down, up in edges if up in known),
         tuple(sorted(counts, key=lambda founder: (-counts[founder], founder))),
         founder_of,
     )
-
-
-def _founders(bodies: pa.ListArray, parents: list[list[int]]) -> dict[int, int]:
-    """Return the first robot without parents that has a gene, by gene."""
-    founder_of: dict[int, int] = {}
-    for row, couple in enumerate(parents):
-        if not couple:
-            for gene in bodies[row].values.field("gene").to_pylist():
-                founder_of.setdefault(gene, row)
-    return founder_of
 
 
 def lineage(births: pa.Table, experiment: str, row: int) -> pa.Table:
@@ -138,13 +134,11 @@ def lineage(births: pa.Table, experiment: str, row: int) -> pa.Table:
     parents = parents_of(births)
     line = ancestors(parents)[row] | 1 << row
     rows = [order for order in parents_first(parents) if line >> order & 1]
-    known = births.select(["birth", "rank"]).take(pa.array(rows)).to_pylist()
-    members = [
-        {"experiment": experiment, "order": order, "number": one["birth"],
-         "rank": one["rank"], "parents": parents[order]}
-        for order, one in zip(rows, known, strict=True)
-    ]  # fmt: skip
-    return pa.Table.from_pylist(members, LINEAGE)
+    known = births.take(pa.array(rows))
+    names = [experiment] * len(rows)
+    above = [parents[order] for order in rows]
+    columns = [names, rows, known["birth"], known["rank"], above]
+    return pa.table(dict(zip(LINEAGE.names, columns, strict=True)), LINEAGE)
 
 
 def ordered(

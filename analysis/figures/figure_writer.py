@@ -9,9 +9,9 @@ import pyarrow.compute as pc
 from rich.progress import Progress
 
 from analysis.figures.catalogue import BIRTHS, FIGURES, DrawnFigure, Figure
-from analysis.figures.family_tree import LINEAGE, Best, best_robots
+from analysis.figures.family_tree import LINEAGE, best_robots
 from analysis.figures.forms import NothingToDraw, Tables
-from analysis.figures.pictures import FOUNDERS, family_tree, gaits
+from analysis.figures.pictures import family_tree, gaits
 from analysis.figures.robot_pictures import RobotPicture, robot_picture
 from analysis.figures.style import PICTURE_ENDING, in_order, label, save
 from analysis.measures.load import LeftOut, Run
@@ -137,26 +137,19 @@ def _robot_pictures(
     pictures: dict[str, RobotPicture] = {}
     problems: dict[str, str] = {}
     for name in bar.track(in_order(best), description="rendering robots"):
+        run = runs[best[name].folder]
         try:
-            pictures[name] = _robot_picture(best[name], runs, simulation)
+            pictures[name] = robot_picture(
+                best[name],
+                read_table(run.folder, "births"),
+                own_experiment(run.document),
+                simulation,
+                origin=Origin(seed=run.seed, run=run.number),
+                has_family=name not in _BASELINES,
+            )
         except RevolveError as error:
             problems[name] = str(error)
     return pictures, problems
-
-
-def _robot_picture(
-    best: Best, runs: Mapping[Path, Run], simulate: Simulate
-) -> RobotPicture:
-    run = runs[best.folder]
-    return robot_picture(
-        best,
-        read_table(best.folder, "births"),
-        own_experiment(run.document),
-        simulate,
-        FOUNDERS,
-        origin=Origin(seed=run.seed, run=run.number),
-        has_family=best.experiment not in _BASELINES,
-    )
 
 
 def _add_gaits(

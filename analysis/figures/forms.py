@@ -1,7 +1,6 @@
 """Plots of the thesis: distributions over runs, and progress over births."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,9 @@ from schema.errors import RevolveError
 Tables = Mapping[str, pa.Table]
 """Measures by name, with the columns of ``outputs``."""
 
+Panels = Mapping[str, str]
+"""Text of the axis or heading of each measure of a figure."""
+
 BOX_RUNS = 5
 """Runs from which on a box is drawn."""
 BAND_RUNS = 3
@@ -34,15 +36,7 @@ class NothingToDraw(RevolveError):  # noqa: N818 - a result, not a failure
     """The tables lack the data of a figure; the message says what is missing."""
 
 
-@dataclass(frozen=True, slots=True)
-class Panel:
-    """One measure of a figure: its column, and the text of its axis or heading."""
-
-    measure: str
-    text: str
-
-
-def over_runs(tables: Tables, *panels: Panel) -> p9.ggplot:
+def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
     """Return the distributions of measures over runs at the end, by experiment.
 
     Each point is a run. A box summarises five or more runs, a bar shows the median of
@@ -59,11 +53,10 @@ def over_runs(tables: Tables, *panels: Panel) -> p9.ggplot:
         raise NothingToDraw("no finished run could be measured")
     runs = stacked(tables["outcomes"], panels)
     if runs.empty:
-        raise NothingToDraw(f"no finished run has a value of {panels[0].measure}")
+        raise NothingToDraw(f"no finished run has a value of {next(iter(panels))}")
     experiments = in_order(runs["experiment"])
     figure = p9.ggplot(runs, p9.aes("experiment", "value"))
-    for layer in (*_violins(tables, panels, experiments), *_summaries(runs)):
-        figure += layer
+    figure += [*_violins(tables, panels, experiments), *_summaries(runs)]
     figure = figure + scales(experiments) + p9.expand_limits(y=0)
     # An invisible layer extends panels of zeros from 0 to 1.
     flat = runs[runs.groupby("panel", observed=True)["value"].transform("max") == 0]
@@ -86,7 +79,7 @@ def over_runs(tables: Tables, *panels: Panel) -> p9.ggplot:
     ]
     figure += p9.scale_x_discrete(limits=experiments, labels=labels)
     look = theme_of_size(3.6) + p9.theme(legend_position="none")
-    return figure + p9.labs(x="", y=panels[0].text) + look
+    return figure + p9.labs(x="", y=next(iter(panels.values()))) + look
 
 
 def _births(outcomes: pa.Table, experiments: list[str]) -> dict[str, str]:
@@ -116,7 +109,7 @@ def _in_panels(count: int, experiments: list[str], births: dict[str, str]) -> li
     ]
 
 
-def stacked(table: pa.Table, panels: Sequence[Panel]) -> Any:  # noqa: ANN401 - pandas
+def stacked(table: pa.Table, panels: Panels) -> Any:  # noqa: ANN401 - pandas
     """Return the values of the panels' measures as a data frame.
 
     Args:
@@ -126,16 +119,16 @@ def stacked(table: pa.Table, panels: Sequence[Panel]) -> Any:  # noqa: ANN401 - 
     Returns:
         ``experiment``, ``panel`` (its text; categories in order) and ``value``.
     """
-    texts = [panel.text for panel in panels]
+    texts = list(panels.values())
     pieces = []
-    for index, panel in enumerate(panels):
-        if panel.measure in table.column_names:
-            known = table.filter(table[panel.measure].is_valid())
+    for index, measure in enumerate(panels):
+        if measure in table.column_names:
+            known = table.filter(table[measure].is_valid())
             places = pa.array(np.full(known.num_rows, index))
             columns = {
                 "experiment": known["experiment"],
                 "panel": pa.DictionaryArray.from_arrays(places, texts),
-                "value": known[panel.measure].cast(pa.float64()),
+                "value": known[measure].cast(pa.float64()),
             }
             pieces.append(pa.table(columns))
     return pa.concat_tables(pieces).to_pandas()
@@ -147,12 +140,10 @@ def _grouped(rows: Any) -> Any:  # noqa: ANN401 - pandas
     return groups["value"]
 
 
-def _violins(
-    tables: Tables, panels: Sequence[Panel], experiments: list[str]
-) -> list[Any]:
+def _violins(tables: Tables, panels: Panels, experiments: list[str]) -> list[Any]:
     """Return a layer of the robots of last populations, if they have the measures."""
     robots = tables.get("robots")
-    if robots is None or not any(one.measure in robots.column_names for one in panels):
+    if robots is None or not panels.keys() & set(robots.column_names):
         return []
     rows = stacked(robots.filter(pc.field("is_last")), panels)
     rows = rows[rows["experiment"].isin(experiments)]

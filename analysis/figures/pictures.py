@@ -7,19 +7,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import ConnectionPatch, Rectangle
 
 from analysis.figures.family_tree import Family, ordered
-from analysis.figures.robot_pictures import Colour, RobotPicture
+from analysis.figures.robot_pictures import FOUNDERS, Colour, RobotPicture
 from analysis.figures.style import label
 from schema.robot.ids import BirthId
 
 _INK, _FAINT = "#333333", "#9A9A9A"
-FOUNDERS: tuple[Colour, ...] = (
-    (0.00, 0.45, 0.70), (0.90, 0.62, 0.00), (0.00, 0.62, 0.45), (0.80, 0.47, 0.65),
-    (0.84, 0.37, 0.00), (0.34, 0.71, 0.91), (0.94, 0.89, 0.26), (0.45, 0.45, 0.45),
-)  # fmt: skip
-"""Colours of founders, those with the most parts first; all others share the last.
-
-Source: Okabe and Ito, 2008.
-"""
 _HEIGHT = 0.53
 """Height of a picture in a family tree in which each robot has a width of 1."""
 _WIDTH = 0.94

@@ -2,7 +2,7 @@
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from datetime import datetime
 from html import escape
 
 import pyarrow as pa
@@ -42,33 +42,28 @@ code { overflow-wrap: anywhere; }
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Provenance:
-    """The command that made a report, its time, and the versions of the software."""
-
-    command: str
-    when: str
-    versions: Mapping[str, str]
-
-
 def report(
     tables: Mapping[str, pa.Table],
     figures: Sequence[DrawnFigure],
-    provenance: Provenance,
+    command: str,
+    when: datetime,
+    versions: Mapping[str, str],
 ) -> str:
     """Return the report as HTML.
 
     Args:
         tables: by the names of ``outputs``; ``left_out`` contains figures, too.
         figures: in the order of the report.
-        provenance: command, time and versions.
+        command: the command that made the report.
+        when: its time, UTC.
+        versions: versions of the software.
     """
     runs = tables["runs"].to_pylist()
     names = [label(name) for name in in_order(row["experiment"] for row in runs)]
     title = f"Revolve Islands: {', '.join(names)}" if names else "Revolve Islands"
     lead = (
         f"{len(runs)} runs, {sum(row['births'] for row in runs)} births; "
-        f"written {provenance.when}"
+        f"written {when:%Y-%m-%d %H:%M} UTC"
     )
     sections = [
         f"<h1>{escape(title)}</h1>",
@@ -78,7 +73,7 @@ def report(
         *_section("Figures", *map(_figure, figures)),
         *_section("Left out", _left_out(tables["left_out"].to_pylist())),
         *_section("Tables", _contents(tables)),
-        *_section("How this was made", _provenance(provenance)),
+        *_section("How this was made", _provenance(command, versions)),
     ]
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
@@ -102,10 +97,10 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     )
 
 
-def _cell(value: object, kind: str = "") -> str:
+def _cell(value: object) -> str:
     """Return a table cell; numbers are right-aligned, with 3 significant digits."""
     if isinstance(value, bool | str):
-        return f"<td{kind}>{escape(str(value))}</td>"
+        return f"<td>{escape(str(value))}</td>"
     if value is None:
         return '<td class="n">–</td>'
     text = f"{value:.3g}" if isinstance(value, float) else str(value)
@@ -154,11 +149,10 @@ def _findings(rows: Sequence[Mapping[str, object]]) -> str:
         verdict = str(row["verdict"])
         kind = verdict.split(maxsplit=1)[0]
         badge = f'<span class="v {kind}">{escape(verdict)}</span>'
-        counted = [
-            str(row[key]) for key in ("runs_a", "runs_b") if row[key] is not None
-        ]
+        counts_of = (row["runs_a"], row["runs_b"])
+        counted = " / ".join(str(count) for count in counts_of if count is not None)
         cells = [row[name] for name in ("figure", "claim", "expected")]
-        cells += [" / ".join(counted) or "–", *(row[name] for name in numbers)]
+        cells += [counted or "–", *(row[name] for name in numbers)]
         lines.append([*map(_cell, cells), f"<td>{badge}</td>", _cell(row["why"])])
     heads = ("figure", "finding", "expected", "runs", "mean a", "mean b", "effect",
              "low", "high", "q", "verdict", "why")  # fmt: skip
@@ -209,9 +203,6 @@ def _contents(tables: Mapping[str, pa.Table]) -> str:
     return _table(("file", "rows", "columns"), rows)
 
 
-def _provenance(provenance: Provenance) -> str:
-    versions = [
-        [_cell(name), _cell(text)] for name, text in provenance.versions.items()
-    ]
-    command = f"<pre>{escape(provenance.command)}</pre>"
-    return command + _table(("software", "version"), versions)
+def _provenance(command: str, versions: Mapping[str, str]) -> str:
+    rows = [[_cell(name), _cell(text)] for name, text in versions.items()]
+    return f"<pre>{escape(command)}</pre>" + _table(("software", "version"), rows)

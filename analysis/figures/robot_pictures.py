@@ -15,7 +15,7 @@ from analysis.render.picture import Picture, RobotRenderer, Simulate
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment, body_space, island_experiment
 from schema.experiment.identity import Identity, Origin
-from schema.experiment.settings import evaluation_settings_of
+from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
@@ -33,6 +33,15 @@ MUTATED = (0.93, 0.93, 0.93)
 """Colour of parts that were added by mutation."""
 
 Colour = tuple[float, float, float]
+
+FOUNDERS: tuple[Colour, ...] = (
+    (0.00, 0.45, 0.70), (0.90, 0.62, 0.00), (0.00, 0.62, 0.45), (0.80, 0.47, 0.65),
+    (0.84, 0.37, 0.00), (0.34, 0.71, 0.91), (0.94, 0.89, 0.26), (0.45, 0.45, 0.45),
+)  # fmt: skip
+"""Colours of founders, those with the most parts first; all others share the last.
+
+Source: Okabe and Ito, 2008.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +72,6 @@ def robot_picture(
     births: pa.Table,
     experiment: Experiment,
     simulate: Simulate,
-    colours: tuple[Colour, ...],
     *,
     origin: Origin,
     has_family: bool,
@@ -75,8 +83,6 @@ def robot_picture(
         births: births table of its run.
         experiment: experiment of the run.
         simulate: the worker's simulation.
-        colours: colours of founders, those with the most parts first; all others
-            share the last.
         origin: seed and run, which determine the noise.
         has_family: render the family, too.
 
@@ -88,13 +94,13 @@ def robot_picture(
     row = row_of(best, births)
     if row < 0:
         raise RunFolderError(f"{best.folder}: birth {best.birth} is not recorded")
-    settings = island_experiment(experiment, best.birth_island)
+    settings = evaluation_settings_of(island_experiment(experiment, best.birth_island))
     relatives = family(births, row)
-    paint = dict(zip(relatives.founders, colours, strict=False))
+    paint = dict(zip(relatives.founders, FOUNDERS, strict=False))
 
     def colour(gene: int) -> Colour:
         founder = relatives.founder_of.get(gene)
-        return MUTATED if founder is None else paint.get(founder, colours[-1])
+        return MUTATED if founder is None else paint.get(founder, FOUNDERS[-1])
 
     def painted(member: int) -> Robot:
         genome = decode_genome(births["genome"][member].as_py())
@@ -108,7 +114,7 @@ def robot_picture(
     members = {*relatives.founders, *chain.from_iterable(relatives.levels)}
     pictures, names = {}, {}
     for member in sorted(members) if has_family else ():
-        with _renderer_of(painted(member), settings, _SMALL) as renderer:
+        with RobotRenderer(painted(member), settings, size=_SMALL) as renderer:
             pictures[member] = _cut(renderer.picture(), _CLOSE)
         columns = (births["island"], births["birth"])
         names[member] = BirthId(*(column[member].as_py() for column in columns))
@@ -126,15 +132,6 @@ def robot_picture(
     )
 
 
-def _renderer_of(
-    robot: Robot, settings: Experiment, size: tuple[int, int]
-) -> RobotRenderer:
-    space = body_space(settings.space)
-    return RobotRenderer(
-        robot, space, settings.simulation, settings.environment, size=size
-    )
-
-
 def _cut(picture: Picture, share: tuple[float, float, float]) -> Picture:
     high, wide = picture.shape[:2]
     top, below = round(share[0] * high), round(share[1] * high)
@@ -143,18 +140,18 @@ def _cut(picture: Picture, share: tuple[float, float, float]) -> Picture:
 
 
 def _gait(
-    robot: Robot, settings: Experiment, simulate: Simulate
+    robot: Robot, settings: EvaluationSettings, simulate: Simulate
 ) -> tuple[tuple[Picture, ...], tuple[float, ...]]:
     """Return pictures from the middle of a robot's life on, by a fixed camera."""
     poses: list[Floats] = []
     watch: Callable[[Any], None] = lambda data: poses.append(data.qpos.copy())  # noqa: E731
-    simulate(robot, evaluation_settings_of(settings), watch=watch)
+    simulate(robot, settings, watch=watch)
     tick_s = settings.simulation.brain_steps * settings.simulation.timestep_s
     step = max(1, round(EVERY_S / tick_s))
     first = len(poses) // 2
     chosen = range(first, len(poses), step)[:FRAMES]
     middle = np.mean([poses[at][:3] for at in chosen], axis=0)
-    with _renderer_of(robot, settings, _LARGE) as renderer:
+    with RobotRenderer(robot, settings, size=_LARGE) as renderer:
         pictures = tuple(
             _cut(renderer.picture(poses[at], look_at=middle), _WIDE) for at in chosen
         )

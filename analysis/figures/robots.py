@@ -16,6 +16,11 @@ from analysis.figures.style import (
 )
 
 _POPULATIONS = {"final": "last populations", "born": "all robots ever evaluated"}
+_BINS = {
+    "count": (1.0, 0.0, "extremities"),
+    "per_part": (0.1, 0.05, "extremities per part"),
+}
+"""Width of a bin, distance of its point from its lower end, and label of the axis."""
 _DODGE = 0.13
 """Distance of two experiments' points, by that of two numbers of extremities."""
 _VERDICTS = {
@@ -78,37 +83,23 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     if not rows.num_rows:
         raise NothingToDraw("no robot was evaluated")
     keys = ["experiment", "population", "bin"]
-    made = rows.group_by(keys).aggregate(
-        [("fitness", "mean"), ("fitness", "stddev"), ("fitness", "count")]
-    )
-    runs = np.asarray(made["fitness_count"], np.int64)
-    mean = np.asarray(made["fitness_mean"], np.float64)
-    half = half_interval(np.asarray(made["fitness_stddev"], np.float64), runs)
-    half[runs < BAND_RUNS] = np.nan
-    width = 1.0 if by == "count" else 0.1
-    places = np.asarray(made["bin"], np.float64) + (0.0 if by == "count" else 0.05)
-    experiments = made["experiment"].to_pylist()
+    totals = [("fitness", "mean"), ("fitness", "stddev"), ("fitness", "count")]
+    made = rows.group_by(keys).aggregate(totals)
+    shown = made.rename_columns([*keys, "fitness", "sd", "runs"]).to_pandas()
+    mean = shown["fitness"]
+    half = half_interval(shown["sd"].to_numpy(), shown["runs"].to_numpy())
+    half[shown["runs"] < BAND_RUNS] = np.nan
+    shown["low"], shown["high"] = (mean - half).clip(lower=0.0), mean + half
+    width, start, axis = _BINS[by]
+    experiments = shown["experiment"]
     names = in_order(experiments)
     # Points of different experiments must not hide each other.
-    spots = [names.index(name) - (len(names) - 1) / 2 for name in experiments]
-    places += _DODGE * width * np.array(spots)
-    panel = pa.DictionaryArray.from_arrays(
-        pc.index_in(made["population"].combine_chunks(), pa.array(list(_POPULATIONS))),
-        list(_POPULATIONS.values()),
-    )
-    shown = pa.table(
-        {
-            "experiment": made["experiment"],
-            "panel": panel,
-            "at": places,
-            "fitness": mean,
-            "low": np.maximum(mean - half, 0.0),
-            "high": mean + half,
-        }
-    )
-    axis = "extremities" if by == "count" else "extremities per part"
+    aside = experiments.map(names.index) - (len(names) - 1) / 2
+    shown["at"] = shown["bin"] + start + _DODGE * width * aside
+    panels = shown["population"].astype("category").cat.set_categories([*_POPULATIONS])
+    shown["panel"] = panels.cat.rename_categories(_POPULATIONS)
     return (
-        p9.ggplot(shown.to_pandas(), p9.aes("at", "fitness"))
+        p9.ggplot(shown, p9.aes("at", "fitness"))
         + p9.geom_linerange(
             p9.aes(ymin="low", ymax="high", colour="experiment"),
             na_rm=True,
@@ -140,13 +131,12 @@ def lineages(tables: Tables) -> p9.ggplot:
     rows = tables.get("lineage")
     if not rows or not any(rows["parents"].to_pylist()):
         raise NothingToDraw("no best robot has parents")
-    lines: list[dict[str, object]] = []
     known = {(row["experiment"], row["order"]): row for row in rows.to_pylist()}
-    for row in known.values():
-        for parent in row["parents"]:
-            above = known[row["experiment"], parent]
-            ends = {"to": above["number"], "to_rank": above["rank"]}
-            lines.append({**row, **ends})
+    lines = [
+        {**row, "to": above["number"], "to_rank": above["rank"]}
+        for row in known.values()
+        for above in (known[row["experiment"], parent] for parent in row["parents"])
+    ]
     names = [label(name) for name in in_order(rows["experiment"].to_pylist())]
     return (
         p9.ggplot(rows.select(["experiment", "number", "rank"]).to_pandas())

@@ -1,5 +1,7 @@
 """Ancestry of individuals, and the descendants of migrants."""
 
+from graphlib import CycleError, TopologicalSorter
+
 import numpy as np
 import pyarrow as pa
 
@@ -44,21 +46,11 @@ def parents_first(parents: list[list[int]]) -> list[int]:
     Raises:
         RunFolderError: an individual is its own ancestor.
     """
-    children: list[list[int]] = [[] for _ in parents]
-    missing = [len(couple) for couple in parents]
-    for child, couple in enumerate(parents):
-        for parent in couple:
-            children[parent].append(child)
-    order = [row for row, count in enumerate(missing) if not count]
-    for row in order:  # grows during the loop
-        for child in children[row]:
-            missing[child] -= 1
-            if not missing[child]:
-                order.append(child)
-    if len(order) < len(parents):
-        own = next(row for row, count in enumerate(missing) if count)
-        raise RunFolderError(f"births: row {own} descends from itself")
-    return order
+    try:
+        return list(TopologicalSorter(dict(enumerate(parents))).static_order())
+    except CycleError as error:
+        row = min(error.args[1])
+        raise RunFolderError(f"births: row {row} descends from itself") from None
 
 
 def ancestors(parents: list[list[int]]) -> list[int]:
@@ -144,20 +136,12 @@ def migrants(
     members = table.members[is_last]
     where = table.islands[table.group_of][is_last]
     homes = np.asarray(births["island"], np.int64)
-    found = []
-    for row, migrant in zip(
-        rows_of(individual_ids(migrations), births).tolist(),
-        migrations.to_pylist(),
-        strict=True,
-    ):
+    found = migrations.to_pylist()
+    rows = rows_of(individual_ids(migrations), births).tolist()
+    for row, migrant in zip(rows, found, strict=True):
         line = np.array([row >= 0 and up >> row & 1 for up in lines], np.bool_)
         is_own = line[members] | (members == row)
-        found.append(
-            migrant
-            | {
-                "descendants": int((line & (homes == migrant["to"])).sum()),
-                "living": int((is_own & (where == migrant["to"])).sum()),
-                "reached": len(np.unique(where[is_own])),
-            }
-        )
+        migrant["descendants"] = int((line & (homes == migrant["to"])).sum())
+        migrant["living"] = int((is_own & (where == migrant["to"])).sum())
+        migrant["reached"] = len(np.unique(where[is_own]))
     return pa.Table.from_pylist(found, run_schema("migrants"))

@@ -9,12 +9,9 @@ import pyarrow.parquet as pq
 from analysis.measures.load import LeftOut
 
 _NAME = b"arena-benchmark"
-_COLUMNS = {
-    "benchmark": pa.string(),
-    "population": pa.int32(),
-    "factor": pa.float64(),
-}
-_ENDING = ".parquet"
+_COLUMNS = pa.schema(
+    {"benchmark": pa.string(), "population": pa.int32(), "factor": pa.float64()}
+)
 _RUNS = "experiment="
 """Prefix of folders that contain tables of runs."""
 
@@ -30,14 +27,14 @@ def read_benchmarks(roots: Iterable[Path]) -> tuple[pa.Table, list[LeftOut]]:
         One row per repetition: ``benchmark`` ("arena" or "spider"), ``population``,
         ``factor`` (simulated by wall-clock time); and files that could not be read.
     """
-    pieces = [pa.schema(list(_COLUMNS.items())).empty_table()]
+    pieces = [_COLUMNS.empty_table()]
     left_out = []
-    for path, is_named in _files(roots):
+    for path, is_named in _files(roots).items():
         try:
             found = pq.read_schema(path)
             if (found.metadata or {}).get(b"revolve.schema") == _NAME:
-                table = pq.read_table(path, columns=list(_COLUMNS))
-                pieces.append(table.replace_schema_metadata().cast(pieces[0].schema))
+                table = pq.read_table(path, columns=_COLUMNS.names)
+                pieces.append(table.replace_schema_metadata().cast(_COLUMNS))
             elif is_named:
                 left_out.append(LeftOut(str(path), "benchmark", "not a benchmark file"))
         except (OSError, pa.ArrowException, ValueError) as error:
@@ -45,13 +42,13 @@ def read_benchmarks(roots: Iterable[Path]) -> tuple[pa.Table, list[LeftOut]]:
     return pa.concat_tables(pieces), left_out
 
 
-def _files(roots: Iterable[Path]) -> list[tuple[Path, bool]]:
+def _files(roots: Iterable[Path]) -> dict[Path, bool]:
     """Return the files that may be benchmarks, and whether each is a root."""
     found: dict[Path, bool] = {}
     for root in roots:
         if root.is_file():
             found[root] = True
-        for path in sorted(root.glob(f"**/*{_ENDING}")):
+        for path in sorted(root.glob("**/*.parquet")):
             if not any(part.startswith(_RUNS) for part in path.parts):
                 found.setdefault(path, False)
-    return list(found.items())
+    return found

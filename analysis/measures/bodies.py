@@ -7,17 +7,16 @@ import pyarrow.compute as pc
 from analysis.measures.outputs import BODY, PER_PART
 from analysis.measures.population_table import Numbers
 
-TOUCH = ("TouchSensor",)
-"""Part types that are touch sensors."""
+TOUCH = "TouchSensor"
+"""Part type of touch sensors."""
 
 
-def body_sizes(births: pa.Table, touch: tuple[str, ...] = TOUCH) -> dict[str, Numbers]:
+def body_sizes(births: pa.Table) -> dict[str, Numbers]:
     """Return the sizes of every individual, absolute and per part.
 
     Args:
         births: births of one run: ``parts``, ``joints``, ``motors``, ``extremities``,
             ``hidden``, ``connections``, ``body``.
-        touch: names of the part types that are touch sensors.
 
     Returns:
         Arrays (B,) by the names of ``outputs.BODY`` and ``PER_PART``. Joints with a
@@ -34,8 +33,7 @@ def body_sizes(births: pa.Table, touch: tuple[str, ...] = TOUCH) -> dict[str, Nu
     found["passive_joints"] = found["joints"] - found["active_joints"]
     lists = births["body"].combine_chunks()
     owners = np.asarray(pc.list_parent_indices(lists), np.int64)
-    kinds = lists.flatten().field("kind")
-    is_touch = np.asarray(pc.is_in(kinds, pa.array(touch, pa.string())), np.bool_)
+    is_touch = np.asarray(pc.equal(lists.flatten().field("kind"), TOUCH), np.bool_)
     count = np.bincount(owners[is_touch], minlength=births.num_rows)
     found["touch_sensors"] = count.astype(np.float64)
     for name in PER_PART:

@@ -1,13 +1,15 @@
 """Diversity: mean distance of the bodies of a population."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pyarrow as pa
 
 from analysis.measures.distance import tree_distances
 from analysis.measures.outputs import run_schema
-from analysis.measures.population_table import Numbers, PopulationTable
+from analysis.measures.population_table import (
+    Numbers,
+    PopulationTable,
+    is_last_of_each,
+)
 from analysis.measures.trees import Integers, Trees
 
 _BLOCK = 2_000_000
@@ -26,18 +28,7 @@ def diversity(table: PopulationTable, trees: Trees) -> Numbers:
 
     Source: Hupkes 2016, section 6.2.1 and figure 6.5.
     """
-    found = np.full(len(table), np.nan)
-    for groups, first, second in _pairs(table, trees):
-        distances = distances_of(trees, first.ravel(), second.ravel())
-        found[groups] = distances.reshape(first.shape).mean(axis=1)
-    return found
-
-
-def _pairs(
-    table: PopulationTable, trees: Trees
-) -> Iterator[tuple[Integers, Integers, Integers]]:
-    """Yield populations of one size, and the trees of all their pairs, (g, pairs)."""
-    sizes = table.sizes
+    found, sizes = np.full(len(table), np.nan), table.sizes
     for size in np.unique(sizes[sizes > 1]).tolist():
         first, second = np.triu_indices(size, 1)
         step = max(1, _BLOCK // len(first))
@@ -46,7 +37,10 @@ def _pairs(
             groups = every[begin : begin + step]
             rows = table.starts[groups][:, None] + np.arange(size)
             living = trees.tree_of[table.members[rows]]
-            yield groups, living[:, first], living[:, second]
+            pairs = living[:, first].ravel(), living[:, second].ravel()
+            distances = distances_of(trees, *pairs).reshape(len(groups), -1)
+            found[groups] = distances.mean(axis=1)
+    return found
 
 
 def distances_of(trees: Trees, first: Integers, second: Integers) -> Integers:
@@ -82,32 +76,20 @@ def mean_distances(table: PopulationTable, trees: Trees, step: int = 15) -> pa.T
     """
     within = diversity(table, trees)
     rows = []
-    last = int(table.births.max(initial=0))
-    for births in range(step, last + 1, step):
+    for births in range(step, int(table.births.max(initial=0)) + 1, step):
         latest = _latest(table, births)
-        living = [
-            trees.tree_of[table.members[table.starts[g] : table.starts[g + 1]]]
-            for g in latest
-        ]
-        grids = [
-            np.meshgrid(one, other, indexing="ij")
-            for index, one in enumerate(living)
-            for other in living[index + 1 :]
-        ]
-        between = None
-        if grids:
-            first, second = (
-                np.concatenate([grid[side].ravel() for grid in grids])
-                for side in (0, 1)
-            )
-            between = float(distances_of(trees, first, second).mean())
+        is_shown = np.isin(table.group_of, latest)
+        living = trees.tree_of[table.members[is_shown]]
+        homes = table.group_of[is_shown]
+        first, second = np.nonzero(homes[:, None] < homes)
+        distances = distances_of(trees, living[first], living[second])
         known = within[latest][~np.isnan(within[latest])]
         rows.append(
             {
                 "births": births,
                 "islands": len(latest),
                 "within": float(known.mean()) if len(known) else None,
-                "between": between,
+                "between": float(distances.mean()) if len(distances) else None,
             }
         )
     return pa.Table.from_pylist(rows, run_schema("between"))
@@ -116,7 +98,5 @@ def mean_distances(table: PopulationTable, trees: Trees, step: int = 15) -> pa.T
 def _latest(table: PopulationTable, births: int) -> Integers:
     """Return each island's last population at or before a number of births."""
     before = np.flatnonzero(table.births <= births)
-    islands = table.islands[before]
-    is_last = np.append(islands[1:] != islands[:-1], True)[: len(islands)]
-    latest: Integers = before[is_last]
+    latest: Integers = before[is_last_of_each(table.islands[before])]
     return latest

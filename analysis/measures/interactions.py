@@ -37,25 +37,24 @@ def interactions(
     pairs = np.unique(np.stack([first, second], axis=1), axis=0)
     both = np.concatenate([first, second])
     time = np.tile(np.asarray(touches["duration_s"], np.float64), 2)
+    ids = (robots, both, pairs[:, 0])
+    homes, at, by = (np.asarray(residence_columns(each)["island"]) for each in ids)
     rows = []
-    homes, at, by = (
-        np.asarray(residence_columns(each)["island"])
-        for each in (robots, both, pairs[:, 0])
-    )
     for island in np.unique(homes).tolist():
         here = homes == island
         count, seconds = int(here.sum()), float(lived[here].sum())
         touched = int(np.isin(robots[here], both).sum())
         contact_s = float(time[at == island].sum())
-        row = {
-            "island": island,
-            "robots": count,
-            "lived_s": seconds,
-            "pairs": int((by == island).sum()),
-            "touched": touched / count,
-            "touching": contact_s / seconds if seconds else None,
-        }
-        rows.append(row)
+        rows.append(
+            {
+                "island": island,
+                "robots": count,
+                "lived_s": seconds,
+                "pairs": int((by == island).sum()),
+                "touched": touched / count,
+                "touching": contact_s / seconds if seconds else None,
+            }
+        )
     return pa.Table.from_pylist(rows, run_schema("interactions"))
 
 
@@ -71,26 +70,15 @@ def _lives(
     """Return the residences of all robots, (S,), and their lengths, (S,) [s]."""
     born = births.filter(births["sim_time_s"].is_valid())
     natives = born.append_column("birth_island", born["island"])
-    events = [
-        (residence_ids(table), np.asarray(table["sim_time_s"], np.float64))
-        for table in (natives, fitness, deaths)
-    ]
-    starts: dict[int, float] = {}
-    for ids, times in events[:2]:
-        found, firsts = np.unique(ids, return_index=True)
-        for robot, time in zip(found.tolist(), times[firsts].tolist(), strict=True):
-            starts.setdefault(robot, time)
-    ends = dict(zip(*(column.tolist() for column in events[2]), strict=True))
-    last: dict[int, float] = {}
-    for ids, times in events:
-        islands = np.asarray(residence_columns(ids)["island"])
-        for island in np.unique(islands).tolist():
-            latest = float(times[islands == island].max())
-            last[island] = max(latest, last.get(island, 0.0))
-    robots = np.array(sorted(starts), np.int64)
-    homes = residence_columns(robots)["island"].to_pylist()
-    lived = [
-        ends.get(robot, last[island]) - starts[robot]
-        for robot, island in zip(robots.tolist(), homes, strict=True)
-    ]
-    return robots, np.array(lived, np.float64)
+    events = (natives, fitness, deaths)
+    ids = np.concatenate([residence_ids(each) for each in events])
+    times = np.concatenate([np.asarray(each["sim_time_s"]) for each in events])
+    islands = np.asarray(residence_columns(ids)["island"])
+    # A native's first event is its birth, an immigrant's its first sample.
+    alive = natives.num_rows + fitness.num_rows
+    robots, firsts = np.unique(ids[:alive], return_index=True)
+    ends = dict(zip(ids[alive:].tolist(), times[alive:].tolist(), strict=True))
+    last = {home: times[islands == home].max() for home in np.unique(islands).tolist()}
+    stays = zip(robots.tolist(), islands[firsts].tolist(), strict=True)
+    until = [ends.get(robot, last[home]) for robot, home in stays]
+    return robots, np.array(until, np.float64) - times[firsts]

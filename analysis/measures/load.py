@@ -100,7 +100,7 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
     left_out: list[LeftOut] = []
     for folder in sorted(folders):
         try:
-            runs.append(_read_run(folder))
+            runs.append(read_run(folder))
         except RunFolderError as error:
             left_out.append(LeftOut(str(folder), "run", str(error)))
     if not runs:
@@ -110,23 +110,23 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
 
 
 def _different(runs: list[Run], left_out: list[LeftOut]) -> list[Run]:
-    """Return each run once; add its other folders to ``left_out``."""
+    """Return each run once; add its other folders to ``left_out``.
+
+    Args:
+        runs: sorted by folder.
+        left_out: what was left out.
+    """
     copies: dict[tuple[str, int, int, str], list[Run]] = {}
     for run in runs:
         name = (run.experiment, run.number, run.seed, run.document)
         copies.setdefault(name, []).append(run)
     kept = []
     for group in copies.values():
-        if len(group) == 1:  # without reading its tables
-            kept += group
-            continue
-        (_, best), *others = sorted(
-            ((_flaws(run), run) for run in group),
-            key=lambda one: (one[0], one[1].folder),
-        )
+        # The tables of a run in only one folder are not read here.
+        best, *others = sorted(group, key=_flaws) if len(group) > 1 else group
         kept.append(best)
-        for (unread, *_), run in others:
-            damaged = ", and not completely readable" if unread else ""
+        for run in others:
+            damaged = ", and not completely readable" if _flaws(run)[0] else ""
             why = f"the same run as {best.folder}{damaged}"
             left_out.append(LeftOut(str(run.folder), "run", why))
     return sorted(kept, key=lambda run: run.folder)
@@ -138,7 +138,12 @@ def _flaws(run: Run) -> tuple[int, bool, int]:
     return len(unread), not run.is_finished, -tables["births"].num_rows
 
 
-def _read_run(folder: Path) -> Run:
+def read_run(folder: Path) -> Run:
+    """Return the run in a folder.
+
+    Raises:
+        RunFolderError: the folder has no run, or not the tables of a finished one.
+    """
     details = _details(folder)
     try:
         document = json.loads(details["document"])

@@ -7,15 +7,10 @@ experiment's run 0, with different seeds. Births are counted per island.
 import pyarrow as pa
 
 _KINDS = {
-    "folder": pa.string(),
-    "experiment": pa.string(),
     "run": pa.int32(),
     "seed": pa.uint64(),
-    "state": pa.string(),
     "island": pa.int32(),
-    "births": pa.int64(),
     "birth_island": pa.int32(),
-    "birth": pa.int64(),
     "is_last": pa.bool_(),
 }
 _RUN = {
@@ -39,14 +34,8 @@ BODY = {
 
 PER_PART = {
     f"{name}_per_part": f"{name} divided by parts"
-    for name in (
-        "active_joints",
-        "passive_joints",
-        "joints",
-        "extremities",
-        "hidden",
-        "connections",
-    )
+    for name in BODY
+    if name not in {"parts", "touch_sensors"}
 }
 """Sizes of a robot divided by its number of parts."""
 
@@ -85,13 +74,6 @@ OUTCOME = {
 }
 """Outcome of a run: one number per measure, by which experiments are compared."""
 
-_SPREAD = {
-    "low": "lower end of the mean's 95 % interval (Student's t over runs)",
-    "high": "upper end of that interval",
-    "least": "minimum over runs",
-    "greatest": "maximum over runs",
-    "runs": "number of runs with a value at these births",
-}
 _TWO_SAMPLES = {
     "runs_a": "number of runs of a",
     "runs_b": "number of runs of b",
@@ -180,7 +162,11 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "measure": "column of populations",
         "births": "births on each island",
         "mean": "mean over runs",
-        **_SPREAD,
+        "low": "lower end of the mean's 95 % interval (Student's t over runs)",
+        "high": "upper end of that interval",
+        "least": "minimum over runs",
+        "greatest": "maximum over runs",
+        "runs": "number of runs with a value at these births",
     },
     "outcomes": {**_RUN, **OUTCOME},
     "comparison": {
@@ -213,9 +199,10 @@ OUTPUTS: dict[str, dict[str, str]] = {
 
 _INTEGERS = {"size", "judged", "ancestors", "planned", "islands", "robots", "samples",
              "pairs", "epoch", "to", "descendants", "living", "reached", "runs",
-             "runs_a", "runs_b", "finding"}  # fmt: skip
-_TEXTS = {"population", "by", "measure", "a", "b", "figure", "claim", "expected",
-          "verdict", "why", "what", "differs"}  # fmt: skip
+             "runs_a", "runs_b", "finding", "births", "birth"}  # fmt: skip
+_TEXTS = {"folder", "experiment", "state", "population", "by", "measure", "a", "b",
+          "figure", "claim", "expected", "verdict", "why", "what",
+          "differs"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 
@@ -241,7 +228,7 @@ def run_schema(table: str) -> pa.Schema:
 def _kind(table: str, name: str) -> pa.DataType:
     if name in _TEXTS:
         return pa.string()
-    if table == "outcomes" and name not in {"births", *_RUN}:
+    if table == "outcomes" and name != "births":
         return pa.float64()
     if name in _INTEGERS or name in _COUNTS.get(table, ()):
         return pa.int64()

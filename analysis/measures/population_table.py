@@ -55,7 +55,7 @@ class PopulationTable:
     @property
     def is_last(self) -> Booleans:
         """Whether a population is the last one recorded of its island, (G,)."""
-        return np.append(self.islands[1:] != self.islands[:-1], True)[: len(self)]
+        return is_last_of_each(self.islands)
 
     def __len__(self) -> int:
         return len(self.births)
@@ -77,6 +77,11 @@ class PopulationTable:
         """Return the sum of each population, (G,), of its members' values, (N,)."""
         total = np.bincount(self.group_of, values, minlength=len(self))
         return total.astype(np.float64)
+
+
+def is_last_of_each(values: Integers) -> Booleans:
+    """Return whether the next of some sorted values is another one, (N,)."""
+    return np.append(values[1:] != values[:-1], True)[: len(values)]
 
 
 def individual_ids(

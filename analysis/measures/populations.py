@@ -54,11 +54,6 @@ def _fitness(run: RunTables) -> Columns:
     }
 
 
-def _rank(run: RunTables) -> Columns:
-    """Return the mean rank (Hupkes 2016, eq. 6.1, figure 6.6)."""
-    return {"rank": _mean(run, np.asarray(run.births["rank"], np.float64))}
-
-
 def _ancestors(run: RunTables) -> Columns:
     """Return unique ancestors, in total and per robot (figure 6.4)."""
     count = unique_ancestors(run.population_table, run.lines).astype(np.float64)
@@ -80,11 +75,14 @@ def _foreign(run: RunTables) -> Columns:
     return {"foreign": foreign_share(run.population_table, run.births, run.parents)}
 
 
-def _sizes(run: RunTables) -> Columns:
-    """Return mean sizes (figures 6.9 to 6.16)."""
-    found = {name: _mean(run, values) for name, values in run.sizes.items()}
-    no_touch = (run.sizes["touch_sensors"] == 0).astype(np.float64)
-    return {**found, "without_touch": _mean(run, no_touch)}
+def _means(run: RunTables) -> Columns:
+    """Return mean rank (Hupkes 2016, eq. 6.1, figure 6.6) and sizes (6.9 to 6.16)."""
+    of_births = {
+        "rank": np.asarray(run.births["rank"], np.float64),
+        **run.sizes,
+        "without_touch": (run.sizes["touch_sensors"] == 0).astype(np.float64),
+    }
+    return {name: _mean(run, values) for name, values in of_births.items()}
 
 
 def _mean(run: RunTables, values: Numbers) -> Numbers:
@@ -94,7 +92,7 @@ def _mean(run: RunTables, values: Numbers) -> Numbers:
 
 
 _POPULATION: tuple[Callable[[RunTables], Columns], ...] = (
-    _fitness, _rank, _ancestors, _diversity, _retention, _foreign, _sizes
+    _fitness, _ancestors, _diversity, _retention, _foreign, _means
 )  # fmt: skip
 
 

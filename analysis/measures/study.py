@@ -1,12 +1,13 @@
 """Measures of many runs, computed in parallel processes."""
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from itertools import repeat
 from multiprocessing import get_context
 
-import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from analysis.measures.load import TABLE, LeftOut, Run, read_tables
 from analysis.measures.measures import measure
@@ -38,32 +39,20 @@ def measure_runs(
     *,
     slots: SlotRule = "parent",
     processes: int = 1,
-    on_measured: Callable[[], None] = lambda: None,
-) -> list[MeasuredRun]:
-    """Return the measures of runs, in their order.
+) -> Iterator[MeasuredRun]:
+    """Yield the measures of runs, in their order.
 
     Args:
         runs: the runs.
         slots: slot that labels a part in tree edit distance.
         processes: number of runs measured in parallel.
-        on_measured: called after each run.
     """
     if processes == 1 or len(runs) <= _FEW:
-        found = []
-        for run in runs:
-            found.append(measure_run(run, slots))
-            on_measured()
-        return found
+        yield from map(measure_run, runs, repeat(slots))
+        return
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
-        futures = [pool.submit(measure_run, run, slots) for run in runs]
-        try:
-            for future in as_completed(futures):
-                future.result()
-                on_measured()
-        except BaseException:
-            pool.shutdown(cancel_futures=True)
-            raise
-        return [future.result() for future in futures]
+        # Cancels the other runs if one cannot be measured.
+        yield from pool.map(measure_run, runs, repeat(slots))
 
 
 def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
@@ -81,9 +70,7 @@ def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
     if any(island.is_online and not island.records_touches for island in run.islands):
         why = "contacts are not recorded (arena.record_touches is false)"
         left_out.append(LeftOut(folder, "interactions", why))
-    left_out += [
-        LeftOut(folder, f"measure {name}", problems[name]) for name in problems
-    ]
+    left_out += [LeftOut(folder, f"measure {one}", problems[one]) for one in problems]
     if not run.is_finished:
         born, planned = tables["births"].num_rows, planned_births(run)
         why = f"the run is not finished: {born} of {planned} births are recorded"
@@ -124,10 +111,8 @@ def _summary(run: Run, births: pa.Table) -> pa.Table:
 
 def _named(table: pa.Table, name: str, run: Run) -> pa.Table:
     """Return a table with the columns that name the run, in the types of the output."""
-    columns = {"experiment": run.experiment, "folder": str(run.folder)}
-    for column, value in columns.items():
-        repeated = pa.repeat(pa.scalar(value), table.num_rows)
-        table = table.append_column(column, repeated)
+    for column, value in (("experiment", run.experiment), ("folder", str(run.folder))):
+        table = table.append_column(column, pa.repeat(value, table.num_rows))
     return table.select(schema(name).names).cast(schema(name))
 
 
@@ -144,12 +129,6 @@ def concatenated(measured: Sequence[MeasuredRun]) -> dict[str, pa.Table]:
 
 def reach(measured: MeasuredRun) -> int:
     """Return the number of births that every island of a run reaches."""
-    table = measured.tables["populations"].filter(
-        measured.tables["populations"]["judged"].is_valid()
-    )
-    islands = np.asarray(table["island"], np.int64)
-    births = np.asarray(table["births"], np.int64)
-    return min(
-        (int(births[islands == island].max()) for island in np.unique(islands)),
-        default=0,
-    )
+    judged = measured.tables["populations"].filter(pc.field("judged").is_valid())
+    last = judged.group_by("island").aggregate([("births", "max")])
+    return min(last["births_max"].to_pylist(), default=0)

@@ -55,11 +55,6 @@ def encode(bodies: pa.ChunkedArray, slots: SlotRule = "parent") -> Trees:
     parts = lists.flatten()
     sizes = np.asarray(pc.list_value_length(lists), np.int64)
     starts = np.concatenate([[0], np.cumsum(sizes)])
-    if not len(parts):
-        if len(lists):
-            raise InvalidRobot("body of birth row 0: has no parts")
-        empty = np.zeros(0, np.int64)
-        return Trees(empty, starts, empty, empty, empty, empty.astype(bool))
     own = np.asarray(parts.field("child_slot"), np.int64)
     places = np.asarray(parts.field("parent_slot"), np.int64)
     parents = np.asarray(parts.field("parent"), np.int64)
@@ -67,9 +62,8 @@ def encode(bodies: pa.ChunkedArray, slots: SlotRule = "parent") -> Trees:
     label = np.where(parents < 0, -1, places if slots == "parent" else own)
     columns = np.stack([parents, np.asarray(kinds, np.int64), label, places], axis=1)
     tree_of, firsts = _different(columns, starts)
-    chosen = np.concatenate([np.arange(starts[i], starts[i + 1]) for i in firsts])
-    lengths = sizes[firsts]
-    return _postorder(tree_of, columns[chosen], lengths, firsts)
+    is_chosen = np.isin(np.repeat(np.arange(len(lists)), sizes), firsts)
+    return _postorder(tree_of, columns[is_chosen], sizes[firsts], firsts)
 
 
 def _different(columns: Integers, starts: Integers) -> tuple[Integers, Integers]:
@@ -101,8 +95,7 @@ def _postorder(
         np.where(is_core, parents != -1, (parents < 0) | (parents >= index)),
         "a part's parent must come before it, and only the core has none",
     )
-    if not lengths.all():
-        raise InvalidRobot(f"body of birth row {bodies[lengths == 0][0]}: has no parts")
+    _check(bodies, lengths == 0, "has no parts")
     above = np.where(is_core, at, parents + starts[tree])
     depth, size = _depth_and_size(above, is_core)
     previous = np.full(len(at), -1, np.int64)
@@ -131,16 +124,13 @@ def _depth_and_size(
     above: Integers, is_core: npt.NDArray[np.bool_]
 ) -> tuple[Integers, Integers]:
     """Return each part's depth and the size of its subtree, itself included."""
-    depth = np.zeros(len(above), np.int64)
-    size = np.ones(len(above), np.int64)
-    walkers = np.flatnonzero(~is_core)
-    ancestors = above[walkers]
-    while len(walkers):
-        depth[walkers] += 1
-        size += np.bincount(ancestors, minlength=len(size))
-        is_below = ~is_core[ancestors]
-        walkers, ancestors = walkers[is_below], above[ancestors[is_below]]
-    return depth, size
+    parents, others = above.tolist(), np.flatnonzero(~is_core).tolist()
+    depth, size = [0] * len(parents), [1] * len(parents)
+    for part in others:  # parents come before their children
+        depth[part] = depth[parents[part]] + 1
+    for part in reversed(others):
+        size[parents[part]] += size[part]
+    return np.array(depth, np.int64), np.array(size, np.int64)
 
 
 def _check(body: Integers, is_wrong: npt.NDArray[np.bool_], rule: str) -> None:

@@ -6,6 +6,7 @@ import pyarrow as pa
 from analysis.measures.population_table import (
     Numbers,
     individual_ids,
+    is_last_of_each,
     residence_columns,
     residence_ids,
 )
@@ -69,10 +70,11 @@ def variability(fitness: pa.Table) -> pa.Table:
 
 def _moments(times: Numbers, values: Numbers) -> tuple[Numbers, Numbers, Numbers]:
     """Return the sample times, and the least and greatest fitness at each of them."""
-    clock, where = np.unique(times, return_inverse=True)
-    least, greatest = np.full(len(clock), np.inf), np.full(len(clock), -np.inf)
-    np.minimum.at(least, where, values)
-    np.maximum.at(greatest, where, values)
+    order = np.argsort(times)
+    clock, starts = np.unique(times[order], return_index=True)
+    least, greatest = (
+        extreme.reduceat(values[order], starts) for extreme in (np.minimum, np.maximum)
+    )
     return clock, least, greatest
 
 
@@ -89,6 +91,5 @@ def last_fitness(fitness: pa.Table) -> tuple[Integers, Numbers]:
     robots = individual_ids(mature)
     times = np.asarray(mature["sim_time_s"], np.float64)
     order = np.lexsort((times, robots))
-    is_last = np.append(robots[order][1:] != robots[order][:-1], True)[: len(order)]
-    chosen = order[is_last]
+    chosen = order[is_last_of_each(robots[order])]
     return robots[chosen], np.asarray(mature["fitness"], np.float64)[chosen]

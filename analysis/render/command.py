@@ -55,13 +55,11 @@ def main(arguments: list[str], simulate: Simulate) -> int:
         raise NoPictures(f"{out}: --gait needs a {PICTURE_ENDING} file")
     named = options.experiment
     settings = settings_of(read_experiment(named) if named else None)
-    space, world = body_space(settings.space), settings.simulation
+    world = settings.simulation
     _check_gait(options.gait, world)
-    robot = read_robot(options.file, space)
+    robot = read_robot(options.file, body_space(settings.space))
     size = (options.width, options.width * 3 // 4)
-    with RobotRenderer(
-        robot, space, world, settings.environment, size=size
-    ) as renderer:
+    with RobotRenderer(robot, settings, size=size) as renderer:
         if not is_film and not options.gait:
             save_picture(renderer.picture(), out)
         else:

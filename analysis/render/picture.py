@@ -8,6 +8,7 @@ import ctypes.util
 import os
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, Self
 
@@ -16,11 +17,9 @@ import numpy.typing as npt
 from PIL import Image
 
 from schema.errors import RevolveError
-from schema.experiment.document import Simulation
-from schema.experiment.environment import Environment
+from schema.experiment.document import body_space
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
-from schema.parts import BodySpace
 from schema.robot.results import Floats, Track
 from schema.robot.robot import Robot
 
@@ -69,9 +68,7 @@ class RobotRenderer:
     def __init__(
         self,
         robot: Robot,
-        space: BodySpace,
-        simulation: Simulation,
-        environment: Environment,
+        settings: EvaluationSettings,
         *,
         size: tuple[int, int] = (640, 480),
     ) -> None:
@@ -79,9 +76,7 @@ class RobotRenderer:
 
         Args:
             robot: a valid robot.
-            space: its part types.
-            simulation: settings of the simulation.
-            environment: ground and scenery.
+            settings: its part types, simulation, ground and scenery.
             size: width and height of pictures [pixels].
 
         Raises:
@@ -94,7 +89,11 @@ class RobotRenderer:
 
         self._mujoco: Any = mujoco
         self.model = solo_spec(
-            robot, space, simulation, environment, furnish=_furnish(*size)
+            robot,
+            body_space(settings.space),
+            settings.simulation,
+            settings.environment,
+            furnish=partial(_furnish, size),
         ).compile()
         self._data = mujoco.MjData(self.model)
         try:
@@ -142,60 +141,56 @@ class RobotRenderer:
         return np.array(self._renderer.render())
 
 
-def _furnish(width: int, height: int) -> Callable[[Any], None]:
-    """Return a function that adds floor, light and sky to a model."""
+def _furnish(size: tuple[int, int], spec: Any) -> None:  # noqa: ANN401 - imported late
+    """Add floor, light and sky to the specification of a model."""
+    import mujoco  # noqa: PLC0415 - after its engine is chosen
 
-    def add(spec: Any) -> None:  # noqa: ANN401 - the engine is imported late
-        import mujoco  # noqa: PLC0415 - the same
-
-        spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
-        spec.visual.global_.fovy = _FIELD_OF_VIEW
-        spec.visual.headlight.ambient = (0.35, 0.35, 0.35)
-        spec.visual.headlight.diffuse = (0.35, 0.35, 0.35)
-        spec.visual.headlight.specular = (0.0, 0.0, 0.0)
-        spec.visual.quality.shadowsize = 2048
-        # Robots are small: a near clipping plane and fine shadows.
-        spec.stat.extent = 0.5
-        spec.visual.map.znear = 0.01
-        spec.visual.map.shadowclip = 1.0
-        spec.add_texture(
-            name="sky",
-            type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-            builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-            rgb1=_SKY,
-            rgb2=_SKY,
-            width=16,
-            height=96,
-        )
-        spec.add_texture(
-            name="tiles",
-            type=mujoco.mjtTexture.mjTEXTURE_2D,
-            builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-            rgb1=_FLOOR[0],
-            rgb2=_FLOOR[1],
-            width=256,
-            height=256,
-        )
-        floor = spec.add_material(name="floor")
-        floor.textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = "tiles"
-        floor.texuniform = True
-        floor.texrepeat = (0.5 / _TILE_M, 0.5 / _TILE_M)
-        for geom in spec.worldbody.geoms:
-            if geom.name in _GROUND:
-                geom.material = "floor"
-        spec.worldbody.add_light(
-            pos=(-0.5, -0.8, 3.0),
-            dir=(0.15, 0.25, -1.0),
-            type=mujoco.mjtLightType.mjLIGHT_SPOT,
-            castshadow=True,
-            cutoff=60.0,
-            exponent=1.0,
-            attenuation=(1.0, 0.0, 0.0),
-            diffuse=(0.5, 0.5, 0.5),
-            specular=(0.1, 0.1, 0.1),
-        )
-
-    return add
+    spec.visual.global_.offwidth, spec.visual.global_.offheight = size
+    spec.visual.global_.fovy = _FIELD_OF_VIEW
+    spec.visual.headlight.ambient = (0.35, 0.35, 0.35)
+    spec.visual.headlight.diffuse = (0.35, 0.35, 0.35)
+    spec.visual.headlight.specular = (0.0, 0.0, 0.0)
+    spec.visual.quality.shadowsize = 2048
+    # Robots are small: a near clipping plane and fine shadows.
+    spec.stat.extent = 0.5
+    spec.visual.map.znear = 0.01
+    spec.visual.map.shadowclip = 1.0
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+        rgb1=_SKY,
+        rgb2=_SKY,
+        width=16,
+        height=96,
+    )
+    spec.add_texture(
+        name="tiles",
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=_FLOOR[0],
+        rgb2=_FLOOR[1],
+        width=256,
+        height=256,
+    )
+    floor = spec.add_material(name="floor")
+    floor.textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = "tiles"
+    floor.texuniform = True
+    floor.texrepeat = (0.5 / _TILE_M, 0.5 / _TILE_M)
+    for geom in spec.worldbody.geoms:
+        if geom.name in _GROUND:
+            geom.material = "floor"
+    spec.worldbody.add_light(
+        pos=(-0.5, -0.8, 3.0),
+        dir=(0.15, 0.25, -1.0),
+        type=mujoco.mjtLightType.mjLIGHT_SPOT,
+        castshadow=True,
+        cutoff=60.0,
+        exponent=1.0,
+        attenuation=(1.0, 0.0, 0.0),
+        diffuse=(0.5, 0.5, 0.5),
+        specular=(0.1, 0.1, 0.1),
+    )
 
 
 def gait_strip(pictures: Sequence[Picture], *, columns: int = 5) -> Picture:
@@ -208,13 +203,10 @@ def gait_strip(pictures: Sequence[Picture], *, columns: int = 5) -> Picture:
     height, width, _ = pictures[0].shape
     columns = min(columns, len(pictures))
     rows = -(-len(pictures) // columns)
-    strip = np.full((rows * height, columns * width, 3), 255, np.uint8)
-    for number, picture in enumerate(pictures):
-        top, left = divmod(number, columns)
-        strip[top * height : (top + 1) * height, left * width : (left + 1) * width] = (
-            picture
-        )
-    return strip
+    cells = np.full((rows * columns, height, width, 3), 255, np.uint8)
+    cells[: len(pictures)] = pictures
+    strip = cells.reshape(rows, columns, height, width, 3).swapaxes(1, 2)
+    return strip.reshape(rows * height, columns * width, 3)
 
 
 def save_picture(picture: Picture, path: Path) -> None:
@@ -223,7 +215,7 @@ def save_picture(picture: Picture, path: Path) -> None:
     Raises:
         NoPictures: the ending is unknown, or the file cannot be written.
     """
-    _write(path, lambda: Image.fromarray(picture).save(path))
+    _save(Image.fromarray(picture), path)
 
 
 def save_animation(pictures: Sequence[Picture], path: Path, interval_s: float) -> None:
@@ -237,22 +229,14 @@ def save_animation(pictures: Sequence[Picture], path: Path, interval_s: float) -
     Raises:
         NoPictures: the file cannot be written.
     """
-    frames = [Image.fromarray(picture) for picture in pictures]
-    _write(
-        path,
-        lambda: frames[0].save(
-            path,
-            save_all=True,
-            append_images=frames[1:],
-            duration=round(1000 * interval_s),
-            loop=0,
-        ),
-    )
+    first, *others = map(Image.fromarray, pictures)
+    pause_ms = round(1000 * interval_s)
+    _save(first, path, save_all=True, append_images=others, duration=pause_ms, loop=0)
 
 
-def _write(path: Path, save: Callable[[], None]) -> None:
+def _save(image: Image.Image, path: Path, **options: Any) -> None:  # noqa: ANN401 - Pillow's
     try:
-        save()
+        image.save(path, **options)
     except OSError as error:
         raise NoPictures(f"{path}: cannot be written: {error.strerror}") from None
     except ValueError as error:

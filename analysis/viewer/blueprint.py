@@ -78,8 +78,7 @@ def _island_view(
 ) -> rrb.Spatial3DView:
     """Return the view of one island, or a close view of one of its robots."""
     path = island_path(island)
-    is_here = follow is not None and follow.island == island
-    tracked = robot_path(island, follow) if follow and is_here else None
+    tracked = robot_path(island, follow) if follow and follow.island == island else None
     is_arena = island in scene.arenas
     return rrb.Spatial3DView(
         origin=f"/{path}",

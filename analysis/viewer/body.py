@@ -185,16 +185,16 @@ class _Builder:
 
     def model(self) -> BoxModel:
         rows = sorted(self.rows, key=lambda row: row[:2])
-        colours = np.array([row[4] for row in rows])
+        segments, attitude_of, centres, halves, colours = zip(*rows, strict=True)
         origins = np.array(self.origins)
         parents = [max(parent, 0) for parent in self.parents]
         return BoxModel(
-            half_sizes=np.array([row[3] for row in rows], dtype=np.float32),
-            colours=np.round(255.0 * colours).astype(np.uint8),
-            segments=np.array([row[0] for row in rows], dtype=np.intp),
-            centres=np.array([row[2] for row in rows]),
+            half_sizes=np.array(halves, dtype=np.float32),
+            colours=np.round(255.0 * np.array(colours)).astype(np.uint8),
+            segments=np.array(segments, dtype=np.intp),
+            centres=np.array(centres),
             attitudes=np.array([quaternion(each) for _, each in self.attitudes]),
-            attitude_of=np.array([row[1] for row in rows], dtype=np.intp),
+            attitude_of=np.array(attitude_of, dtype=np.intp),
             carried_by=np.array([owner for owner, _ in self.attitudes], dtype=np.intp),
             parents=tuple(self.parents),
             anchors=origins - origins[parents],
@@ -208,13 +208,10 @@ def _plain(boxes: Iterable[Box]) -> list[Box]:
     for segment in (0, 1):
         own = [box for box in boxes if box.segment == segment]
         thick = [box for box in own if box.size[0] >= _PLATE_M]
-        chosen = thick or own[:1]
-        if chosen:
-            halves = [0.5 * np.asarray(box.size) for box in chosen]
-            middles = [np.asarray(box.position) for box in chosen]
-            pairs = list(zip(middles, halves, strict=True))
-            low = np.min([middle - half for middle, half in pairs], axis=0)
-            high = np.max([middle + half for middle, half in pairs], axis=0)
+        if chosen := thick or own[:1]:
+            halves = np.array([0.5 * np.asarray(box.size) for box in chosen])
+            middles = np.array([box.position for box in chosen])
+            low, high = (middles - halves).min(axis=0), (middles + halves).max(axis=0)
             size, middle = (high - low).tolist(), (0.5 * (low + high)).tolist()
             found.append(
                 Box("all", tuple(size), tuple(middle), 0.0, segment, chosen[0].rotation)

@@ -4,8 +4,7 @@ import argparse
 import re
 from pathlib import Path
 
-from rich.progress import Progress
-
+from analysis.measures.load import Run
 from analysis.progress import bars
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
@@ -21,19 +20,19 @@ from analysis.viewer.output import HOST, PORT, Output, Window, keep_serving
 from analysis.viewer.recording import Recording, ViewerError
 from analysis.viewer.replay import (
     CHUNK_S,
-    Span,
     last_time,
-    read_experiment,
     read_news,
     read_poses,
+    shown_run,
 )
 from analysis.viewer.resimulate import Simulators, resimulate
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
 from analysis.viewer.watch import watch
-from schema.agent.command import add_network_flags, tls_of
+from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
 from schema.agent.service import tell_user
 from schema.agent.supervisor import stop_on_signals
+from schema.experiment.file import own_experiment
 from schema.experiment.plugin_access import allow
 from schema.flags import Flags, add_plugins, number
 from schema.robot.ids import BirthId
@@ -61,7 +60,7 @@ def main(arguments: list[str], simulators: Simulators) -> int:
     options = _flags().parse_args(arguments[1:])
     allow(options.plugins)
     output = Output.of(options.save, options.serve)
-    if (options.run is None) == (options.connect is None):
+    if options.run is not None and options.connect is not None:
         raise ViewerError("give either a run folder or --connect ADDRESS")
     if options.ancestry and not options.robot:
         raise ViewerError("--ancestry: needs --robot best or --robot ISLAND:BIRTH")
@@ -71,7 +70,7 @@ def main(arguments: list[str], simulators: Simulators) -> int:
     if options.robot or (options.start, options.until) != (None, None):
         raise ViewerError("--robot, --from and --until: for a run folder only")
     stop = stop_on_signals()
-    with LiveSource(options.connect, options.fleet, tls_of(options)) as source:
+    with LiveSource(connect_of(options), options.fleet, tls_of(options)) as source:
         watch(source, output, options.follow, stop)
     return 0
 
@@ -81,11 +80,12 @@ def _replay(
 ) -> None:
     """Record a run from its tables, and keep serving the recording."""
     folder: Path = options.run
-    scene = scene_of(read_experiment(folder))
-    news = read_news(folder)
+    run = shown_run(folder)
+    scene = scene_of(own_experiment(run.document))
+    news = read_news(run)
     born = {one.birth for one in news.births}
     _check(options, born, is_online=bool(scene.arenas))
-    motions = _motions(options, simulators)
+    motions = _motions(options, run, simulators)
     moving = [each.birth for each in motions]
     blueprint = layout(scene, follow=options.follow, motions=moving)
     name = f"{news.experiment}-{folder.name}"
@@ -98,7 +98,11 @@ def _replay(
             show.tell(news)
             bar.remove_task(task)
             if span is not None:
-                _replay_poses(folder, span, show, bar)
+                chunks = (span[1] - span[0]) / CHUNK_S
+                pieces = read_poses(folder, *span)
+                shown = bar.track(pieces, chunks, description="recording poses")
+                for arena, poses in shown:
+                    show.move(arena, poses)
         bodies = {one.birth: one.body for one in news.births}
         recording.upright("motion")
         recording.ground("motion", scene.below(moving))
@@ -121,20 +125,18 @@ def _check(options: argparse.Namespace, born: set[BirthId], *, is_online: bool) 
         raise ViewerError(f"--follow {name}: no robot of that name was born")
 
 
-def _motions(options: argparse.Namespace, simulators: Simulators) -> list[Motion]:
+def _motions(
+    options: argparse.Namespace, run: Run, simulators: Simulators
+) -> list[Motion]:
     """Return the motion of the robots of ``--robot``; print if it is as recorded."""
-    folder: Path = options.run
-    births = selected_robots(folder, _wanted(options), has_ancestry=options.ancestry)
+    wanted = _wanted(options)
+    births = selected_robots(run.folder, wanted, has_ancestry=options.ancestry)
     if not births:
         return []
     with bars(f"re-simulating robots: {len(births)}") as bar:
         task = bar.add_task("re-simulating", total=1.0)
         motions = resimulate(
-            folder,
-            read_experiment(folder),
-            births,
-            simulators,
-            lambda share: bar.update(task, completed=share),
+            run, births, simulators, lambda share: bar.update(task, completed=share)
         )
     for motion in motions:
         tell_user(motion.verdict)
@@ -150,7 +152,7 @@ def _wanted(options: argparse.Namespace) -> list[BirthId]:
     return [best if birth is None else birth for birth in options.robot]
 
 
-def _span(options: argparse.Namespace, folder: Path) -> Span:
+def _span(options: argparse.Namespace, folder: Path) -> tuple[float, float]:
     """Return the simulated time to show; print it if it is not the whole run."""
     end_s = last_time(folder) if options.until is None else options.until
     start_s = max(0.0, end_s - LAST_S) if options.start is None else options.start
@@ -161,14 +163,7 @@ def _span(options: argparse.Namespace, folder: Path) -> Span:
             f"showing poses from {start_s:g} s to {end_s:g} s; use --from and --until "
             "for others"
         )
-    return Span(start_s, end_s)
-
-
-def _replay_poses(folder: Path, span: Span, show: Show, bar: Progress) -> None:
-    chunks = (span.end_s - span.start_s) / CHUNK_S
-    pieces = read_poses(folder, span)
-    for arena, poses in bar.track(pieces, chunks, description="recording poses"):
-        show.move(arena, poses)
+    return start_s, end_s
 
 
 def _robot_name(text: str) -> BirthId:
@@ -197,12 +192,13 @@ def _flags() -> Flags:
         epilog="for example: revolve view runs/scenario3-seed1 --save run.rrd",
         allow_abbrev=False,
     )
-    flags.add_argument("run", nargs="?", type=Path, help="run folder to replay")
     flags.add_argument(
-        "--connect", metavar="ADDRESS",
-        help="show the live run of the coordinator at this address (in the run "
-        "folder's file 'address')",
-    )  # fmt: skip
+        "run",
+        nargs="?",
+        type=Path,
+        help="run folder to replay (default: the live run at the hub)",
+    )
+    add_connect(flags)
     flags.add_argument(
         "--save", type=Path, metavar="FILE",
         help="write a recording (.rrd) instead of opening a window",

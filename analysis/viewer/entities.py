@@ -2,11 +2,8 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
-from analysis.viewer.body import Float32s
 from schema.robot.ids import BirthId
+from schema.wire.updates import Birth
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,25 +14,13 @@ class TimePoint:
     births: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class PoseBatch:
-    """T poses of one robot, their times (T,) [s] and births so far (T,), if known."""
-
-    sim_time_s: npt.NDArray[np.float64]
-    births: npt.NDArray[np.int64] | None
-    centres: Float32s
-    attitudes: Float32s
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class AncestryNode:
-    """An individual in the ancestry graph: column, row (its rank) and parents."""
+    """An individual in the ancestry graph: its birth, and its number among all."""
 
-    birth: BirthId
+    birth: Birth
     order: int
-    rank: int
-    parents: tuple[BirthId, ...]
-    is_alive: bool
+    is_alive: bool = True
 
 
 def name_of(birth: BirthId) -> str:

@@ -1,13 +1,12 @@
-"""Box models of a run's robots, and off-line populations on a grid."""
+"""Off-line populations on a grid."""
 
+from collections.abc import Callable, Mapping
 from itertools import count
 
-from analysis.viewer.body import BoxModel, box_model, neutral_pose
+from analysis.viewer.body import BoxModel, neutral_pose
 from analysis.viewer.entities import TimePoint, robot_path
 from analysis.viewer.recording import Recording
-from schema.parts import BodySpace
 from schema.robot.ids import BirthId
-from schema.robot.robot import Robot
 from schema.wire.updates import Level
 
 SPACING_M = 0.6
@@ -15,26 +14,8 @@ COLUMNS = 5
 """Spots in a row; the first row is nearest to the camera."""
 
 
-class BoxModels:
-    """Box models of a run's robots, each made when it is first used."""
-
-    def __init__(self, space: BodySpace) -> None:
-        self._space = space
-        self._bodies: dict[BirthId, Robot] = {}
-        self._made: dict[BirthId, BoxModel] = {}
-
-    def add(self, birth: BirthId, body: Robot) -> None:
-        """Add the body of a robot, unless it is known."""
-        self._bodies.setdefault(birth, body)
-
-    def __contains__(self, birth: BirthId) -> bool:
-        return birth in self._bodies
-
-    def __getitem__(self, birth: BirthId) -> BoxModel:
-        if birth not in self._made:
-            body = self._bodies[birth]
-            self._made[birth] = box_model(body, self._space, is_plain=True)
-        return self._made[birth]
+BoxModels = Mapping[BirthId, Callable[[], BoxModel]]
+"""Functions that return the box models of the known robots."""
 
 
 class Gallery:
@@ -62,11 +43,10 @@ class Gallery:
             if birth in spots or birth not in models:
                 continue
             spots[birth] = next(free)
-            path = robot_path(level.island, birth)
-            self._recording.log_boxes(path, models[birth], when)
-            self._recording.log_place(
-                path, *neutral_pose(models[birth], spot_place(spots[birth]))
-            )
+            path, model = robot_path(level.island, birth), models[birth]()
+            self._recording.log_boxes(path, model, when)
+            place = neutral_pose(model, spot_place(spots[birth]))
+            self._recording.log_place(path, *place)
 
 
 def spot_place(spot: int) -> tuple[float, float]:

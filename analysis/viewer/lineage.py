@@ -1,7 +1,6 @@
 """Ancestry graph: the newest births from left to right, at the height of their rank."""
 
 from collections import OrderedDict
-from dataclasses import dataclass
 
 from analysis.viewer.entities import AncestryNode, TimePoint
 from analysis.viewer.recording import Recording
@@ -14,19 +13,12 @@ _EVERY = 10
 """Births between two drawings: Rerun needs the whole graph each time."""
 
 
-@dataclass(slots=True)
-class _Entry:
-    birth: Birth
-    order: int
-    is_alive: bool = True
-
-
 class Lineage:
     """Ancestry of the newest births, with those that are alive."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
-        self._entries: OrderedDict[BirthId, _Entry] = OrderedDict()
+        self._entries: OrderedDict[BirthId, AncestryNode] = OrderedDict()
         self._known: set[BirthId] = set()
         self._latest = TimePoint()
         self._undrawn = 0
@@ -37,7 +29,7 @@ class Lineage:
             return False
         if self._undrawn >= _EVERY:
             self.draw()
-        self._entries[one.birth] = _Entry(one, len(self._known))
+        self._entries[one.birth] = AncestryNode(one, len(self._known))
         self._known.add(one.birth)
         if len(self._entries) > _MOST:
             self._entries.popitem(last=False)
@@ -60,20 +52,6 @@ class Lineage:
 
     def draw(self) -> None:
         """Draw the graph if there are new births."""
-        if not self._undrawn:
-            return
-        self._undrawn = 0
-        first = next(iter(self._entries.values())).order
-        self._recording.ancestry(
-            [
-                AncestryNode(
-                    birth,
-                    entry.order - first,
-                    entry.birth.rank,
-                    entry.birth.parents,
-                    entry.is_alive,
-                )
-                for birth, entry in self._entries.items()
-            ],
-            self._latest,
-        )
+        if self._undrawn:
+            self._undrawn = 0
+            self._recording.ancestry(list(self._entries.values()), self._latest)

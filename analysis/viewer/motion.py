@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from analysis.viewer.body import BoxModel, place_rows
-from analysis.viewer.entities import PoseBatch, TimePoint, motion_path, name_of
+from analysis.viewer.entities import TimePoint, motion_path, name_of
 from analysis.viewer.recording import Recording, ViewerError
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
@@ -45,10 +45,8 @@ def selected_robots(
         ViewerError: no robot of that name was born.
     """
     births = read_table(folder, "births").select(["island", "birth", "parents"])
-    parents = {
-        BirthId(row["island"], row["birth"]): row["parents"]
-        for row in births.to_pylist()
-    }
+    rows = (row.values() for row in births.to_pylist())
+    parents = {BirthId(island, birth): couple for island, birth, couple in rows}
     found: dict[BirthId, None] = {}
     for birth in wanted:
         if birth not in parents:
@@ -80,11 +78,10 @@ def best_evaluated(folder: Path) -> tuple[BirthId, float]:
     alone = read_table(folder, "evaluations")
     together = read_table(folder, "fitness")
     judged = (alone, together.filter(together["is_mature"]))
-    found = [(pc.max(rows["fitness"]).as_py(), rows) for rows in judged]
-    known = [(best, rows) for best, rows in found if best is not None]
-    if not known:
+    rows = pa.concat_tables(judged, promote_options="default")
+    best = pc.max(rows["fitness"]).as_py()
+    if best is None:
         raise ViewerError(f"{folder}: no robot has been evaluated yet")
-    best, rows = max(known, key=lambda one: one[0])
     (row,) = rows.filter(pc.equal(rows["fitness"], best)).slice(0, 1).to_pylist()
     return individual(row), best
 
@@ -106,6 +103,7 @@ def show_motion(
     if lane is not None:
         row, column = divmod(lane, LANES)
         centres[..., :2] += LANE_M * np.array([column, row], dtype=np.float32)
-    recording.log_boxes(path, model, TimePoint(float(times[0])))
-    recording.log_poses(path, PoseBatch(times, None, centres, attitudes))
-    recording.log_line(motion.verdict, TimePoint(float(times[0])), "INFO")
+    start = TimePoint(float(times[0]))
+    recording.log_boxes(path, model, start)
+    recording.log_poses(path, times, None, centres, attitudes)
+    recording.log_line(motion.verdict, start, "INFO")

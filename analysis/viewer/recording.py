@@ -14,13 +14,7 @@ import numpy.typing as npt
 import rerun as rr
 
 from analysis.viewer.body import BoxModel, Float32s
-from analysis.viewer.entities import (
-    AncestryNode,
-    PoseBatch,
-    TimePoint,
-    island_path,
-    name_of,
-)
+from analysis.viewer.entities import AncestryNode, TimePoint, island_path, name_of
 from analysis.viewer.ground import Surface
 from analysis.viewer.scene import Scene
 from schema.errors import RevolveError
@@ -99,31 +93,26 @@ class Recording:
 
     def add_scene(self, scene: Scene) -> None:
         """Log the islands of a run, before any robot."""
-        is_alone = len(scene.islands) == 1
         grounds = zip(scene.islands, scene.walls, scene.surfaces, strict=True)
         for island, walls, surfaces in grounds:
-            self._island(island, walls, is_alone=is_alone)
+            path = island_path(island)
+            self.upright(path)
+            self._curves(island, is_alone=len(scene.islands) == 1)
+            if len(walls):
+                boxes = rr.Boxes3D(
+                    centers=walls[:, :3],
+                    quaternions=walls[:, 3:7],
+                    half_sizes=walls[:, 7:],
+                    colors=_WALL,
+                )
+                self._stream.log(f"{path}/wall", boxes, static=True)
             # Off-line populations are shown on a grid, without ground.
             if island in scene.arenas:
-                self.ground(island_path(island), surfaces)
+                self.ground(path, surfaces)
 
-    def _island(
-        self,
-        island: int,
-        walls: Sequence[tuple[Float32s, Float32s]],
-        *,
-        is_alone: bool,
-    ) -> None:
-        """Log the axes, walls and styles of the curves of an island.
-
-        Args:
-            island: number of the island.
-            walls: centre and attitude (7,), and half sizes (3,) of each wall.
-            is_alone: the run has no other island.
-        """
-        path = island_path(island)
-        self.upright(path)
-        hue = _HUES[island % len(_HUES)]
+    def _curves(self, island: int, *, is_alone: bool) -> None:
+        """Log names and colours of an island's curves; it may be the only island."""
+        path, hue = island_path(island), _HUES[island % len(_HUES)]
         pale = tuple((each + 255) // 2 for each in hue)
         own = "" if is_alone else f"{island}: "
         fitness = rr.SeriesLines(
@@ -133,18 +122,6 @@ class Recording:
         size = rr.SeriesLines(names=f"{own}alive", colors=_ALIVE if is_alone else hue)
         self._stream.log(f"{path}/fitness", fitness, static=True)
         self._stream.log(f"{path}/size", size, static=True)
-        if walls:
-            places = np.array([place for place, _ in walls])
-            self._stream.log(
-                f"{path}/wall",
-                rr.Boxes3D(
-                    centers=places[:, :3],
-                    quaternions=places[:, 3:],
-                    half_sizes=np.array([half for _, half in walls]),
-                    colors=_WALL,
-                ),
-                static=True,
-            )
 
     def ground(self, path: str, surfaces: Sequence[Surface]) -> None:
         """Log ground and scenery.
@@ -169,15 +146,29 @@ class Recording:
         )
         self._stream.log(path, boxes)
 
-    def log_poses(self, path: str, moves: PoseBatch) -> None:
-        """Log poses of a robot in one batch."""
-        rows, count, _ = moves.centres.shape
-        index = [rr.TimeColumn(SIMULATED, duration=_nanoseconds(moves.sim_time_s))]
-        if moves.births is not None:
-            index.append(rr.TimeColumn(BIRTHS, sequence=moves.births))
+    def log_poses(
+        self,
+        path: str,
+        times_s: npt.NDArray[np.float64],
+        births: npt.NDArray[np.int64] | None,
+        centres: Float32s,
+        attitudes: Float32s,
+    ) -> None:
+        """Log poses of a robot in one batch.
+
+        Args:
+            path: entity of the robot.
+            times_s: (T,) times of the poses [s].
+            births: (T,) births so far, if known.
+            centres: (T, B, 3) centres of the boxes [m].
+            attitudes: (T, B, 4) attitudes of the boxes x, y, z, w.
+        """
+        rows, count, _ = centres.shape
+        index = [rr.TimeColumn(SIMULATED, duration=_nanoseconds(times_s))]
+        if births is not None:
+            index.append(rr.TimeColumn(BIRTHS, sequence=births))
         columns = rr.Boxes3D.columns(
-            centers=moves.centres.reshape(-1, 3),
-            quaternions=moves.attitudes.reshape(-1, 4),
+            centers=centres.reshape(-1, 3), quaternions=attitudes.reshape(-1, 4)
         )
         self._stream.send_columns(path, index, columns.partition([count] * rows))
 
@@ -220,22 +211,25 @@ class Recording:
         self._stream.log("log", rr.TextLog(text, level=level))
 
     def ancestry(self, entries: Sequence[AncestryNode], when: TimePoint) -> None:
-        """Log the whole ancestry graph."""
+        """Log the whole ancestry graph: the first entry at the left, by rank."""
         self._at(when)
-        shown = {each.birth for each in entries}
-        names = [name_of(each.birth) for each in entries]
+        births = [each.birth for each in entries]
+        shown = {one.birth for one in births}
+        names = [name_of(one.birth) for one in births]
+        columns = [each.order - entries[0].order for each in entries]
+        ranks = [one.rank for one in births]
         nodes = rr.GraphNodes(
             names,
-            positions=[(30.0 * each.order, 90.0 * each.rank) for each in entries],
+            positions=np.stack([columns, ranks], axis=1) * (30.0, 90.0),
             colors=[_ALIVE if each.is_alive else _DEAD for each in entries],
             labels=names,
             radii=[13.0 if each.is_alive else 8.0 for each in entries],
             show_labels=False,
         )
         edges = [
-            (name_of(parent), name_of(each.birth))
-            for each in entries
-            for parent in each.parents
+            (name_of(parent), name_of(one.birth))
+            for one in births
+            for parent in one.parents
             if parent in shown
         ]
         arrows = rr.GraphEdges(edges, graph_type="directed")

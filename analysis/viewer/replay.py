@@ -1,19 +1,14 @@
 """Reads the tables of a run, in the form of the messages of a live run."""
 
-import json
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from analysis.measures.load import Run, read_run
 from schema.errors import RunFolderError
-from schema.experiment.document import Experiment
-from schema.experiment.file import own_experiment
-from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
 from schema.tables.files import FINISHED, campaign, read_table
 from schema.wire.updates import (
@@ -27,25 +22,28 @@ from schema.wire.updates import (
 CHUNK_S = 20.0
 """Simulated time of the poses that are read and shown at once [s]."""
 
-_DETAILS = "run.json"
 _BORN = ("island", "birth", "parents", "rank", "body", "sim_time_s")
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
-    """Interval of simulated time whose poses are shown [s]."""
+def shown_run(folder: Path) -> Run:
+    """Return the run in a folder.
 
-    start_s: float
-    end_s: float
+    Raises:
+        RunFolderError: the folder has no run.
+    """
+    try:
+        return read_run(folder)
+    except RunFolderError as error:
+        raise RunFolderError(f"{folder}: no run found: {error}") from None
 
 
-def read_news(folder: Path) -> Update:
+def read_news(run: Run) -> Update:
     """Return the contents of a run's tables, except poses.
 
     Raises:
-        RunFolderError: the folder has no run, or a table cannot be read.
+        RunFolderError: a table cannot be read, or no robot has been born.
     """
-    details = _details(folder)
+    folder = run.folder
     counts: dict[int, int] = {}
     births = []
     for row in read_table(folder, "births").select(_BORN).to_pylist():
@@ -59,33 +57,13 @@ def read_news(folder: Path) -> Update:
         epoch=0,
         sequence=0,
         is_whole=True,
-        experiment=details["name"],
+        experiment=run.experiment,
         births=tuple(births),
         deaths=tuple(map(read_death, read_table(folder, "deaths").to_pylist())),
         levels=tuple(read_levels(population)),
         migrants=tuple(map(read_migrant, read_table(folder, "migrations").to_pylist())),
-        document=details["document"],
+        document=run.document,
     )
-
-
-def read_experiment(folder: Path) -> Experiment:
-    """Return the experiment of a run.
-
-    Raises:
-        RunFolderError: the folder has no run.
-        ExperimentError: its document has another version.
-    """
-    return own_experiment(_details(folder)["document"])
-
-
-def read_origin(folder: Path) -> Origin:
-    """Return seed and number of a run, which determine its noise, for island 0.
-
-    Raises:
-        RunFolderError: the folder has no run.
-    """
-    details = _details(folder)
-    return Origin(seed=details["seed"], run=details["run"])
 
 
 def last_time(folder: Path) -> float:
@@ -97,12 +75,15 @@ def last_time(folder: Path) -> float:
     return float(max(times))
 
 
-def read_poses(folder: Path, span: Span) -> Iterator[tuple[int, pa.Table]]:
+def read_poses(
+    folder: Path, start_s: float, end_s: float
+) -> Iterator[tuple[int, pa.Table]]:
     """Yield the poses of a span, in pieces of ``CHUNK_S``.
 
     Args:
         folder: the run folder.
-        span: interval of simulated time.
+        start_s: simulated time of the span's start [s].
+        end_s: simulated time of its end [s].
 
     Yields:
         Number of an island, and its rows by time.
@@ -110,9 +91,9 @@ def read_poses(folder: Path, span: Span) -> Iterator[tuple[int, pa.Table]]:
     Raises:
         RunFolderError: the table cannot be read.
     """
-    poses = _within(folder, span)
+    poses = _within(folder, start_s, end_s)
     times = poses["sim_time_s"].to_numpy()
-    chunks = np.floor((times - span.start_s) / CHUNK_S).astype(np.int64)
+    chunks = np.floor((times - start_s) / CHUNK_S).astype(np.int64)
     for chunk in np.unique(chunks).tolist():
         now = poses.filter(pa.array(chunks == chunk))
         for island in sorted(pc.unique(now["island"]).to_pylist()):
@@ -125,38 +106,19 @@ def rows_by_robot(poses: pa.Table) -> Iterator[tuple[BirthId, pa.Table]]:
     born = poses["island"]
     if "birth_island" in poses.column_names:
         born = pc.coalesce(poses["birth_island"], born)
-    islands, numbers = born.to_numpy(), poses["birth"].to_numpy()
-    order = np.lexsort((numbers, islands))
-    poses = poses.take(order)
-    islands, numbers = islands[order], numbers[order]
-    is_new = (np.diff(islands) != 0) | (np.diff(numbers) != 0)
-    starts = [0, *(np.flatnonzero(is_new) + 1).tolist()] if len(order) else []
-    for start, end in zip(starts, [*starts[1:], len(order)], strict=True):
-        birth = BirthId(int(islands[start]), int(numbers[start]))
-        yield birth, poses.slice(start, end - start)
+    ids = np.stack([born.to_numpy(), poses["birth"].to_numpy()], axis=1)
+    robots, robot_of = np.unique(ids, axis=0, return_inverse=True)
+    order = np.argsort(robot_of, kind="stable")
+    counts = np.bincount(robot_of, minlength=len(robots))
+    ends = np.cumsum(counts)
+    for robot, start, count in zip(robots.tolist(), ends - counts, counts, strict=True):
+        yield BirthId(*robot), poses.take(order[start : start + count])
 
 
-def _details(folder: Path) -> dict[str, Any]:
-    """Return the description of a run.
-
-    Raises:
-        RunFolderError: the folder has no run.
-    """
-    try:
-        details: dict[str, Any] = json.loads((folder / _DETAILS).read_text("utf-8"))
-        texts = {key: str(details[key]) for key in ("name", "document")}
-        return {**texts, **{key: int(details[key]) for key in ("seed", "run")}}
-    except OSError as error:
-        why = f"{_DETAILS}: {error.strerror}"
-    except (ValueError, KeyError, TypeError) as error:
-        why = f"{_DETAILS}: {error}"
-    raise RunFolderError(f"{folder}: no run found: {why}")
-
-
-def _within(folder: Path, span: Span) -> pa.Table:
+def _within(folder: Path, start_s: float, end_s: float) -> pa.Table:
     """Return the poses of a span, reading no more than needed."""
     time = pc.field("sim_time_s")
-    is_in = (time >= span.start_s) & (time <= span.end_s)
+    is_in = (time >= start_s) & (time <= end_s)
     if (folder / FINISHED).is_dir():
         return campaign(folder, "poses").to_table(filter=is_in)
     return read_table(folder, "poses").filter(is_in)

@@ -10,15 +10,15 @@ from typing import Protocol
 
 import pyarrow as pa
 import pyarrow.compute as pc
-from msgspec.structs import replace
 
+from analysis.measures.load import Run
 from analysis.viewer.entities import name_of
 from analysis.viewer.motion import Motion
 from analysis.viewer.recording import ViewerError
-from analysis.viewer.replay import read_origin
 from schema.agent.platform_tag import platform_tag
 from schema.experiment.document import Experiment, body_space, island_experiment
-from schema.experiment.identity import Identity
+from schema.experiment.file import experiment_from_text
+from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import (
     EvaluationSettings,
     evaluation_settings,
@@ -69,8 +69,7 @@ class Simulators:
 
 
 def resimulate(
-    folder: Path,
-    experiment: Experiment,
+    run: Run,
     births: list[BirthId],
     simulators: Simulators,
     report: Callable[[float], None],
@@ -78,8 +77,7 @@ def resimulate(
     """Return the motions of robots, in their order.
 
     Args:
-        folder: the run folder.
-        experiment: experiment of the run.
+        run: the run.
         births: the robots.
         simulators: functions that simulate.
         report: called with the progress, 0 to 1.
@@ -88,35 +86,32 @@ def resimulate(
         ViewerError: no evaluation or pose of a robot is recorded.
         RevolveError: the journal cannot be read, or a robot cannot be simulated.
     """
-    arenas = [
-        birth
-        for birth in births
-        if island_experiment(experiment, birth.island).arena is not None
-    ]
-    moved = {each.birth: each for each in _together(folder, arenas, simulators, report)}
+    experiment = experiment_from_text(run.document)
+    moved: dict[BirthId, Motion] = {}
+    for island in sorted({birth.island for birth in births}):
+        if island_experiment(experiment, island).arena is not None:
+            moved |= _in_arena(run.folder, island, births, simulators, report)
     for number, birth in enumerate(births, start=1):
         if birth not in moved:
-            moved[birth] = _alone(folder, experiment, birth, simulators)
+            own = island_experiment(experiment, birth.island)
+            moved[birth] = _alone(run, own, birth, simulators)
             report(number / len(births))
     return [moved[birth] for birth in births]
 
 
-def _alone(
-    folder: Path, experiment: Experiment, birth: BirthId, simulators: Simulators
-) -> Motion:
-    """Return the motion of a robot that was evaluated alone."""
-    own = island_experiment(experiment, birth.island)
+def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) -> Motion:
+    """Return the motion of a robot that was evaluated alone on its island."""
     settings = read_evaluation_settings(evaluation_settings(own))
-    rows = _rows_of(folder, "evaluations", birth).to_pylist()
+    rows = _rows_of(run.folder, "evaluations", birth).to_pylist()
     if not rows:
         raise ViewerError(f"robot {name_of(birth)}: no evaluation is recorded")
     recorded = rows[0]
     if recorded["simulated_s"] is not None:
         steps = round(recorded["simulated_s"] / settings.simulation.timestep_s)
         settings = lasting(settings, steps)
-    genome = _rows_of(folder, "births", birth)["genome"][0].as_py()
+    genome = _rows_of(run.folder, "births", birth)["genome"][0].as_py()
     robot = develop(decode_genome(genome), body_space(own.space))
-    origin = replace(read_origin(folder), island=birth.island)
+    origin = Origin(seed=run.seed, run=run.number, island=birth.island)
     identity = Identity(origin, birth, recorded["trial"])
     evaluation, poses = simulators.alone(robot, settings, identity)
     differing = [
@@ -127,38 +122,21 @@ def _alone(
     return Motion(birth, poses, _verdict(birth, differing, recorded["platform"]))
 
 
-def _together(
-    folder: Path,
-    births: list[BirthId],
-    simulators: Simulators,
-    report: Callable[[float], None],
-) -> list[Motion]:
-    """Return the motions of robots in the arenas that they were born in."""
-    motions: list[Motion] = []
-    for island in sorted({birth.island for birth in births}):
-        recorded = {
-            birth: _rows_of(folder, "poses", birth)
-            for birth in births
-            if birth.island == island
-        }
-        for birth, rows in recorded.items():
-            if not rows.num_rows:
-                raise ViewerError(f"robot {name_of(birth)}: no pose is recorded")
-        motions += _in_arena(folder, island, recorded, simulators, report)
-    return motions
-
-
 def _in_arena(
     folder: Path,
     island: int,
-    recorded: dict[BirthId, pa.Table],
+    births: list[BirthId],
     simulators: Simulators,
     report: Callable[[float], None],
-) -> list[Motion]:
-    spans = [pc.min_max(rows["sim_time_s"]).as_py() for rows in recorded.values()]
-    start_s = min(span["min"] for span in spans)
-    end_s = max(span["max"] for span in spans)
-    settings, past = simulators.history(folder, island, start_s)
+) -> dict[BirthId, Motion]:
+    """Return the motions of the robots that were born in one arena."""
+    here = [birth for birth in births if birth.island == island]
+    recorded = {birth: _rows_of(folder, "poses", birth) for birth in here}
+    for birth, rows in recorded.items():
+        if not rows.num_rows:
+            raise ViewerError(f"robot {name_of(birth)}: no pose is recorded")
+    span = pc.min_max(pa.concat_tables(recorded.values())["sim_time_s"]).as_py()
+    settings, past = simulators.history(folder, island, span["min"])
     samples, motion = [], []
     is_equal = True
     steps = simulators.together(settings, past, frozenset(recorded))
@@ -168,15 +146,15 @@ def _in_arena(
         samples.append(step.samples)
         motion.append(step.motion)
         times = step.samples["sim_time_s"]
-        if len(times) and pc.max(times).as_py() >= end_s:
+        if len(times) and pc.max(times).as_py() >= span["max"]:
             break
     replayed, frames = pa.concat_tables(samples), pa.concat_tables(motion)
     platform = next(iter(read_table(folder, "runs")["platform"].to_pylist()), "")
-    motions = []
+    motions = {}
     for birth, rows in recorded.items():
         differing = _differences(rows, _only(replayed, birth), is_equal=is_equal)
         verdict = _verdict(birth, differing, platform)
-        motions.append(Motion(birth, _only(frames, birth), verdict))
+        motions[birth] = Motion(birth, _only(frames, birth), verdict)
     return motions
 
 

@@ -26,7 +26,8 @@ class Scene:
         arenas: islands on which robots live together, in simulated time.
         extent_m: half width of the largest arena or population grid [m].
         space: the part types.
-        walls: walls of each island: place and attitude (7,) and half sizes (3,).
+        walls: walls of each island, (W, 10): centre [m], attitude x, y, z, w, and
+            half sizes [m].
         surfaces: surfaces above the plane of each island.
     """
 
@@ -34,7 +35,7 @@ class Scene:
     arenas: frozenset[int]
     extent_m: float
     space: BodySpace
-    walls: tuple[tuple[tuple[Float32s, Float32s], ...], ...]
+    walls: tuple[Float32s, ...]
     surfaces: tuple[tuple[Surface, ...], ...]
 
     def below(self, births: Iterable[BirthId]) -> tuple[Surface, ...]:
@@ -58,34 +59,33 @@ def scene_of(experiment: Experiment) -> Scene:
     islands = tuple(range(island_count(experiment)))
     settings = [of_island(experiment, each) for each in islands]
     arenas = [each.arena for each in settings]
-    reaches = [_reach(arena) if arena else _GALLERY_M for arena in arenas]
+    reaches = [
+        _MARGIN * max(0.5 * arena.wall_diameter_m, arena.birth_radius_m)
+        if arena
+        else _GALLERY_M
+        for arena in arenas
+    ]
     return Scene(
         islands,
         frozenset(each for each in islands if arenas[each] is not None),
         max(reaches),
         body_space(experiment.space),
-        tuple(_ring_wall(arena) if arena else () for arena in arenas),
+        tuple(map(_ring_wall, arenas)),
         tuple(surfaces(each.environment, each.simulation) for each in settings),
     )
 
 
-def _reach(arena: Arena) -> float:
-    """Return the half width of an arena's view [m]."""
-    return _MARGIN * max(0.5 * arena.wall_diameter_m, arena.birth_radius_m)
-
-
-def _ring_wall(arena: Arena) -> tuple[tuple[Float32s, Float32s], ...]:
+def _ring_wall(arena: Arena | None) -> Float32s:
     """Return the walls of an arena, as ``schema.mjcf.world`` builds them."""
-    if not arena.wall_diameter_m:
-        return ()
+    if arena is None or not arena.wall_diameter_m:
+        return np.zeros((0, 10), np.float32)
     half, height = 0.5 * arena.wall_thickness_m, 0.5 * arena.wall_height_m
     centre = 0.5 * arena.wall_diameter_m + half
     length = (centre + half) * tan(pi / arena.wall_segments)
-    size = np.array([half, length, height], dtype=np.float32)
     walls = []
     for index in range(arena.wall_segments):
         angle = 2.0 * pi * index / arena.wall_segments
+        place = (centre * cos(angle), centre * sin(angle), height)
         attitude = (0.0, 0.0, sin(0.5 * angle), cos(0.5 * angle))
-        place = (centre * cos(angle), centre * sin(angle), height, *attitude)
-        walls.append((np.array(place, dtype=np.float32), size))
-    return tuple(walls)
+        walls.append((*place, *attitude, half, length, height))
+    return np.array(walls, np.float32)

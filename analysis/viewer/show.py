@@ -4,15 +4,18 @@
 pose and disappear at its death. Data that arrives twice is recorded once.
 """
 
+from collections import defaultdict
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache, partial
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from analysis.viewer.body import Float32s, place_rows
-from analysis.viewer.entities import PoseBatch, TimePoint, name_of, robot_path
-from analysis.viewer.gallery import BoxModels, Gallery
+from analysis.viewer.body import BoxModel, Float32s, box_model, place_rows
+from analysis.viewer.entities import TimePoint, name_of, robot_path
+from analysis.viewer.gallery import Gallery
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.recording import Recording
 from analysis.viewer.replay import rows_by_robot
@@ -33,22 +36,14 @@ _BLINK_S = 0.1
 
 @dataclass(slots=True)
 class _Clock:
-    """Times of the births on one island [s], ascending."""
+    """Time of each birth on one island [s], by its number there; both ascend."""
 
-    times_s: list[float] = field(default_factory=list)
-    births: list[int] = field(default_factory=list)
+    times_s: dict[int, float] = field(default_factory=dict)
 
     def births_at(self, times_s: npt.NDArray[np.float64]) -> npt.NDArray[np.int64]:
         """Return the numbers of births up to some times."""
-        after = np.searchsorted(self.times_s, times_s, side="right")
-        return np.array([0, *self.births], dtype=np.int64)[after]
-
-    def when(self, births: int) -> TimePoint:
-        """Return the time of a birth by its number on the island, from 1."""
-        index = int(np.searchsorted(self.births, births))
-        if index < len(self.births) and self.births[index] == births:
-            return TimePoint(self.times_s[index], births)
-        return TimePoint(None, births)
+        after = np.searchsorted(list(self.times_s.values()), times_s, side="right")
+        return np.array([0, *self.times_s], dtype=np.int64)[after]
 
 
 @dataclass(slots=True)
@@ -80,8 +75,10 @@ class Show:
         self._recording = recording
         self._lineage = Lineage(recording)
         self._gallery = Gallery(recording)
-        self._models = BoxModels(space)
-        self._clocks: dict[int, _Clock] = {}
+        self._space = space
+        # Each model is made at the first call.
+        self._models: dict[BirthId, Callable[[], BoxModel]] = {}
+        self._clocks: defaultdict[int, _Clock] = defaultdict(_Clock)
         self._shown: dict[tuple[int, BirthId], _ShownRobot] = {}
         self._gone: dict[tuple[int, BirthId], Death] = {}
         self._levels: set[tuple[int, int]] = set()
@@ -127,22 +124,17 @@ class Show:
                 continue
             times = rows["sim_time_s"].to_numpy()
             path = self._settle(arena, birth, times)
-            centres, attitudes = place_rows(self._models[birth], rows)
-            births = self._clock(arena).births_at(times)
-            moves = PoseBatch(
-                times, births, _coarse(centres, _PER_M), _coarse(attitudes, _PER_TURN)
-            )
-            self._recording.log_poses(path, moves)
+            centres, attitudes = place_rows(self._models[birth](), rows)
+            births = self._clocks[arena].births_at(times)
+            coarse = _coarse(centres, _PER_M), _coarse(attitudes, _PER_TURN)
+            self._recording.log_poses(path, times, births, *coarse)
         if has_all:
             self._remove_absent(arena, shown)
         return pa.concat_tables(unknown) if unknown else None
 
-    def _clock(self, island: int) -> _Clock:
-        return self._clocks.setdefault(island, _Clock())
-
     def _at(self, island: int, time_s: float) -> TimePoint:
         """Return a time of an arena, with its births so far."""
-        births = self._clock(island).births_at(np.array([time_s]))
+        births = self._clocks[island].births_at(np.array([time_s]))
         return TimePoint(time_s, int(births[0]))
 
     def _settle(
@@ -154,7 +146,7 @@ class Show:
         robot = self._shown.get(key)
         if robot is None or first_s - robot.drawn_s >= _REPEAT_S:
             when = self._at(arena, first_s)
-            self._recording.log_boxes(path, self._models[birth], when)
+            self._recording.log_boxes(path, self._models[birth](), when)
             was_gone = robot is not None and robot.is_gone
             self._shown[key] = _ShownRobot(path, first_s, last_s, was_gone)
         self._shown[key].seen_s = last_s
@@ -167,11 +159,11 @@ class Show:
             if key in self._gone:
                 self._leave(self._gone[key])
             elif key[1] not in shown:
-                robot = self._shown.pop(key)
+                robot = self._shown[key]
                 births = self._at(arena, robot.seen_s).births
                 when = TimePoint(robot.seen_s + _BLINK_S, births)
                 self._recording.remove(robot.path, when)
-            if key in self._shown and key[1] not in shown:
+            if key[1] not in shown:
                 del self._shown[key]
 
     def _leave(self, gone: Death) -> None:
@@ -185,13 +177,13 @@ class Show:
 
     def _born(self, one: Birth) -> None:
         if one.body is not None:
-            self._models.add(one.birth, decode_body(one.body))
+            body = decode_body(one.body)
+            model = cache(partial(box_model, body, self._space, is_plain=True))
+            self._models.setdefault(one.birth, model)
         if not self._lineage.add(one):
             return
-        clock = self._clock(one.birth.island)
         if one.sim_time_s is not None:
-            clock.times_s.append(one.sim_time_s)
-            clock.births.append(one.births)
+            self._clocks[one.birth.island].times_s[one.births] = one.sim_time_s
         parents = " and ".join(map(name_of, one.parents))
         text = f"{name_of(one.birth)} is born{' to ' if parents else ''}{parents}"
         self._recording.log_line(text, TimePoint(one.sim_time_s, one.births), "INFO")
@@ -209,7 +201,8 @@ class Show:
         if (level.island, level.births) in self._levels:
             return
         self._levels.add((level.island, level.births))
-        when = self._clock(level.island).when(level.births)
+        time_s = self._clocks[level.island].times_s.get(level.births)
+        when = TimePoint(time_s, level.births)
         fitness = (level.mean, level.best) if level.judged else ()
         self._recording.level(level.island, when, level.size, fitness)
         if when.sim_time_s is None and level.members:
@@ -237,10 +230,8 @@ def _in_order(news: Update) -> list[Birth | Level | Death]:
 
     A birth at the time of a death comes before the death.
     """
-    births = [((one.births, 0), one) for one in news.births]
-    levels = [((level.births, 1), level) for level in news.levels]
-    keyed: list[tuple[tuple[int, int], Birth | Level]] = [*births, *levels]
-    came = [each for _, each in sorted(keyed, key=lambda pair: pair[0])]
+    came: list[Birth | Level] = [*news.births, *news.levels]
+    came.sort(key=lambda one: one.births)
     return [*came, *sorted(news.deaths, key=lambda gone: gone.births)]
 
 

@@ -26,9 +26,7 @@ from coordinator.islands.events import (
     MigrationEvent,
     Record,
     Started,
-    Vet,
-    Vetted,
-    VettingFailed,
+    Verdict,
 )
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import birth_record, population_records
@@ -40,6 +38,8 @@ class Arena:
     """One world and its living robots.
 
     Attributes:
+        experiment: its settings.
+        clock: its intervals.
         births: number of births, founders included.
         step: physics step of the last decision.
         is_finished: all births of the experiment are done, or ``is_extinct``.
@@ -66,9 +66,9 @@ class Arena:
         self.births = 0
         self.step = 0
         self.is_finished = self.is_extinct = False
-        self._experiment = experiment
+        self.experiment = experiment
         self._rules = rules
-        self._clock = ArenaClock(rules, experiment.simulation)
+        self.clock = ArenaClock(rules, experiment.simulation)
         self._space = body_space(experiment.space)
         self._parents_needed = experiment.selection.parents_needed
         self._number = number
@@ -117,20 +117,18 @@ class Arena:
         if isinstance(event, Started) == self._has_started:
             why = "it has started before" if self._has_started else "it has not started"
             raise self._unexpected(event, why)
-        match event:
-            case Started():
-                self._has_started = True
-                return [*self._vetting_queue.begin_founders()]
-            case Vetted() | VettingFailed():
-                return self._vetted(event)
-            case Advanced():
-                return self._advanced(event) if self._is_awaited(event) else []
-            case Commanded():
-                return self._commanded(event)
-            case _:
-                return self._migrated(event)
+        if isinstance(event, Started):
+            self._has_started = True
+            return [*self._vetting_queue.begin_founders()]
+        if isinstance(event, Verdict):
+            return self._vetted(event)
+        if isinstance(event, Advanced):
+            return self._advanced(event) if self._is_awaited(event) else []
+        if isinstance(event, Commanded):
+            return self._commanded(event)
+        return self._migrated(event)
 
-    def _vetted(self, event: Vetted | VettingFailed) -> list[ArenaCommand]:
+    def _vetted(self, event: Verdict) -> list[ArenaCommand]:
         was_busy = self._vetting_queue.is_busy
         vets = self._vetting_queue.take(event)
         if not was_busy or self._vetting_queue.is_busy:
@@ -162,7 +160,7 @@ class Arena:
     def _advanced(self, event: Advanced) -> list[ArenaCommand]:
         """Record the result of an advance, and decide."""
         advance = event.advance
-        over_s = self._clock.seconds(advance.step - self.step)
+        over_s = self.clock.seconds(advance.step - self.step)
         self._awaited = None
         self._advances += 1
         self.step = advance.step
@@ -171,7 +169,7 @@ class Arena:
             commands.append(Append("poses", event.pose_rows, advance.poses))
         commands += touch_records(advance.touches, self._moment, over_s)
         for casualty in advance.casualties:
-            died_s = self._clock.seconds(casualty.step)
+            died_s = self.clock.seconds(casualty.step)
             moment = self._moment._replace(sim_time_s=died_s)
             commands.append(death_record(casualty, "diverged", moment))
         self._living.update(advance)
@@ -182,9 +180,9 @@ class Arena:
         if self._founders:
             return [*self._insert(self._founders.pop()), *self._conclude()]
         commands: list[ArenaCommand] = []
-        if self.step % self._clock.sample == 0:
+        if self.step % self.clock.sample == 0:
             commands += sample_records(self._living, self._moment)
-        if self.step % self._clock.birth == 0:
+        if self.step % self.clock.birth == 0:
             self.is_extinct = not self._orders.insertions and (
                 len(self._living) < self._parents_needed
             )
@@ -192,24 +190,18 @@ class Arena:
             if migration is not None:
                 migration.is_starving = self.is_extinct and migration.may_bring_robots
                 self.is_extinct = self.is_extinct and not migration.is_starving
-            if self.is_extinct or self.births >= self._experiment.births:
+            if self.is_extinct or self.births >= self.experiment.births:
                 return [*commands, self._finish()]
-            commands += self._mate()
-        if self.step % self._clock.cull == 0:
+            mature = self._living.mature()
+            if self._living.has_room and len(mature) >= self._parents_needed:
+                commands += self._vetting_queue.begin_child(mature)
+        if self.step % self.clock.cull == 0:
             reason, culled = select_culled(self._living.mature(), self._rules)
             commands += [
                 death_record(self._living.remove(one.birth), reason, self._moment)
                 for one in culled
             ]
         return commands if self._vetting_queue.is_busy else commands + self._conclude()
-
-    def _mate(self) -> list[Vet]:
-        """Begin a birth if there is room and there are parents."""
-        mature = self._living.mature()
-        needed = self._parents_needed
-        if not self._living.has_room or len(mature) < needed:
-            return []
-        return self._vetting_queue.begin_child(mature)
 
     def _conclude(self) -> list[ArenaCommand]:
         """Insert viable robots, carry out orders, and advance unless paused."""
@@ -259,7 +251,7 @@ class Arena:
         return self._conclude() if self._is_held else []
 
     def _advance(self) -> AdvanceShard:
-        clock, step = self._clock, self.step
+        clock, step = self.clock, self.step
         until = clock.next_decision(step, is_founding=bool(self._founders))
         self._awaited = AdvanceShard(
             self._number,
@@ -290,11 +282,11 @@ class Arena:
 
     @property
     def _moment(self) -> Moment:
-        return Moment(self._number, self.births, self._clock.seconds(self.step))
+        return Moment(self._number, self.births, self.clock.seconds(self.step))
 
     def _unexpected(self, event: ArenaEvent, why: str) -> UnexpectedEvent:
         return UnexpectedEvent(
             f"arena {self._number} at step {self.step}, {self.births} of "
-            f"{self._experiment.births} born, {len(self._living)} alive, "
+            f"{self.experiment.births} born, {len(self._living)} alive, "
             f"{self._advances} advances done: {why}, got {event}"
         )

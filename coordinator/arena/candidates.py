@@ -5,7 +5,7 @@ from math import inf
 
 from coordinator.evolution.breeding import Breeder, Candidate
 from coordinator.evolution.selection import Couple, Individual
-from coordinator.islands.events import Vet, Vetted, VettingFailed
+from coordinator.islands.events import Verdict, Vet
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
@@ -38,16 +38,13 @@ class VettingQueue:
 
     def begin_founders(self) -> list[Vet]:
         """Generate the founders; return their vettings."""
-        vets: list[Vet] = []
-        for number in range(self._next):
-            vets += self._try(number, 0, None, "")
-        return vets
+        return [vet for number in range(self._next) for vet in self._try(number, 0)]
 
     def begin_child(self, mature: Sequence[Individual]) -> list[Vet]:
         """Mate two of the mature; return the vetting, if there is a candidate."""
         self._mature = tuple(mature)
         self._end = self._failed + self._attempts
-        return self._try(self._next, self._failed, None, "")
+        return self._try(self._next, self._failed)
 
     def take_viable(self) -> list[Candidate]:
         """Return the viable candidates by birth id, and remove them."""
@@ -59,7 +56,7 @@ class VettingQueue:
         self._next, self._failed = self._next + 1, 0
         return BirthId(self._island, self._next - 1)
 
-    def take(self, event: Vetted | VettingFailed) -> list[Vet]:
+    def take(self, event: Verdict) -> list[Vet]:
         """Handle a report; return the vetting of the next attempt, if there is one.
 
         Raises:
@@ -76,17 +73,14 @@ class VettingQueue:
         if candidate is None or event.attempt < candidate.attempt:
             return []
         del self._in_vetting[number]
-        if isinstance(event, Vetted) and event.report.is_viable:
+        if event.is_viable:
             self._viable[number] = candidate
             if number == self._next:
                 self.take_number()
             return []
-        why = event.report.reason if isinstance(event, Vetted) else event.reason
-        return self._try(number, candidate.attempt + 1, candidate.couple, why)
+        return self._try(number, candidate.attempt + 1, candidate.couple, event.reason)
 
-    def _is_new(
-        self, event: Vetted | VettingFailed, candidate: Candidate | None
-    ) -> bool:
+    def _is_new(self, event: Verdict, candidate: Candidate | None) -> bool:
         """Return whether an answer belongs to no request so far."""
         number = event.birth.number
         if candidate is not None:
@@ -96,7 +90,7 @@ class VettingQueue:
         return not 0 <= number < self._next
 
     def _try(
-        self, number: int, attempt: int, couple: Couple | None, why: str
+        self, number: int, attempt: int, couple: Couple | None = None, why: str = ""
     ) -> list[Vet]:
         """Return the vetting of the first candidate from an attempt on, if any."""
         birth = BirthId(self._island, number)

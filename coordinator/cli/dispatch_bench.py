@@ -7,12 +7,12 @@ machine can hold are simulated (``coordinator.cli.fleet_model``).
 """
 
 import argparse
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -48,6 +48,7 @@ MOST_NULL_CPU_S = 0.4e-3
 LEAST_WORKERS = 1000
 """Workers that one coordinator must keep busy with evaluations of 10 s."""
 
+_say = partial(print, flush=True)
 _CLIENT = Client("bench", 1)
 _IN_FLIGHT = 64
 _ROBOTS = 50
@@ -252,8 +253,3 @@ def simulate(coordinator_s: float) -> bool:
         )
     _say(f"required for {_LONG_S:g} s: {LEAST_WORKERS} workers")
     return reached >= LEAST_WORKERS
-
-
-def _say(line: str) -> None:
-    sys.stdout.write(f"{line}\n")
-    sys.stdout.flush()

@@ -37,6 +37,7 @@ from schema.errors import NetworkError, RevolveError
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text, experiment_text
 from schema.tables.files import has_rows
+from schema.wire.status import RunStatus
 
 
 def start(
@@ -105,10 +106,10 @@ def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:
         try:
             scheduler = execute_runs(
                 folder,
-                [Planned(held.details, status, lambda: held)],
+                [Planned(status, lambda: held)],
                 deployment,
-                lambda run: conclusions.append(_conclude(run)),
-                lambda _details, _error: None,  # raised below
+                lambda run: conclusions.append(conclude(run)),
+                lambda _status, _error: None,  # raised below
             )
         except NetworkError:
             held.forget()
@@ -138,15 +139,14 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
         status = unbegun_status(path, details)
         try:
             if not holds_run(path):
-                take = partial(RunFolder, path, details)
-                planned.append(Planned(details, status, take))
+                planned.append(Planned(status, partial(RunFolder, path, details)))
                 continue
             found, status = read_details(path), folder_status(path)
             if status.state == "finished" and not has_evaluated(path):
                 failed.append(path)
         except RevolveError as error:
             # The damaged run fails when the scheduler opens it; the others continue.
-            planned.append(Planned(details, status, partial(_raise, error)))
+            planned.append(Planned(status, partial(_raise, error)))
             continue
         check_adopted(path, found, details)
         theirs, ours = (
@@ -154,7 +154,7 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
         )
         if theirs != ours:
             tell_user(f"{path}: keeps its own number of births, {theirs} (not {ours})")
-        planned.append(Planned(found, status, partial(RunFolder, path)))
+        planned.append(Planned(status, partial(RunFolder, path)))
     return planned, failed
 
 
@@ -173,12 +173,12 @@ def _execute_campaign(
         failed: folders of finished runs in which all evaluations failed.
         deployment: processes and network.
     """
-    finished = sum(one.status.state == "finished" for one in planned)
+    finished = sum(one.is_finished for one in planned)
     if finished:
         tell_user(f"{finished} of {len(planned)} runs are already finished")
 
     def conclude_run(run: RunSession) -> None:
-        conclusion = _conclude(run)
+        conclusion = conclude(run)
         if conclusion.failures:
             tell_user(f"{run.held.path}: {conclusion.failures}")
         if not conclusion.has_evaluated:
@@ -200,9 +200,5 @@ def _execute_campaign(
     return 1 if failed else 0
 
 
-def _conclude(run: RunSession) -> Conclusion:
-    return conclude(run.held.path, run.experiment, run.loop.islands)
-
-
-def _report(details: RunDetails, error: RevolveError) -> None:
-    tell_user(f"{details.name}-{details.run} failed: {error}")
+def _report(status: RunStatus, error: RevolveError) -> None:
+    tell_user(f"{status.name}-{status.run} failed: {error}")

@@ -3,7 +3,8 @@
 import argparse
 
 from coordinator.storage.campaign import shipped_campaigns
-from schema.agent.command import add_cpu_limit, add_network_flags
+from schema.agent.address import FORMS
+from schema.agent.command import add_access, add_cpu_limit, add_network_flags
 from schema.experiment.file import shipped_experiments
 from schema.flags import (
     Flags,
@@ -14,9 +15,6 @@ from schema.flags import (
     whole_number,
 )
 
-LISTEN = "tcp/127.0.0.1:7447"
-"""Default address of ``revolve coordinator``."""
-
 _COMMANDS = {
     "run": (
         "Evolve experiments with coordinator, analyzer and workers on this machine.",
@@ -24,7 +22,7 @@ _COMMANDS = {
     ),
     "coordinator": (
         "Run experiments on workers and analyzers that connect.",
-        "revolve coordinator scenario1 --listen tcp/127.0.0.1:7447",
+        "revolve coordinator scenario1 --seed 1",
     ),
     "resume": (
         "Resume a run or campaign that was stopped or killed.",
@@ -125,18 +123,19 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
             action="store_true",
             help="run everything in one process without network; slower, for debugging",
         )
-    listen = LISTEN if command == "coordinator" else "a free port of this machine"
+    listen = "hub" if command == "coordinator" else "only a socket of its own"
     flags.add_argument(
         "--listen",
         metavar="ADDRESS",
-        help=f"address that agents connect to (default: {listen})",
+        help=f"address that agents connect to, {FORMS} (default: {listen})",
     )
     flags.add_argument(
         "--connect",
         metavar="ADDRESS",
-        help="share the workers of an existing hub: another coordinator, or a Zenoh "
-        "router",
+        help="share the workers of an existing hub: its address, or the folder of an "
+        "active run",
     )
+    add_access(flags)
     add_network_flags(flags)
     flags.add_argument(
         "--speed",

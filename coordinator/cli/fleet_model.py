@@ -4,16 +4,14 @@ Jobs are assigned by the same state machine as in runs. Workers, network and the
 coordinator's processor are modelled: evaluation times are lognormally distributed,
 workers leave and join, and the coordinator handles one answer after the other. Each
 takes the measured time of a whole birth: vetting, mating, journal, tables, dispatch and
-network.
+network. A worker, too, does its jobs one after the other, in the order of assignment.
 Nothing else limits the model, so all lost utilisation is waiting for the coordinator.
 """
 
+import sched
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
-from heapq import heappop, heappush
 from itertools import count
 from math import log
 
@@ -86,11 +84,10 @@ class Outcome:
 class _Totals:
     """Totals of the second half of the simulation."""
 
-    used_s: float = 0.0
-    present_s: float = 0.0
-    handling_s: float = 0.0
-    dispatch_s: float = 0.0
     births: int = 0
+    handled: int = 0
+    used_s: float = 0.0
+    dispatch_s: float = 0.0
 
 
 class FleetModel:
@@ -100,133 +97,109 @@ class FleetModel:
         self._setting = setting
         self._rng = np.random.default_rng(_SEED)
         self._dispatch = Dispatch()
-        self._agenda: list[tuple[float, int, Callable[[], None]]] = []
-        self._order, self._jobs, self._names = count(), count(1), count()
-        # Jobs of each worker, the running one first.
-        self._workers: dict[str, deque[int]] = {}
-        self._lasts_s: dict[int, float] = {}
-        self._lost = 0
-        self._inbox: deque[Returned] = deque()
+        # Time in which a slow coordinator, too, serves every worker once.
+        round_s = max(setting.evaluation_s, setting.workers * setting.coordinator_s)
+        self._end_s = max(_ROUNDS, _LEAST / setting.workers) * round_s
         self._now_s = 0.0
+        self._agenda = sched.scheduler(lambda: self._now_s, self._pass)
+        self._jobs, self._names = count(1), count()
+        self._lasts_s: dict[int, float] = {}
+        # Times at which the workers and the coordinator are done with all their work.
+        self._workers_end_s: dict[str, float] = {}
+        self._coordinator_end_s = 0.0
+        self._lost = 0
         self._totals = _Totals()
 
     def run(self) -> Outcome:
         """Simulate enough evaluations; return the result of the second half."""
-        setting = self._setting
-        # Time in which a slow coordinator, too, serves every worker once.
-        round_s = max(setting.evaluation_s, setting.workers * setting.coordinator_s)
-        end_s = max(_ROUNDS, _LEAST / setting.workers) * round_s
+        setting, span_s = self._setting, self._end_s / 2
         for _ in range(setting.workers):
             self._join()
         for _ in range((setting.credits + 1) * setting.workers):
             self._request()
-        self._at(0.0, self._tick)
+        self._tick()
         if setting.losses_per_s:
-            self._at(self._rng.exponential(1 / setting.losses_per_s), self._lose)
-        self._at(end_s / 2, self._reset_totals)
-        self._at(end_s, lambda: None)
-        while self._now_s < end_s:
-            now_s, _, call = heappop(self._agenda)
-            self._pass(now_s)
-            call()
-        totals, span_s = self._totals, end_s / 2
+            self._plan_loss()
+        self._at(span_s, self._reset_totals)
+        self._agenda.run()
+        totals = self._totals
         return Outcome(
-            utilisation=totals.used_s / totals.present_s,
+            utilisation=totals.used_s / (setting.workers * span_s),
             births_per_s=totals.births / span_s,
-            coordinator=totals.handling_s / span_s,
+            coordinator=totals.handled * setting.coordinator_s / span_s,
             dispatch_s=totals.dispatch_s / max(1, totals.births),
             lost=self._lost,
         )
 
-    def _at(self, when_s: float, call: Callable[[], None]) -> None:
-        heappush(self._agenda, (when_s, next(self._order), call))
+    def _pass(self, seconds: float) -> None:
+        self._now_s += seconds
 
-    def _pass(self, now_s: float) -> None:
-        """Advance the time; add up workers' and coordinator's time."""
-        passed_s, self._now_s = now_s - self._now_s, now_s
-        self._totals.present_s += passed_s * len(self._workers)
-        self._totals.handling_s += passed_s * bool(self._inbox)
+    def _at(self, when_s: float, call: Callable[..., None], *arguments: object) -> None:
+        """Plan a call, unless it is after the end."""
+        if when_s <= self._end_s:
+            self._agenda.enterabs(when_s, 0, call, arguments)
 
     def _reset_totals(self) -> None:
         """Start counting: the fleet has reached its steady state."""
         self._totals = _Totals()
 
-    def _handle_event(self, event: DispatchEvent) -> None:
+    def _tell(self, event: DispatchEvent) -> None:
         """Pass an event to ``Dispatch`` and carry out its commands."""
         began_s = time.thread_time()
         commands = self._dispatch.handle(event)
         self._totals.dispatch_s += time.thread_time() - began_s
+        self._totals.handled += isinstance(event, Returned)
         for command in commands:
             if isinstance(command, Assign):
-                arrival_s = self._now_s + self._setting.latency_s
-                name, number = command.agent, command.job.number
-                self._at(arrival_s, partial(self._arrive, name, number))
+                self._evaluate(command.agent, command.job.number)
             elif isinstance(command, Deliver):
                 self._totals.births += 1
                 self._totals.used_s += self._lasts_s.pop(command.job.number)
                 self._request()
 
     def _request(self) -> None:
-        number = next(self._jobs)
-        self._handle_event(Requested(Job(number, "evaluate", b"")))
+        self._tell(Requested(Job(next(self._jobs), "evaluate", b"")))
 
     def _tick(self) -> None:
-        self._handle_event(Ticked(self._now_s))
+        self._tell(Ticked(self._now_s))
         self._at(self._now_s + _TICK_S, self._tick)
 
     def _join(self) -> None:
         name = f"worker-{next(self._names):06}"
-        self._workers[name] = deque()
-        self._handle_event(Joined(name, "worker", self._setting.credits - 1, "model"))
+        self._workers_end_s[name] = self._now_s
+        self._tell(Joined(name, "worker", self._setting.credits - 1, "model"))
+
+    def _plan_loss(self) -> None:
+        wait_s = self._rng.exponential(1 / self._setting.losses_per_s)
+        self._at(self._now_s + wait_s, self._lose)
 
     def _lose(self) -> None:
         """Remove a worker with all its jobs; another one joins."""
-        names = list(self._workers)
-        name = names[self._rng.integers(len(names))]
-        del self._workers[name]
+        name = self._rng.choice(list(self._workers_end_s))
+        del self._workers_end_s[name]
         self._lost += 1
-        self._handle_event(Left(name))
+        self._tell(Left(name))
         self._join()
-        next_s = self._rng.exponential(1 / self._setting.losses_per_s)
-        self._at(self._now_s + next_s, self._lose)
+        self._plan_loss()
 
-    def _arrive(self, name: str, number: int) -> None:
-        """Give a worker a job; it starts at once if it has no other."""
-        if name in self._workers:
-            self._workers[name].append(number)
-            if len(self._workers[name]) == 1:
-                self._evaluate(name)
-
-    def _evaluate(self, name: str) -> None:
+    def _evaluate(self, name: str, number: int) -> None:
+        """Have a worker do a job after its others; the answer arrives later."""
         setting = self._setting
         # Makes the mean of the distribution equal to the setting.
         shift = log(setting.evaluation_s) - setting.spread**2 / 2
         lasts_s = self._rng.lognormal(shift, setting.spread)
-        self._lasts_s[self._workers[name][0]] = lasts_s
-        self._at(self._now_s + lasts_s, partial(self._complete, name))
-
-    def _complete(self, name: str) -> None:
-        """Send an answer and start the next job."""
-        if name not in self._workers:
-            return
-        queue = self._workers[name]
-        returned = Returned(queue.popleft(), name, "ok")
-        arrival_s = self._now_s + self._setting.latency_s
-        self._at(arrival_s, partial(self._take, returned))
-        if queue:
-            self._evaluate(name)
+        arrival_s = self._now_s + setting.latency_s
+        end_s = max(arrival_s, self._workers_end_s[name]) + lasts_s
+        self._lasts_s[number], self._workers_end_s[name] = lasts_s, end_s
+        returned = Returned(number, name, "ok")
+        self._at(end_s + setting.latency_s, self._take, returned)
 
     def _take(self, returned: Returned) -> None:
-        """Queue an answer for the coordinator."""
-        self._inbox.append(returned)
-        if len(self._inbox) == 1:
-            self._at(self._now_s + self._setting.coordinator_s, self._handle)
-
-    def _handle(self) -> None:
-        """Finish handling an answer; start with the next."""
-        self._handle_event(self._inbox.popleft())
-        if self._inbox:
-            self._at(self._now_s + self._setting.coordinator_s, self._handle)
+        """Queue an answer for the coordinator, unless its worker is lost."""
+        if returned.agent in self._workers_end_s:
+            begin_s = max(self._now_s, self._coordinator_end_s)
+            self._coordinator_end_s = begin_s + self._setting.coordinator_s
+            self._at(self._coordinator_end_s, self._tell, returned)
 
 
 def most_workers(setting: Setting) -> tuple[int, Outcome]:

@@ -1,23 +1,19 @@
 """Events of a journal as fields, and as aligned lines of text."""
 
+import re
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from coordinator.islands.events import (
     Advanced,
+    Answered,
     Audited,
     Commanded,
-    Evaluated,
-    EvaluationFailed,
     Insert,
     JournalledEvent,
     Order,
-    Pause,
-    Remove,
-    ReplaceBrain,
-    Resume,
+    Verdict,
     Vetted,
-    VettingFailed,
 )
 from coordinator.run.requests import requester_of
 from schema.robot.ids import BirthId
@@ -76,62 +72,52 @@ class Selection:
         return is_origin and self.birth in (None, birth.number)
 
 
-_NAMES: dict[type[JournalledEvent], str] = {
-    Vetted: "vetted",
-    VettingFailed: "vetting-failed",
-    Evaluated: "evaluated",
-    EvaluationFailed: "evaluation-failed",
-    Advanced: "advanced",
-    Commanded: "operator-order",
-    Audited: "audited",
-}
-
-
 def describe(event: JournalledEvent, selection: Selection) -> list[Fields]:
     """Return the fields of an event's lines; none if it is not selected.
 
     An advance has one line, or one for each selected robot in it.
     """
-    birth: BirthId | None
+    birth: BirthId | None = None
     if isinstance(event, Advanced):
-        return _advance(event, selection)
-    if isinstance(event, Commanded):
+        island = event.island
+        if not selection.has(island, None):
+            return _robots(event, selection)
+        fields = _advance(event)
+    elif isinstance(event, Commanded):
         island, birth = event.island, getattr(event.order, "birth", None)
-        fields: Fields = {"order": _order(event.order), "step": event.step}
+        fields = {"order": _order(event.order), "step": event.step}
     elif isinstance(event, Audited):
         island, birth = requester_of(event.first), event.first.birth
         fields = _audit(event)
     else:
         island, birth = requester_of(event), event.birth
         fields = _answer(event)
-    if not selection.has(island, birth):
-        return []
-    return [{**_head(event, island, birth), **fields}]
+    is_selected = selection.has(island, birth)
+    return [{**_head(event, island, birth), **fields}] if is_selected else []
 
 
 def _head(event: JournalledEvent, island: int, birth: BirthId | None) -> Fields:
-    head: Fields = {"event": _NAMES[type(event)], "island": island}
+    is_order = isinstance(event, Commanded)
+    name = "operator-order" if is_order else _words(event).replace(" ", "-")
+    head: Fields = {"event": name, "island": island}
     return head if birth is None else {**head, "birth": _id(birth)}
 
 
-def _answer(event: Vetted | VettingFailed | Evaluated | EvaluationFailed) -> Fields:
-    match event:
-        case Vetted(attempt=attempt, report=report):
-            reason = {} if report.is_viable else {"reason": report.reason}
-            return {
-                "attempt": attempt,
-                "verdict": "viable" if report.is_viable else "not viable",
-                **reason,
-                "motors": report.motors,
-                "mass": report.mass,
-            }
-        case VettingFailed():
-            return {"attempt": event.attempt, "reason": event.reason}
-        case Evaluated():
-            outcome = asdict(event.evaluation)
-        case EvaluationFailed():
-            outcome = {"reason": event.reason}
-    return {"trial": event.trial, **outcome, **_worker(event.provenance)}
+def _words(named: object) -> str:
+    """Return the name of an object's class as words: "replace brain"."""
+    return re.sub("(?<=[a-z])(?=[A-Z])", " ", type(named).__name__).lower()
+
+
+def _answer(event: Answered) -> Fields:
+    if not isinstance(event, Verdict):
+        found = event.evaluation
+        outcome = asdict(found) if found else {"reason": event.reason}
+        return {"trial": event.trial, **outcome, **_worker(event.provenance)}
+    fields: Fields = {"attempt": event.attempt}
+    if isinstance(event, Vetted):
+        fields["verdict"] = "viable" if event.is_viable else "not viable"
+        fields |= {"motors": event.report.motors, "mass": event.report.mass}
+    return fields if event.is_viable else {**fields, "reason": event.reason}
 
 
 def _audit(event: Audited) -> Fields:
@@ -139,66 +125,60 @@ def _audit(event: Audited) -> Fields:
     return {
         "verdict": "results agree" if event.agrees else "results differ",
         "outcomes": [
-            one.evaluation.fitness if isinstance(one, Evaluated) else one.reason
-            for one in both
+            one.evaluation.fitness if one.evaluation else one.reason for one in both
         ],
         "workers": [one.provenance.agent for one in both],
     }
 
 
-def _advance(event: Advanced, selection: Selection) -> list[Fields]:
+def _advance(event: Advanced) -> Fields:
+    """Return the fields of an advance; counts of zero are left out."""
     advance = event.advance
-    progress = {"advance": event.number, "step": advance.step}
-    if selection.has(event.island, None):
-        counts = {
-            "diverged": [_id(one.birth) for one in advance.casualties],
-            "contacts": len(advance.touches),
-            "pose_rows": event.pose_rows,
-        }
-        return [
-            {
-                **_head(event, event.island, None),
-                **progress,
-                "robots": len(advance.judgements),
-                **{key: value for key, value in counts.items() if value},
-                "state": advance.digest.hex(),
-                **_worker(event.provenance),
-            }
-        ]
+    counts = {
+        "diverged": [_id(one.birth) for one in advance.casualties],
+        "contacts": len(advance.touches),
+        "pose_rows": event.pose_rows,
+    }
+    return {
+        "advance": event.number,
+        "step": advance.step,
+        "robots": len(advance.judgements),
+        **{key: value for key, value in counts.items() if value},
+        "state": advance.digest.hex(),
+        **_worker(event.provenance),
+    }
+
+
+def _robots(event: Advanced, selection: Selection) -> list[Fields]:
+    """Return the fields of the selected robots of an advance."""
+    advance = event.advance
     robots: tuple[Judgement | Casualty, ...] = advance.judgements + advance.casualties
+    progress = {"advance": event.number, "step": advance.step}
     return [
-        {**_head(event, event.island, one.birth), **progress, **_robot(one)}
+        {
+            **_head(event, event.island, one.birth),
+            **progress,
+            **(
+                {"verdict": "diverged", "reason": one.reason}
+                if isinstance(one, Casualty)
+                else {"fitness": one.fitness, "age_s": one.age_s}
+            ),
+        }
         for one in robots
         if selection.has(event.island, one.birth)
     ]
 
 
-def _robot(found: Judgement | Casualty) -> Fields:
-    if isinstance(found, Casualty):
-        return {"verdict": "diverged", "reason": found.reason}
-    return {"fitness": found.fitness, "age_s": found.age_s}
-
-
 def _order(order: Order) -> str:
-    match order:
-        case Pause():
-            return "pause"
-        case Resume():
-            return "resume"
-        case Insert(place=place):
-            return f"insert at ({place[0]:g}, {place[1]:g}) m" if place else "insert"
-        case Remove():
-            return "remove"
-        case ReplaceBrain():
-            return "replace brain"
+    place = order.place if isinstance(order, Insert) else None
+    at = f" at ({place[0]:g}, {place[1]:g}) m" if place else ""
+    return f"{_words(order)}{at}"
 
 
 def _worker(provenance: Provenance) -> Fields:
-    return {
-        "worker": provenance.agent,
-        "platform": provenance.platform,
-        "wall_s": provenance.wall_s,
-    }
+    """Return the fields of a provenance; the agent is a worker."""
+    fields = asdict(provenance)
+    return {"worker": fields.pop("agent"), **fields}
 
 
 def _id(birth: BirthId) -> str:

@@ -12,12 +12,12 @@ from coordinator.cli.progress import Display
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network
 from coordinator.run.live_server import LiveServer
-from coordinator.run.operators import OperatorServer
+from coordinator.run.operators import answer_operator
 from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
-from coordinator.storage.folder import RunDetails
 from schema.agent.supervisor import stop_on_signals
 from schema.errors import RevolveError
+from schema.wire.status import RunStatus
 
 _TURN_S = 0.2
 _CHORES_S = 1.0
@@ -31,7 +31,7 @@ def execute_runs(
     planned: Sequence[Planned],
     deployment: Deployment,
     conclude: Callable[[RunSession], object],
-    report: Callable[[RunDetails, RevolveError], None],
+    report: Callable[[RunStatus, RevolveError], None],
 ) -> RunScheduler:
     """Execute runs until all are finished or a signal stops them.
 
@@ -93,7 +93,6 @@ class _Server:
     def __init__(self, scheduler: RunScheduler, network: Network) -> None:
         self._scheduler = scheduler
         self._network = network
-        self._operator_server = OperatorServer(scheduler)
         self._watched: RunSession | None = None
         self._live: LiveServer | None = None
 
@@ -104,7 +103,7 @@ class _Server:
             now_s: the time, of any clock that only goes forward [s].
         """
         for order in self._network.orders():
-            order.reply(self._operator_server.answer(order.data, now_s))
+            order.reply(answer_operator(self._scheduler, order.data, now_s))
         run = self._scheduler.watched
         if run is not self._watched:
             if self._live is not None:

@@ -1,7 +1,6 @@
 """Summary of a finished run: best robot, failures, where the results are."""
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,9 +9,9 @@ import pyarrow.compute as pc
 
 from coordinator.arena.arena import Arena
 from coordinator.evolution.selection import fittest_first
-from coordinator.islands.island import Island
+from coordinator.run.session import RunSession
 from coordinator.storage.hints import command
-from schema.experiment.document import Experiment, body_space
+from schema.experiment.document import body_space
 from schema.formats.files import write_robot
 from schema.robot.genome import develop
 from schema.tables.files import read_table
@@ -35,21 +34,18 @@ class Conclusion:
     has_evaluated: bool
 
 
-def conclude(
-    folder: Path, experiment: Experiment, islands: Mapping[int, Island | Arena]
-) -> Conclusion:
-    """Write the best robot of all islands to a file; return the run's summary.
+def conclude(run: RunSession) -> Conclusion:
+    """Write the best robot of all islands to a file; return the summary of a run.
 
     Args:
-        folder: run folder with its tables.
-        experiment: the run's experiment.
-        islands: finished islands by number.
+        run: a finished run with its tables.
 
     Raises:
         RunFolderError: a table cannot be read, or the robot cannot be written.
     """
+    folder = run.held.path
     failures = _failures(folder)
-    lines = _results(folder, experiment, islands)
+    lines = _results(run)
     if failures:
         lines.insert(1, failures)
     lines += [f"tables: {folder / 'tables'}", "try next:"]
@@ -59,31 +55,23 @@ def conclude(
     return Conclusion("\n".join(lines), failures, has_evaluated(folder))
 
 
-def _results(
-    folder: Path, experiment: Experiment, islands: Mapping[int, Island | Arena]
-) -> list[str]:
+def _results(run: RunSession) -> list[str]:
     """Describe the last population; write its best robot to a file."""
-    births = sum(island.births for island in islands.values())
-    extinct = [
-        number
-        for number, island in sorted(islands.items())
-        if isinstance(island, Arena) and island.is_extinct
+    file, islands = run.held.path / BEST, run.loop.islands.values()
+    births = sum(island.births for island in islands)
+    alive = [
+        each for each in islands if not (isinstance(each, Arena) and each.is_extinct)
     ]
-    if len(extinct) == len(islands):
+    if not alive:
         return [f"extinct after {births} births: too few robots are left to mate"]
-    judged = [
-        one
-        for number, island in sorted(islands.items())
-        if number not in extinct
-        for one in island.judged
-    ]
+    judged = [one for island in alive for one in island.judged]
     if not judged:
         return [f"{births} births; no robot of the last population has a fitness"]
     best = fittest_first(judged)[0]
     mean = sum(one.fitness for one in judged) / len(judged)
-    space = body_space(experiment.space)
+    space = body_space(run.experiment.space)
     robot = develop(best.genome, space)
-    write_robot(robot, folder / BEST, space)
+    write_robot(robot, file, space)
     motors = sum(space[part.kind].outputs for part in robot.parts)
     where = f" of island {best.birth.island}" if len(islands) > 1 else ""
     return [
@@ -93,7 +81,7 @@ def _results(
             f"{best.fitness:.4f}, rank {best.rank}, {len(robot.parts)} parts, "
             f"{motors} motors"
         ),
-        f"its file: {folder / BEST}",
+        f"its file: {file}",
     ]
 
 

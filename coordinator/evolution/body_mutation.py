@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator
 from math import ceil
 
 from coordinator.evolution.generation import (
-    endpoints,
     pick_growth,
     random_neuron,
     random_part,
@@ -21,6 +20,7 @@ from coordinator.evolution.mutable_genome import (
     MutableGenome,
     SizeCounts,
     copied,
+    fitting_subtrees,
     free_places,
     lineage,
     preorder,
@@ -48,10 +48,8 @@ def duplicable(
     sizes: dict[MutableGenome, SizeCounts], space: Space
 ) -> list[MutableGenome]:
     """Return the subtrees of which a second copy stays within all limits."""
-    room = size_limits(space).minus(next(iter(sizes.values())))
-    return [
-        branch for branch, size in sizes.items() if branch.parent and size.fits(room)
-    ]
+    total = next(iter(sizes.values()))
+    return fitting_subtrees(sizes, size_limits(space).minus(total))
 
 
 def delete_subtree(
@@ -169,9 +167,4 @@ def _add_part(
         random_neuron(draws) for _ in range(min(share, space.max_hidden - size.hidden))
     )
     parent.graft(part, slot)
-    wire(
-        draws,
-        endpoints([part], "input", "output", "hidden"),
-        endpoints(preorder(root), "output", "hidden"),
-        experiment.generation.p_connect_neurons,
-    )
+    wire(draws, [part], preorder(root), experiment.generation.p_connect_neurons)

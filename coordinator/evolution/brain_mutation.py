@@ -29,8 +29,6 @@ def delete_hidden_neurons(
     """
     new_offsets: dict[MutableGenome, list[int | None]] = {}
     for branch in branches:
-        if not branch.hidden:
-            continue
         stays = [not draws.chance(probability) for _ in branch.hidden]
         if not all(stays):
             offsets = iter(range(len(stays)))
@@ -42,7 +40,7 @@ def delete_hidden_neurons(
             genes = [
                 _renumbered(gene, branch, new_offsets) for gene in branch.connections
             ]
-            branch.connections = tuple([gene for gene in genes if gene is not None])
+            branch.connections = tuple(filter(None, genes))
     for branch, after_deletion in new_offsets.items():
         branch.hidden = tuple(
             neuron

@@ -55,9 +55,8 @@ class Candidate:
     ) -> Individual:
         """Return the individual; its fitness is None if its evaluation failed."""
         rank = 1 + max((parent.rank for parent in self.couple or ()), default=0)
-        has_failed = fitness is None
-        value = 0.0 if fitness is None else fitness
-        return Individual(self.birth, self.genome, value, rank, generation, has_failed)
+        individual = Individual(self.birth, self.genome, 0.0, rank, generation)
+        return individual.evaluated(fitness)
 
 
 class Breeder:

@@ -107,12 +107,7 @@ def _add_brain(
         hosts = [b for b in branches if b.kind.inputs or b.outputs]
     for _ in range(draws.below(experiment.space.max_hidden + 1)):
         draws.pick(hosts).hidden += (random_neuron(draws),)
-    wire(
-        draws,
-        endpoints(branches, "input", "output", "hidden"),
-        endpoints(branches, "output", "hidden"),
-        experiment.generation.p_connect_neurons,
-    )
+    wire(draws, branches, branches, experiment.generation.p_connect_neurons)
 
 
 def random_neuron(draws: BufferedRng) -> NeuronGene:
@@ -187,14 +182,15 @@ def connect(draws: BufferedRng, source: Endpoint, target: Endpoint) -> Connectio
 
 def wire(
     draws: BufferedRng,
-    sources: list[Endpoint],
-    targets: list[Endpoint],
+    sources: Iterable[MutableGenome],
+    targets: Iterable[MutableGenome],
     probability: float,
 ) -> None:
-    """Add each connection of the full product with a probability."""
-    for source in sources:
+    """Add connections between neurons of branches, each possible with a probability."""
+    ends = endpoints(targets, "output", "hidden")
+    for source in endpoints(sources, "input", "output", "hidden"):
         source[0].connections += tuple(
             connect(draws, source, target)
-            for target in targets
+            for target in ends
             if draws.chance(probability)
         )

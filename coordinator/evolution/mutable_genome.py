@@ -218,13 +218,8 @@ def size_limits(space: Space) -> SizeCounts:
 
 def size_of(branches: Iterable[MutableGenome]) -> SizeCounts:
     """Return the counts of some branches, without their children."""
-    parts = inputs = outputs = hidden = 0
-    for branch in branches:
-        parts += 1
-        inputs += branch.kind.inputs
-        outputs += len(branch.outputs)
-        hidden += len(branch.hidden)
-    return SizeCounts(parts, inputs, outputs, hidden)
+    sizes = [(1, b.kind.inputs, len(b.outputs), len(b.hidden)) for b in branches]
+    return SizeCounts(*map(sum, zip(*sizes, strict=True)))
 
 
 def subtree_sizes(branches: Sequence[MutableGenome]) -> dict[MutableGenome, SizeCounts]:
@@ -245,3 +240,12 @@ def subtree_sizes(branches: Sequence[MutableGenome]) -> dict[MutableGenome, Size
             hidden += below.hidden
         sums[branch] = SizeCounts(parts, inputs, outputs, hidden)
     return dict(reversed(sums.items()))
+
+
+def fitting_subtrees(
+    sizes: dict[MutableGenome, SizeCounts], room: SizeCounts
+) -> list[MutableGenome]:
+    """Return the subtrees, except the whole tree, that exceed no count of ``room``."""
+    return [
+        branch for branch, size in sizes.items() if branch.parent and size.fits(room)
+    ]

@@ -24,6 +24,7 @@ from coordinator.evolution.brain_mutation import (
 )
 from coordinator.evolution.mutable_genome import (
     MutableGenome,
+    fitting_subtrees,
     gene_ids,
     level,
     preorder,
@@ -113,11 +114,7 @@ def crossover(
     replaced = draws.pick(branches[1:])
     rest = size_of(branches).minus(size_of(preorder(replaced)))
     room = size_limits(space).minus(rest)
-    candidates = [
-        branch
-        for branch, size in donated_sizes.items()
-        if branch.parent and size.fits(room)
-    ]
+    candidates = fitting_subtrees(donated_sizes, room)
     if not candidates:
         return False
     donated = draws.pick(candidates)

@@ -4,8 +4,9 @@ Events are past participles, commands imperatives; all are immutable.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
+
+from msgspec import Struct
 
 from coordinator.evolution.selection import Individual
 from schema.robot.brain import Brain
@@ -15,34 +16,50 @@ from schema.robot.results import Evaluation, Provenance, Report
 from schema.robot.robot import Robot
 from schema.wire.arena import Advance, Changes
 
+
+class Message(Struct, frozen=True):
+    """Base of all events and commands: immutable, compared by its fields."""
+
+
 # --- Events --------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Started:
+class Started(Message, frozen=True):
     """The run starts; the first event, once."""
 
 
-@dataclass(frozen=True, slots=True)
-class Vetted:
+class Vetted(Message, frozen=True):
     """The analyzer reported on a candidate's body."""
 
     birth: BirthId
     attempt: int
     report: Report
 
+    @property
+    def is_viable(self) -> bool:
+        """The body can be built and simulated."""
+        return self.report.is_viable
 
-@dataclass(frozen=True, slots=True)
-class VettingFailed:
+    @property
+    def reason(self) -> str:
+        """Reason why it cannot; empty if viable."""
+        return self.report.reason
+
+
+class VettingFailed(Message, frozen=True):
     """The analyzer failed on a candidate and would fail again."""
 
     birth: BirthId
     attempt: int
     reason: str
+    is_viable: ClassVar[bool] = False
 
 
-@dataclass(frozen=True, slots=True)
-class Evaluated:
+Verdict = Vetted | VettingFailed
+"""Answers to a request to vet a candidate."""
+
+
+class Evaluated(Message, frozen=True):
     """A robot was evaluated.
 
     Attributes:
@@ -58,10 +75,10 @@ class Evaluated:
     provenance: Provenance
     trial: int = 0
     requester: int | None = None
+    reason: ClassVar[str] = ""
 
 
-@dataclass(frozen=True, slots=True)
-class EvaluationFailed:
+class EvaluationFailed(Message, frozen=True):
     """A robot's evaluation failed for a reason that lies in the robot.
 
     Attributes:
@@ -76,10 +93,14 @@ class EvaluationFailed:
     provenance: Provenance
     trial: int = 0
     requester: int | None = None
+    evaluation: ClassVar[None] = None
 
 
-@dataclass(frozen=True, slots=True)
-class Advanced:
+Outcome = Evaluated | EvaluationFailed
+"""Answers to a request to evaluate a robot: either a reason or an evaluation."""
+
+
+class Advanced(Message, frozen=True):
     """An arena shard reached the requested step.
 
     Attributes:
@@ -98,18 +119,15 @@ class Advanced:
     provenance: Provenance
 
 
-@dataclass(frozen=True, slots=True)
-class Pause:
+class Pause(Message, frozen=True):
     """Pause the arena until it is resumed."""
 
 
-@dataclass(frozen=True, slots=True)
-class Resume:
+class Resume(Message, frozen=True):
     """Resume a paused arena."""
 
 
-@dataclass(frozen=True, slots=True)
-class Insert:
+class Insert(Message, frozen=True):
     """Insert a robot: a birth without parents that may mate like any other robot.
 
     Attributes:
@@ -121,15 +139,13 @@ class Insert:
     place: tuple[float, float] | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Remove:
+class Remove(Message, frozen=True):
     """Remove a robot; no effect if it is dead."""
 
     birth: BirthId
 
 
-@dataclass(frozen=True, slots=True)
-class ReplaceBrain:
+class ReplaceBrain(Message, frozen=True):
     """Replace a robot's brain; its genome stays the same."""
 
     birth: BirthId
@@ -140,8 +156,7 @@ Order = Pause | Resume | Insert | Remove | ReplaceBrain
 """Orders that an operator may give to an arena."""
 
 
-@dataclass(frozen=True, slots=True)
-class Commanded:
+class Commanded(Message, frozen=True):
     """An operator gave an order.
 
     Attributes:
@@ -157,8 +172,7 @@ class Commanded:
     order: Order
 
 
-@dataclass(frozen=True, slots=True)
-class Immigrated:
+class Immigrated(Message, frozen=True):
     """A neighbour's migrants of an epoch arrived (may be empty).
 
     Attributes:
@@ -174,8 +188,7 @@ class Immigrated:
     migrants: tuple[Individual, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class NeighbourClosed:
+class NeighbourClosed(Message, frozen=True):
     """A neighbour has finished and sends no more migrants.
 
     Attributes:
@@ -191,25 +204,20 @@ MigrationEvent = Immigrated | NeighbourClosed
 """Events that follow from other islands' commands; they are not journalled."""
 
 
-@dataclass(frozen=True, slots=True)
-class Audited:
+class Audited(Message, frozen=True):
     """The same evaluation was done twice, by two workers if there are two."""
 
-    first: Evaluated | EvaluationFailed
-    second: Evaluated | EvaluationFailed
+    first: Outcome
+    second: Outcome
 
     @property
     def agrees(self) -> bool:
         """Both outcomes are equal to the last bit."""
-        match self.first, self.second:
-            case Evaluated(evaluation=one), Evaluated(evaluation=other):
-                return one == other
-            case EvaluationFailed(reason=one), EvaluationFailed(reason=other):
-                return one == other
-        return False
+        one, other = self.first, self.second
+        return (one.evaluation, one.reason) == (other.evaluation, other.reason)
 
 
-Answered = Vetted | VettingFailed | Evaluated | EvaluationFailed
+Answered = Verdict | Outcome
 """Events that answer a request of an off-line island."""
 
 ExternalEvent = Answered | Advanced | Commanded
@@ -220,13 +228,12 @@ JournalledEvent = ExternalEvent | Audited
 
 IslandEvent = Started | Answered | MigrationEvent
 
-ArenaEvent = Started | Vetted | VettingFailed | Advanced | Commanded | MigrationEvent
+ArenaEvent = Started | Verdict | Advanced | Commanded | MigrationEvent
 
 # --- Commands ------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class Vet:
+class Vet(Message, frozen=True):
     """Vet a candidate's body on an analyzer."""
 
     birth: BirthId
@@ -234,8 +241,7 @@ class Vet:
     robot: Robot
 
 
-@dataclass(frozen=True, slots=True)
-class Evaluate:
+class Evaluate(Message, frozen=True):
     """Evaluate a robot on a worker.
 
     Attributes:
@@ -253,16 +259,14 @@ class Evaluate:
     requester: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Record:
+class Record(Message, frozen=True):
     """Write a row of a table; the rows of a table have a reproducible order."""
 
     table: str
     row: Mapping[str, Any]
 
 
-@dataclass(frozen=True, slots=True)
-class Append:
+class Append(Message, frozen=True):
     """Append rows to a bulk table, given as columns.
 
     Attributes:
@@ -277,8 +281,7 @@ class Append:
     columns: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class AdvanceShard:
+class AdvanceShard(Message, frozen=True):
     """Change an arena shard, then advance it.
 
     Attributes:
@@ -296,8 +299,7 @@ class AdvanceShard:
     wants_snapshot: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Emigrate:
+class Emigrate(Message, frozen=True):
     """Send the migrants of an epoch (may be empty) to a neighbour.
 
     Attributes:
@@ -313,8 +315,7 @@ class Emigrate:
     migrants: tuple[Individual, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Finish:
+class Finish(Message, frozen=True):
     """The island has finished; its neighbours are informed."""
 
     island: int
@@ -326,6 +327,6 @@ IslandCommand = Vet | Evaluate | Record | Emigrate | Finish
 ArenaCommand = Vet | AdvanceShard | Record | Append | Emigrate | Finish
 
 
-def fitness_of(outcome: Evaluated | EvaluationFailed) -> float | None:
+def fitness_of(outcome: Outcome) -> float | None:
     """Return the fitness of an outcome; None if the evaluation failed."""
-    return outcome.evaluation.fitness if isinstance(outcome, Evaluated) else None
+    return outcome.evaluation.fitness if outcome.evaluation else None

@@ -15,18 +15,16 @@ from coordinator.islands.events import (
     Answered,
     Evaluate,
     Evaluated,
-    EvaluationFailed,
     Finish,
-    Immigrated,
     IslandCommand,
     IslandEvent,
     MigrationEvent,
-    NeighbourClosed,
+    Outcome,
     Record,
     Started,
+    Verdict,
     Vet,
-    Vetted,
-    VettingFailed,
+    fitness_of,
 )
 from coordinator.islands.island_migration import IslandMigration
 from coordinator.islands.migration import MigrationEpochs
@@ -53,13 +51,14 @@ class _Birth:
 
     candidate: Candidate
     is_viable: bool = False
-    outcome: Evaluated | EvaluationFailed | None = None
+    outcome: Outcome | None = None
 
 
 class Island:
     """One population and its births.
 
     Attributes:
+        experiment: its settings.
         births: number of recorded births.
         population: living individuals, in birth order.
     """
@@ -85,7 +84,7 @@ class Island:
         selection = experiment.selection
         self.births = 0
         self.population: tuple[Individual, ...] = ()
-        self._experiment = experiment
+        self.experiment = experiment
         self._seed, self._run, self._number = seed, run, number
         self._space = body_space(experiment.space)
         self._breeder = Breeder(experiment, seed, run)
@@ -93,12 +92,10 @@ class Island:
             Reevaluations(experiment, number) if selection.reevaluation else None
         )
         self._migration = IslandMigration(experiment, epochs) if epochs else None
-        self._has_started = False
         self._generation = 0
         self._begun = 0
         # Founders have no parents: all of them are in flight together.
         self._window = self._brood_end = selection.population
-        self._brood_window = experiment.window
         self._in_flight: dict[int, _Birth] = {}
         self._brood: list[Individual] = []
 
@@ -110,7 +107,7 @@ class Island:
     @property
     def is_finished(self) -> bool:
         """All births of the experiment are recorded, and no re-evaluation is open."""
-        return self.births == self._experiment.births and not (
+        return self.births == self.experiment.births and not (
             self._reevaluations and self._reevaluations.is_open
         )
 
@@ -126,27 +123,22 @@ class Island:
         """
         if isinstance(event, Evaluated) and not isfinite(event.evaluation.fitness):
             raise self._unexpected(event, "fitness must be finite")
-        match event:
-            case Started():
-                if self._has_started:
-                    raise self._unexpected(event, "it has started before")
-                self._has_started = True
-                commands = self._proceed()
-            case (
-                Immigrated()
-                | NeighbourClosed()
-                | Evaluated(requester=int())
-                | EvaluationFailed(requester=int())
-            ):
-                commands = self._migrated(event)
-            case Evaluated() | EvaluationFailed() if event.trial:
-                if self._reevaluations is None:
-                    raise self._unexpected(event, "it re-evaluates no robot")
-                self._reevaluations.take(event)
-                commands = self._proceed()
-            case _:
-                commands = self._answered(event)
-        simulation = self._experiment.simulation
+        if isinstance(event, Started):
+            if self._begun:
+                raise self._unexpected(event, "it has started before")
+            commands = self._proceed()
+        elif isinstance(event, MigrationEvent) or (
+            isinstance(event, Outcome) and event.requester is not None
+        ):
+            commands = self._migrated(event)
+        elif isinstance(event, Outcome) and event.trial:
+            if self._reevaluations is None:
+                raise self._unexpected(event, "it re-evaluates no robot")
+            self._reevaluations.take(event)
+            commands = self._proceed()
+        else:
+            commands = self._answered(event)
+        simulation = self.experiment.simulation
         if simulation.evaluation_s is None:
             return commands
         return with_durations(commands, simulation, self._seed, self._run)
@@ -157,17 +149,14 @@ class Island:
         if found is None:
             return []
         candidate = found.candidate
-        match event:
-            case Vetted(report=report) if report.is_viable:
-                found.is_viable = True
-                return [Evaluate(candidate.birth, candidate.robot)]
-            case Vetted() | VettingFailed():
-                why = event.report if isinstance(event, Vetted) else event
-                attempt = candidate.attempt + 1
-                return [self._begin(event.birth, attempt, candidate.couple, why.reason)]
-            case Evaluated() | EvaluationFailed():
-                found.outcome = event
-                return self._proceed()
+        if isinstance(event, Outcome):
+            found.outcome = event
+            return self._proceed()
+        if event.is_viable:
+            found.is_viable = True
+            return [Evaluate(candidate.birth, candidate.robot)]
+        attempt = candidate.attempt + 1
+        return [self._begin(event.birth, attempt, candidate.couple, event.reason)]
 
     def _birth_of(self, event: Answered) -> _Birth | None:
         """Return the birth that an answer belongs to; None for a duplicate answer.
@@ -181,7 +170,7 @@ class Island:
         found = self._in_flight.get(birth.number)
         if found is None or found.outcome is not None:
             return None
-        if isinstance(event, Vetted | VettingFailed):
+        if isinstance(event, Verdict):
             attempt = found.candidate.attempt
             if event.attempt > attempt:
                 raise self._unexpected(event, f"it is at attempt {attempt}")
@@ -193,7 +182,7 @@ class Island:
 
     def _unexpected(self, event: IslandEvent, why: str) -> UnexpectedEvent:
         return UnexpectedEvent(
-            f"island {self._number}, {self.births} of {self._experiment.births} born, "
+            f"island {self._number}, {self.births} of {self.experiment.births} born, "
             f"{self._begun} begun, brood {self._generation} ends at "
             f"{self._brood_end}: {why}, got {event}"
         )
@@ -229,13 +218,10 @@ class Island:
         self._in_flight[birth.number] = _Birth(candidate)
         return Vet(birth, candidate.attempt, candidate.robot)
 
-    def _commit(
-        self, candidate: Candidate, outcome: Evaluated | EvaluationFailed
-    ) -> list[IslandCommand]:
+    def _commit(self, candidate: Candidate, outcome: Outcome) -> list[IslandCommand]:
         """Add an evaluated candidate to the brood; return its rows."""
         del self._in_flight[self.births]
-        fitness = outcome.evaluation.fitness if isinstance(outcome, Evaluated) else None
-        individual = candidate.individual(self._generation, fitness)
+        individual = candidate.individual(self._generation, fitness_of(outcome))
         self._brood.append(individual)
         self.births += 1
         return [
@@ -260,9 +246,7 @@ class Island:
         commands, self.population = migration.send(self.population, self.births)
         return [*rows, *commands, *self._receive(migration)]
 
-    def _migrated(
-        self, event: MigrationEvent | Evaluated | EvaluationFailed
-    ) -> list[IslandCommand]:
+    def _migrated(self, event: MigrationEvent | Outcome) -> list[IslandCommand]:
         """Handle an event of a neighbour or the re-evaluation of an immigrant.
 
         A finished island ignores it.
@@ -285,22 +269,19 @@ class Island:
     def _open_brood(self) -> list[IslandCommand]:
         """Record the population and open the next brood, or finish."""
         commands: list[IslandCommand] = []
-        fitness = [
-            (one.birth, None if one.has_failed else one.fitness)
-            for one in self.population
-        ]
+        fitness = [(one.birth, one.known_fitness) for one in self.population]
         commands += population_records(self._number, self.births, fitness)
         if self.is_finished:
             migration = self._migration
             neighbours = migration.epochs.links.neighbours if migration else ()
             return [*commands, Finish(self._number, neighbours)]
-        selection = self._experiment.selection
+        selection = self.experiment.selection
         children = selection.children
         if selection.culling is not None:
             # A brood keeps within the population limit, but has at least one child.
             room = selection.culling.population_limit - len(self.population)
             children = min(children, max(1, room))
         self._generation += 1
-        self._window = self._brood_window
-        self._brood_end = min(self.births + children, self._experiment.births)
+        self._window = self.experiment.window
+        self._brood_end = min(self.births + children, self.experiment.births)
         return commands

@@ -6,9 +6,8 @@ from coordinator.evolution.selection import Individual
 from coordinator.islands.events import (
     Emigrate,
     Evaluate,
-    Evaluated,
-    EvaluationFailed,
     MigrationEvent,
+    Outcome,
     Record,
     fitness_of,
 )
@@ -18,8 +17,6 @@ from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, body_space
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
-
-Outcome = Evaluated | EvaluationFailed
 
 
 class IslandMigration:
@@ -59,7 +56,7 @@ class IslandMigration:
         Raises:
             UnexpectedEvent: the event is impossible now; nothing has changed.
         """
-        if not isinstance(event, Evaluated | EvaluationFailed):
+        if not isinstance(event, Outcome):
             self.epochs.take(event)
             return
         epoch = self.epochs.epoch

@@ -20,7 +20,8 @@ from coordinator.islands.events import (
     NeighbourClosed,
 )
 from schema.errors import UnexpectedEvent
-from schema.experiment.migration import Migration, migrant_count
+from schema.experiment.document import Experiment
+from schema.experiment.migration import migrant_count
 from schema.robot.ids import BirthId
 
 
@@ -56,21 +57,18 @@ class MigrationEpochs:
 
     def __init__(
         self,
-        migration: Migration,
+        experiment: Experiment,
         number: int,
         links: Neighbours,
-        *,
-        tournament_size: int,
         seed: int,
         run: int,
     ) -> None:
         """Initialise the first epoch.
 
         Args:
-            migration: settings of the island.
+            experiment: settings of the island, migration included.
             number: number of the island.
             links: its neighbours.
-            tournament_size: for emigrants, where tournaments choose them.
             seed: seed of the run.
             run: number of the repeat, from 0.
         """
@@ -78,8 +76,9 @@ class MigrationEpochs:
         self.links = links
         self.epoch = 0
         self.is_waiting = False
-        self._migration = migration
-        self._tournament_size = tournament_size
+        assert experiment.migration is not None
+        self._migration = migration = experiment.migration
+        self._tournament_size = experiment.selection.tournament_size
         self._stream = partial(stream, seed, run)
         self._due_births = migration.epoch
         self._due_s = inf if migration.epoch_s is None else migration.epoch_s
@@ -125,13 +124,13 @@ class MigrationEpochs:
         if is_moved:
             count = min(count * len(targets), max(0, spare))
         chosen = self._choose(candidates, min(count, len(candidates)))
-        shares = dict.fromkeys(targets, chosen)
-        if is_moved:
-            # The first target changes, or a single migrant would always go there.
-            shares = {
-                to: chosen[(place - self.epoch) % len(targets) :: len(targets)]
-                for place, to in enumerate(targets)
-            }
+        # Each target gets all that are copied, or a share of those that are moved. The
+        # first target changes, or a single migrant would always go there.
+        step = len(targets) if is_moved else 1
+        shares = {
+            to: chosen[(place - self.epoch) % step :: step]
+            for place, to in enumerate(targets)
+        }
         sent = [
             Emigrate(self.island, to, self.epoch, tuple(shares.get(to, ())))
             for to in self._active

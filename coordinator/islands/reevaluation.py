@@ -7,16 +7,16 @@ Source: Hupkes 2016, section 8.2, on scenarios between his 2 and 3.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
 from math import fsum
+
+from msgspec.structs import replace
 
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import (
     Evaluate,
-    Evaluated,
-    EvaluationFailed,
     IslandCommand,
+    Outcome,
     Record,
     fitness_of,
 )
@@ -25,8 +25,6 @@ from schema.errors import UnexpectedEvent
 from schema.experiment.document import Experiment, Simulation, body_space, steps_of
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
-
-Outcome = Evaluated | EvaluationFailed
 
 
 def with_durations(
@@ -46,19 +44,6 @@ def with_durations(
     return timed
 
 
-@dataclass(slots=True)
-class _History:
-    """Evaluations of an individual so far.
-
-    Attributes:
-        fitness: of each trial, None where it failed.
-        births: number of births at the last re-evaluation.
-    """
-
-    fitness: list[float | None]
-    births: int = 0
-
-
 class Reevaluations:
     """Re-evaluations of the robots of one island."""
 
@@ -70,7 +55,9 @@ class Reevaluations:
         self._island = island
         self._founders = experiment.selection.population
         self._due_births = self._founders + rules.interval
-        self._histories: dict[BirthId, _History] = {}
+        # Fitness of each trial, and number of births at the last re-evaluation.
+        self._trials: dict[BirthId, list[float | None]] = {}
+        self._last_births: dict[BirthId, int] = {}
         self._outcomes: dict[BirthId, Outcome | None] = {}
 
     @property
@@ -95,13 +82,11 @@ class Reevaluations:
         chosen = sorted(natives, key=self._last_evaluation)[:count]
         commands = []
         for one in sorted(chosen, key=lambda one: one.birth):
-            history = self._histories.setdefault(
-                one.birth, _History([one.known_fitness])
-            )
-            history.births = births
+            trials = self._trials.setdefault(one.birth, [one.known_fitness])
+            self._last_births[one.birth] = births
             self._outcomes[one.birth] = None
             robot = develop(one.genome, self._space)
-            commands.append(Evaluate(one.birth, robot, len(history.fitness)))
+            commands.append(Evaluate(one.birth, robot, len(trials)))
         return commands
 
     def take(self, outcome: Outcome) -> None:
@@ -110,8 +95,8 @@ class Reevaluations:
         Raises:
             UnexpectedEvent: no such re-evaluation is open.
         """
-        birth, history = outcome.birth, self._histories.get(outcome.birth)
-        trials = len(history.fitness) if history else 0
+        birth = outcome.birth
+        trials = len(self._trials.get(birth, ()))
         if outcome.trial < trials:
             return
         if birth not in self._outcomes or outcome.trial > trials:
@@ -130,7 +115,7 @@ class Reevaluations:
         records = []
         for birth, outcome in sorted(outcomes.items()):
             assert outcome is not None
-            self._histories[birth].fitness.append(fitness_of(outcome))
+            self._trials[birth].append(fitness_of(outcome))
             records.append(evaluation_record(outcome))
         evaluated = (
             self._evaluated(one) if one.birth in outcomes else one for one in population
@@ -139,7 +124,7 @@ class Reevaluations:
 
     def _evaluated(self, individual: Individual) -> Individual:
         """Return an individual with the fitness that follows from its trials."""
-        trials = self._histories[individual.birth].fitness
+        trials = self._trials[individual.birth]
         if self._rules.fitness == "replace":
             trials = trials[-1:]
         if all(each is None for each in trials):
@@ -149,5 +134,4 @@ class Reevaluations:
     def _last_evaluation(self, individual: Individual) -> tuple[int, BirthId]:
         """Return the number of births at the last evaluation, and the id for ties."""
         birth = individual.birth
-        history = self._histories.get(birth)
-        return history.births if history else birth.number + 1, birth
+        return self._last_births.get(birth, birth.number + 1), birth

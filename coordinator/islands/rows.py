@@ -1,10 +1,11 @@
 """Table rows of off-line islands, and those that arenas share with them."""
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 from coordinator.evolution.breeding import Candidate
 from coordinator.evolution.selection import Individual
-from coordinator.islands.events import Emigrate, Evaluated, EvaluationFailed, Record
+from coordinator.islands.events import Emigrate, Outcome, Record
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
 from schema.tables.columns import body_rows, sizes
@@ -57,23 +58,29 @@ def birth_record(
     return Record("births", row)
 
 
-def evaluation_record(outcome: Evaluated | EvaluationFailed) -> Record:
-    """Return the evaluations row of an outcome; a failure has no measures."""
-    provenance = outcome.provenance
-    found = outcome.evaluation if isinstance(outcome, Evaluated) else None
-    island = outcome.birth.island if outcome.requester is None else outcome.requester
-    row = {
-        **named(outcome.birth, island),
-        "trial": outcome.trial,
-        "status": "ok" if isinstance(outcome, Evaluated) else "failed",
-        "reason": "" if isinstance(outcome, Evaluated) else outcome.reason,
+def outcome_columns(outcome: Outcome) -> dict[str, Any]:
+    """Return reason and measures of an outcome; a failure has no measures."""
+    found = outcome.evaluation
+    return {
+        "reason": outcome.reason,
         "fitness": found and found.fitness,
         "path_velocity": found and found.path_velocity,
         "straight_velocity": found and found.straight_velocity,
         "simulated_s": found and found.simulated_s,
-        "wall_s": provenance.wall_s,
-        "worker": provenance.agent,
-        "platform": provenance.platform,
+    }
+
+
+def evaluation_record(outcome: Outcome) -> Record:
+    """Return the evaluations row of an outcome."""
+    island = outcome.birth.island if outcome.requester is None else outcome.requester
+    row = {
+        **named(outcome.birth, island),
+        "trial": outcome.trial,
+        "status": "ok" if outcome.evaluation else "failed",
+        **outcome_columns(outcome),
+        "wall_s": outcome.provenance.wall_s,
+        "worker": outcome.provenance.agent,
+        "platform": outcome.provenance.platform,
     }
     return Record("evaluations", row)
 

@@ -3,7 +3,7 @@
 from coordinator.arena.arena import Arena
 from coordinator.islands.island import Island
 from coordinator.islands.migration import MigrationEpochs, Neighbours
-from coordinator.islands.topology import connections
+from coordinator.islands.topology import Edge, connections
 from schema.experiment.document import Experiment, island_count, island_experiment
 from schema.experiment.settings import evaluation_settings
 
@@ -23,42 +23,35 @@ def archipelago(
     """
     count = island_count(experiment)
     owns = [island_experiment(experiment, number) for number in range(count)]
-    links = _links(experiment, owns, seed, run)
+    edges: tuple[Edge, ...] = ()
+    if experiment.migration is not None:
+        edges = connections(experiment.migration, count, seed, run)
     islands: dict[int, Island | Arena] = {}
     for number, own in enumerate(owns):
-        epochs = None
-        if own.migration is not None and links[number].neighbours:
-            epochs = MigrationEpochs(
-                own.migration,
-                number,
-                links[number],
-                tournament_size=own.selection.tournament_size,
-                seed=seed,
-                run=run,
-            )
+        links, epochs = _neighbours(number, owns, edges), None
+        if own.migration is not None and links.neighbours:
+            epochs = MigrationEpochs(own, number, links, seed, run)
         machine = Island if own.arena is None else Arena
         islands[number] = machine(own, seed, run, number, epochs=epochs)
     return islands
 
 
-def _links(
-    experiment: Experiment, owns: list[Experiment], seed: int, run: int
-) -> list[Neighbours]:
-    """Return the neighbours of each island."""
-    edges: tuple[tuple[int, int], ...] = ()
-    if experiment.migration is not None:
-        edges = connections(experiment.migration, len(owns), seed, run)
-    links = []
-    for number, own in enumerate(owns):
-        sources = tuple(source for source, to in edges if to == number)
-        links.append(
-            Neighbours(
-                targets=tuple(to for source, to in edges if source == number),
-                sources=sources,
-                differing=tuple(each for each in sources if _differs(own, owns[each])),
-            )
-        )
-    return links
+def _neighbours(
+    number: int, owns: list[Experiment], edges: tuple[Edge, ...]
+) -> Neighbours:
+    """Return the neighbours of an island.
+
+    Args:
+        number: of the island.
+        owns: settings of all islands.
+        edges: along which migrants travel.
+    """
+    sources = tuple(source for source, to in edges if to == number)
+    return Neighbours(
+        targets=tuple(to for source, to in edges if source == number),
+        sources=sources,
+        differing=tuple(each for each in sources if _differs(owns[number], owns[each])),
+    )
 
 
 def _differs(own: Experiment, other: Experiment) -> bool:

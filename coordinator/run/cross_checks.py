@@ -8,14 +8,8 @@ stop the run, as it is unknown which of them is right.
 from dataclasses import dataclass
 from hashlib import sha256
 
-from coordinator.islands.events import (
-    Answered,
-    Audited,
-    Evaluate,
-    Evaluated,
-    EvaluationFailed,
-    Record,
-)
+from coordinator.islands.events import Answered, Audited, Evaluate, Outcome, Record
+from coordinator.islands.rows import outcome_columns
 
 _WHOLE = 2**32
 
@@ -48,7 +42,7 @@ class CrossChecks:
         """
         self._share = share
         self._others: dict[int, int] = {}
-        self._outcomes: dict[int, Evaluated | EvaluationFailed] = {}
+        self._outcomes: dict[int, Outcome] = {}
 
     def chooses(self, command: Evaluate) -> bool:
         """Return whether an evaluation is done twice."""
@@ -72,7 +66,7 @@ class CrossChecks:
             The outcome, if the job is not one of a pair; for a pair nothing at the
             first, and at the second the check and, if they agree, the outcome.
         """
-        if not isinstance(outcome, Evaluated | EvaluationFailed):
+        if not isinstance(outcome, Outcome):
             return [outcome]
         other = self._others.pop(number, None)
         if other is None:
@@ -92,7 +86,7 @@ def describe(event: Audited) -> str:
         f"{each.provenance.agent} ({each.provenance.platform or 'gone'}) says "
         + (
             f"fitness {each.evaluation.fitness!r}"
-            if isinstance(each, Evaluated)
+            if each.evaluation
             else repr(each.reason)
         )
         for each in (event.first, event.second)
@@ -106,22 +100,18 @@ def describe(event: Audited) -> str:
 
 def audit_records(event: Audited) -> list[Record]:
     """Return the two rows of an audit."""
-    return [_row(event, each) for each in (event.first, event.second)]
-
-
-def _row(event: Audited, outcome: Evaluated | EvaluationFailed) -> Record:
-    judged = outcome.evaluation if isinstance(outcome, Evaluated) else None
-    row = {
-        "island": outcome.birth.island,
-        "birth": outcome.birth.number,
-        "trial": outcome.trial,
-        "agrees": event.agrees,
-        "worker": outcome.provenance.agent,
-        "platform": outcome.provenance.platform,
-        "reason": "" if isinstance(outcome, Evaluated) else outcome.reason,
-        "fitness": judged and judged.fitness,
-        "path_velocity": judged and judged.path_velocity,
-        "straight_velocity": judged and judged.straight_velocity,
-        "simulated_s": judged and judged.simulated_s,
-    }
-    return Record("audits", row)
+    return [
+        Record(
+            "audits",
+            {
+                "island": each.birth.island,
+                "birth": each.birth.number,
+                "trial": each.trial,
+                "agrees": event.agrees,
+                "worker": each.provenance.agent,
+                "platform": each.provenance.platform,
+                **outcome_columns(each),
+            },
+        )
+        for each in (event.first, event.second)
+    ]

@@ -4,12 +4,14 @@ No run waits for a viewer. The feed keeps a short form of everything that it sen
 so that a viewer that connects late or lost an update gets the whole.
 """
 
+from collections import Counter, defaultdict
+from typing import Any
+
 from msgspec.structs import replace
 
 from coordinator.islands.events import Record
 from coordinator.storage.folder import RunDetails
 from schema.robot.ids import BirthId
-from schema.tables.columns import Row
 from schema.wire.updates import (
     Birth,
     Death,
@@ -47,84 +49,70 @@ class Feed:
         self._births: dict[BirthId, Birth] = {}
         self._bodies: list[BirthId] = []
         self._dead: set[BirthId] = set()
-        self._born: dict[int, int] = {}
+        self._born = Counter[int]()
         self._deaths: list[Death] = []
-        self._levels: list[Level] = []
+        self._levels: dict[tuple[int, int], Level] = {}
         self._newest: dict[int, Level] = {}
         self._migrants: list[Migrant] = []
-        self._new_births: list[Birth] = []
-        self._new_deaths: list[Death] = []
-        self._new_rows: list[Row] = []
-        self._new_migrants: list[Migrant] = []
-        self._workers: tuple[WorkerInfo, ...] = ()
+        # By table: births, deaths, migrants, and rows of populations.
+        self._new: defaultdict[str, list[Any]] = defaultdict(list)
 
     def read(self) -> None:
         """Note the rows that are unread."""
         for record in self.unread:
-            self._note(record)
+            row, new = record.row, self._new[record.table]
+            match record.table:
+                case "births":
+                    self._born[row["island"]] += 1
+                    new.append(read_birth(row, self._born[row["island"]]))
+                case "population":
+                    new.append(row)
+                case "deaths":
+                    new.append(read_death(row))
+                case "migrations":
+                    new.append(read_migrant(row))
         self.unread.clear()
-
-    def _note(self, record: Record) -> None:
-        row = record.row
-        match record.table:
-            case "births":
-                island = row["island"]
-                self._born[island] = self._born.get(island, 0) + 1
-                self._new_births.append(read_birth(row, self._born[island]))
-            case "population":
-                self._new_rows.append(dict(row))
-            case "deaths":
-                self._new_deaths.append(read_death(row))
-            case "migrations":
-                self._new_migrants.append(read_migrant(row))
 
     def update(self, workers: tuple[WorkerInfo, ...]) -> Update | None:
         """Return what is new since the last call; None if nothing is new."""
         self.read()
-        fresh = read_levels(self._new_rows)
-        is_new = self._new_births or self._new_deaths or fresh or self._new_migrants
-        if not is_new and workers == self._workers:
+        if not any(self._new.values()) and workers == self._past.workers:
             return None
-        self._past = replace(self._past, sequence=self._past.sequence + 1)
+        new, self._new = self._new, defaultdict(list)
+        sequence = self._past.sequence + 1
+        self._past = replace(self._past, sequence=sequence, workers=workers)
         update = replace(
             self._past,
             is_whole=False,
             document="",
-            births=tuple(self._new_births),
-            deaths=tuple(self._new_deaths),
-            levels=tuple(fresh),
-            migrants=tuple(self._new_migrants),
-            workers=workers,
+            births=tuple(new["births"]),
+            deaths=tuple(new["deaths"]),
+            levels=tuple(read_levels(new["population"])),
+            migrants=tuple(new["migrations"]),
         )
         self._remember(update)
-        for sent in (
-            self._new_births, self._new_deaths, self._new_rows, self._new_migrants
-        ):  # fmt: skip
-            sent.clear()
         return update
 
     def whole(self) -> Update:
         """Return everything that ``update`` has returned so far, as one update."""
-        all_levels = {(level.island, level.births): level for level in self._levels}
-        for newest in self._newest.values():
-            all_levels[newest.island, newest.births] = newest
         return replace(
             self._past,
             births=tuple(self._births.values()),
             deaths=tuple(self._deaths),
-            levels=tuple(all_levels.values()),
+            levels=tuple(self._levels.values()),
             migrants=tuple(self._migrants),
-            workers=self._workers,
         )
 
     def _remember(self, update: Update) -> None:
         """Add an update to the past; drop the bodies of dead robots."""
-        self._workers = update.workers
         self._migrants += update.migrants
         self._deaths += update.deaths
         self._dead.update(gone.birth for gone in update.deaths)
         for level in update.levels:
-            self._levels.append(replace(level, members=()))
+            if before := self._newest.get(level.island):
+                short = replace(before, members=())
+                self._levels[before.island, before.births] = short
+            self._levels[level.island, level.births] = level
             self._newest[level.island] = level
         self._births.update((one.birth, one) for one in update.births)
         self._bodies += [one.birth for one in update.births]

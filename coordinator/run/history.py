@@ -3,7 +3,6 @@
 import shutil
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from coordinator.dispatch.fleet import Fleet
@@ -41,16 +40,14 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
     context = RunContext.of(str(folder), 0, experiment, details.origin)
     if island not in context.arena:
         raise RunFolderError(f"{folder}: island {island} has no arena")
-    snapshot_store = _SnapshotStore(
-        Snapshots(folder), steps_of(from_s, experiment.simulation)
-    )
+    until = steps_of(from_s, experiment.simulation)
     loop = Loop(
         archipelago(experiment, details.seed, details.run),
         context=context,
         fleet=Fleet(LocalAgents({}, "")),
         log=_Nothing(),
         rows=_Nothing(),
-        snapshot_store=snapshot_store,
+        snapshot_store=Snapshots(folder, until=until),
     )
     with tempfile.TemporaryDirectory() as place:
         # A copy: opening a journal repairs it, and its run may be active.
@@ -58,26 +55,6 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
         with Journal.open(Path(place)) as journal:
             loop.start(journal.replay())
     return context.arena[island], loop.shard_requests.past(island)
-
-
-@dataclass(frozen=True, slots=True)
-class _SnapshotStore:
-    """Snapshots of a run up to a step, read-only."""
-
-    kept: Snapshots
-    until: int
-
-    def has(self, shard: int, step: int, digest: bytes) -> bool:
-        return step <= self.until and self.kept.has(shard, step, digest)
-
-    def write(self, shard: int, step: int, data: bytes) -> None:
-        """Keep nothing."""
-
-    def read(self, shard: int, step: int) -> bytes:
-        return self.kept.read(shard, step)
-
-    def drop_before(self, shard: int, step: int) -> None:
-        """Remove nothing."""
 
 
 class _Nothing:

@@ -8,6 +8,7 @@ point makes the same decisions again when it replays its journal.
 import logging
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import KW_ONLY, dataclass
 from typing import Protocol
 
 from coordinator.arena.arena import Arena
@@ -16,13 +17,13 @@ from coordinator.dispatch.fleet import End, Fleet
 from coordinator.islands.events import (
     Advanced,
     AdvanceShard,
+    Answered,
     Append,
     ArenaCommand,
     Audited,
     Commanded,
     Emigrate,
     Evaluate,
-    Evaluated,
     EvaluationFailed,
     ExternalEvent,
     Finish,
@@ -31,6 +32,7 @@ from coordinator.islands.events import (
     JournalledEvent,
     MigrationEvent,
     NeighbourClosed,
+    Outcome,
     Record,
     Started,
     Vet,
@@ -78,56 +80,43 @@ class Rows(Protocol):
         """Take bulk rows whose event the journal has."""
 
 
+@dataclass(eq=False)
 class Loop:
     """The islands of a run and their connection to agents, journal and tables.
 
     Attributes:
         islands: the state machines of the islands, by number.
-        shard_requests: the advances of the arenas.
-        client: identifies this run to the fleet.
+        context: what all requests have in common.
+        fleet: the agents.
+        log: the journal.
+        rows: the tables.
+        snapshot_store: the snapshots of arenas.
         throttle: limits the speed of arenas; None: no limit.
+        checks: cross-checks to make.
+        confirm: raises if this process may no longer write to the run.
+        watch: called with each row, for viewers.
+        client: identifies this run to the fleet.
+        shard_requests: the advances of the arenas.
     """
 
-    def __init__(
-        self,
-        islands: Mapping[int, Island | Arena],
-        *,
-        context: RunContext,
-        fleet: Fleet,
-        log: Log,
-        rows: Rows,
-        snapshot_store: SnapshotStore,
-        throttle: RealTimeThrottle | None = None,
-        checks: Checks = NO_CHECKS,
-        confirm: Callable[[], None] = lambda: None,
-        watch: Callable[[Record], None] | None = None,
-    ) -> None:
-        """Connect the state machines; ``start`` starts them.
+    islands: Mapping[int, Island | Arena]
+    _: KW_ONLY
+    context: RunContext
+    fleet: Fleet
+    log: Log
+    rows: Rows
+    snapshot_store: SnapshotStore
+    throttle: RealTimeThrottle | None = None
+    checks: Checks = NO_CHECKS
+    confirm: Callable[[], None] = lambda: None
+    watch: Callable[[Record], None] = lambda _record: None
 
-        Args:
-            islands: the state machines of the islands, by number.
-            context: what all requests have in common.
-            fleet: the agents.
-            log: the journal.
-            rows: the tables.
-            snapshot_store: the snapshots of arenas.
-            throttle: limits the speed of arenas; None: no limit.
-            checks: cross-checks to make.
-            confirm: raises if this process may no longer write to the run.
-            watch: called with each row, for viewers; None: no viewers.
-        """
-        self.islands = dict(islands)
+    def __post_init__(self) -> None:
+        """Connect the state machines; ``start`` starts them."""
+        context, fleet = self.context, self.fleet
         self.client = context.client
-        self.throttle = throttle
-        self.shard_requests = ShardRequests(context, snapshot_store, fleet)
-        self._requests = Requests(context, fleet, checks.audit)
-        self._checks = checks
-        self._confirm = confirm
-        self._fleet = fleet
-        self._log = log
-        self._rows = rows
-        self._snapshot_store = snapshot_store
-        self._watch = watch
+        self.shard_requests = ShardRequests(context, self.snapshot_store, fleet)
+        self._requests = Requests(context, fleet, self.checks.audit)
         self._now_s = 0.0
 
     @property
@@ -156,12 +145,9 @@ class Loop:
         for number in sorted(self.islands):
             note(self._tell(number, Started()))
         for event in history:
-            if isinstance(event, Audited):
-                self._note_audit(event)
-                continue
-            if not isinstance(event, Advanced | Commanded):
+            if isinstance(event, Answered):
                 unanswered.pop(key_of(event), None)
-            note(self._tell(island_of(event), event))
+            note(self._act_on(event))
         for request in unanswered.values():
             self._requests.send(request)
         self.shard_requests.send_noted()
@@ -196,13 +182,13 @@ class Loop:
                 if snapshot:
                     # It must be on disk before the journal has the advance.
                     step = event.advance.step
-                    self._snapshot_store.write(event.island, step, snapshot)
+                    self.snapshot_store.write(event.island, step, snapshot)
                 events.append(event)
         self._take(events)
 
     def leave(self) -> None:
         """Drop all open requests."""
-        self._fleet.leave(self.client)
+        self.fleet.leave(self.client)
 
     def order(self, event: Commanded) -> None:
         """Take an operator's order; the journal has it on return.
@@ -219,26 +205,27 @@ class Loop:
         if not events:
             return
         # A process that was suspended while another took over must not write a byte.
-        self._confirm()
+        self.confirm()
         for event in events:
             if isinstance(event, Advanced) and event.pose_rows:
                 poses = event.advance.poses
-                self._rows.store(Append("poses", event.pose_rows, poses))
-        self._log.append(events)
+                self.rows.store(Append("poses", event.pose_rows, poses))
+        self.log.append(events)
         for event in events:
-            if isinstance(event, Audited):
-                self._note_audit(event)
-                continue
-            for request in self._tell(island_of(event), event):
+            for request in self._act_on(event):
                 if isinstance(request, AdvanceShard):
                     self._advance(request)
                 else:
                     self._requests.send(request)
         self._warn(events)
 
-    def _note_audit(self, event: Audited) -> None:
+    def _act_on(self, event: JournalledEvent) -> list[Request]:
+        """Act on an event that the journal holds; return the requests to send."""
+        if not isinstance(event, Audited):
+            return self._tell(island_of(event), event)
         for record in audit_records(event):
-            self._rows.write(record)
+            self.rows.write(record)
+        return []
 
     def _warn(self, events: Sequence[JournalledEvent]) -> None:
         """Warn the user about cross-checks that failed and robots that crash workers.
@@ -253,7 +240,7 @@ class Loop:
             if isinstance(event, EvaluationFailed) and is_quarantined(event):
                 birth = event.birth
                 line = f"birth {birth.number} of island {birth.island}: {event.reason}"
-                if self._checks.pauses:
+                if self.checks.pauses:
                     raise RunPaused(f"{line}; resume to go on without it")
                 _LOG.warning("%s", line)
 
@@ -279,21 +266,19 @@ class Loop:
                     case Record():
                         self._write(command)
                     case Append():
-                        self._rows.append(command)
+                        self.rows.append(command)
                     case Vet() | Evaluate() | AdvanceShard():
                         requests.append(command)
                     case Emigrate(island, to, epoch, migrants):
                         events.append((to, Immigrated(to, island, epoch, migrants)))
                     case Finish(island, neighbours):
-                        events += [
-                            (to, NeighbourClosed(to, island)) for to in neighbours
-                        ]
+                        for to in neighbours:
+                            events.append((to, NeighbourClosed(to, island)))
         return requests
 
     def _write(self, record: Record) -> None:
-        self._rows.write(record)
-        if self._watch is not None:
-            self._watch(record)
+        self.rows.write(record)
+        self.watch(record)
 
     def _handled(
         self, number: int, event: Event
@@ -310,7 +295,7 @@ class Loop:
             ):
                 _LOG.warning("%s", drift)
                 self._write(drift.record)
-            if not isinstance(event, Evaluated | EvaluationFailed):
+            if not isinstance(event, Outcome):
                 return machine.handle(event)
         elif machine is not None and not isinstance(event, Advanced | Commanded):
             return machine.handle(event)

@@ -8,7 +8,7 @@ is with them, the other on its way to or from the analyzers and this process.
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import partial
 
 from msgspec.structs import replace
@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from coordinator.dispatch.events import Client
 from coordinator.dispatch.fleet import End, Fleet
 from coordinator.run.session import RateMeter, RunSession
-from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.folder import RunFolder
 from schema.errors import RevolveError
 from schema.wire.status import RunStatus, Status
 
@@ -29,56 +29,47 @@ class Planned:
     """A run that is planned.
 
     Attributes:
-        details: of the run.
-        status: its progress before it is started.
+        status: its name, and its progress before it is started.
         take: locks its folder.
     """
 
-    details: RunDetails
     status: RunStatus
     take: Callable[[], RunFolder]
 
+    @property
+    def is_finished(self) -> bool:
+        """It needs no start."""
+        return self.status.state == "finished"
 
+
+@dataclass(eq=False)
 class RunScheduler:
-    """All runs of this process.
+    """All runs of this process; ``turn`` starts them.
 
     Attributes:
+        planned: all runs in order, finished ones included.
         fleet: the agents.
+        open_run: opens the run of a folder; the flag says whether it is watched.
+        most: number of runs that there may be at once.
+        conclude: called with each run that is finished.
+        report: called with each run that cannot continue, and its error.
         failed: runs that could not continue, with their errors.
     """
 
-    def __init__(
-        self,
-        planned: Sequence[Planned],
-        fleet: Fleet,
-        *,
-        open_run: Callable[[RunFolder, bool], RunSession],
-        most: int,
-        conclude: Callable[[RunSession], object],
-        report: Callable[[RunDetails, RevolveError], None],
-    ) -> None:
-        """Plan runs; ``turn`` starts them.
+    planned: Sequence[Planned]
+    fleet: Fleet
+    _: KW_ONLY
+    open_run: Callable[[RunFolder, bool], RunSession]
+    most: int
+    conclude: Callable[[RunSession], object]
+    report: Callable[[RunStatus, RevolveError], None]
 
-        Args:
-            planned: all runs in order, finished ones included.
-            fleet: the agents.
-            open_run: opens the run of a folder; the flag says whether it is watched.
-            most: number of runs that there may be at once.
-            conclude: called with each run that is finished.
-            report: called with each run that cannot continue, and its error.
-        """
-        self.failed: list[tuple[RunDetails, RevolveError]] = []
-        self.fleet = fleet
-        self._open_run = open_run
-        self._most = most
-        self._conclude = conclude
-        self._report = report
-        self._known = [one.status for one in planned]
-        self._planned = deque(
-            (place, one)
-            for place, one in enumerate(planned)
-            if one.status.state != "finished"
-        )
+    def __post_init__(self) -> None:
+        """Plan the runs."""
+        self.failed: list[tuple[RunStatus, RevolveError]] = []
+        self._known = [one.status for one in self.planned]
+        places = enumerate(self.planned)
+        self._waiting = deque(each for each in places if not each[1].is_finished)
         self._places: dict[RunSession, int] = {}
         self._run_of: dict[Client, RunSession] = {}
         self._rate = RateMeter()
@@ -92,7 +83,7 @@ class RunScheduler:
     @property
     def is_finished(self) -> bool:
         """All runs have ended."""
-        return not (self._places or self._planned or self._is_stopped)
+        return not (self._places or self._waiting or self._is_stopped)
 
     @property
     def watched(self) -> RunSession | None:
@@ -106,8 +97,8 @@ class RunScheduler:
             timeout_s: how long to wait for the first answer [s].
             clock: returns the time, monotonic [s].
         """
-        while self._planned and self._has_room():
-            self._begin(*self._planned.popleft())
+        while self._waiting and self._has_room():
+            self._begin(*self._waiting.popleft())
         now_s = clock()
         acting: dict[RunSession, list[End]] = {}
         for run in self._places:
@@ -125,13 +116,13 @@ class RunScheduler:
         if not self._places:
             return True
         is_full = self.fleet.open >= SLACK * self.fleet.dispatch.credits
-        return not is_full and len(self._places) < self._most
+        return not is_full and len(self._places) < self.most
 
     def _begin(self, place: int, planned: Planned) -> None:
         try:
-            run = self._open_run(planned.take(), self.watched is None)
+            run = self.open_run(planned.take(), self.watched is None)
         except RevolveError as error:
-            self._fail(place, planned.details, error)
+            self._fail(place, error)
             return
         self._places[run] = place
         self._run_of[run.loop.client] = run
@@ -143,19 +134,19 @@ class RunScheduler:
             act()
             if run.loop.is_finished:
                 run.finish()
-                self._conclude(run)
+                self.conclude(run)
         except RevolveError as error:
-            self._fail(self._places[run], run.held.details, _cause(run, error))
+            self._fail(self._places[run], _cause(run, error))
             self._dismiss(run)
             return
         if run.loop.is_finished:
             self._known[self._places[run]] = replace(run.status(0.0), births_per_s=0.0)
             self._dismiss(run)
 
-    def _fail(self, place: int, details: RunDetails, error: RevolveError) -> None:
-        self.failed.append((details, error))
-        self._report(details, error)
-        self._known[place] = replace(self._known[place], state="failed")
+    def _fail(self, place: int, error: RevolveError) -> None:
+        status = self._known[place] = replace(self._known[place], state="failed")
+        self.failed.append((status, error))
+        self.report(status, error)
 
     def _dismiss(self, run: RunSession) -> None:
         run.close()

@@ -4,6 +4,7 @@ import json
 from collections import deque
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -26,7 +27,6 @@ from coordinator.storage.snapshots import Snapshots
 from schema.agent.platform_tag import cpu_flags, our_version, platform_tag
 from schema.agent.service import tell_user
 from schema.errors import RunFolderError
-from schema.experiment.document import Experiment, island_experiment
 from schema.experiment.file import experiment_from_text
 from schema.tables.columns import TABLES
 from schema.tables.files import has_rows
@@ -126,7 +126,7 @@ class RunSession:
                 throttle=RealTimeThrottle(speed, timestep_s) if speed else None,
                 checks=checks,
                 confirm=held.confirm,
-                watch=self.feed.unread.append if self.feed else None,
+                watch=self.feed.unread.append if self.feed else lambda _record: None,
             )
             self._births, self._simulated = RateMeter(), RateMeter()
             self._opened = stack.pop_all()
@@ -189,8 +189,7 @@ class RunSession:
             now_s: the time, of a monotonic clock [s].
         """
         islands = tuple(
-            _island_status(island, island_experiment(self.experiment, number))
-            for number, island in sorted(self.loop.islands.items())
+            _island_status(island) for _, island in sorted(self.loop.islands.items())
         )
         self._births.note(now_s, sum(island.births for island in islands))
         simulated_s = sum(island.simulated_s or 0.0 for island in islands)
@@ -221,32 +220,25 @@ def _check_journal(folder: Path) -> None:
         )
 
 
-def _island_status(island: Island | Arena, own: Experiment) -> IslandStatus:
-    best = max((one.fitness for one in island.judged), default=None)
-    alive = len(island.population)
-    if not isinstance(island, Arena):
-        return IslandStatus(island.births, own.births, best, alive)
+def _island_status(island: Island | Arena) -> IslandStatus:
+    arena = island if isinstance(island, Arena) else None
     return IslandStatus(
         births=island.births,
-        wanted=island.births if island.is_finished else own.births,
-        best=best,
-        alive=alive,
-        simulated_s=island.step * own.simulation.timestep_s,
-        is_paused=island.is_paused,
+        wanted=island.births if island.is_finished else island.experiment.births,
+        best=max((one.fitness for one in island.judged), default=None),
+        alive=len(island.population),
+        simulated_s=arena.clock.seconds(arena.step) if arena else None,
+        is_paused=bool(arena and arena.is_paused),
     )
 
 
 def _runs_row(held: RunFolder) -> Record:
     """Return the one row of the runs table."""
-    details = held.details
     began = (held.path / DETAILS).stat().st_mtime
     versions = {name: metadata.version(name) for name in _LIBRARIES}
     versions["revolve-islands"] = our_version()
     row = {
-        "name": details.name,
-        "run": details.run,
-        "seed": details.seed,
-        "document": details.document,
+        **asdict(held.details),
         "state": "finished",
         "versions": json.dumps(versions),
         "platform": platform_tag(),

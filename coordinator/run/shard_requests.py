@@ -11,6 +11,7 @@ from typing import Protocol
 
 import pyarrow as pa
 import pyarrow.compute
+from msgspec import structs
 
 from coordinator.dispatch.events import AssignShard, Read, ShardFailed
 from coordinator.dispatch.fleet import Fleet
@@ -210,7 +211,7 @@ class ShardRequests:
         # Nothing from before a drift is ever repeated.
         wants_snapshot = requested.wants_snapshot or past.wants_snapshot or is_drift
         past.wants_snapshot, past.may_be_kept = False, wants_snapshot
-        past.requested = replace(requested, wants_snapshot=wants_snapshot)
+        past.requested = structs.replace(requested, wants_snapshot=wants_snapshot)
         rebuild: Rebuild | None = None
         if command.is_whole:
             rebuild = self.past(shard)

@@ -46,16 +46,12 @@ class Campaign:
 
     def runs(self, folder: Path) -> list[tuple[Path, RunDetails]]:
         """Return folder and details of each run, repeat by repeat."""
-        return [
-            (
-                folder / f"{experiment.name}-{repeat}",
-                RunDetails(
-                    experiment.name, repeat, self.seed, experiment_text(experiment)
-                ),
-            )
+        runs = [
+            RunDetails(each.name, repeat, self.seed, experiment_text(each))
             for repeat in range(self.repeats)
-            for experiment in self.experiments
+            for each in self.experiments
         ]
+        return [(folder / f"{each.name}-{each.run}", each) for each in runs]
 
 
 def is_campaign(folder: Path) -> bool:

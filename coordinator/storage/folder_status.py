@@ -1,9 +1,8 @@
 """Status of a run, read from its folder."""
 
+from collections import Counter
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.compute as pc
 from msgspec.structs import replace
 
 from coordinator.storage.folder import RunDetails, read_details, read_state
@@ -29,34 +28,26 @@ def folder_status(folder: Path) -> RunStatus:
     if state == "running" and not read_holder(folder):
         state = "stopped"
     status = unbegun_status(folder, details)
-    births = _by_island(read_table(folder, "births").select(["island"]), "count")
+    births = Counter(read_table(folder, "births")["island"].to_pylist())
     if state == "finished" and not births:
         check_rewritable(folder, details)
         raise RunFolderError(
             f"{folder}: is finished, but its tables are missing; to write them again: "
             f"{command('resume', folder)}"
         )
-    population = read_table(folder, "population").select(
-        ["island", "births", "fitness"]
+    populations = read_table(folder, "population").group_by(["island", "births"])
+    summaries = populations.aggregate([("fitness", "max"), ([], "count_all")])
+    newest = {row["island"]: row for row in summaries.sort_by("births").to_pylist()}
+    islands = tuple(
+        IslandStatus(
+            births=births[number],
+            wanted=births[number] if state == "finished" else island.wanted,
+            best=newest.get(number, {}).get("fitness_max"),
+            alive=newest.get(number, {}).get("count_all", 0),
+        )
+        for number, island in enumerate(status.islands)
     )
-    newest = _by_island(population.select(["island", "births"]), "max")
-    islands = []
-    for number, island in enumerate(status.islands):
-        born = births.get(number, 0)
-        is_now = pc.and_(
-            pc.equal(population["island"], number),
-            pc.equal(population["births"], newest.get(number, -1)),
-        )
-        living = population.filter(is_now)
-        islands.append(
-            IslandStatus(
-                births=born,
-                wanted=born if state == "finished" else island.wanted,
-                best=pc.max(living["fitness"]).as_py(),
-                alive=living.num_rows,
-            )
-        )
-    return replace(status, state=state, islands=tuple(islands))
+    return replace(status, state=state, islands=islands)
 
 
 def check_rewritable(folder: Path, details: RunDetails) -> None:
@@ -81,14 +72,6 @@ def check_rewritable(folder: Path, details: RunDetails) -> None:
             f"{folder}: is finished, but its tables are missing, and the journal "
             "cannot restore them: put a copy of the tables in their place"
         )
-
-
-def _by_island(table: pa.Table, what: str) -> dict[int, int]:
-    """Return the count or the maximum of a table's last column by island."""
-    column = table.schema.names[-1]
-    grouped = table.group_by("island").aggregate([(column, what)])
-    found = grouped[f"{column}_{what}"].to_pylist()
-    return dict(zip(grouped["island"].to_pylist(), found, strict=True))
 
 
 def unbegun_status(folder: Path, details: RunDetails) -> RunStatus:

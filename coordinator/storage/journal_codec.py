@@ -1,5 +1,7 @@
 """Events of the journal as Protobuf bytes, and back."""
 
+from dataclasses import asdict
+
 from coordinator.islands.events import (
     Advanced,
     Audited,
@@ -10,6 +12,7 @@ from coordinator.islands.events import (
     Insert,
     JournalledEvent,
     Order,
+    Outcome,
     Pause,
     Remove,
     ReplaceBrain,
@@ -46,24 +49,7 @@ from schema.wire.messages import (
 
 def encode_entry(event: JournalledEvent) -> bytes:
     """Return an event as bytes; the poses of an advance are left out."""
-    entry = pb.Entry()
-    match event:
-        case Advanced():
-            entry.island = event.island
-            _write_advance(event, entry.advanced)
-            _sign(entry, event.provenance)
-        case Commanded():
-            entry.island = event.island
-            entry.commanded.command_id = event.command_id
-            entry.commanded.step = event.step
-            _write_order(event.order, entry.commanded)
-        case Audited():
-            entry.audited.first.ParseFromString(encode_entry(event.first))
-            entry.audited.second.ParseFromString(encode_entry(event.second))
-        case _:
-            entry.island, entry.birth = event.birth
-            _write_answer(event, entry)
-    return entry.SerializeToString(deterministic=True)
+    return _entry(event).SerializeToString(deterministic=True)
 
 
 def decode_entry(data: bytes) -> JournalledEvent:
@@ -72,43 +58,49 @@ def decode_entry(data: bytes) -> JournalledEvent:
     Raises:
         MalformedMessage: the bytes are no entry, or it holds no event.
     """
-    return _journalled(parsed(data, pb.Entry()))
-
-
-def _journalled(entry: pb.Entry) -> JournalledEvent:
+    entry = parsed(data, pb.Entry())
     is_audit = entry.WhichOneof("event") == "audited"
     return _audited(entry.audited) if is_audit else _event(entry)
 
 
-def _write_answer(
-    event: Vetted | VettingFailed | Evaluated | EvaluationFailed, entry: pb.Entry
-) -> None:
-    if isinstance(event, Vetted | VettingFailed):
-        entry.attempt = event.attempt
-    else:
-        entry.trial = event.trial
-        if event.requester is not None:
-            entry.requester = event.requester
-        _sign(entry, event.provenance)
+def _entry(event: JournalledEvent) -> pb.Entry:
     match event:
-        case Vetted():
-            write_report(event.report, entry.vetted)
-        case VettingFailed():
-            entry.vetting_failed = event.reason
-        case Evaluated():
-            entry.evaluated.CopyFrom(evaluation_to_message(event.evaluation))
-        case EvaluationFailed():
-            entry.evaluation_failed = event.reason
+        case Audited(first, second):
+            audit = pb.AuditEntry(first=_entry(first), second=_entry(second))
+            return pb.Entry(audited=audit)
+        case Commanded():
+            return pb.Entry(island=event.island, commanded=_command(event))
+        case Advanced():
+            advance = advance_to_message(event.advance)
+            advance.ClearField("poses")
+            advanced = pb.AdvanceEntry(
+                number=event.number, advance=advance, pose_rows=event.pose_rows
+            )
+            entry = pb.Entry(island=event.island, advanced=advanced)
+        case Vetted() | VettingFailed():
+            entry = pb.Entry(attempt=event.attempt)
+            entry.island, entry.birth = event.birth
+            if isinstance(event, Vetted):
+                write_report(event.report, entry.vetted)
+            else:
+                entry.vetting_failed = event.reason
+            return entry
+        case Evaluated() | EvaluationFailed():
+            entry = pb.Entry(trial=event.trial, requester=event.requester)
+            entry.island, entry.birth = event.birth
+            if isinstance(event, Evaluated):
+                entry.evaluated.CopyFrom(evaluation_to_message(event.evaluation))
+            else:
+                entry.evaluation_failed = event.reason
+    entry.provenance.CopyFrom(pb.Provenance(**asdict(event.provenance)))
+    return entry
 
 
-def _write_advance(event: Advanced, entry: pb.AdvanceEntry) -> None:
-    entry.number = event.number
-    entry.pose_rows = event.pose_rows
-    entry.advance.CopyFrom(advance_to_message(event.advance))
-    entry.advance.ClearField("poses")
-
-
-def _write_order(order: Order, command: pb.Command) -> None:
+def _command(event: Commanded) -> pb.Command:
+    command, order = (
+        pb.Command(command_id=event.command_id, step=event.step),
+        event.order,
+    )
     match order:
         case Pause():
             command.pause.SetInParent()
@@ -124,6 +116,7 @@ def _write_order(order: Order, command: pb.Command) -> None:
         case ReplaceBrain():
             change = BrainChange(order.birth, order.brain)
             write_brain_change(change, command.replace_brain)
+    return command
 
 
 def _event(entry: pb.Entry) -> ExternalEvent:
@@ -145,10 +138,8 @@ def _event(entry: pb.Entry) -> ExternalEvent:
             return EvaluationFailed(birth, reason, signed, entry.trial, requester)
         case "advanced":
             message = entry.advanced
-            advance = advance_from_message(message.advance)
-            return Advanced(
-                entry.island, message.number, advance, message.pose_rows, signed
-            )
+            advance, rows = advance_from_message(message.advance), message.pose_rows
+            return Advanced(entry.island, message.number, advance, rows, signed)
         case "commanded":
             command = entry.commanded
             order = _order(command)
@@ -158,8 +149,7 @@ def _event(entry: pb.Entry) -> ExternalEvent:
 
 def _audited(message: pb.AuditEntry) -> Audited:
     first, second = _event(message.first), _event(message.second)
-    kinds = Evaluated | EvaluationFailed
-    if not (isinstance(first, kinds) and isinstance(second, kinds)):
+    if not (isinstance(first, Outcome) and isinstance(second, Outcome)):
         raise MalformedMessage("entry: an audit must hold two evaluations")
     return Audited(first, second)
 
@@ -183,10 +173,3 @@ def _order(command: pb.Command) -> Order:
             change = read_brain_change(command.replace_brain)
             return ReplaceBrain(change.birth, change.brain)
     raise MalformedMessage("command: holds no order")
-
-
-def _sign(entry: pb.Entry, provenance: Provenance) -> None:
-    signed = entry.provenance
-    signed.agent = provenance.agent
-    signed.platform = provenance.platform
-    signed.wall_s = provenance.wall_s

@@ -20,11 +20,18 @@ _NAME = re.compile(r"island-\d+-(\d+)\.bin")
 
 
 class Snapshots:
-    """Snapshots of a run folder that this process has locked."""
+    """Snapshots of a run folder that this process has locked, or only reads."""
 
-    def __init__(self, folder: Path) -> None:
-        """Open the snapshots of a run folder."""
+    def __init__(self, folder: Path, *, until: int | None = None) -> None:
+        """Open the snapshots of a run folder.
+
+        Args:
+            folder: the run folder.
+            until: last step whose snapshot counts, for a process that only reads: it
+                removes none; None if this process has locked the folder.
+        """
         self._folder = folder / FOLDER
+        self._until = until
 
     def has(self, shard: int, step: int, digest: bytes) -> bool:
         """Return whether there is a snapshot of a shard's step with this digest.
@@ -32,7 +39,8 @@ class Snapshots:
         Raises:
             RunFolderError: it cannot be read.
         """
-        if not self._path(shard, step).exists():
+        is_later = self._until is not None and step > self._until
+        if is_later or not self._path(shard, step).exists():
             return False
         return sha256(self.read(shard, step)).digest() == digest
 
@@ -60,11 +68,13 @@ class Snapshots:
             ) from None
 
     def drop_before(self, shard: int, step: int) -> None:
-        """Remove a shard's snapshots that are older than a step.
+        """Remove a shard's snapshots that are older than a step, unless only reading.
 
         Raises:
             RunFolderError: the disk fails.
         """
+        if self._until is not None:
+            return
         with storage_errors(self._folder):
             for path in self._folder.glob(f"island-{shard}-*.bin"):
                 match = _NAME.fullmatch(path.name)

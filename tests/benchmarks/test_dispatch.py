@@ -75,7 +75,6 @@ def campaign(folder: Path) -> Iterator[tuple[RunScheduler, TimedNetwork]]:
     experiment = replace(read_experiment("scenario2"), births=BIRTHS)
     planned = [
         Planned(
-            details,
             unbegun_status(path, details),
             lambda path=path, details=details: RunFolder(path, details),  # type: ignore[misc]
         )
@@ -97,7 +96,7 @@ def campaign(folder: Path) -> Iterator[tuple[RunScheduler, TimedNetwork]]:
             open_run=lambda held, _timed: RunSession(held, fleet),
             most=100,
             conclude=lambda _run: None,
-            report=lambda _details, error: pytest.fail(str(error)),
+            report=lambda _status, error: pytest.fail(str(error)),
         )
         stack.callback(scheduler.close)
         yield scheduler, timed

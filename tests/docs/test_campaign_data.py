@@ -274,7 +274,7 @@ def test_kept_outcomes_give_the_same_comparison(
     place: Path, parts: Parts, data: Path
 ) -> None:
     runs, _ = read_runs([place / "runs" / part.folder for part in parts])
-    measured = measure_runs(runs)
+    measured = list(measure_runs(runs))
     rows = kept(data, "outcomes")
     ours, theirs = KeptOutcomes(rows), Outcomes(measured)
     names = ["scenario1", "scenario2", "scenario3"]
@@ -298,7 +298,7 @@ def test_progression_of_kept_rows_equals_that_of_the_runs(
     place: Path, parts: Parts, data: Path
 ) -> None:
     runs, _ = read_runs([place / "runs" / part.folder for part in parts])
-    complete = progression(concatenated(measure_runs(runs))["populations"])
+    complete = progression(concatenated(list(measure_runs(runs)))["populations"])
     ours = progression(kept(data, "populations"))
     is_kept = pc.is_in(complete["births"], pa.array([MARK, BIRTHS]))
     assert ours == complete.filter(is_kept)

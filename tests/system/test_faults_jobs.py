@@ -199,8 +199,8 @@ def test_disagreeing_workers_are_reported_and_stop_the_run(
     module.write_text(module.read_text().replace("return value", drift))
     workspace.run("run", *WORDS, "--in-process", "--out", "calm")
     fleet = fleet_of(workspace, *WORDS, "--audit", "1")
-    fleet.join("sound")
-    fleet.join("broken", environment={"DRIFT": "1"})
+    fleet.join("sound", "worker", "--plugins", "plugged")
+    fleet.join("broken", "worker", "--plugins", "plugged", environment={"DRIFT": "1"})
     fleet.begin(workers=2)
     _, err = fleet.coordinator.communicate(timeout=60)
     assert fleet.coordinator.returncode == 2

@@ -3,7 +3,7 @@
 import pytest
 
 from analysis.figures.catalogue import FIGURES
-from analysis.figures.forms import NothingToDraw, Panel, over_births, over_runs, stacked
+from analysis.figures.forms import NothingToDraw, over_births, over_runs, stacked
 from analysis.figures.style import colours, in_order, label
 from tests.analysis.drawn import Row, layers, table
 
@@ -36,7 +36,7 @@ def course(experiment: str, runs: int, *mean: float) -> list[Row]:
     ]  # fmt: skip
 
 
-FITNESS = Panel("fitness", "fitness [m/s]")
+FITNESS = {"fitness": "fitness [m/s]"}
 
 
 def test_spread_shows_runs_as_points_and_robots_as_violins() -> None:
@@ -65,9 +65,9 @@ def test_spread_shows_runs_as_points_and_robots_as_violins() -> None:
 
 
 def test_panels_keep_their_given_order() -> None:
-    panels = [Panel("parts", "z"), Panel("hidden", "a")]
+    panels = {"parts": "z", "hidden": "a"}
     rows = [{"experiment": "x", "parts": 7.0, "hidden": 1.0}]
-    figure = over_runs({"outcomes": table("outcomes", rows)}, *panels)
+    figure = over_runs({"outcomes": table("outcomes", rows)}, panels)
     assert list(figure.data["panel"].cat.categories) == ["z", "a"]
     assert figure.data["value"].tolist() == [7.0, 1.0]
     figure.draw()
@@ -81,14 +81,14 @@ def test_different_births_of_experiments_are_labelled() -> None:
     tables = {"outcomes": table("outcomes", rows)}
     (feet,) = [
         scale.labels
-        for scale in over_runs(tables, Panel("parts", "z")).scales
+        for scale in over_runs(tables, {"parts": "z"}).scales
         if "x" in scale.aesthetics
     ]
     assert feet == ["scenario 1\n60 births", "scenario 3\n30 births", "b\n60 births"]
-    several = over_runs(tables, Panel("parts", "z"), Panel("hidden", "a"))
+    several = over_runs(tables, {"parts": "z", "hidden": "a"})
     assert several.labels.x == "60 births: scenario 1, b; 30 births: scenario 3"
     alike = {"outcomes": table("outcomes", rows[::2])}
-    alone = over_runs(alike, Panel("parts", "z"), Panel("hidden", "a"))
+    alone = over_runs(alike, {"parts": "z", "hidden": "a"})
     assert alone.labels.x == ""
 
 
@@ -100,8 +100,8 @@ def test_an_interval_is_clipped_at_zero() -> None:
 
 def test_panels_of_zeros_begin_at_zero() -> None:
     rows = [{"experiment": "x", "births": 60, "parts": 7.0, "hidden": 0.0}]
-    panels = Panel("parts", "z"), Panel("hidden", "a")
-    figure = over_runs({"outcomes": table("outcomes", rows)}, *panels).draw()
+    panels = {"parts": "z", "hidden": "a"}
+    figure = over_runs({"outcomes": table("outcomes", rows)}, panels).draw()
     lows, highs = zip(*(axes.get_ylim() for axes in figure.axes), strict=True)
     assert min(lows) > -1.0
     assert max(highs[1], 1.0) == highs[1]
@@ -168,4 +168,4 @@ def test_an_experiment_has_the_same_colour_in_every_figure() -> None:
 
 def test_null_values_have_no_rows() -> None:
     rows = table("outcomes", [*outcomes("a", 0.1), {"experiment": "b"}])
-    assert stacked(rows, [FITNESS])["value"].tolist() == [0.1]
+    assert stacked(rows, FITNESS)["value"].tolist() == [0.1]

@@ -15,8 +15,8 @@ from analysis.figures.family_tree import (
     ordered,
     row_of,
 )
-from analysis.figures.pictures import FOUNDERS, family_tree, gaits
-from analysis.figures.robot_pictures import RobotPicture
+from analysis.figures.pictures import family_tree, gaits
+from analysis.figures.robot_pictures import FOUNDERS, RobotPicture
 from analysis.figures.robots import lineages
 from analysis.measures.outputs import schema
 from schema.robot.ids import BirthId

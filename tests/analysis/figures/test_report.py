@@ -1,6 +1,7 @@
 """Tests of the report, read by an HTML parser."""
 
 import base64
+from datetime import UTC, datetime
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import pyarrow as pa
 import pytest
 
 from analysis.figures.catalogue import DrawnFigure, Figure
-from analysis.figures.report import Provenance, report
+from analysis.figures.report import report
 from analysis.measures.outputs import schema
 
 PICTURE = b"\x89PNG\r\n\x1a\nnothing more"
@@ -86,8 +87,8 @@ def read(tmp_path: Path) -> Reader:
         )
         for number in ("6.2", "6.10")
     ]
-    provenance = Provenance("revolve analyze runs", "2020-01-01", {"numpy": "9.9"})
-    page = report(tables(), figures, provenance)
+    when = datetime(2020, 1, 1, tzinfo=UTC)
+    page = report(tables(), figures, "revolve analyze runs", when, {"numpy": "9.9"})
     assert page.startswith("<!DOCTYPE html>")
     reader = Reader()
     reader.feed(page)
@@ -128,14 +129,15 @@ def test_differing_settings_of_equal_names_are_shown_beside_their_runs() -> None
     rows[2]["differs"] = "births & all: 1 instead of 2"
     runs = pa.Table.from_pylist(rows, schema("runs"))
     reader = Reader()
-    reader.feed(report({**tables(), "runs": runs}, [], Provenance("", "now", {})))
+    now = datetime.now(UTC)
+    reader.feed(report({**tables(), "runs": runs}, [], "", now, {}))
     assert "seeds settings scenario 1" in reader.text
     assert "b 1 finished 30 1 8 births & all: 1 instead of 2 Findings" in reader.text
 
 
 def test_a_report_without_runs_has_no_empty_sections() -> None:
     empty = {name: table.slice(0, 0) for name, table in tables().items()}
-    page = report(empty, [], Provenance("revolve analyze", "now", {}))
+    page = report(empty, [], "revolve analyze", datetime.now(UTC), {})
     reader = Reader()
     reader.feed(page)
     assert reader.open == []

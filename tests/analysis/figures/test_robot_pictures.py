@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from analysis.figures.family_tree import Best
-from analysis.figures.pictures import FOUNDERS
 from analysis.figures.robot_pictures import robot_picture
 from coordinator.evolution.generation import generate
 from schema.errors import SimulationDiverged
@@ -40,7 +39,6 @@ def test_gait_uses_noise_of_the_robots_run_and_island() -> None:
             members,
             EXPERIMENT,
             simulate,
-            FOUNDERS,
             origin=Origin(seed=7, run=3),
             has_family=False,
         )

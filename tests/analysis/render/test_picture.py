@@ -17,9 +17,7 @@ from analysis.render.picture import (
     save_animation,
     save_picture,
 )
-from schema.experiment.document import Simulation
-from schema.experiment.environment import FLAT
-from schema.formats.files import write_robot
+from schema.formats.files import settings_of, write_robot
 from schema.parts import BUILT_IN
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.robot import Part, Robot
@@ -39,7 +37,7 @@ ROBOT = Robot(
 def renderer() -> Iterator[RobotRenderer]:
     try:
         choose_engine()
-        made = RobotRenderer(ROBOT, BUILT_IN, Simulation(), FLAT, size=(160, 120))
+        made = RobotRenderer(ROBOT, settings_of(None), size=(160, 120))
     except NoPictures as error:
         pytest.skip(str(error))
     with made:

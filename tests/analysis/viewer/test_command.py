@@ -12,8 +12,9 @@ import pytest
 from msgspec.structs import replace
 
 from analysis.viewer.blueprint import layout
-from analysis.viewer.entities import PoseBatch, TimePoint
-from analysis.viewer.gallery import BoxModels, Gallery, spot_place
+from analysis.viewer.body import box_model
+from analysis.viewer.entities import TimePoint
+from analysis.viewer.gallery import Gallery, spot_place
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.live import Sequel
 from analysis.viewer.output import Output, Window, keep_serving
@@ -91,18 +92,18 @@ def test_a_ring_wall_is_where_mujoco_has_it() -> None:
     model = spec.compile()
     (walls,) = scene_of(Experiment(name="e", arena=arena)).walls
     assert len(walls) == model.ngeom == 5
-    for geom, (place, half) in enumerate(walls):
-        assert place[:3] == pytest.approx(model.geom_pos[geom], abs=1e-6)
-        assert place[[6, 3, 4, 5]] == pytest.approx(model.geom_quat[geom], abs=1e-6)
-        assert half == pytest.approx(model.geom_size[geom], abs=1e-6)
+    for geom, wall in enumerate(walls):
+        assert wall[:3] == pytest.approx(model.geom_pos[geom], abs=1e-6)
+        assert wall[[6, 3, 4, 5]] == pytest.approx(model.geom_quat[geom], abs=1e-6)
+        assert wall[7:] == pytest.approx(model.geom_size[geom], abs=1e-6)
 
 
 def test_living_robots_keep_their_spot_and_dead_robots_free_it() -> None:
-    recorded, models = Recorded(), BoxModels(BUILT_IN)
+    recorded = Recorded()
     gallery = Gallery(recorded)  # type: ignore[arg-type]
     names = [BirthId(0, number) for number in range(4)]
-    for name in names:
-        models.add(name, CORE)
+    model = box_model(CORE, BUILT_IN, is_plain=True)
+    models = dict.fromkeys(names, lambda: model)
     gallery.show(Level(0, 3, 3, 3, 0.0, 0.0, tuple(names[:3])), models)
     gallery.show(Level(0, 4, 3, 3, 0.0, 0.0, (names[0], names[2], names[3])), models)
     kinds = [call[0] for call in recorded.calls]
@@ -130,7 +131,7 @@ def test_ancestry_is_drawn_every_ten_births_with_living_robots_marked() -> None:
     _, entries, _ = recorded.calls[1]
     assert isinstance(entries, list)
     # The last one was born since.
-    assert [each.birth.number for each in entries if each.is_alive] == [3, 10, 11]
+    assert [one.birth.birth.number for one in entries if one.is_alive] == [3, 10, 11]
 
 
 def test_a_death_has_as_many_births_as_the_last_pose() -> None:
@@ -147,10 +148,8 @@ def test_a_death_has_as_many_births_as_the_last_pose() -> None:
         for n in range(2)
     ]  # fmt: skip
     show.move(0, pa.Table.from_pylist(rows, TABLES["poses"]))
-    (moves,) = [call[2] for call in recorded.calls if call[0] == "log_poses"]
-    assert isinstance(moves, PoseBatch)
-    assert moves.births is not None
-    assert moves.births.tolist() == [1, 2]
+    (births,) = [call[3] for call in recorded.calls if call[0] == "log_poses"]
+    assert births.tolist() == [1, 2]
     (gone,) = [call[2] for call in recorded.calls if call[0] == "remove"]
     assert gone == TimePoint(10.0, 2)
 

@@ -270,11 +270,13 @@ def test_a_wrong_advance_raises_and_changes_nothing(change: dict[str, Any]) -> N
     advance = right.advance
     if "fitness" in change:
         judged = tuple(replace(one, **change) for one in advance.judgements)
-        wrong = replace(right, advance=replace(advance, judgements=judged))
+        wrong = msgspec.structs.replace(
+            right, advance=replace(advance, judgements=judged)
+        )
     elif "step" in change or "judgements" in change:
-        wrong = replace(right, advance=replace(advance, **change))
+        wrong = msgspec.structs.replace(right, advance=replace(advance, **change))
     else:
-        wrong = replace(right, **change)
+        wrong = msgspec.structs.replace(right, **change)
     with pytest.raises(UnexpectedEvent, match=r"arena 0 at step .* born"):
         lived.arena.handle(wrong)
     lived.waiting.clear()

@@ -19,7 +19,7 @@ from coordinator.dispatch.events import DispatchEvent, Returned
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.run.loop import Loop
-from coordinator.run.operators import RunOperator
+from coordinator.run.operators import reply_to
 from coordinator.run.run_context import RunContext
 from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.compare import compare
@@ -127,14 +127,13 @@ class Run:
             **other,
         )
         self.loop.start(journal.replay())
-        self.operator = RunOperator(self.loop, EXPERIMENT)
 
     def turn(self, now_s: float) -> None:
         ends = self.fleet.listen(0.0, now_s)
         self.loop.act(now_s, ends.get(self.loop.client, ()))
 
     def ask(self, action: OperatorAction, name: str = "x") -> str:
-        reply = self.operator.reply_to(OperatorRequest(name, 0, action))
+        reply = reply_to(OperatorRequest(name, 0, action), self.loop)
         return f"refused: {reply.text}" if reply.is_refused else reply.text
 
 
@@ -329,8 +328,8 @@ def test_invalid_orders_are_refused_and_not_journalled(
 
 def test_orders_for_other_islands_are_refused(tmp_path: Path) -> None:
     with ExitStack() as stack:
-        operator = Run(tmp_path / "run", stack, lambda _: None).operator
-        assert operator.reply_to(OperatorRequest("x", 7, PauseArena())).is_refused
+        run = Run(tmp_path / "run", stack, lambda _: None)
+        assert reply_to(OperatorRequest("x", 7, PauseArena()), run.loop).is_refused
 
 
 def test_missing_snapshot_is_named(tmp_path: Path) -> None:

@@ -1,8 +1,9 @@
 """Audits: which evaluations are done twice, and what happens to the pair."""
 
-from dataclasses import replace
+import dataclasses
 
 import pytest
+from msgspec.structs import replace
 
 from coordinator.islands.events import (
     Audited,
@@ -22,7 +23,9 @@ ROBOT = Robot((Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),))
 BIRTH = BirthId(2, 7)
 ONE = Evaluated(BIRTH, Evaluation(0.25, 0.0, 0.05, 12.0), Provenance("a", "p", 0.1))
 OTHER = replace(ONE, provenance=Provenance("b", "q", 0.7))
-DIFFERENT = replace(OTHER, evaluation=replace(ONE.evaluation, fitness=0.25 + 1e-16))
+DIFFERENT = replace(
+    OTHER, evaluation=dataclasses.replace(ONE.evaluation, fitness=0.25 + 1e-16)
+)
 FAILED = EvaluationFailed(BIRTH, "flew away", Provenance("c", "p", 0.1))
 
 
@@ -68,7 +71,7 @@ def test_different_answers_give_no_result(other: Evaluated | EvaluationFailed) -
 
 
 def _far() -> Evaluation:
-    return replace(ONE.evaluation, fitness=9.5)
+    return dataclasses.replace(ONE.evaluation, fitness=9.5)
 
 
 def test_equal_failures_agree() -> None:

@@ -17,11 +17,12 @@ from coordinator.run.scheduler import SLACK, Planned, RunScheduler
 from coordinator.run.session import RunSession
 from coordinator.storage.campaign import Campaign
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunDetails, RunFolder, read_state
+from coordinator.storage.folder import RunFolder, read_state
 from coordinator.storage.folder_status import folder_status, unbegun_status
 from coordinator.storage.lock import LOCK
 from schema.errors import RevolveError, RunFolderError
 from schema.experiment.file import read_experiment
+from schema.wire.status import RunStatus
 
 BIRTHS = 24
 EXPERIMENTS = tuple(
@@ -41,19 +42,17 @@ def plan(folder: Path) -> list[Planned]:
     planned = []
     for path, details in CAMPAIGN.runs(folder):
         if path.exists():
-            planned.append(
-                Planned(details, folder_status(path), partial(RunFolder, path))
-            )
+            planned.append(Planned(folder_status(path), partial(RunFolder, path)))
         else:
             status = unbegun_status(path, details)
-            planned.append(Planned(details, status, partial(RunFolder, path, details)))
+            planned.append(Planned(status, partial(RunFolder, path, details)))
     return planned
 
 
 def scheduler_of(
     planned: list[Planned],
     agents: Agents,
-    report: Callable[[RunDetails, RevolveError], None] = lambda *_: None,
+    report: Callable[[RunStatus, RevolveError], None] = lambda *_: None,
 ) -> RunScheduler:
     fleet = Fleet(agents)
     return RunScheduler(
@@ -143,7 +142,7 @@ def broken() -> None:
 
 def replaced(planned: Planned) -> Planned:
     """Return the same, but fail if it starts."""
-    return Planned(planned.details, planned.status, never)
+    return Planned(planned.status, never)
 
 
 def never() -> RunFolder:
@@ -181,7 +180,7 @@ def test_runs_are_started_until_requests_are_twice_the_credits(
     )
     details = Campaign((one_at_a_time,), 30, 1).runs(tmp_path)
     planned = [
-        Planned(each, unbegun_status(path, each), partial(RunFolder, path, each))
+        Planned(unbegun_status(path, each), partial(RunFolder, path, each))
         for path, each in details
     ]
     scheduler = scheduler_of(planned, Silent())
@@ -221,7 +220,7 @@ def test_run_whose_disk_fails_stops_no_other(tmp_path: Path, alone: Path) -> Non
     (victim / "epoch").write_text("7")
     scheduler.do_chores(0.0)
     conduct(scheduler)
-    assert [details.name for details, _ in scheduler.failed] == [
+    assert [status.name for status, _ in scheduler.failed] == [
         victim.name.rpartition("-")[0]
     ]
     others = [path for path, _ in CAMPAIGN.runs(alone) if path.name != victim.name]

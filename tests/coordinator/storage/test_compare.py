@@ -1,10 +1,10 @@
 """Comparison of two runs, finished or not."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from coordinator.islands.events import Record
 from coordinator.storage.compare import compare
