@@ -12,6 +12,8 @@ COMMANDS = {
     "run": (_COORDINATOR, "evolve experiments on this machine"),
     "resume": (_COORDINATOR, "resume a run or campaign after a stop or crash"),
     "coordinator": (_COORDINATOR, "run experiments for remote workers"),
+    "hub": ("coordinator.cli.hub", "connect coordinators, workers and viewers"),
+    "cluster": ("coordinator.cluster.command", "make certificates for a lab"),
     "status": ("coordinator.cli.status", "show the progress of runs"),
     "log": ("coordinator.cli.log", "print the journal of a run"),
     "arena": ("coordinator.cli.arena", "inspect and control a running arena"),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from coordinator.cli.deployment import Deployment
 from coordinator.cli.execute import resume, start, start_campaign
-from coordinator.cli.flags import LISTEN, parser
+from coordinator.cli.flags import parser
 from coordinator.dispatch.events import AgentKind
 from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
@@ -20,7 +20,8 @@ from coordinator.storage.campaign import (
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import holds_run, read_details
 from coordinator.storage.hints import stopped
-from schema.agent.command import tls_of
+from schema.agent.address import HUB, listen_address
+from schema.agent.command import access_of, connect_of, tls_of
 from schema.agent.service import tell_user
 from schema.agent.supervisor import cores
 from schema.errors import NetworkError
@@ -116,7 +117,9 @@ def _deployment(
         raise NetworkError("--listen and --connect exclude each other")
     if options.view and options.in_process:
         raise NetworkError("--view needs a network, but --in-process has none")
-    is_hub = options.command == "coordinator" and not options.connect
+    listen = options.listen
+    if options.command == "coordinator" and not options.connect:
+        listen = listen or HUB
     workers: int | None = options.workers
     if workers is None:
         workers = 0 if options.connect else cores()
@@ -134,10 +137,11 @@ def _deployment(
             "worker": worker.serve.service.process,
         },
         answers=answers if options.in_process else None,
-        listen=options.listen or (LISTEN if is_hub else None),
-        connect=options.connect,
+        listen=listen_address(listen) if listen else None,
+        connect=connect_of(options) if options.connect else None,
         fleet=options.fleet,
         tls=tls_of(options),
+        certificates=access_of(options),
         quiet=options.quiet,
         fsync=options.fsync,
         threads=threads,

@@ -29,7 +29,7 @@ from analysis.viewer.resimulate import Simulators, resimulate
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
 from analysis.viewer.watch import watch
-from schema.agent.command import add_network_flags, tls_of
+from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
 from schema.agent.service import tell_user
 from schema.agent.supervisor import stop_on_signals
 from schema.experiment.file import experiment_from_text
@@ -58,7 +58,7 @@ def main(arguments: list[str], simulators: Simulators) -> int:
     """
     options = _flags().parse_args(arguments[1:])
     output = Output.of(options.save, options.serve)
-    if (options.run is None) == (options.connect is None):
+    if options.run is not None and options.connect is not None:
         raise ViewerError("give either a run folder or --connect ADDRESS")
     if options.ancestry and not options.robot:
         raise ViewerError("--ancestry: needs --robot best or --robot ISLAND:BIRTH")
@@ -68,7 +68,7 @@ def main(arguments: list[str], simulators: Simulators) -> int:
     if options.robot or (options.start, options.until) != (None, None):
         raise ViewerError("--robot, --from and --until: for a run folder only")
     stop = stop_on_signals()
-    with LiveSource(options.connect, options.fleet, tls_of(options)) as source:
+    with LiveSource(connect_of(options), options.fleet, tls_of(options)) as source:
         watch(source, output, options.follow, stop)
     return 0
 
@@ -190,12 +190,13 @@ def _flags() -> Flags:
         epilog="for example: revolve view runs/scenario3-seed1 --save run.rrd",
         allow_abbrev=False,
     )
-    flags.add_argument("run", nargs="?", type=Path, help="run folder to replay")
     flags.add_argument(
-        "--connect", metavar="ADDRESS",
-        help="show the live run of the coordinator at this address (in the run "
-        "folder's file 'address')",
-    )  # fmt: skip
+        "run",
+        nargs="?",
+        type=Path,
+        help="run folder to replay (default: the live run at the hub)",
+    )
+    add_connect(flags)
     flags.add_argument(
         "--save", type=Path, metavar="FILE",
         help="write a recording (.rrd) instead of opening a window",

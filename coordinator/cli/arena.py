@@ -6,7 +6,7 @@ from pathlib import Path
 from uuid import uuid4
 
 from coordinator.cli.status import ask, ask_status
-from schema.agent.command import add_network_flags
+from schema.agent.command import add_connect, add_network_flags
 from schema.errors import InvalidRobot, NetworkError
 from schema.flags import Flags, add_count, number, whole_number
 from schema.formats.files import read_robot
@@ -108,7 +108,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = Flags(
         prog="revolve arena",
         description="Inspect and control a running arena.",
-        epilog="example: revolve arena list --connect tcp/127.0.0.1:7447",
+        epilog="example: revolve arena list --connect runs/scenario3-seed1",
         allow_abbrev=False,
     )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
@@ -129,10 +129,7 @@ def _parser() -> argparse.ArgumentParser:
                 "--place", type=number, nargs=2, metavar=("X", "Y"),
                 help="position [m] (default: drawn as for a birth)",
             )  # fmt: skip
-        action.add_argument(
-            "--connect", required=True, metavar="ADDRESS",
-            help="address of the coordinator; the run folder's file 'address' holds it",
-        )  # fmt: skip
+        add_connect(action)
         action.add_argument(
             "--run", default="", metavar="NAME",
             help="run, by the end of its folder's name (default: the only run)",

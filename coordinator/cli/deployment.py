@@ -12,15 +12,14 @@ from coordinator.network.service import Network
 from coordinator.run.cross_checks import NO_CHECKS, Checks
 from coordinator.run.live_server import open_viewer
 from coordinator.storage.disk import replace_text
-from schema.agent.network import THIS_MACHINE, Agent, Tls
+from schema.agent.access import Certificate
+from schema.agent.address import ADDRESS
+from schema.agent.network import Agent, Tls
 from schema.agent.platform_tag import platform_tag
 from schema.agent.service import tell_user
 from schema.agent.supervision import CPU_LIMIT_S, ProcessSlot
 from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name
-
-ADDRESS = "address"
-"""File of a run or campaign folder that holds the hub's address while it runs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +30,11 @@ class Deployment:
         workers: worker processes to start here; one analyzer starts with them.
         bodies: function that a process of each kind runs.
         answers: functions that replace processes and network, or None.
-        listen: address of the hub; None: a free port of this machine.
+        listen: address of the hub beside its own Unix socket; None: only that socket.
         connect: address of an existing hub; None: this process is the hub.
         fleet: name of the fleet whose agents do the work.
         tls: certificate files for a ``tls/`` address.
+        certificates: those that may connect to this hub; None: all of the authority.
         quiet: show no progress.
         fsync: survive power loss, too.
         threads: threads of a worker process that advance one arena together.
@@ -59,6 +59,7 @@ class Deployment:
     view: bool = False
     cpu_limit_s: float = CPU_LIMIT_S
     checks: Checks = NO_CHECKS
+    certificates: tuple[Certificate, ...] | None = None
     allows_drift: bool = False
 
 
@@ -81,25 +82,26 @@ def connected_agents(
     with ExitStack() as stack:
         network = stack.enter_context(
             Network(
-                name=unique_name("coordinator"),
+                name=unique_name(_own_name(deployment)),
                 fleet=deployment.fleet,
-                listen=(deployment.listen or THIS_MACHINE,),
+                listen=(deployment.listen,) if deployment.listen else (),
                 connect=deployment.connect or "",
                 tls=deployment.tls,
+                certificates=deployment.certificates,
             )
         )
         file = folder / ADDRESS
         # Written whole: other processes wait for the file and read it at once.
-        text = f"{network.address}\n"
+        text = "\n".join(dict.fromkeys((network.address, network.own_address, "")))
         replace_text(file, text)
         stack.callback(_remove, file, text)
         if deployment.view:
-            open_viewer(network.address, deployment.fleet, deployment.tls)
+            open_viewer(network.own_address, deployment.fleet, deployment.tls)
         sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
         pools = []
         for kind, size in sizes.items() if deployment.workers else ():
             agent = Agent(
-                kind, f"own-{kind}", network.address, deployment.fleet,
+                kind, f"own-{kind}", network.own_address, deployment.fleet,
                 tls=deployment.tls, threads=deployment.threads,
                 cpu_limit_s=deployment.cpu_limit_s,
             )  # fmt: skip
@@ -108,6 +110,15 @@ def connected_agents(
         if deployment.listen is not None:
             tell_user(f"listening on {network.address}")
         yield network, pools
+
+
+def _own_name(deployment: Deployment) -> str:
+    """Return the coordinator's name: that of its certificate at a hub with TLS."""
+    if deployment.tls and (deployment.connect or "").startswith("tls/"):
+        from schema.agent.certificate import certificate_name
+
+        return certificate_name(deployment.tls.certificate)
+    return "coordinator"
 
 
 def _remove(file: Path, text: str) -> None:

@@ -3,12 +3,10 @@
 import argparse
 
 from coordinator.storage.campaign import shipped_campaigns
-from schema.agent.command import add_cpu_limit, add_network_flags
+from schema.agent.address import FORMS
+from schema.agent.command import add_access, add_cpu_limit, add_network_flags
 from schema.experiment.file import shipped_experiments
 from schema.flags import Flags, add_count, positive_number, share, whole_number
-
-LISTEN = "tcp/127.0.0.1:7447"
-"""Default address of ``revolve coordinator``."""
 
 _COMMANDS = {
     "run": (
@@ -17,7 +15,7 @@ _COMMANDS = {
     ),
     "coordinator": (
         "Run experiments on workers and analyzers that connect.",
-        "revolve coordinator scenario1 --listen tcp/127.0.0.1:7447",
+        "revolve coordinator scenario1 --seed 1",
     ),
     "resume": (
         "Resume a run or campaign that was stopped or killed.",
@@ -118,18 +116,19 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
             action="store_true",
             help="run everything in one process without network; slower, for debugging",
         )
-    listen = LISTEN if command == "coordinator" else "a free port of this machine"
+    listen = "hub" if command == "coordinator" else "only a socket of its own"
     flags.add_argument(
         "--listen",
         metavar="ADDRESS",
-        help=f"address that agents connect to (default: {listen})",
+        help=f"address that agents connect to, {FORMS} (default: {listen})",
     )
     flags.add_argument(
         "--connect",
         metavar="ADDRESS",
-        help="share the workers of an existing hub: another coordinator, or a Zenoh "
-        "router",
+        help="share the workers of an existing hub: its address, or the folder of an "
+        "active run",
     )
+    add_access(flags)
     add_network_flags(flags)
     flags.add_argument(
         "--speed",

@@ -7,7 +7,6 @@ from uuid import uuid4
 from rich.console import Console
 from rich.table import Table
 
-from coordinator.cli.deployment import ADDRESS
 from coordinator.cli.format import duration, run_details
 from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, read_campaign
@@ -15,7 +14,8 @@ from coordinator.storage.folder import DETAILS, EPOCH, RunDetails, holds_run
 from coordinator.storage.folder_status import folder_status, unbegun_status
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.lock import LOCK
-from schema.agent.command import add_network_flags, tls_of
+from schema.agent.address import read_address
+from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
 from schema.agent.service import tell_user
 from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.flags import Flags
@@ -48,9 +48,9 @@ def main(arguments: list[str]) -> int:
     """
     flags = _flags()
     options = flags.parse_args(arguments[1:])
-    if (options.folder is None) == (options.connect is None):
+    if options.folder is not None and options.connect is not None:
         flags.error("give either a folder or --connect")
-    if options.connect is not None:
+    if options.folder is None:
         for name, status in ask_status(options).items():
             _show(status, name)
         return 0
@@ -85,7 +85,7 @@ def ask(
     """
     replies = ask_coordinators(
         encode_operator_request(request),
-        connect=options.connect,
+        connect=connect_of(options),
         fleet=options.fleet,
         tls=tls_of(options),
         only=only,
@@ -96,9 +96,9 @@ def ask(
 def _live(folder: Path, options: argparse.Namespace) -> Status | None:
     """Return the status from a folder's coordinator; None if none is running."""
     try:
-        options.connect = (folder / ADDRESS).read_text(encoding="utf-8").strip()
+        options.connect = read_address(folder)
         found = ask_status(options)
-    except (OSError, NetworkError):
+    except NetworkError:
         return None
     here = folder.resolve()
     for status in found.values():
@@ -203,10 +203,9 @@ def _flags() -> Flags:
         "folder",
         nargs="?",
         metavar="FOLDER",
-        help="run or campaign folder, or a folder that contains some",
+        help="run or campaign folder, or a folder that contains some (default: all "
+        "coordinators at the hub)",
     )
-    flags.add_argument(
-        "--connect", metavar="ADDRESS", help="ask all coordinators at this hub"
-    )
+    add_connect(flags)
     add_network_flags(flags)
     return flags

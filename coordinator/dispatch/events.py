@@ -203,13 +203,14 @@ class ShardReturned:
     Attributes:
         number: of the ``AssignShard``.
         outcome: "done"; "stateless" (the worker does not have the state); "error"
-            with a reason; "lost" (no reply).
-        reason: empty unless error.
+            with a reason; "malformed" (an answer that is not believed) with a reason;
+            "lost" (no reply).
+        reason: empty unless error or malformed.
         answer: decoded; None unless done.
     """
 
     number: int
-    outcome: Literal["done", "stateless", "error", "lost"]
+    outcome: Literal["done", "stateless", "error", "malformed", "lost"]
     reason: str = ""
     answer: object = None
 

@@ -182,14 +182,14 @@ class Fleet:
         self._obey(self.dispatch.handle(event))
 
     def _read_advance(self, event: Returned, read: Read) -> ShardReturned:
-        """Return the outcome of an advance; an unfit answer is the worker's error."""
+        """Return the outcome of an advance."""
         if event.outcome != "ok":
             return ShardReturned(event.number, event.outcome, event.reason)
         try:
             answer = read(event.answer)
         except MalformedMessage as error:
             self._malformed += 1
-            return ShardReturned(event.number, "error", str(error))
+            return ShardReturned(event.number, "malformed", str(error))
         if answer is None:
             return ShardReturned(event.number, "stateless")
         return ShardReturned(event.number, "done", answer=answer)

@@ -209,7 +209,8 @@ class ShardDispatch:
             REST_S * 2**shard.failures, LONGEST_REST_S
         )
         shard.failures += 1
-        shard.errors += event.outcome != "lost"
+        # A malformed answer is a fault of its worker alone.
+        shard.errors += event.outcome not in ("lost", "malformed")
         if shard.errors < MAX_ERRORS:
             return []
         reason = event.reason or "lacks the state that it was given"

@@ -7,7 +7,7 @@ events in the order of their arrival.
 import json
 import logging
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
@@ -17,17 +17,18 @@ import zenoh
 
 from coordinator.dispatch.events import AgentKind, DispatchEvent, Left, Returned
 from coordinator.network.membership import Membership
+from schema.agent.access import Certificate
+from schema.agent.address import new_socket, parse_address
 from schema.agent.network import (
     ASK_TIMEOUT_S,
     DEFAULT_FLEET,
     FENCED,
     JOB_TIMEOUT_S,
-    THIS_MACHINE,
     UNFIT,
     Tls,
+    cannot_listen,
     client_config,
     hub_config,
-    parse_address,
 )
 from schema.agent.platform_tag import wire_version
 from schema.agent.service import Outlet
@@ -83,6 +84,7 @@ class Network:
 
     Attributes:
         address: where agents connect to.
+        own_address: where this user's processes on this machine connect to.
         malformed: messages about agents that did not decode and were dropped; answers
             to jobs are not decoded here.
     """
@@ -92,30 +94,36 @@ class Network:
         *,
         name: str,
         fleet: str = DEFAULT_FLEET,
-        listen: tuple[str, ...] = (THIS_MACHINE,),
+        listen: tuple[str, ...] = (),
         connect: str = "",
         tls: Tls | None = None,
+        certificates: Iterable[Certificate] | None = None,
     ) -> None:
         """Configure the session; ``with`` opens it.
 
         Args:
             name: of this process, never used by another one.
             fleet: name of the fleet.
-            listen: addresses of the hub within this process.
+            listen: addresses of the hub within this process, beside a Unix socket
+                that only this user can connect to.
             connect: address of a hub elsewhere; then nothing listens here.
             tls: files for ``tls/`` addresses.
+            certificates: those that may connect; None: all of the authority.
 
         Raises:
             NetworkError: invalid names or addresses, or an address that other
                 machines reach without TLS.
         """
-        self.address = connect or listen[0]
+        self.own_address = connect or new_socket()
+        self.address = connect or (*listen, self.own_address)[0]
         self.malformed = 0
         self._me = Member(
             check_name(fleet, "fleet"), "coordinator", check_name(name, "name")
         )
         self._config = (
-            client_config(connect, tls) if connect else hub_config(listen, tls)
+            client_config(connect, tls)
+            if connect
+            else hub_config((*listen, self.own_address), tls, certificates)
         )
         self._is_hub = not connect
         self._inbox: SimpleQueue[_News] = SimpleQueue()
@@ -142,7 +150,9 @@ class Network:
                 config = zenoh.Config.from_json5(self._config)
                 self._session = opened.enter_context(zenoh.open(config))
             except zenoh.ZError as error:
-                raise NetworkError(self._why_not(str(error))) from None
+                if not self._is_hub:
+                    raise NetworkError(f"no hub at {self.address}") from None
+                raise cannot_listen(self.address, str(error)) from None
             self._declare()
             self._opened = opened.pop_all()
         return self
@@ -150,16 +160,9 @@ class Network:
     def __exit__(self, *_: object) -> None:
         self._opened.close()
 
-    def _why_not(self, error: str) -> str:
-        """Return an error of the engine as one short line."""
-        if not self._is_hub:
-            return f"no hub at {self.address}"
-        if "in use" in error:
-            return f"cannot listen on {self.address}: it is in use"
-        return f"cannot listen on {self.address}: {error.partition(' at /')[0].strip()}"
-
     def _declare(self) -> None:
-        if self._is_hub and parse_address(self.address)[2] == 0:
+        protocol, _, port = parse_address(self.address)
+        if self._is_hub and protocol == "tcp" and port == 0:
             self.address = self._free_address()
         put = zenoh.handlers.Callback(self._inbox.put, indirect=False)
         self._watches = [
@@ -182,7 +185,8 @@ class Network:
         key = f"@/{self._session.zid()}/router"
         for reply in self._session.get(key, consolidation=_NOW):
             if reply.ok is not None:
-                return str(json.loads(reply.ok.payload.to_bytes())["locators"][0])
+                found = json.loads(reply.ok.payload.to_bytes())["locators"]
+                return next(str(each) for each in found if each.startswith("tcp/"))
         raise NetworkError(f"the hub did not report its port on {self.address}")
 
     def send(self, number: int, agent: str, payload: bytes) -> None:

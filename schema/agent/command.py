@@ -6,12 +6,21 @@ themselves.
 """
 
 import argparse
+import os
 import re
 import socket
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from schema.agent.access import Certificate, read_certificates
+from schema.agent.address import (
+    CONNECT_VARIABLE,
+    FORMS,
+    default_connect,
+    hub_of,
+    parse_address,
+)
 from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config
 from schema.agent.supervision import CPU_LIMIT_S, Death, ProcessSlot
 from schema.agent.supervisor import ProcessPool, stop_on_signals, stop_with_input
@@ -22,6 +31,43 @@ from schema.flags import Flags, positive_number, whole_number
 _POLL_S = 0.5
 
 
+_TLS_FILES = {
+    "--tls-ca": "certificate authority of the fleet (PEM)",
+    "--tls-certificate": "certificate (PEM)",
+    "--tls-key": "private key (PEM, PKCS#8)",
+}
+"""Flags of certificate files; each takes its default from the environment."""
+
+
+def _variable(flag: str) -> str:
+    """Return the environment variable of a flag, such as ``REVOLVE_TLS_CA``."""
+    return f"REVOLVE{flag[1:].replace('-', '_').upper()}"
+
+
+def add_connect(flags: argparse.ArgumentParser) -> None:
+    """Add ``--connect`` to a command that always needs a hub; see ``connect_of``."""
+    flags.add_argument(
+        "--connect",
+        metavar="ADDRESS",
+        help=f"address of the hub, {FORMS}, or the folder of an active run (default: "
+        f"${CONNECT_VARIABLE}, else this user's hub on this machine)",
+    )
+
+
+def connect_of(options: argparse.Namespace) -> str:
+    """Return the address of the hub that ``--connect`` or its default means.
+
+    Raises:
+        NetworkError: an invalid address, or a folder without an active run.
+    """
+    given = options.connect
+    try:
+        return hub_of(given or default_connect())
+    except NetworkError as error:
+        where = "--connect" if given else f"${CONNECT_VARIABLE}"
+        raise NetworkError(f"{where}: {error}") from None
+
+
 def add_network_flags(flags: argparse.ArgumentParser) -> None:
     """Add the flags for the fleet and its certificates."""
     flags.add_argument(
@@ -29,11 +75,33 @@ def add_network_flags(flags: argparse.ArgumentParser) -> None:
         default=DEFAULT_FLEET,
         help=f"name of the fleet (default: {DEFAULT_FLEET})",
     )
+    for flag, what in _TLS_FILES.items():
+        variable = _variable(flag)
+        flags.add_argument(
+            flag,
+            metavar="FILE",
+            default=os.environ.get(variable),
+            help=f"{what}; default: ${variable}",
+        )
+
+
+def add_access(flags: argparse.ArgumentParser) -> None:
+    """Add the flag for the rights of certificates at a hub."""
     flags.add_argument(
-        "--tls-ca", metavar="FILE", help="certificate authority of the fleet (PEM)"
+        "--access",
+        metavar="FILE",
+        help="certificates that may connect, and their roles: access.json of a kit of "
+        "'revolve cluster' (default: any certificate of the authority may do anything)",
     )
-    flags.add_argument("--tls-certificate", metavar="FILE", help="certificate (PEM)")
-    flags.add_argument("--tls-key", metavar="FILE", help="private key (PEM, PKCS#8)")
+
+
+def access_of(options: argparse.Namespace) -> tuple[Certificate, ...] | None:
+    """Return the certificates that ``--access`` lists; None without it.
+
+    Raises:
+        NetworkError: the file cannot be read or is invalid.
+    """
+    return tuple(read_certificates(Path(options.access))) if options.access else None
 
 
 def add_cpu_limit(flags: argparse.ArgumentParser) -> None:
@@ -53,11 +121,8 @@ def tls_of(options: argparse.Namespace) -> Tls | None:
     Raises:
         NetworkError: one is not named, or not there.
     """
-    files = {
-        "--tls-ca": options.tls_ca,
-        "--tls-certificate": options.tls_certificate,
-        "--tls-key": options.tls_key,
-    }
+    given = (options.tls_ca, options.tls_certificate, options.tls_key)
+    files = dict(zip(_TLS_FILES, given, strict=True))
     if not any(files.values()):
         return None
     for flag, file in files.items():
@@ -65,7 +130,7 @@ def tls_of(options: argparse.Namespace) -> Tls | None:
             raise NetworkError(f"{flag} is missing: {', '.join(files)} go together")
         if not Path(file).is_file():
             raise NetworkError(f"{flag}: no such file: {file}")
-    return Tls(options.tls_ca, options.tls_certificate, options.tls_key)
+    return Tls(*given)
 
 
 def host_name() -> str:
@@ -90,16 +155,17 @@ def run_pool(
     flags = _flags(role, processes)
     options = flags.parse_args(arguments)
     try:
+        connect, tls = connect_of(options), tls_of(options)
         agent = Agent(
             role,
-            check_name(options.name, "--name"),
-            options.connect,
+            _name(options.name, connect, tls),
+            connect,
             check_name(options.fleet, "--fleet"),
-            tls=tls_of(options),
+            tls=tls,
             threads=options.threads,
             cpu_limit_s=options.cpu_limit,
         )
-        client_config(agent.connect, agent.tls)
+        client_config(connect, tls)
     except RevolveError as error:
         flags.error(str(error))
     stop = stop_on_signals()
@@ -123,6 +189,24 @@ def run_pool(
     return 0
 
 
+def _name(given: str | None, connect: str, tls: Tls | None) -> str:
+    """Return an agent's name: with TLS that of its certificate, else the machine's.
+
+    Raises:
+        NetworkError: an invalid name, or another one than the certificate's.
+    """
+    if tls is None or parse_address(connect).protocol != "tls":
+        return check_name(given or host_name(), "--name")
+    from schema.agent.certificate import certificate_name
+
+    name = certificate_name(tls.certificate)
+    if given not in (None, name):
+        raise NetworkError(
+            f"--name: must be {name!r}, the name of {tls.certificate}, got {given!r}"
+        )
+    return check_name(name, tls.certificate)
+
+
 def tell_death(death: Death) -> str:
     """Return a line about the job that crashed a process."""
     task = death.task
@@ -133,15 +217,10 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
     flags = Flags(
         prog=f"revolve {role}",
         description=f"Serve coordinators as {role} until Ctrl-C.",
-        epilog=f"example: revolve {role} --connect tcp/127.0.0.1:7447 --processes 2",
+        epilog=f"example: revolve {role} --processes 2",
         allow_abbrev=False,
     )
-    flags.add_argument(
-        "--connect",
-        required=True,
-        metavar="ADDRESS",
-        help="the coordinator's address, tcp/HOST:PORT or tls/HOST:PORT",
-    )
+    add_connect(flags)
     flags.add_argument(
         "--processes",
         type=whole_number(),
@@ -151,8 +230,8 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
     )
     flags.add_argument(
         "--name",
-        default=host_name(),
-        help="name of this machine (default: its host name)",
+        help="name of this machine (default: that of its certificate, else its host "
+        "name)",
     )
     flags.add_argument(
         "--until-closed",

@@ -5,17 +5,17 @@ discovery, and only addresses with certificates are reachable from other machine
 """
 
 import json
-import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from ipaddress import ip_address
 from typing import Any
 
+from schema.agent.access import Certificate, access_control
+from schema.agent.address import UNIX, parse_address
 from schema.agent.supervision import CPU_LIMIT_S
 from schema.agent.topics import Role
 from schema.errors import NetworkError
 
-# Port 0: any free port.
-THIS_MACHINE = "tcp/127.0.0.1:0"
 DEFAULT_FLEET = "default"
 
 # Prefix of an agent's refusal if a newer coordinator has taken the run over.
@@ -27,9 +27,6 @@ JOB_TIMEOUT_S = 7 * 24 * 3600.0
 ASK_TIMEOUT_S = 10.0
 # A frozen process counts as gone after this [ms].
 LEASE_MS = 5000
-
-_ADDRESS = re.compile(r"(tcp|tls)/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):(\d{1,5})")
-_LAST_PORT = 65535
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,20 +73,6 @@ class Agent:
     cpu_limit_s: float = CPU_LIMIT_S
 
 
-def parse_address(address: str) -> tuple[str, str, int]:
-    """Return protocol, host and port of an address.
-
-    Raises:
-        NetworkError: not of the form ``tcp/host:port`` or ``tls/host:port``.
-    """
-    match = _ADDRESS.fullmatch(address)
-    if match is None or int(match[3]) > _LAST_PORT:
-        raise NetworkError(
-            f"an address must be tcp/HOST:PORT or tls/HOST:PORT, got {address!r}"
-        )
-    return match[1], match[2].strip("[]"), int(match[3])
-
-
 def _is_loopback(host: str) -> bool:
     if host == "localhost":
         return True
@@ -104,16 +87,22 @@ def _check_tls(address: str, protocol: str, tls: Tls | None) -> None:
         raise NetworkError(f"{address} needs --tls-ca, --tls-certificate and --tls-key")
 
 
-def hub_config(listen: tuple[str, ...], tls: Tls | None = None) -> str:
-    """Return the configuration (JSON5) of a hub within a process.
+def hub_config(
+    listen: tuple[str, ...],
+    tls: Tls | None = None,
+    certificates: Iterable[Certificate] | None = None,
+) -> str:
+    """Return the configuration (JSON5) of a hub, within a process or for zenohd.
 
     Args:
         listen: addresses; one at least.
         tls: files for the ``tls/`` ones among them.
+        certificates: those whose owners may connect, each with the rights of its role;
+            None: every certificate of the authority has all rights.
 
     Raises:
         NetworkError: no address, an invalid one, one that other machines reach
-            without TLS, or one that needs files.
+            without TLS, one that needs files, or names of certificates that clash.
     """
     protocols = set()
     if not listen:
@@ -127,7 +116,10 @@ def hub_config(listen: tuple[str, ...], tls: Tls | None = None) -> str:
                 "use tls/HOST:PORT with --tls-ca, --tls-certificate and --tls-key"
             )
         protocols.add(protocol)
-    if "tls" in protocols and any(parse_address(a)[2] == 0 for a in listen):
+    if "tls" in protocols and any(
+        protocol != UNIX and port == 0
+        for protocol, _, port in map(parse_address, listen)
+    ):
         raise NetworkError("with a tls/ address each address needs a port, got 0")
     link = _link(protocols)
     if tls and "tls" in protocols:
@@ -142,13 +134,29 @@ def hub_config(listen: tuple[str, ...], tls: Tls | None = None) -> str:
     config["mode"] = "router"
     config["listen"] = {"endpoints": list(listen), "exit_on_failure": True}
     config["connect"] = {"endpoints": []}
+    if certificates is not None:
+        config["access_control"] = access_control(certificates)
     # Only on this machine: reports the port that was chosen.
     config["adminspace"] = {
-        "enabled": protocols == {"tcp"},
+        "enabled": "tls" not in protocols,
         "permissions": {"read": True, "write": False},
     }
     config["transport"]["unicast"] = {"max_sessions": 10000, "accept_pending": 1000}
     return json.dumps(config)
+
+
+def cannot_listen(address: str, error: str) -> NetworkError:
+    """Return the error for an address that a hub cannot listen on.
+
+    Args:
+        address: where it was to listen.
+        error: the engine's message.
+    """
+    if "in use" in error or "acquire lock" in error:
+        why = f"it is in use; to share its workers: --connect {address}"
+    else:
+        why = error.partition(" at /")[0].strip()
+    return NetworkError(f"cannot listen on {address}: {why}")
 
 
 def client_config(connect: str, tls: Tls | None = None) -> str:

@@ -148,7 +148,7 @@ def run(folder: Path, out: str, *, is_watched: bool) -> float:
     process_pool = [start(folder, cores[0], "coordinator", *words, *listen)]
     address = folder / out / "address"
     wait_for(address.exists)
-    connect = ("--connect", address.read_text().strip())
+    connect = ("--connect", address.read_text().split()[0])
     recording = folder / f"{out}.rrd"
     viewer: subprocess.Popen[bytes] | None = None
     if is_watched:

@@ -18,7 +18,7 @@ ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis")
 
 # Library -> patterns, relative to the root, of the files that may import it.
 PERMITTED = {
-    "zenoh": ("*/**/service.py", "*/**/client_service.py", "analysis/viewer/live.py"),
+    "zenoh": ("*/**/service.py", "*/**/*_service.py", "analysis/viewer/live.py"),
     "mujoco": (
         "schema/mjcf/*.py",
         "schema/experiment/scenery.py",

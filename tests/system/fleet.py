@@ -49,7 +49,7 @@ class Fleet:
             "the coordinator listens",
         )
         if not listen:
-            self.address = (self.folder / "address").read_text().strip()
+            self.address = (self.folder / "address").read_text().split()[0]
         self.agents: dict[str, subprocess.Popen[str]] = {}
 
     @property

@@ -108,7 +108,7 @@ class Fleet:
         paced = (*words("run"), "--speed", "20")
         self.coordinator = workspace.start("coordinator", *paced, *listen)
         until((self.folder / "address").exists, "the coordinator listens")
-        self.address = (self.folder / "address").read_text().strip()
+        self.address = (self.folder / "address").read_text().split()[0]
         self.analyzer = workspace.start("analyzer", "--connect", self.address)
         self.workers: dict[str, Process] = {}
 

@@ -158,7 +158,7 @@ def test_status_of_all_coordinators_of_a_hub(
     _write(workspace.folder)
     first = workspace.start("coordinator", *_words("one")[1:], "--listen", HUB)
     until((workspace.folder / "one" / "address").exists, "the first one listens")
-    address = (workspace.folder / "one" / "address").read_text().strip()
+    address = (workspace.folder / "one" / "address").read_text().split()[0]
     workspace.start("coordinator", "steady.toml", "--connect", address, "--out", "two")
     until((workspace.folder / "two" / "address").exists, "the second one is connected")
 
@@ -183,7 +183,7 @@ def test_status_of_all_coordinators_of_a_hub(
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
-        (("status",), "either a folder or --connect"),
+        (("status", "x", "--connect", HUB), "either a folder or --connect"),
         (("status", "nowhere"), "no run and no campaign"),
         (("run", "thesis", "scenario1"), "must have different names"),
         (("run", "scenario1", "--repeats", "0"), "must be a whole number >= 1"),

@@ -124,7 +124,7 @@ class ComparedRuns:
             "coordinator", *words(self.name, out), *listen
         )
         self.until((folder / "address").exists, "the coordinator listens")
-        address = (folder / "address").read_text().strip()
+        address = (folder / "address").read_text().split()[0]
         self.workspace.start("analyzer", "--connect", address)
         process_pool = [
             self.workspace.start("worker", "--connect", address, "--processes", "1")

@@ -302,7 +302,7 @@ def test_a_malformed_message_is_counted_and_dropped(
 
 def test_port_in_use_is_reported_in_one_line(network: Network) -> None:
     with (
-        pytest.raises(NetworkError, match=r"^cannot listen on .*: it is in use$"),
+        pytest.raises(NetworkError, match=r"^cannot listen on .*: it is in use; "),
         Network(name="d", listen=(network.address,)),
     ):
         pass

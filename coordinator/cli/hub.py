@@ -1,0 +1,58 @@
+"""Command ``revolve hub``: the hub of a fleet as a process of its own.
+
+Coordinators connect to it like workers, and may come and go.
+"""
+
+from coordinator.network.hub_service import serve_hub
+from schema.agent.address import FORMS, HUB, listen_address, parse_address
+from schema.agent.command import access_of, add_access, add_network_flags, tls_of
+from schema.agent.network import hub_config
+from schema.agent.service import tell_user
+from schema.agent.supervisor import stop_on_signals
+from schema.flags import Flags
+
+
+def main(arguments: list[str]) -> int:
+    """Route messages until Ctrl-C; return the exit code.
+
+    Args:
+        arguments: the command's name first.
+
+    Raises:
+        NetworkError: an address that cannot be listened on, or invalid certificates.
+    """
+    options = _flags().parse_args(arguments[1:])
+    tls, certificates = tls_of(options), access_of(options)
+    addresses = tuple(map(listen_address, options.listen or [HUB]))
+    config = hub_config(addresses, tls, certificates)
+    if options.print_config:
+        print(config)
+        return 0
+    has_tls = any(parse_address(each).protocol == "tls" for each in addresses)
+    if has_tls and certificates is None:
+        tell_user("without --access any certificate of the authority may do anything")
+    serve_hub(config, addresses, stop_on_signals())
+    return 0
+
+
+def _flags() -> Flags:
+    flags = Flags(
+        prog="revolve hub",
+        description="Connect coordinators, agents and viewers until Ctrl-C.",
+        epilog="example: revolve hub",
+        allow_abbrev=False,
+    )
+    flags.add_argument(
+        "--listen",
+        action="append",
+        metavar="ADDRESS",
+        help=f"address, {FORMS}; may be repeated (default: this user's hub)",
+    )
+    add_access(flags)
+    add_network_flags(flags)
+    flags.add_argument(
+        "--print-config",
+        action="store_true",
+        help="print the hub's configuration for zenohd, and exit",
+    )
+    return flags

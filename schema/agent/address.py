@@ -1,0 +1,203 @@
+"""Addresses of hubs: their forms, their defaults, and the one that a run folder names.
+
+Processes of one user on one machine meet at a Unix socket in a directory that only this
+user can enter. Other addresses are for a user who asks for them.
+"""
+
+import contextlib
+import fcntl
+import os
+import re
+import secrets
+import stat
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+from schema.errors import NetworkError
+
+ADDRESS = "address"
+"""File of a run or campaign folder that holds its hub's addresses, one in each line."""
+UNIX = "unixsock-stream"
+"""Protocol of Unix sockets."""
+CONNECT_VARIABLE = "REVOLVE_CONNECT"
+"""Environment variable with the default of ``--connect``."""
+HUB = "hub"
+"""Short form of the address of this user's hub on this machine."""
+FORMS = "tcp/HOST:PORT, tls/HOST:PORT, unixsock-stream/PATH or hub"
+
+_ADDRESS = re.compile(r"(tcp|tls)/(\[[0-9a-fA-F:.]+\]|[A-Za-z0-9._-]+):(\d{1,5})")
+_SOCKET = re.compile(rf"{UNIX}/(/[!-~]+)")
+_LAST_PORT = 65535
+# The system's limit is 104 to 108 bytes, and the lock file's name has 5 more.
+_LONGEST_PATH = 98
+_LONGEST_FILE = 4096
+_SETTLED_S = 60.0
+
+
+class Address(NamedTuple):
+    """Parts of an address.
+
+    Attributes:
+        protocol: "tcp", "tls" or "unixsock-stream".
+        host: name or IP address without brackets; the path of a Unix socket.
+        port: 0 lets the system choose one; 0 for a Unix socket.
+    """
+
+    protocol: str
+    host: str
+    port: int
+
+
+def parse_address(address: str) -> Address:
+    """Return the parts of an address.
+
+    Raises:
+        NetworkError: of no allowed form, or a path that is too long for a socket.
+    """
+    if match := _SOCKET.fullmatch(address):
+        if len(match[1]) > _LONGEST_PATH:
+            raise NetworkError(
+                f"a socket's path must have at most {_LONGEST_PATH} characters, got "
+                f"{len(match[1])}: {match[1]}"
+            )
+        return Address(UNIX, match[1], 0)
+    match = _ADDRESS.fullmatch(address)
+    if match is None or int(match[3]) > _LAST_PORT:
+        raise NetworkError(f"an address must be {FORMS}, got {address[:200]!r}")
+    return Address(match[1], match[2].strip("[]"), int(match[3]))
+
+
+def user_hub() -> str:
+    """Return the address of this user's hub on this machine.
+
+    Raises:
+        NetworkError: there is no directory that only this user can enter.
+    """
+    return f"{UNIX}/{runtime_directory() / 'hub.sock'}"
+
+
+def new_socket() -> str:
+    """Return the address of a Unix socket that no other process uses.
+
+    Raises:
+        NetworkError: there is no directory that only this user can enter.
+    """
+    place = runtime_directory()
+    _remove_unused(place)
+    return f"{UNIX}/{place / f'{secrets.token_hex(8)}.sock'}"
+
+
+def _remove_unused(place: Path) -> None:
+    """Remove the sockets that killed processes have left behind.
+
+    The engine keeps a lock beside each socket while it listens.
+    """
+    for lock in place.glob("*.sock.lock"):
+        with contextlib.suppress(OSError), lock.open("rb") as file:
+            # A new socket's lock may be created but not taken yet.
+            if time.time() - lock.stat().st_mtime > _SETTLED_S:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                lock.with_suffix("").unlink()
+                lock.unlink()
+
+
+def default_connect() -> str:
+    """Return the default of ``--connect``: the environment's, else the user's hub.
+
+    Raises:
+        NetworkError: there is no directory that only this user can enter.
+    """
+    return os.environ.get(CONNECT_VARIABLE) or user_hub()
+
+
+def runtime_directory() -> Path:
+    """Return the directory of this user's sockets; create it if it is missing.
+
+    It is ``revolve`` in ``$XDG_RUNTIME_DIR``, else ``revolve-UID`` among the temporary
+    files. Nobody but its owner can enter it.
+
+    Raises:
+        NetworkError: it cannot be created, or others could enter it.
+    """
+    base = os.environ.get("XDG_RUNTIME_DIR", "")
+    place = Path(base) / "revolve"
+    if not base or not os.access(base, os.W_OK):
+        place = Path(tempfile.gettempdir()) / f"revolve-{os.getuid()}"
+    try:
+        place.mkdir(mode=0o700, exist_ok=True)
+        found = place.lstat()
+    except OSError as error:
+        raise NetworkError(f"{place}: cannot be used: {error.strerror}") from None
+    is_private = stat.S_IMODE(found.st_mode) == stat.S_IRWXU
+    if not (stat.S_ISDIR(found.st_mode) and is_private and found.st_uid == os.getuid()):
+        raise NetworkError(
+            f"{place}: must be a directory of this user with mode 0700, or others "
+            "could join the fleet: remove it, or set XDG_RUNTIME_DIR"
+        )
+    return place
+
+
+def listen_address(place: str) -> str:
+    """Return the address that a user wants to listen on.
+
+    Args:
+        place: an address, or "hub" for this user's hub.
+
+    Raises:
+        NetworkError: there is no directory that only this user can enter.
+    """
+    return user_hub() if place == HUB else place
+
+
+def hub_of(place: str) -> str:
+    """Return the address that a user means: an address, or a run folder's.
+
+    Args:
+        place: an address, "hub", or a folder of a run or campaign that is active.
+
+    Raises:
+        NetworkError: neither; or the folder's file is missing or damaged.
+    """
+    if place == HUB:
+        return user_hub()
+    folder = Path(place)
+    if "/" not in place or folder.is_dir():
+        return read_address(folder)
+    parse_address(place)
+    return place
+
+
+def read_address(folder: Path) -> str:
+    """Return the address of the hub of an active run or campaign.
+
+    A Unix socket comes first, if it is on this machine: it needs no certificates.
+
+    Raises:
+        NetworkError: no such folder, no active run, or a damaged file.
+    """
+    file = folder / ADDRESS
+    if not folder.is_dir():
+        raise NetworkError(f"must be {FORMS}, or a run folder, got {str(folder)!r}")
+    try:
+        with file.open("rb") as source:
+            lines = source.read(_LONGEST_FILE).decode("ascii").split()
+        addresses = [(line, parse_address(line)) for line in lines]
+    except FileNotFoundError:
+        raise NetworkError(
+            f"{folder}: no coordinator is running ({ADDRESS} is missing)"
+        ) from None
+    except (OSError, ValueError, NetworkError) as error:
+        raise NetworkError(
+            f"{file}: damaged ({error}): give the address itself to --connect"
+        ) from None
+    is_here = [
+        parts.protocol != UNIX or Path(parts.host).is_socket() for _, parts in addresses
+    ]
+    here = [
+        address for (address, _), yes in zip(addresses, is_here, strict=True) if yes
+    ]
+    if not here:
+        raise NetworkError(f"{file}: no address that this machine can reach")
+    return min(here, key=lambda address: not address.startswith(UNIX))

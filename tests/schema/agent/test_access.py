@@ -1,0 +1,119 @@
+"""Access rules of a hub: names, files, and the keys that each role may use."""
+
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from schema.agent.access import (
+    Certificate,
+    CertificateRole,
+    access_control,
+    permissions,
+    read_certificates,
+)
+from schema.agent.topics import Member, agents_alive, news_of_all, poses_of_all
+from schema.errors import NetworkError
+
+WORKER = Member("default", "worker", "a-0.1234abcd")
+OTHER = Member("default", "worker", "b-0.1234abcd")
+ANALYZER = Member("default", "analyzer", "a-0.1234abcd")
+COORDINATOR = Member("default", "coordinator", "c.1234abcd")
+
+
+def may(role: CertificateRole, name: str, flow: str, message: str, key: str) -> bool:
+    """Return whether a certificate's rules include a message's key expression."""
+    wanted = zenoh.KeyExpr(key)
+    return any(
+        zenoh.KeyExpr(allowed).includes(wanted)
+        for each in permissions(Certificate(name, role))
+        if each.flow == flow and message in each.messages
+        for allowed in each.keys
+    )
+
+
+def test_worker_uses_its_own_keys_only() -> None:
+    for message, key in [
+        ("declare_queryable", WORKER.jobs),
+        ("declare_queryable", WORKER.info),
+        ("reply", WORKER.jobs),
+        ("declare_subscriber", WORKER.cancelled),
+        ("liveliness_token", WORKER.alive),
+        ("put", WORKER.poses(3)),
+    ]:
+        assert may("worker", "a", "ingress", message, key)
+        stolen = key.replace("/a-0", "/b-0")
+        assert not may("worker", "a", "ingress", message, stolen)
+        assert not may("worker", "a", "ingress", message, key.replace("/w/", "/an/"))
+        assert not may("worker", "a", "ingress", message, key.replace("/w/", "/co/"))
+
+
+@pytest.mark.parametrize("role", ["worker", "analyzer", "viewer", "operator"])
+def test_only_coordinators_give_and_cancel_jobs(role: CertificateRole) -> None:
+    for member in (WORKER, ANALYZER):
+        assert may("coordinator", "c", "ingress", "query", member.jobs)
+        assert may("coordinator", "c", "ingress", "put", member.cancelled)
+        assert not may(role, "x", "ingress", "query", member.jobs)
+        assert not may(role, "x", "ingress", "put", member.cancelled)
+
+
+@pytest.mark.parametrize("role", ["worker", "analyzer", "viewer", "coordinator"])
+def test_only_operators_give_orders(role: CertificateRole) -> None:
+    assert may("operator", "o", "ingress", "query", COORDINATOR.command)
+    assert not may(role, "x", "ingress", "query", COORDINATOR.command)
+
+
+@pytest.mark.parametrize("role", ["viewer", "operator"])
+def test_viewers_read_only(role: CertificateRole) -> None:
+    assert may(role, "v", "ingress", "query", COORDINATOR.state)
+    assert may(role, "v", "ingress", "declare_subscriber", news_of_all("default"))
+    assert may(role, "v", "ingress", "declare_subscriber", poses_of_all("default"))
+    assert may(
+        role, "v", "ingress", "declare_liveliness_subscriber",
+        agents_alive("default", "coordinator"),
+    )  # fmt: skip
+    for message in ("put", "reply", "declare_queryable", "liveliness_token"):
+        assert not may(role, "v", "ingress", message, COORDINATOR.events)
+
+
+def test_worker_gets_no_job_of_another() -> None:
+    assert may("worker", "a", "egress", "query", WORKER.jobs)
+    assert not may("worker", "a", "egress", "query", OTHER.jobs)
+
+
+def test_coordinator_cannot_take_another_name() -> None:
+    assert may("coordinator", "c", "ingress", "liveliness_token", COORDINATOR.alive)
+    stolen = COORDINATOR.alive.replace("/c.", "/d.")
+    assert not may("coordinator", "c", "ingress", "liveliness_token", stolen)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), [("a", "a"), ("a", "a-1"), ("lab.x", "lab"), ("a", "")]
+)
+def test_names_whose_keys_overlap_are_refused(first: str, second: str) -> None:
+    with pytest.raises(NetworkError):
+        access_control([Certificate(first, "worker"), Certificate(second, "viewer")])
+
+
+def test_similar_names_are_allowed() -> None:
+    access_control([Certificate("a1", "worker"), Certificate("a12", "worker")])
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"{}",
+        b'[{"name": "a"}]',
+        b'[{"name": "a", "role": "king"}]',
+        b'[{"name": "a", "role": "worker", "more": 1}]',
+        b"[" * 100_000,
+        b"\xff",
+    ],
+)
+def test_invalid_file_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "access.json"
+    file.write_bytes(content)
+    with pytest.raises(NetworkError, match="must be a JSON list") as caught:
+        read_certificates(file)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,133 @@
+"""Addresses of hubs: forms, defaults, the private directory, files of run folders."""
+
+import fcntl
+import os
+import socket
+from pathlib import Path
+
+import pytest
+
+from schema.agent.address import (
+    default_connect,
+    hub_of,
+    new_socket,
+    parse_address,
+    read_address,
+    runtime_directory,
+    user_hub,
+)
+from schema.errors import NetworkError
+
+
+@pytest.fixture
+def runtime(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    return tmp_path
+
+
+def test_runtime_directory_is_private(runtime: Path) -> None:
+    place = runtime_directory()
+    assert place == runtime / "revolve"
+    assert place.stat().st_mode & 0o777 == 0o700
+    assert runtime_directory() == place
+
+
+def test_without_runtime_directory_a_private_temporary_one_is_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path))
+    assert runtime_directory() == tmp_path / f"revolve-{os.getuid()}"
+    assert runtime_directory().stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("mode", [0o755, 0o770, 0o701])
+def test_directory_that_others_can_enter_is_refused(runtime: Path, mode: int) -> None:
+    (runtime / "revolve").mkdir()
+    (runtime / "revolve").chmod(mode)
+    with pytest.raises(NetworkError, match="mode 0700"):
+        new_socket()
+
+
+def test_link_to_a_private_directory_is_refused(runtime: Path) -> None:
+    (runtime / "elsewhere").mkdir(mode=0o700)
+    (runtime / "revolve").symlink_to(runtime / "elsewhere")
+    with pytest.raises(NetworkError, match="mode 0700"):
+        user_hub()
+
+
+def test_sockets_differ_and_the_users_hub_does_not(runtime: Path) -> None:
+    assert new_socket() != new_socket()
+    assert user_hub() == f"unixsock-stream/{runtime}/revolve/hub.sock"
+    assert parse_address(user_hub()) == (
+        "unixsock-stream", f"{runtime}/revolve/hub.sock", 0,
+    )  # fmt: skip
+
+
+def test_sockets_of_killed_processes_are_removed(runtime: Path) -> None:
+    place = runtime_directory()
+    names = ["killed", "alive", "starting"]
+    for name in names:
+        (place / f"{name}.sock").touch()
+        (place / f"{name}.sock.lock").touch()
+        if name != "starting":
+            os.utime(place / f"{name}.sock.lock", (0, 0))
+    with (place / "alive.sock.lock").open("rb") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        new_socket()
+    left = {path.name.partition(".")[0] for path in place.iterdir()}
+    assert (runtime / "revolve", left) == (place, {"alive", "starting"})
+
+
+@pytest.mark.parametrize("path", ["relative.sock", "/" + "x" * 98, "/with space", "/"])
+def test_invalid_socket_paths_are_refused(path: str) -> None:
+    with pytest.raises(NetworkError):
+        parse_address(f"unixsock-stream/{path}")
+
+
+def test_default_address_comes_from_the_environment(
+    runtime: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("REVOLVE_CONNECT", raising=False)
+    assert default_connect() == f"unixsock-stream/{runtime}/revolve/hub.sock"
+    monkeypatch.setenv("REVOLVE_CONNECT", "tls/hub.example:7447")
+    assert default_connect() == "tls/hub.example:7447"
+
+
+def test_folder_of_a_run_gives_its_hubs_address(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    with pytest.raises(NetworkError, match="no coordinator is running"):
+        hub_of(str(folder))
+    path = tmp_path / "s"
+    (folder / "address").write_text(f"tls/hub:7447\nunixsock-stream/{path}\n")
+    assert hub_of(str(folder)) == "tls/hub:7447", "the socket is on another machine"
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(path))
+        assert hub_of(str(folder)) == f"unixsock-stream/{path}"
+    assert hub_of("tcp/127.0.0.1:7447") == "tcp/127.0.0.1:7447"
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"tcp/h:1\nrubbish\n", b"x" * 10000])
+def test_damaged_address_file_is_named_in_one_line(
+    tmp_path: Path, content: bytes
+) -> None:
+    (tmp_path / "address").write_bytes(content)
+    with pytest.raises(NetworkError, match="damaged") as caught:
+        read_address(tmp_path)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 600
+
+
+@pytest.mark.parametrize("content", [b"", b"\n", b"unixsock-stream//nowhere/s\n"])
+def test_address_file_without_reachable_address_is_refused(
+    tmp_path: Path, content: bytes
+) -> None:
+    (tmp_path / "address").write_bytes(content)
+    with pytest.raises(NetworkError, match="no address that this machine can reach"):
+        read_address(tmp_path)
+
+
+def test_neither_address_nor_folder_is_refused() -> None:
+    with pytest.raises(NetworkError, match="or a run folder, got 'nowhere'"):
+        hub_of("nowhere")

@@ -1,0 +1,178 @@
+"""Roles of certificates at a real hub, and processes of one user without flags."""
+
+import json
+import subprocess
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from coordinator.storage.compare import compare
+from schema.agent.network import Tls, client_config
+from schema.agent.topics import Member, agents_alive, member_of
+from tests.system.fleet import make_certificate, size
+from tests.system.test_agents import free_address
+from tests.system.workspace import Workspace, wait_until
+
+pytestmark = pytest.mark.system
+
+ROLES = {
+    "chief": "coordinator",
+    "good": "worker",
+    "bad": "worker",
+    "judge": "analyzer",
+    "looker": "viewer",
+    "boss": "operator",
+}
+RUN = ("scenario1", "--seed", "5", "--births", "60", "--quiet", "--out", "run")
+
+
+class Lab:
+    """A hub with access rules, a coordinator, an analyzer, and certificates for all."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self.workspace = workspace
+        self.address = free_address().replace("tcp/", "tls/")
+        self.folder = workspace.folder / "run"
+        names = [*ROLES, "hub"]
+        self.tls = {name: self.certified(name, "ca") for name in names}
+        members = [{"name": name, "role": role} for name, role in ROLES.items()]
+        (workspace.folder / "access.json").write_text(json.dumps(members))
+        self.hub = self.start("hub", "hub", "--access", "access.json")
+        assert self.hub.stderr is not None
+        assert self.hub.stderr.readline().startswith("listening on tls/")
+
+    def certified(self, name: str, authority: str) -> Tls:
+        return make_certificate(self.workspace.folder, name, authority, "127.0.0.1")
+
+    def start(self, name: str, *words: str) -> subprocess.Popen[str]:
+        where = "--listen" if words[0] == "hub" else "--connect"
+        tls = self.tls[name]
+        files = ("--tls-ca", tls.ca, "--tls-certificate", tls.certificate)
+        return self.workspace.start(
+            *words, where, self.address, *files, "--tls-key", tls.key
+        )
+
+    @contextmanager
+    def session(self, tls: Tls) -> Iterator[zenoh.Session]:
+        config = client_config(self.address, tls)
+        with zenoh.open(zenoh.Config.from_json5(config)) as session:
+            yield session
+
+
+@pytest.fixture
+def lab(workspace: Workspace) -> Lab:
+    return Lab(workspace)
+
+
+def replies(session: zenoh.Session, key: str, payload: bytes = b"") -> list[bytes]:
+    """Return the replies to a query, errors included."""
+    found = session.get(
+        key, payload=payload, timeout=1.0, consolidation=zenoh.ConsolidationMode.NONE
+    )
+    return [
+        (reply.ok or reply.err).payload.to_bytes()  # type: ignore[union-attr]
+        for reply in found
+    ]
+
+
+def members(session: zenoh.Session, role: str) -> list[Member]:
+    """Return the processes of a role whose tokens a session may see."""
+    key = agents_alive("default", role)  # type: ignore[arg-type]
+    found = session.liveliness().get(key, timeout=1.0)
+    return [member_of(str(each.ok.key_expr)) for each in found if each.ok]
+
+
+def test_certificates_act_in_their_role_only(lab: Lab, undisturbed: Path) -> None:
+    coordinator = lab.start("chief", "coordinator", *RUN)
+    lab.start("good", "worker", "--processes", "1")
+    with ExitStack() as stack:
+        head, operator, viewer, liar, spy = (
+            stack.enter_context(lab.session(lab.tls[name]))
+            for name in ("chief", "boss", "looker", "bad", "bad")
+        )
+        wait_until(lambda: bool(members(operator, "coordinator")), "the coordinator")
+        wait_until(lambda: bool(members(head, "worker")), "the worker")
+        (chief,), (good,) = members(operator, "coordinator"), members(head, "worker")
+        # Nothing is born without an analyzer: the liar has all the time it wants.
+        forged = (
+            chief.alive.replace(chief.name, "chief.00000000"),
+            "revolve/default/an/bad-0.1/alive",
+            good.alive.replace(good.name, "good-0.00000000"),
+            "revolve/default/w/bad-0.1/alive",
+        )
+        kept = [liar.liveliness().declare_token(key) for key in forged]
+        stolen = liar.declare_queryable(
+            good.jobs, lambda query: query.reply(query.key_expr, b"forged")
+        )
+        heard: list[zenoh.Sample] = []
+        ears = spy.declare_subscriber("revolve/**", heard.append)
+        liar.put(good.cancelled, b"forged")
+        # The one token that its certificate allows is there, so the others were sent.
+        wait_until(lambda: len(members(head, "worker")) == 2, "the liar's own token")
+        assert {each.name for each in members(head, "worker")} == {
+            good.name, "bad-0.1",
+        }  # fmt: skip
+        assert members(head, "analyzer") == []
+        assert members(operator, "coordinator") == [chief]
+        kept[-1].undeclare()  # type: ignore[no-untyped-call]
+        assert replies(spy, good.jobs) == []
+        assert replies(spy, chief.command) == []
+        assert replies(spy, chief.state) == []
+        assert replies(viewer, chief.command) == []
+        assert replies(viewer, good.info) == []
+        assert len(replies(viewer, chief.state)) == 1
+        assert len(replies(operator, chief.command)) == 1
+        lab.start("judge", "analyzer")
+        wait_until(lambda: coordinator.poll() is not None, "the run ends")
+        stolen.undeclare()  # type: ignore[no-untyped-call]
+        ears.undeclare()  # type: ignore[no-untyped-call]
+        assert heard == []
+    assert coordinator.returncode == 0
+    assert compare(lab.folder, undisturbed) == []
+
+
+def test_strangers_do_not_connect(lab: Lab) -> None:
+    stranger = lab.certified("stranger", "another")
+    false_ca = Tls(lab.tls["good"].ca, stranger.certificate, stranger.key)
+    unlisted = lab.certified("unlisted", "ca")
+    with pytest.raises(zenoh.ZError), lab.session(false_ca):
+        pass
+    with lab.session(unlisted) as nobody, lab.session(lab.tls["chief"]) as head:
+        nobody_token = nobody.liveliness().declare_token(
+            "revolve/default/w/unlisted-0.1/alive"
+        )
+        with lab.session(lab.tls["bad"]) as known:
+            token = known.liveliness().declare_token("revolve/default/w/bad-0.1/alive")
+            wait_until(lambda: bool(members(head, "worker")), "the known one's token")
+            assert [each.name for each in members(head, "worker")] == ["bad-0.1"]
+            token.undeclare()  # type: ignore[no-untyped-call]
+        nobody_token.undeclare()  # type: ignore[no-untyped-call]
+
+
+def test_three_commands_of_one_user_need_no_address(
+    workspace: Workspace, undisturbed: Path
+) -> None:
+    place = {"XDG_RUNTIME_DIR": str(workspace.folder), "REVOLVE_CONNECT": ""}
+    coordinator = workspace.start("coordinator", *RUN, environment=place)
+    for role in ("analyzer", "worker"):
+        workspace.start(role, "--processes", "1", environment=place)
+    wait_until(lambda: size(workspace.folder / "run") > 0, "the run begins")
+    told = workspace.start("status", environment=place).communicate()[0]
+    assert "1 workers, 1 analyzers" in told
+    second = workspace.start(
+        "coordinator", *RUN[:-1], "second", environment=place
+    ).communicate()[1]
+    assert "in use; to share its workers: --connect unixsock-stream/" in second
+    wait_until(lambda: coordinator.poll() is not None, "the run ends")
+    assert coordinator.returncode == 0
+    assert compare(workspace.folder / "run", undisturbed) == []
+
+
+def test_name_of_an_agent_is_that_of_its_certificate(lab: Lab) -> None:
+    process = lab.start("good", "worker", "--name", "other")
+    assert process.wait(60) == 2
+    assert process.stderr is not None
+    assert "--name: must be 'good', the name of " in process.stderr.read()
