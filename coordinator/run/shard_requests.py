@@ -31,6 +31,7 @@ from schema.experiment.plugin_source import plugins_of
 from schema.parts import BodySpace, Vector
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
+from schema.tables.segments import warn_once
 from schema.wire.arena import Advance, Changes
 from schema.wire.arena_codec import (
     AdvanceRequest,
@@ -358,11 +359,16 @@ def _read_answer(
         got = (advance.digest, rows.num_rows)
         must = (repeats.advance.digest, repeats.pose_rows)
         if got != must:
-            raise MalformedMessage(
+            why = (
                 f"advance to step {advance.step}: the digest of its state and its "
                 f"number of poses must be {must[0].hex()[:16]}... and {must[1]}, got "
                 f"{got[0].hex()[:16]}... and {got[1]}: this machine's results differ"
             )
+            warn_once(
+                f"arena {request.shard}: worker {provenance.agent} cannot compute its "
+                f"lost poses: {why}; waiting for another worker"
+            )
+            raise MalformedMessage(why, "impossible")
     poses = place_poses(advance.poses, rows, request.shard)
     signed = replace(provenance, wall_s=answer.wall_s)
     event = Advanced(
