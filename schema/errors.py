@@ -37,13 +37,15 @@ class NetworkError(RevolveError):
     """An address that cannot be listened on or reached."""
 
 
-MessageFault = Literal["malformed", "too large", "stale", "impossible"]
+MessageFault = Literal["malformed", "too large", "stale", "impossible", "differs"]
 """What is wrong with a message, for counts.
 
 - ``malformed``: it does not decode, or breaks a rule of its own type.
 - ``too large``: it exceeds a limit of ``schema.limits``, or one of its request.
 - ``stale``: it belongs to another request.
 - ``impossible``: it contradicts its request or the state of the run.
+- ``differs``: it repeats a past result with another outcome, as a machine that
+  computes differently does; like an error, this can stop a run.
 """
 
 

@@ -7,7 +7,7 @@ An answer is returned to the client that requested the job, which interprets it.
 
 from collections.abc import Callable, Sequence
 from itertools import count
-from typing import Protocol
+from typing import Literal, Protocol
 
 from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
@@ -189,7 +189,10 @@ class Fleet:
             answer = read(event.answer)
         except MalformedMessage as error:
             self._malformed += 1
-            return ShardReturned(event.number, "malformed", str(error))
+            # A machine that computes differently lies no more than one that fails.
+            differs = error.kind == "differs"
+            outcome: Literal["error", "malformed"] = "error" if differs else "malformed"
+            return ShardReturned(event.number, outcome, str(error))
         if answer is None:
             return ShardReturned(event.number, "stateless")
         return ShardReturned(event.number, "done", answer=answer)

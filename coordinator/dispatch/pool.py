@@ -231,7 +231,7 @@ class Backoff:
         if agent.rests:
             return
         agent.rests = True
-        rest_s = min(REST_S * 2**agent.failures, LONGEST_REST_S)
+        rest_s = min(REST_S * 2 ** min(agent.failures, 10), LONGEST_REST_S)
         agent.failures += 1
         heappush(self._until, (now_s + rest_s, next(self._order), agent.joined.agent))
 

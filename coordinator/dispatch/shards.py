@@ -30,9 +30,6 @@ from schema.errors import UnexpectedEvent
 MAX_ERRORS = 3
 REST_S = 0.05
 LONGEST_REST_S = 3.2
-MOST_DOUBLINGS = 20
-"""Doublings of the rest; more would exceed any number."""
-
 DRIFT_S = 30.0
 """Time that a shard waits for its own platform before it may drift [s]."""
 
@@ -209,7 +206,7 @@ class ShardDispatch:
             shard.lost = (*shard.lost, event.number)
         shard.avoid = (*shard.avoid, agent)
         shard.rests_until_s = self._now_s + min(
-            REST_S * 2 ** min(shard.failures, MOST_DOUBLINGS), LONGEST_REST_S
+            REST_S * 2 ** min(shard.failures, 10), LONGEST_REST_S
         )
         shard.failures += 1
         # A malformed answer is a fault of its worker alone.

@@ -35,10 +35,13 @@ _ROUNDING_S = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Inserted:
-    """A living robot of an arena: its step of insertion, and its number of joints."""
+    """A living robot of an arena: its step of insertion, and its number of joints.
+
+    The number is None if its body is not known, as after a snapshot.
+    """
 
     step: int
-    joints: int
+    joints: int | None
 
 
 def inserted(robot: Robot, space: BodySpace, step: int) -> Inserted:
@@ -85,7 +88,10 @@ class ExpectedAdvance:
     @property
     def most_pose_bytes(self) -> int:
         """Length of columns with as many poses."""
-        joints = sum(robot.joints for robot in self.born.values())
+        most = self.experiment.space.max_parts
+        joints = sum(
+            most if one.joints is None else one.joints for one in self.born.values()
+        )
         a_sample = len(self.born) * POSE_BYTES + joints * ANGLE_BYTES
         return COLUMNS_BYTES + len(self.samples) * a_sample
 

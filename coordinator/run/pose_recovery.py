@@ -101,7 +101,7 @@ class PoseRecovery:
                 if self._snapshots.has(
                     island, event.advance.step, event.advance.digest
                 ):
-                    self._requests.begin_after(own[:number])
+                    self._requests.begin_at(event)
                     begin = number
                     break
             self._arenas[island] = _Arena(deque(own[begin:]), first[island])

@@ -4,7 +4,7 @@ The changes and advances since a shard's newest snapshot are kept, so that anoth
 worker can rebuild its state. Nothing here decides what happens in an arena.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Protocol
@@ -31,7 +31,6 @@ from schema.experiment.plugin_source import plugins_of
 from schema.parts import BodySpace, Vector
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
-from schema.tables.segments import warn_once
 from schema.wire.arena import Advance, Changes
 from schema.wire.arena_codec import (
     AdvanceRequest,
@@ -65,9 +64,9 @@ class _Past:
     Its state at ``step`` is that of the newest snapshot, at ``base`` (0 is the empty
     arena), after ``history``. ``platform`` is that of the last advance, empty before
     the first; ``places`` are those of the robots that lived after it, and ``born``
-    their steps of insertion. The requested advance may have a snapshot in the
-    store if ``may_be_kept``, as in any replay. It must have the result of ``repeats``,
-    if there is one.
+    their steps of insertion. The requested advance may have a snapshot in the store if
+    ``may_be_kept``, as in any replay. It must have the result of ``repeats``, if there
+    is one.
     """
 
     step: int = 0
@@ -90,15 +89,6 @@ class _Past:
             each.birth: inserted(each.robot, space, self.step)
             for each in changes.insertions
         }
-
-    def note(self, command: AdvanceShard, event: Advanced, space: BodySpace) -> None:
-        """Note the result of an advance."""
-        advance = event.advance
-        born = self.born_after(command.changes, space)
-        self.places = {one.birth: one.place for one in advance.judgements}
-        self.born = {birth: at for birth, at in born.items() if birth in self.places}
-        self.step, self.digest = advance.step, advance.digest
-        self.platform = event.provenance.platform
 
     def drifts_to(self, platform: str) -> bool:
         """Return whether a platform differs from that of the last advance."""
@@ -162,17 +152,17 @@ class ShardRequests:
         """Return the advance of a shard that is requested, or noted."""
         return self._past(shard).requested
 
-    def begin_after(self, advances: Iterable[tuple[AdvanceShard, Advanced]]) -> None:
-        """Let a shard begin with the snapshot of the last of its first advances.
-
-        Args:
-            advances: commands and results from the first on; the store has a snapshot
-                of the last.
-        """
-        for command, event in advances:
-            past = self._past(event.island)
-            past.note(command, event, self._space(event.island))
-            past.base = past.step
+    def begin_at(self, event: Advanced) -> None:
+        """Let a shard begin with the snapshot of an advance, which the store has."""
+        past, advance = self._past(event.island), event.advance
+        past.step = past.base = advance.step
+        past.digest, past.platform = advance.digest, event.provenance.platform
+        past.places = {one.birth: one.place for one in advance.judgements}
+        timestep_s = self._context.experiments[event.island].simulation.timestep_s
+        past.born = {
+            one.birth: Inserted(advance.step - round(one.age_s / timestep_s), None)
+            for one in advance.judgements
+        }
 
     def past(self, shard: int) -> Rebuild:
         """Return what a worker needs to rebuild a shard's state."""
@@ -232,15 +222,20 @@ class ShardRequests:
         if requested is None or requested.number != event.number:
             raise UnexpectedEvent(f"no such advance was requested: {event}")
         past.requested = None
+        born = past.born_after(requested.changes, self._space(event.island))
+        living = {one.birth for one in advance.judgements}
+        past.born = {birth: at for birth, at in born.items() if birth in living}
+        past.step, past.digest = advance.step, advance.digest
         agent, platform = event.provenance.agent, event.provenance.platform
         drift: Drift | None = None
         if past.drifts_to(platform):
             before = past.platform
             drift = Drift(event.island, advance.step, before, platform, agent)
-        past.note(requested, event, self._space(event.island))
+        past.platform = platform
         past.history.append(
             PastAdvance(requested.changes, requested.until, advance.digest)
         )
+        past.places = {one.birth: one.place for one in advance.judgements}
         store, may_be_kept = self._snapshot_store, past.may_be_kept
         if may_be_kept and store.has(event.island, past.step, past.digest):
             past.base, past.history = past.step, []
@@ -356,19 +351,7 @@ def _read_answer(
     check_advance(advance, expected)
     rows = read_poses(advance.poses, advance, expected)
     if repeats is not None:
-        got = (advance.digest, rows.num_rows)
-        must = (repeats.advance.digest, repeats.pose_rows)
-        if got != must:
-            why = (
-                f"advance to step {advance.step}: the digest of its state and its "
-                f"number of poses must be {must[0].hex()[:16]}... and {must[1]}, got "
-                f"{got[0].hex()[:16]}... and {got[1]}: this machine's results differ"
-            )
-            warn_once(
-                f"arena {request.shard}: worker {provenance.agent} cannot compute its "
-                f"lost poses: {why}; waiting for another worker"
-            )
-            raise MalformedMessage(why, "impossible")
+        _check_repeated(advance, rows.num_rows, repeats)
     poses = place_poses(advance.poses, rows, request.shard)
     signed = replace(provenance, wall_s=answer.wall_s)
     event = Advanced(
@@ -379,3 +362,19 @@ def _read_answer(
         signed,
     )
     return Reached(event, answer.snapshot)
+
+
+def _check_repeated(advance: Advance, rows: int, repeats: Advanced) -> None:
+    """Raise unless an advance has a past result.
+
+    Raises:
+        MalformedMessage: another digest or number of poses.
+    """
+    got, must = (advance.digest, rows), (repeats.advance.digest, repeats.pose_rows)
+    if got != must:
+        raise MalformedMessage(
+            f"advance to step {advance.step}: the digest of its state and its "
+            f"number of poses must be {must[0].hex()[:16]}... and {must[1]}, got "
+            f"{got[0].hex()[:16]}... and {got[1]}: this machine's results differ",
+            "differs",
+        )
