@@ -4,7 +4,9 @@ The class of an exception names the source of the fault, which decides its handl
 """
 
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, Literal
+
+from schema.limits import LONGEST_REASON, printable
 
 
 class RevolveError(Exception):
@@ -35,8 +37,27 @@ class NetworkError(RevolveError):
     """An address that cannot be listened on or reached."""
 
 
+MessageFault = Literal["malformed", "too large", "stale", "impossible"]
+"""What is wrong with a message, for counts.
+
+- ``malformed``: it does not decode, or breaks a rule of its own type.
+- ``too large``: it exceeds a limit of ``schema.limits``, or one of its request.
+- ``stale``: it belongs to another request.
+- ``impossible``: it contradicts its request or the state of the run.
+"""
+
+
 class MalformedMessage(RevolveError):  # noqa: N818 - reads as what it says
-    """Bytes of a peer that do not decode; they are counted and dropped."""
+    """A message of a peer that is not believed; it is counted and dropped.
+
+    Attributes:
+        kind: what is wrong, for counts.
+    """
+
+    def __init__(self, why: str, kind: MessageFault = "malformed") -> None:
+        """Initialise with a reason, which may quote the peer and is cut."""
+        super().__init__(printable(why, LONGEST_REASON))
+        self.kind: MessageFault = kind
 
 
 class UnexpectedEvent(RevolveError):  # noqa: N818 - reads as what it says

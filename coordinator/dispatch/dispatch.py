@@ -237,8 +237,11 @@ class Dispatch:
     def _fail(
         self, pending: Pending, event: Returned, reason: str
     ) -> Iterator[DispatchCommand]:
-        """Give a job to another agent, or give it up after several errors."""
-        pending.errors += event.outcome != "lost"
+        """Give a job to another agent, or give it up after several errors.
+
+        A malformed answer is a fault of its agent alone, so it is no such error.
+        """
+        pending.errors += event.outcome == "error"
         if pending.errors == MAX_ERRORS:
             del pending.holders[event.agent]
             yield Deliver(pending.job, event.agent, reason=reason)

@@ -176,10 +176,17 @@ DispatchCommand = Assign | Deliver | Cancel
 
 @dataclass(frozen=True, slots=True)
 class ShardSeen:
-    """A shard was advanced on a platform, according to the journal."""
+    """A shard was advanced on a platform, according to the journal.
+
+    Attributes:
+        shard: the shard.
+        platform: empty if it was never advanced.
+        may_drift: it may move to another platform, if shards may.
+    """
 
     shard: int
     platform: str
+    may_drift: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,13 +203,14 @@ class ShardReturned:
     Attributes:
         number: of the ``AssignShard``.
         outcome: "done"; "stateless" (the worker does not have the state); "error"
-            with a reason; "lost" (no reply).
-        reason: empty unless error.
+            with a reason; "malformed" (an answer that is not believed) with a reason;
+            "lost" (no reply).
+        reason: empty unless error or malformed.
         answer: decoded; None unless done.
     """
 
     number: int
-    outcome: Literal["done", "stateless", "error", "lost"]
+    outcome: Literal["done", "stateless", "error", "malformed", "lost"]
     reason: str = ""
     answer: object = None
 

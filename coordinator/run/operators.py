@@ -151,6 +151,13 @@ def _carry_out(request: OperatorRequest, scheduler: RunScheduler) -> OperatorRep
         Refused: no running run with an arena has the given name, or several have.
     """
     run = _run(request.run, scheduler)
+    if run.recovery is not None:
+        done, total = run.recovery.progress
+        return OperatorReply(
+            f"lost poses are computed again (advance {done} of {total}): try again "
+            "when that is done",
+            is_refused=True,
+        )
     replies: list[OperatorReply] = []
     scheduler.guard(run, lambda: replies.append(reply_to(request, run.loop)))
     if replies:

@@ -9,13 +9,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
-from google.protobuf.message import DecodeError
-
 from schema.agent.network import FENCED, UNFIT, Agent
 from schema.agent.supervision import ProcessSlot, Task
 from schema.errors import MalformedMessage, PluginDiffers, RevolveError, UnknownPlugin
 from schema.experiment.plugin_source import check_plugins
+from schema.limits import ADVANCE_REQUEST_BYTES, LONGEST_NAME, LONGEST_REASON, printable
 from schema.wire import revolve_pb2 as pb
+from schema.wire.parsing import parsed, require_most
 
 _MOST_CANCELLED = 1000
 
@@ -155,8 +155,8 @@ class Server:
             data: bytes of a ``Request``, of which only the name of the job is needed.
         """
         try:
-            task = self._task(pb.Request.FromString(data))
-        except DecodeError:
+            task = self._task(_parsed(data))
+        except MalformedMessage:
             self.counts.malformed += 1
             return
         self._cancelled[task] = None
@@ -176,14 +176,15 @@ class Server:
                 answer = self.compute(data)
         except (UnknownPlugin, PluginDiffers) as error:
             self.counts.refused += 1
-            return Reply(reason=f"{UNFIT}{error}")
+            return Reply(reason=printable(f"{UNFIT}{error}", LONGEST_REASON))
         except RevolveError as error:
             self.counts.refused += 1
             self.counts.malformed += isinstance(error, MalformedMessage)
-            return Reply(reason=str(error))
+            return Reply(reason=printable(str(error), LONGEST_REASON))
         except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
             self.counts.refused += 1
-            return Reply(reason=f"{type(error).__name__}: {error}")
+            why = f"{type(error).__name__}: {error}"
+            return Reply(reason=printable(why, LONGEST_REASON))
         self.counts.answered += 1
         return Reply(answer)
 
@@ -194,14 +195,12 @@ class Server:
         """Return the fields that requests of all kinds share.
 
         Raises:
-            MalformedMessage: not the bytes of a request, or one without a run.
+            MalformedMessage: not the bytes of a request, or one without a run or with
+                a name that is too long.
             PluginDiffers: a plug-in that is missing or has another source here.
             RevolveError: an older epoch than the newest one of its run.
         """
-        try:
-            request = pb.Request.FromString(data)
-        except DecodeError as error:
-            raise MalformedMessage(f"not the bytes of a Request: {error}") from None
+        request = _parsed(data)
         if not request.run:
             raise MalformedMessage("Request: names no run")
         newest = self._epochs.get(request.run, 0)
@@ -213,3 +212,15 @@ class Server:
         self._epochs[request.run] = request.epoch
         check_plugins(request.plugins)
         return request
+
+
+def _parsed(data: bytes) -> pb.Request:
+    """Return the fields that requests of all kinds share.
+
+    Raises:
+        MalformedMessage: not the bytes of a request, or too long a name, of which this
+            process would keep many.
+    """
+    request = parsed(data, pb.Request(), ADVANCE_REQUEST_BYTES)
+    require_most(len(request.run), LONGEST_NAME, "characters of Request.run")
+    return request

@@ -164,18 +164,32 @@ def test_arenas_of_all_runs_share_the_workers(fleet: Fleet, agents: Agents) -> N
     assert fleet.open == 1
 
 
-def test_an_unfit_answer_to_an_advance_is_the_workers_error(
-    fleet: Fleet, agents: Agents
+@pytest.mark.parametrize("is_answer", [True, False])
+def test_errors_of_several_workers_stop_an_arena_and_unfit_answers_do_not(
+    fleet: Fleet, agents: Agents, *, is_answer: bool
 ) -> None:
     shard = new_shard(fleet)
     fleet.advance(shard)
+    tried = []
     for now_s in range(1, 4):
         number, agent, _ = agents.sent[-1]
-        agents.news = [Returned(number, agent, "ok", b"bad")]
+        tried.append(agent)
+        agents.news = [
+            Returned(number, agent, "ok", b"bad")
+            if is_answer
+            else Returned(number, agent, "error", reason="no such plug-in")
+        ]
         ends = fleet.listen(0.0, float(10 * now_s))
-        assert fleet.malformed == now_s
+        assert fleet.malformed == (now_s if is_answer else 0)
         fleet.tell(Ticked(10 * now_s + 5.0))
-    assert ends == {ARENA: [ShardFailed(shard, agent, "bad bytes")]}
+    assert set(tried) == {"one", "two"}
+    if not is_answer:
+        assert ends == {ARENA: [ShardFailed(shard, agent, "no such plug-in")]}
+        return
+    assert ends == {}
+    number, agent, _ = agents.sent[-1]
+    agents.news = [Returned(number, agent, "ok", b"answer")]
+    assert fleet.listen(0.0, 50.0) == {ARENA: [ShardDone(shard, agent, b"answer")]}
 
 
 def test_a_worker_without_the_state_is_given_it(fleet: Fleet, agents: Agents) -> None:

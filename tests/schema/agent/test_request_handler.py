@@ -11,6 +11,7 @@ from schema.agent.request_handler import MOST_SOURCES, FairQueue, Reply, Server
 from schema.agent.supervision import Death, ProcessSlot, Task
 from schema.errors import InvalidRobot, UnknownPlugin
 from schema.experiment.plugin_source import check_plugins, plugins_of
+from schema.limits import LONGEST_REASON
 from schema.wire import revolve_pb2 as pb
 
 
@@ -74,6 +75,23 @@ def test_error_is_the_reason_of_the_reply(error: Exception, reason: str) -> None
     made = server(raising(error))
     assert made.reply(request()) == Reply(reason=reason)
     assert made.counts.refused == 1
+
+
+@pytest.mark.parametrize("error", [InvalidRobot, UnknownPlugin, ValueError])
+def test_reasons_are_short_printable_lines(error: type[Exception]) -> None:
+    """They quote the request, which may be long or meant for a terminal."""
+    quoted = error("\x1b[2J\n" + "x" * 10_000_000)
+    reason = server(raising(quoted)).reply(request()).reason
+    assert len(reason) == LONGEST_REASON
+    assert reason.isprintable()
+
+
+def test_long_names_of_runs_are_refused_and_not_kept() -> None:
+    made = server()
+    data = pb.Request(run="x" * 1001, number=7).SerializeToString()
+    made.cancel(data)
+    assert "characters of Request.run" in made.reply(data).reason
+    assert (made.counts.malformed, made._cancelled, made._epochs) == (2, {}, {})
 
 
 def test_agent_without_a_plugin_is_unfit() -> None:
