@@ -89,9 +89,9 @@ def population_records(
     island: int, births: int, fitness: Iterable[tuple[BirthId, float | None]]
 ) -> list[Record]:
     """Return the population rows of the living, each with its fitness if known."""
+    now = {"island": island, "births": births}
     rows = (
-        {**named(birth, island), "births": births, "fitness": value}
-        for birth, value in fitness
+        {**now, **named(birth, island), "fitness": value} for birth, value in fitness
     )
     return [Record("population", row) for row in rows]
 
