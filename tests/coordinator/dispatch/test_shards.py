@@ -211,7 +211,7 @@ def test_errors_of_several_workers_end_an_advance_and_losses_do_not() -> None:
 
 
 def test_any_number_of_malformed_answers_only_lets_the_shard_rest() -> None:
-    dispatch = ShardDispatch(count(1))
+    dispatch = Fleet()
     dispatch.handle(joined("a", "x86"))
     dispatch.handle(ShardRequested(0))
     for number in range(1, 1300):
@@ -220,7 +220,7 @@ def test_any_number_of_malformed_answers_only_lets_the_shard_rest() -> None:
 
 
 def test_a_shard_that_may_not_drift_waits_for_its_platform() -> None:
-    dispatch = ShardDispatch(count(1), allows_drift=True)
+    dispatch = Fleet(allows_drift=True)
     dispatch.handle(joined("a", "arm"))
     dispatch.handle(ShardSeen(0, "x86", may_drift=False))
     assert dispatch.handle(ShardRequested(0)) == []
