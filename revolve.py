@@ -150,16 +150,11 @@ def _lines(names: Iterable[str]) -> str:
 
 
 def _overview() -> str:
-    return "\n".join(
-        [
-            "Evolve the bodies and brains of robots, on one machine or on many.",
-            "",
-            "usage: revolve COMMAND ...    (help: revolve COMMAND --help)",
-            "",
-            _lines(COMMANDS),
-            "",
-            "example: revolve run scenario1 --seed 1 --births 600",
-        ]
+    return (
+        "Evolve the bodies and brains of robots, on one machine or on many.\n\n"
+        "usage: revolve COMMAND ...    (help: revolve COMMAND --help)\n\n"
+        f"{_lines(COMMANDS)}\n\n"
+        "example: revolve run scenario1 --seed 1 --births 600"
     )
 
 

@@ -183,24 +183,25 @@ SERVO = Motor(gain=0.9, max_torque=0.17658, max_velocity=5.236)
 """1.8 kg cm, 50 rpm; the gain is that of the thesis, much lower than RoboGen's."""
 
 
-def _side_slots(reach: float) -> tuple[Slot, ...]:
-    """Return the four slots (front, back, right, left) of a box-shaped part."""
-    return (
+def block_shape(size: Vector, mass: float) -> Shape:
+    """Return the shape of a box with slots at its front, back, right and left.
+
+    Args:
+        size: full lengths along x, y, z [m]; x and y are equal.
+        mass: [kg].
+    """
+    reach = 0.5 * size[0]
+    slots = (
         Slot((0.0, -reach, 0.0), MINUS_Y, Z),
         Slot((0.0, reach, 0.0), Y, Z),
         Slot((reach, 0.0, 0.0), X, Z),
         Slot((-reach, 0.0, 0.0), MINUS_X, Z),
     )
+    return Shape((Box("body", size, (0.0, 0.0, 0.0), mass),), slots)
 
 
-_CORE = Shape(
-    boxes=(Box("body", (0.09, 0.09, 0.045), (0.0, 0.0, 0.0), 0.09),),
-    slots=_side_slots(0.045),
-)
-_BRICK = Shape(
-    boxes=(Box("body", (0.041, 0.041, 0.0355), (0.0, 0.0, 0.0), 0.0102),),
-    slots=_side_slots(0.0205),
-)
+_CORE = block_shape((0.09, 0.09, 0.045), 0.09)
+_BRICK = block_shape((0.041, 0.041, 0.0355), 0.0102)
 _ACTIVE_HINGE = Shape(
     boxes=(
         Box("root", PLATE, (0.0, 0.0, 0.0), 0.007),

@@ -16,21 +16,14 @@ import math
 from dataclasses import replace
 
 from schema import parts
-from schema.parts import BodySpace, Box, Joint, Matrix, Shape, Slot, Vector
+from schema.parts import Box, Joint, Matrix, Shape, Slot, Vector
 
 BAR_KG_PER_M = 0.137
 """Mass of a bar per metre: 1.37 g/cm."""
 
-_BRICK: Vector = (0.041, 0.041, 0.0355)
+_CORE = parts.block_shape((0.041, 0.041, 0.0355), 0.0445)
+_BRICK = parts.block_shape((0.041, 0.041, 0.0355), 0.0102)
 _BASE_SLOT_Z = Slot((-0.00075, 0.0, 0.0), parts.MINUS_X, parts.Z)
-
-
-def _block(mass: float) -> Shape:
-    """Return the shape of a brick or core, which differ in mass only."""
-    brick = parts.FIXED_BRICK.shape(())
-    return Shape((Box("body", _BRICK, (0.0, 0.0, 0.0), mass),), brick.slots)
-
-
 _ACTIVE_HINGE = Shape(
     boxes=(
         Box("root", parts.PLATE, (0.0, 0.0, 0.0), 0.002),
@@ -104,24 +97,10 @@ def _bar(values: tuple[float, ...]) -> Shape:
     )
 
 
-CORE = replace(parts.CORE, shape=parts.constant_shape(_block(0.0445)))
-FIXED_BRICK = replace(parts.FIXED_BRICK, shape=parts.constant_shape(_block(0.0102)))
+CORE = replace(parts.CORE, shape=parts.constant_shape(_CORE))
+FIXED_BRICK = replace(parts.FIXED_BRICK, shape=parts.constant_shape(_BRICK))
 ACTIVE_HINGE = replace(parts.ACTIVE_HINGE, shape=parts.constant_shape(_ACTIVE_HINGE))
 HINGE = replace(parts.HINGE, shape=parts.constant_shape(_HINGE))
 PARAMETRIC_BAR_JOINT = replace(parts.PARAMETRIC_BAR_JOINT, shape=_bar)
 TOUCH_SENSOR = replace(parts.TOUCH_SENSOR, shape=parts.constant_shape(_TOUCH))
 LIGHT_SENSOR = parts.LIGHT_SENSOR
-
-ROBOGEN_2016: BodySpace = {
-    part_type.name: part_type
-    for part_type in (
-        CORE,
-        FIXED_BRICK,
-        ACTIVE_HINGE,
-        HINGE,
-        PARAMETRIC_BAR_JOINT,
-        TOUCH_SENSOR,
-        LIGHT_SENSOR,
-    )
-}
-"""All of these types by name."""

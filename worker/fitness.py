@@ -5,7 +5,7 @@ experiment's fitness section and returns a finite number, higher is better.
 """
 
 import math
-from typing import Protocol, cast
+from typing import Protocol
 
 import numpy as np
 
@@ -33,7 +33,7 @@ def fitness_of(track: Track, fitness: Fitness) -> float:
     Raises:
         FitnessUndefined: the function raised or gave no finite number.
     """
-    function = cast("FitnessFunction", fitness_function(fitness))
+    function = fitness_function(fitness)
     try:
         value = float(function(track, fitness))
     except Exception as error:

@@ -15,6 +15,7 @@ from analysis.render.picture import Picture, RobotRenderer, Simulate
 from schema.errors import RunFolderError
 from schema.experiment.document import Experiment, body_space, island_experiment
 from schema.experiment.identity import Identity, Origin
+from schema.experiment.settings import evaluation_settings_of
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
@@ -147,8 +148,7 @@ def _gait(
     """Return pictures from the middle of a robot's life on, by a fixed camera."""
     poses: list[Floats] = []
     watch: Callable[[Any], None] = lambda data: poses.append(data.qpos.copy())  # noqa: E731
-    world = settings.environment
-    simulate(robot, settings.space, settings.simulation, world, watch=watch)
+    simulate(robot, evaluation_settings_of(settings), watch=watch)
     tick_s = settings.simulation.brain_steps * settings.simulation.timestep_s
     step = max(1, round(EVERY_S / tick_s))
     first = len(poses) // 2

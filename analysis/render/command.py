@@ -63,7 +63,7 @@ def main(arguments: list[str], simulate: Simulate) -> int:
         if not is_film and not options.gait:
             save_picture(renderer.picture(), out)
         else:
-            live = partial(simulate, robot, settings.space, world, settings.environment)
+            live = partial(simulate, robot, settings)
             tick_s = world.brain_steps * world.timestep_s
             _draw_motion(renderer, live, options.gait, out, tick_s)
     print(f"{out}: written")

@@ -16,9 +16,10 @@ import numpy.typing as npt
 from PIL import Image
 
 from schema.errors import RevolveError
-from schema.experiment.document import Simulation, Space
+from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.identity import NO_IDENTITY, Identity
+from schema.experiment.settings import EvaluationSettings
 from schema.parts import BodySpace
 from schema.robot.results import Floats, Track
 from schema.robot.robot import Robot
@@ -89,12 +90,12 @@ class RobotRenderer:
         choose_engine()
         import mujoco  # noqa: PLC0415 - after its engine is chosen
 
-        from schema.mjcf.model import solo_model  # noqa: PLC0415 - the same
+        from schema.mjcf.model import solo_spec  # noqa: PLC0415 - the same
 
         self._mujoco: Any = mujoco
-        self.model = solo_model(
+        self.model = solo_spec(
             robot, space, simulation, environment, furnish=_furnish(*size)
-        )
+        ).compile()
         self._data = mujoco.MjData(self.model)
         try:
             self._renderer = mujoco.Renderer(self.model, size[1], size[0])
@@ -264,9 +265,7 @@ class Simulate(Protocol):
     def __call__(
         self,
         robot: Robot,
-        space: Space,
-        simulation: Simulation,
-        environment: Environment,
+        settings: EvaluationSettings,
         *,
         identity: Identity = NO_IDENTITY,
         watch: Callable[[Any], None],

@@ -423,13 +423,9 @@ def body_space(space: Space) -> BodySpace:
 
 def _freed(kind: PartType) -> PartType:
     """Return a part type whose beta may vary; in planar bodies it is 0."""
-    return replace(
-        kind,
-        own_parameters=tuple(
-            Parameter("beta", 0.0, pi, 0.0) if parameter.name == "beta" else parameter
-            for parameter in kind.own_parameters
-        ),
-    )
+    free = Parameter("beta", 0.0, pi, 0.0)
+    own = (free if each.name == "beta" else each for each in kind.own_parameters)
+    return replace(kind, own_parameters=tuple(own))
 
 
 def steps_of(seconds: float, simulation: Simulation) -> int:

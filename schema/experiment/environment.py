@@ -1,5 +1,6 @@
 """The section ``[environment]``: slope, rough ground and scenery."""
 
+from collections.abc import Iterator
 from functools import cached_property, lru_cache
 from math import cos, isclose, radians, sin
 from typing import Annotated
@@ -73,23 +74,22 @@ def is_mjcf(scenery: str) -> bool:
     return scenery.lstrip().startswith("<")
 
 
-def ground_problem(environment: Environment) -> str:
-    """Return what is wrong with rough ground, or nothing."""
+def ground_problems(environment: Environment) -> Iterator[str]:
+    """Yield what is wrong with rough ground."""
     if not environment.roughness_m:
-        return ""
+        return
     extent_m, patch_m = environment.extent_m, environment.patch_m
     whole = environment.patches
     if not whole or not isclose(whole * patch_m, extent_m, rel_tol=1e-9):
-        return (
+        yield (
             "environment.extent_m: must be a whole multiple of environment.patch_m = "
             f"{patch_m:g}, got {extent_m:g}"
         )
     if 2 * whole > MOST_PATCHES:
-        return (
+        yield (
             "environment.patch_m: must be >= 2 environment.extent_m / "
             f"{MOST_PATCHES} = {2 * extent_m / MOST_PATCHES:g}, got {patch_m:g}"
         )
-    return ""
 
 
 @lru_cache(maxsize=8)

@@ -77,7 +77,7 @@ def parse_experiment(text: str, where: str) -> Experiment:
         raise ExperimentError(f"{where}: not valid TOML: {error}") from None
     _refuse_unknown(document, Experiment, where, "")
     _read_scenery(document, where)
-    document = _completed(document)
+    _complete(document)
     try:
         experiment = msgspec.convert(document, type=Experiment)
     except msgspec.ValidationError as error:
@@ -106,20 +106,12 @@ def _read_scenery(document: dict[str, Any], where: str) -> None:
         environment["scenery"] = text
 
 
-def _completed(document: dict[str, Any]) -> dict[str, Any]:
-    """Return a document with complete sections in ``islands``."""
-    if "islands" not in document:
-        return document
-    islands = [
-        {key: _completed_table(document.get(key), value) for key, value in each.items()}
-        for each in document["islands"]
-    ]
-    return {**document, "islands": islands}
-
-
-def _completed_table(kept: Any, changed: Any) -> Any:  # noqa: ANN401 - any TOML value
-    """Return a section with the changes of islands merged into it."""
-    return {**(kept or {}), **changed} if isinstance(changed, dict) else changed
+def _complete(document: dict[str, Any]) -> None:
+    """Merge each section into those of ``islands``, in place."""
+    for islands in document.get("islands", ()):
+        for key, changed in islands.items():
+            if isinstance(changed, dict):
+                islands[key] = {**document.get(key, {}), **changed}
 
 
 def experiment_text(experiment: Experiment) -> str:

@@ -5,6 +5,7 @@ from functools import lru_cache
 from typing import TypeVar, cast
 
 import msgspec
+from msgspec.structs import replace
 
 from schema.errors import ExperimentError
 from schema.experiment.document import (
@@ -52,24 +53,28 @@ class ArenaSettings(Section, frozen=True):
 
 def vetting_settings(experiment: Experiment) -> bytes:
     """Return the JSON that every vetting request of an experiment holds."""
-    return msgspec.json.encode(
-        VettingSettings(space=experiment.space, vetting=experiment.vetting)
-    )
+    return msgspec.json.encode(_sections(experiment, VettingSettings))
 
 
 def evaluation_settings_of(experiment: Experiment) -> EvaluationSettings:
     """Return the evaluation settings of an experiment."""
-    return EvaluationSettings(
-        space=experiment.space,
-        simulation=experiment.simulation,
-        fitness=experiment.fitness,
-        environment=experiment.environment,
-    )
+    return _sections(experiment, EvaluationSettings)
 
 
 def evaluation_settings(experiment: Experiment) -> bytes:
     """Return the JSON that every evaluation request of an experiment holds."""
     return msgspec.json.encode(evaluation_settings_of(experiment))
+
+
+def arena_settings_of(experiment: Experiment) -> ArenaSettings:
+    """Return the settings of an experiment's arena, without an origin.
+
+    Raises:
+        ExperimentError: the experiment has no arena.
+    """
+    if experiment.arena is None:
+        raise ExperimentError(f"{experiment.name}: has no [arena]")
+    return _sections(experiment, ArenaSettings)
 
 
 def arena_settings(experiment: Experiment, origin: Origin) -> bytes:
@@ -82,18 +87,12 @@ def arena_settings(experiment: Experiment, origin: Origin) -> bytes:
     Raises:
         ExperimentError: the experiment has no arena.
     """
-    if experiment.arena is None:
-        raise ExperimentError(f"{experiment.name}: has no arena")
-    return msgspec.json.encode(
-        ArenaSettings(
-            origin=origin,
-            space=experiment.space,
-            simulation=experiment.simulation,
-            fitness=experiment.fitness,
-            environment=experiment.environment,
-            arena=experiment.arena,
-        )
-    )
+    return msgspec.json.encode(replace(arena_settings_of(experiment), origin=origin))
+
+
+def _sections(experiment: Experiment, kind: type[T]) -> T:
+    """Return settings with the sections of the same names of an experiment."""
+    return msgspec.convert(experiment, kind, from_attributes=True)
 
 
 @lru_cache(maxsize=64)
@@ -154,8 +153,7 @@ def lasting(settings: EvaluationSettings, steps: int) -> EvaluationSettings:
             f"{clock.window_steps} steps, got {steps}"
         )
     warmup = steps - clock.window_steps
-    simulation = msgspec.structs.replace(clock, warmup_steps=warmup)
-    return msgspec.structs.replace(settings, simulation=simulation)
+    return replace(settings, simulation=replace(clock, warmup_steps=warmup))
 
 
 @lru_cache(maxsize=64)

@@ -76,28 +76,42 @@ def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
         MalformedMessage: a .pb file that does not hold a robot.
     """
     ending = _ending(path, _READ)
+    if ending in _TEXTS:
+        return _TEXTS[ending](read_text(path), str(path), space)
     if ending == MJCF_ENDING:
         # MuJoCo is imported only if needed: it is slow to load.
         from schema.formats.mjcf import read_mjcf  # noqa: PLC0415
 
         robot, _ = read_mjcf(path)
-        _check(robot, space, path)
-        return robot
+    else:
+        try:
+            robot = decode_robot(_read(path))
+        except MalformedMessage as error:
+            raise MalformedMessage(f"{path}: {error}") from None
     try:
-        data = path.read_bytes()
-        text = data.decode() if ending in _TEXTS else ""
-    except OSError as error:
-        raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
+        check_robot(robot, space)
+    except InvalidRobot as error:
+        raise InvalidRobot(f"{path}: {error}") from None
+    return robot
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file.
+
+    Raises:
+        InvalidRobot: a file that cannot be read, or is not UTF-8.
+    """
+    try:
+        return _read(path).decode()
     except UnicodeDecodeError as error:
         raise InvalidRobot(f"{path}: not UTF-8 text (byte {error.start})") from None
-    if ending in _TEXTS:
-        return _TEXTS[ending](text, str(path), space)
+
+
+def _read(path: Path) -> bytes:
     try:
-        robot = decode_robot(data)
-    except MalformedMessage as error:
-        raise MalformedMessage(f"{path}: {error}") from None
-    _check(robot, space, path)
-    return robot
+        return path.read_bytes()
+    except OSError as error:
+        raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
 
 
 def write_robot(
@@ -137,13 +151,6 @@ def write_robot(
         path.write_bytes(data)
     except OSError as error:
         raise InvalidRobot(f"{path}: cannot be written: {error.strerror}") from None
-
-
-def _check(robot: Robot, space: BodySpace, path: Path) -> None:
-    try:
-        check_robot(robot, space)
-    except InvalidRobot as error:
-        raise InvalidRobot(f"{path}: {error}") from None
 
 
 def _ending(path: Path, endings: tuple[str, ...]) -> str:

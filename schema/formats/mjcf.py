@@ -17,7 +17,8 @@ import numpy as np
 from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
 from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
-from schema.mjcf.model import solo_model, solo_spec
+from schema.formats.files import read_text
+from schema.mjcf.model import solo_spec
 from schema.robot.robot import Robot, check_robot
 from schema.wire.codec import decode_robot, encode_robot
 
@@ -80,7 +81,7 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
         check_robot(robot, space)
     except (MalformedMessage, ExperimentError, InvalidRobot) as error:
         raise InvalidRobot(f"{where}: {error}") from None
-    built = solo_model(robot, space, settings.simulation, settings.environment)
+    built = solo_spec(robot, space, settings.simulation, settings.environment).compile()
     _check_body(model, built, where)
     return robot, settings
 
@@ -91,12 +92,7 @@ def read_mjcf(path: Path) -> tuple[Robot, EvaluationSettings]:
     Raises:
         InvalidRobot: as ``robot_from_mjcf``, or the file cannot be read.
     """
-    try:
-        return robot_from_mjcf(path.read_text(encoding="utf-8"), str(path))
-    except OSError as error:
-        raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise InvalidRobot(f"{path}: not UTF-8 text (byte {error.start})") from None
+    return robot_from_mjcf(read_text(path), str(path))
 
 
 def _bytes(held: dict[str, str], name: str) -> bytes:

@@ -66,6 +66,13 @@ class RobogenPart:
     where: str
     children: dict[int, "RobogenPart"] = field(default_factory=dict)
 
+    def subtree(self) -> list["RobogenPart"]:
+        """Return the part and all parts below it."""
+        found = [self]
+        for part in found:
+            found += part.children.values()
+        return found
+
 
 @dataclass(slots=True)
 class RobogenRobot:

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from schema.parts import BUILT_IN, Slot, Vector
+from schema.parts import BUILT_IN, MINUS_X, MINUS_Y, Slot, X, Y, Z
 from schema.robot.frames import attach
 from schema.robot.robot import ORIENTATIONS
 
@@ -15,9 +15,6 @@ SQUARE = ("Core", "FixedBrick")
 """Parts whose slots RoboGen numbers left, right, front, back."""
 
 _OUR_SLOTS = (3, 2, 0, 1)
-_X: Vector = (1.0, 0.0, 0.0)
-_Y: Vector = (0.0, 1.0, 0.0)
-_Z: Vector = (0.0, 0.0, 1.0)
 
 
 def our_slot(kind: str, slot: int) -> int:
@@ -52,9 +49,9 @@ def our_orientation(parent: str, slot: int, child: str, quarter: int) -> int:
 def _their_slot(kind: str, slot: int) -> Slot:
     """Return RoboGen's slot at the origin, without tilt."""
     if kind in SQUARE:
-        normal = ((-1.0, 0.0, 0.0), _X, (0.0, -1.0, 0.0), _Y)[slot]
-        return Slot((0.0, 0.0, 0.0), normal, (_Y, _Y, _Z, _Z)[slot])
-    return Slot((0.0, 0.0, 0.0), _X if slot else (-1.0, 0.0, 0.0), _Y)
+        normal = (MINUS_X, X, MINUS_Y, Y)[slot]
+        return Slot((0.0, 0.0, 0.0), normal, (Y, Y, Z, Z)[slot])
+    return Slot((0.0, 0.0, 0.0), X if slot else MINUS_X, Y)
 
 
 def _our_slot(kind: str, slot: int) -> Slot:

@@ -123,14 +123,9 @@ def _body(document: object, where: str) -> RobogenPart:
 
 def _check_connected(root: RobogenPart, count: int, where: str) -> None:
     """Raise if some parts form a ring that is not connected to the core."""
-    waiting, reached = [root], 0
-    while waiting:
-        reached += 1
-        waiting += waiting.pop().children.values()
-    if reached != count:
+    if apart := count - len(root.subtree()):
         raise InvalidRobot(
-            f"{where}: body.connection: {count - reached} parts are not connected to "
-            "the core"
+            f"{where}: body.connection: {apart} parts are not connected to the core"
         )
 
 

@@ -47,7 +47,9 @@ def robot_from_robogen_text(text: str, where: str, space: BodySpace) -> Robot:
     """
     sections = _sections(text, where)
     root = _body(next(sections), where)
-    numbers = _counts(root)
+    # Of each part: its input and output neurons, then the hidden ones so far.
+    kinds = {part.name: BUILT_IN[part.kind] for part in root.subtree()}
+    numbers = {name: kind.inputs + kind.outputs for name, kind in kinds.items()}
     theirs = RobogenRobot(root)
     for line, words in next(sections, []):
         part, kind = _exactly(words, ("PART", "TYPE"), line)
@@ -126,18 +128,6 @@ def _graft(parent: RobogenPart, slot: int, child: RobogenPart) -> None:
             f"{child.where}: {parent.name!r} has {free} free slots, got slot {slot}"
         )
     parent.children[own] = child
-
-
-def _counts(root: RobogenPart) -> dict[str, int]:
-    """Return the number of input and output neurons of each part by name."""
-    counts: dict[str, int] = {}
-    waiting = [root]
-    while waiting:
-        part = waiting.pop()
-        kind = BUILT_IN[part.kind]
-        counts[part.name] = kind.inputs + kind.outputs
-        waiting += part.children.values()
-    return counts
 
 
 def _read_parameters(theirs: RobogenRobot, words: list[str], line: str) -> None:

@@ -7,13 +7,15 @@ refused, so that no document contains itself.
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 
 import yaml
 
 from schema.errors import InvalidRobot, nearest
+
+T = TypeVar("T", int, float)
 
 _SLOT = re.compile("0|[1-9][0-9]{0,3}")
 
@@ -161,13 +163,7 @@ class Table:
         Raises:
             InvalidRobot: no such key and no default, or not a whole number.
         """
-        if default is not None and key not in self._values:
-            return default
-        try:
-            return int(self.text(key))
-        except ValueError:
-            shown = _shown(self._node(key))
-            self.refuse(key, f"must be a whole number, got {shown}")
+        return self._number(key, default, int, "a whole number")
 
     def number(self, key: str, default: float | None = None) -> float:
         """Return the finite number of a key.
@@ -175,15 +171,19 @@ class Table:
         Raises:
             InvalidRobot: no such key and no default, or not a finite number.
         """
+        return self._number(key, default, float, "a finite number")
+
+    def _number(
+        self, key: str, default: T | None, parse: Callable[[str], T], what: str
+    ) -> T:
         if default is not None and key not in self._values:
             return default
         try:
-            value = float(self.text(key))
+            value = parse(self.text(key))
         except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            shown = _shown(self._node(key))
-            self.refuse(key, f"must be a finite number, got {shown}")
+            value = None
+        if value is None or not math.isfinite(value):
+            self.refuse(key, f"must be {what}, got {_shown(self._node(key))}")
         return value
 
     def key_as_slot(self, key: str) -> int:

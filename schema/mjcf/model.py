@@ -21,7 +21,7 @@ import numpy as np
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.mjcf.footing import footprint, standing_height
-from schema.mjcf.world import add_ground, set_options
+from schema.mjcf.world import add_ground, set_contacts, set_options
 from schema.parts import IDENTITY, BodySpace, Joint, PartType
 from schema.robot.frames import place_parts, shapes_of
 from schema.robot.results import Floats
@@ -104,19 +104,6 @@ def solo_spec(
     return spec
 
 
-def solo_model(
-    robot: Robot,
-    space: BodySpace,
-    simulation: Simulation,
-    environment: Environment,
-    *,
-    furnish: Furnish | None = None,
-) -> mujoco.MjModel:
-    """Return the compiled ``solo_spec``."""
-    spec = solo_spec(robot, space, simulation, environment, furnish=furnish)
-    return spec.compile()
-
-
 def shared_model(
     robots: Sequence[tuple[str, mujoco.MjSpec]],
     simulation: Simulation,
@@ -167,11 +154,8 @@ class _Builder:
     def _set_defaults(self) -> None:
         spec, simulation = self.spec, self.simulation
         spec.compiler.degree = False
-        geom = spec.default.geom
-        geom.type = mujoco.mjtGeom.mjGEOM_BOX
-        geom.condim = 3
-        geom.friction = (simulation.friction, 0.0, 0.0)
-        geom.solref = (simulation.contact_time_s, 1.0)
+        spec.default.geom.type = mujoco.mjtGeom.mjGEOM_BOX
+        set_contacts(spec, simulation)
         joint = spec.default.joint
         joint.type = mujoco.mjtJoint.mjJNT_HINGE
         joint.limited = 1

@@ -27,15 +27,13 @@ def set_options(
 
     Args:
         spec: of the world.
-        simulation: time step and strength of gravity.
+        simulation: time step, strength of gravity and contacts.
         environment: its slope.
         is_single: the world has one robot, so contact islands are not needed.
     """
     option = spec.option
     option.timestep = simulation.timestep_s
-    gravity, (x, y, z) = simulation.gravity, environment.down
-    # As in ``gravity_vector``: no negative zero.
-    option.gravity = 0.0 + gravity * x, gravity * y, gravity * z
+    option.gravity = environment.gravity_vector(simulation.gravity)
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.solver = mujoco.mjtSolver.mjSOL_NEWTON
@@ -51,6 +49,15 @@ def set_options(
         # One spec of a robot can be attached to many worlds.
         spec.copy_during_attach = True
     option.disableflags |= int(disabled)
+    set_contacts(spec, simulation)
+
+
+def set_contacts(spec: mujoco.MjSpec, simulation: Simulation) -> None:
+    """Set the default contacts of a spec's geoms."""
+    geom = spec.default.geom
+    geom.condim = 3
+    geom.friction = (simulation.friction, 0.0, 0.0)
+    geom.solref = (simulation.contact_time_s, 1.0)
 
 
 def add_ground(
@@ -60,7 +67,7 @@ def add_ground(
 
     Args:
         spec: of the world.
-        simulation: friction and contact.
+        simulation: default contacts of scenery.
         environment: rough ground becomes the geom ``rough``, scenery ``scenery/{k}``.
 
     Raises:
@@ -70,19 +77,14 @@ def add_ground(
         name="ground",
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=(0.0, 0.0, 1.0),
-        condim=3,
-        friction=(simulation.friction, 0.0, 0.0),
-        solref=(simulation.contact_time_s, 1.0),
     )
     if environment.roughness_m:
-        _add_relief(spec, simulation, environment)
+        _add_relief(spec, environment)
     if environment.scenery:
         add_scenery(spec, environment.scenery, simulation)
 
 
-def _add_relief(
-    spec: mujoco.MjSpec, simulation: Simulation, environment: Environment
-) -> None:
+def _add_relief(spec: mujoco.MjSpec, environment: Environment) -> None:
     shares, extent = relief(environment), environment.extent_m
     field = spec.add_hfield()
     field.name, (field.nrow, field.ncol) = "rough", shares.shape
@@ -92,13 +94,10 @@ def _add_relief(
         name="rough",
         type=mujoco.mjtGeom.mjGEOM_HFIELD,
         hfieldname="rough",
-        condim=3,
-        friction=(simulation.friction, 0.0, 0.0),
-        solref=(simulation.contact_time_s, 1.0),
     )
 
 
-def add_ring_wall(spec: mujoco.MjSpec, arena: Arena, simulation: Simulation) -> None:
+def add_ring_wall(spec: mujoco.MjSpec, arena: Arena) -> None:
     """Add a ring of straight walls about the origin, if the arena has one.
 
     The inner faces touch the circle of ``wall_diameter_m`` from outside; geoms are
@@ -121,7 +120,4 @@ def add_ring_wall(spec: mujoco.MjSpec, arena: Arena, simulation: Simulation) -> 
                 0.5 * arena.wall_height_m,
             ),
             quat=(np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)),
-            condim=3,
-            friction=(simulation.friction, 0.0, 0.0),
-            solref=(simulation.contact_time_s, 1.0),
         )

@@ -21,15 +21,10 @@ from schema.parts import Parameter
 Layer = Literal["input", "output", "hidden"]
 LAYERS: tuple[Layer, ...] = ("input", "output", "hidden")
 
+_WEIGHTED = (Parameter("bias", -1.0, 1.0, 0.0), Parameter("gain", 0.0, 1.0, 0.5))
 NEURON_TYPES: dict[str, tuple[Parameter, ...]] = {
-    "Simple": (
-        Parameter("bias", -1.0, 1.0, 0.0),
-        Parameter("gain", 0.0, 1.0, 0.5),
-    ),
-    "Sigmoid": (
-        Parameter("bias", -1.0, 1.0, 0.0),
-        Parameter("gain", 0.0, 1.0, 0.5),
-    ),
+    "Simple": _WEIGHTED,
+    "Sigmoid": _WEIGHTED,
     "Oscillator": (
         Parameter("period", 0.0, 10.0, 5.0),
         Parameter("phase_offset", 0.0, 3.14, 0.0),

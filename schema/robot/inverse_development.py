@@ -1,6 +1,6 @@
 """Genome of a given robot: the inverse of development."""
 
-from schema.robot.brain import Brain, Connection, Layer
+from schema.robot.brain import Brain, Layer
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, assemble
 from schema.robot.robot import Part, Robot
 
@@ -18,8 +18,12 @@ def genome_of(robot: Robot) -> Genome:
     neurons, places = _shares(robot.brain)
     connections: dict[int, list[ConnectionGene]] = {}
     for edge in robot.brain.connections:
-        owner, gene = _connection(edge, places, robot.parts)
-        connections.setdefault(owner, []).append(gene)
+        part, layer, offset = places[edge.source]
+        end, end_layer, end_offset = places[edge.target]
+        path = _path(part, end, robot.parts)
+        target = (end_layer, end_offset)
+        gene = ConnectionGene((layer, offset), path, target, edge.weight)
+        connections.setdefault(part, []).append(gene)
     return assemble(
         robot.parts,
         lambda index: (
@@ -45,17 +49,6 @@ def _shares(
         places.append((neuron.part, neuron.layer, len(share)))
         share.append(NeuronGene(neuron.kind, neuron.parameters))
     return shares, places
-
-
-def _connection(
-    edge: Connection, places: list[Place], parts: tuple[Part, ...]
-) -> tuple[int, ConnectionGene]:
-    """Return the source part of a connection, and its gene."""
-    part, layer, offset = places[edge.source]
-    end, end_layer, end_offset = places[edge.target]
-    path = _path(part, end, parts)
-    gene = ConnectionGene((layer, offset), path, (end_layer, end_offset), edge.weight)
-    return part, gene
 
 
 def _path(start: int, end: int, parts: tuple[Part, ...]) -> tuple[int, ...]:

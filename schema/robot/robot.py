@@ -12,7 +12,7 @@ from msgspec import Struct
 
 from schema.errors import InvalidRobot
 from schema.parts import BodySpace, PartType
-from schema.robot.brain import Brain, Layer, check_brain
+from schema.robot.brain import Brain, check_brain
 
 ORIENTATIONS = (0, 90, 180, 270)
 GENES = 2**64
@@ -154,20 +154,15 @@ def check_body(parts: Sequence[Part], space: BodySpace) -> None:
         _check_part(part, index, space)
         if index == 0:
             continue
-        parent = parts[part.parent]
-        if part.parent_slot >= space[parent.kind].arity:
-            raise _no_slot(index, "parent_slot", parent, part.parent_slot, space)
-        if part.slot >= space[part.kind].arity:
-            raise _no_slot(index, "slot", part, part.slot, space)
-
-
-def _no_slot(
-    index: int, name: str, owner: Part, slot: int, space: BodySpace
-) -> InvalidRobot:
-    return InvalidRobot(
-        f"body.parts[{index}].{name}: {owner.kind} has slots "
-        f"0..{space[owner.kind].arity - 1}, got {slot}"
-    )
+        for name, slot, kind in (
+            ("parent_slot", part.parent_slot, space[parts[part.parent].kind]),
+            ("slot", part.slot, space[part.kind]),
+        ):
+            if slot >= kind.arity:
+                raise InvalidRobot(
+                    f"body.parts[{index}].{name}: {kind.name} has slots "
+                    f"0..{kind.arity - 1}, got {slot}"
+                )
 
 
 def _check_part(part: Part, index: int, space: BodySpace) -> None:
@@ -225,14 +220,11 @@ def _check_order(parts: Sequence[Part]) -> None:
 def _check_wiring(robot: Robot, space: BodySpace) -> None:
     """Raise unless inputs and outputs match the sensors and motors."""
     kinds = [space[part.kind] for part in robot.parts]
-    _check_owners(robot, "input", [kind.inputs for kind in kinds])
-    _check_owners(robot, "output", [kind.outputs for kind in kinds])
-
-
-def _check_owners(robot: Robot, layer: Layer, counts: Sequence[int]) -> None:
-    expected = [index for index, count in enumerate(counts) for _ in range(count)]
-    owners = [n.part for n in robot.brain.neurons if n.layer == layer]
-    if owners != expected:
-        raise InvalidRobot(
-            f"brain: {layer} neurons must belong to parts {expected}, got {owners}"
-        )
+    inputs, outputs = [kind.inputs for kind in kinds], [kind.outputs for kind in kinds]
+    for layer, counts in (("input", inputs), ("output", outputs)):
+        expected = [part for part, count in enumerate(counts) for _ in range(count)]
+        owners = [n.part for n in robot.brain.neurons if n.layer == layer]
+        if owners != expected:
+            raise InvalidRobot(
+                f"brain: {layer} neurons must belong to parts {expected}, got {owners}"
+            )

@@ -18,6 +18,7 @@ Columns of several tables:
 - ``fitness``: higher is better.
 """
 
+from itertools import chain
 from typing import Any
 
 import pyarrow as pa
@@ -33,32 +34,45 @@ VERSION = 2
 Row = dict[str, Any]
 
 
-def _column(
-    name: str,
+TABLES: dict[str, pa.Schema] = {}
+"""Schemas by table name; each table below adds itself."""
+
+
+def _columns(
+    names: str,
     kind: pa.DataType,
     unit: str = "",
     *,
     is_repeatable: bool = True,
     is_nullable: bool = False,
     absent: int | None = None,
-) -> pa.Field:
-    """Return a column; ``absent`` is its value in rows that are older than it."""
+) -> list[pa.Field]:
+    """Return columns of one type, given their names with spaces between.
+
+    ``absent`` is their value in rows that are older than they.
+    """
     metadata = {"unit": unit, "repeatable": "true" if is_repeatable else "false"}
     if absent is not None:
         metadata["absent"] = str(absent)
-    return pa.field(name, kind, nullable=is_nullable, metadata=metadata)
+    return [
+        pa.field(name, kind, nullable=is_nullable, metadata=metadata)
+        for name in names.split()
+    ]
 
 
-def _table(name: str, *columns: pa.Field, is_repeatable: bool = True) -> pa.Schema:
+def _table(
+    name: str, *columns: list[pa.Field], is_repeatable: bool = True
+) -> pa.Schema:
     """Return a schema; ``is_repeatable`` false holds for all of its columns."""
     metadata = {"revolve.schema": name, "revolve.schema_version": str(VERSION)}
-    fields = [_column("record", pa.int64()), *columns]
+    fields = list(chain(_columns("record", pa.int64()), *columns))
     if not is_repeatable:
         fields = [
             field.with_metadata(field.metadata | {b"repeatable": b"false"})
             for field in fields
         ]
-    return pa.schema(fields, metadata=metadata)
+    TABLES[name] = pa.schema(fields, metadata=metadata)
+    return TABLES[name]
 
 
 def _inner(name: str, kind: pa.DataType) -> pa.Field:
@@ -82,29 +96,31 @@ PART = pa.struct(
 )
 """Part of a body; the fields are those of ``schema.robot.robot.Part``."""
 
-_BIRTH_ISLAND = _column("birth_island", pa.int32(), is_nullable=True)
+_ISLAND = _columns("island", pa.int32())
+_INDIVIDUAL = [
+    *_ISLAND,
+    *_columns("birth_island", pa.int32(), is_nullable=True),
+    *_columns("birth", pa.int64()),
+]
+_OUTCOME = [
+    *_columns("fitness", pa.float64(), is_nullable=True),
+    *_columns("path_velocity straight_velocity", pa.float64(), "m/s", is_nullable=True),
+    *_columns("simulated_s", pa.float64(), "s", is_nullable=True),
+]
 
 BIRTHS = _table(
     "births",
-    _column("island", pa.int32()),
-    _column("birth", pa.int64()),
-    _column("parents", pa.list_(_inner("item", PARENT))),
-    _column("generation", pa.int32(), is_nullable=True),
-    _column("rank", pa.int32()),
-    _column("attempts", pa.int32()),
-    _column("genome", pa.binary()),
-    _column("body", pa.list_(_inner("item", PART)), "params: m, rad, 1 by type"),
-    _column("parts", pa.int32()),
-    _column("joints", pa.int32()),
-    _column("motors", pa.int32()),
-    _column("extremities", pa.int32()),
-    _column("inputs", pa.int32()),
-    _column("outputs", pa.int32()),
-    _column("hidden", pa.int32()),
-    _column("connections", pa.int32()),
-    _column("sim_time_s", pa.float64(), "s", is_nullable=True),
-    _column("x", pa.float64(), "m", is_nullable=True),
-    _column("y", pa.float64(), "m", is_nullable=True),
+    _ISLAND,
+    _columns("birth", pa.int64()),
+    _columns("parents", pa.list_(_inner("item", PARENT))),
+    _columns("generation", pa.int32(), is_nullable=True),
+    _columns("rank attempts", pa.int32()),
+    _columns("genome", pa.binary()),
+    _columns("body", pa.list_(_inner("item", PART)), "params: m, rad, 1 by type"),
+    _columns("parts joints motors extremities", pa.int32()),
+    _columns("inputs outputs hidden connections", pa.int32()),
+    _columns("sim_time_s", pa.float64(), "s", is_nullable=True),
+    _columns("x y", pa.float64(), "m", is_nullable=True),
 )
 """One row per individual born.
 
@@ -120,19 +136,12 @@ BIRTHS = _table(
 
 EVALUATIONS = _table(
     "evaluations",
-    _column("island", pa.int32()),
-    _BIRTH_ISLAND,
-    _column("birth", pa.int64()),
-    _column("trial", pa.int32(), absent=0),
-    _column("status", pa.string()),
-    _column("reason", pa.string()),
-    _column("fitness", pa.float64(), is_nullable=True),
-    _column("path_velocity", pa.float64(), "m/s", is_nullable=True),
-    _column("straight_velocity", pa.float64(), "m/s", is_nullable=True),
-    _column("simulated_s", pa.float64(), "s", is_nullable=True),
-    _column("wall_s", pa.float64(), "s", is_repeatable=False),
-    _column("worker", pa.string(), is_repeatable=False),
-    _column("platform", pa.string(), is_repeatable=False),
+    _INDIVIDUAL,
+    _columns("trial", pa.int32(), absent=0),
+    _columns("status reason", pa.string()),
+    _OUTCOME,
+    _columns("wall_s", pa.float64(), "s", is_repeatable=False),
+    _columns("worker platform", pa.string(), is_repeatable=False),
 )
 """One row per finished evaluation.
 
@@ -145,11 +154,11 @@ EVALUATIONS = _table(
 
 POPULATION = _table(
     "population",
-    _column("island", pa.int32()),
-    _column("births", pa.int64()),
-    _BIRTH_ISLAND,
-    _column("birth", pa.int64()),
-    _column("fitness", pa.float64(), is_nullable=True),
+    _ISLAND,
+    _columns("births", pa.int64()),
+    _columns("birth_island", pa.int32(), is_nullable=True),
+    _columns("birth", pa.int64()),
+    _columns("fitness", pa.float64(), is_nullable=True),
 )
 """One row per individual alive when ``births`` individuals had been born.
 
@@ -159,16 +168,13 @@ is null if the evaluation failed or the robot is not mature.
 
 FITNESS = _table(
     "fitness",
-    _column("island", pa.int32()),
-    _BIRTH_ISLAND,
-    _column("birth", pa.int64()),
-    _column("sim_time_s", pa.float64(), "s"),
-    _column("births", pa.int64()),
-    _column("age_s", pa.float64(), "s"),
-    _column("path_velocity", pa.float64(), "m/s"),
-    _column("straight_velocity", pa.float64(), "m/s"),
-    _column("fitness", pa.float64()),
-    _column("is_mature", pa.bool_()),
+    _INDIVIDUAL,
+    _columns("sim_time_s", pa.float64(), "s"),
+    _columns("births", pa.int64()),
+    _columns("age_s", pa.float64(), "s"),
+    _columns("path_velocity straight_velocity", pa.float64(), "m/s"),
+    _columns("fitness", pa.float64()),
+    _columns("is_mature", pa.bool_()),
 )
 """One row per living robot and sample of an arena, mature or not.
 
@@ -180,13 +186,11 @@ _COORDINATE = pa.float32()
 
 POSES = _table(
     "poses",
-    _column("island", pa.int32()),
-    _BIRTH_ISLAND,
-    _column("birth", pa.int64()),
-    _column("sim_time_s", pa.float64(), "s"),
-    *(_column(axis, _COORDINATE, "m") for axis in "xyz"),
-    *(_column(f"q{axis}", _COORDINATE) for axis in "wxyz"),
-    _column("angles", pa.list_(_inner("item", _COORDINATE)), "rad"),
+    _INDIVIDUAL,
+    _columns("sim_time_s", pa.float64(), "s"),
+    _columns("x y z", _COORDINATE, "m"),
+    _columns("qw qx qy qz", _COORDINATE),
+    _columns("angles", pa.list_(_inner("item", _COORDINATE)), "rad"),
 )
 """One row per living robot and recorded pose of an arena.
 
@@ -197,16 +201,12 @@ POSES = _table(
 
 DEATHS = _table(
     "deaths",
-    _column("island", pa.int32()),
-    _BIRTH_ISLAND,
-    _column("birth", pa.int64()),
-    _column("sim_time_s", pa.float64(), "s"),
-    _column("births", pa.int64()),
-    _column("reason", pa.string()),
-    _column("detail", pa.string()),
-    _column("x", pa.float64(), "m"),
-    _column("y", pa.float64(), "m"),
-    _column("z", pa.float64(), "m", is_nullable=True),
+    _INDIVIDUAL,
+    _columns("sim_time_s", pa.float64(), "s"),
+    _columns("births", pa.int64()),
+    _columns("reason detail", pa.string()),
+    _columns("x y", pa.float64(), "m"),
+    _columns("z", pa.float64(), "m", is_nullable=True),
 )
 """One row per robot that left an arena.
 
@@ -220,14 +220,10 @@ DEATHS = _table(
 
 TOUCHES = _table(
     "touches",
-    _column("island", pa.int32()),
-    _BIRTH_ISLAND,
-    _column("birth", pa.int64()),
-    _column("other_island", pa.int32()),
-    _column("other_birth", pa.int64()),
-    _column("sim_time_s", pa.float64(), "s"),
-    _column("over_s", pa.float64(), "s"),
-    _column("duration_s", pa.float64(), "s"),
+    _INDIVIDUAL,
+    _columns("other_island", pa.int32()),
+    _columns("other_birth", pa.int64()),
+    _columns("sim_time_s over_s duration_s", pa.float64(), "s"),
 )
 """One row per pair of robots that touched during an interval of an arena.
 
@@ -238,14 +234,12 @@ TOUCHES = _table(
 
 MIGRATIONS = _table(
     "migrations",
-    _column("island", pa.int32()),
-    _column("to", pa.int32()),
-    _column("epoch", pa.int64()),
-    _column("births", pa.int64()),
-    _column("sim_time_s", pa.float64(), "s", is_nullable=True),
-    _column("birth_island", pa.int32()),
-    _column("birth", pa.int64()),
-    _column("fitness", pa.float64(), is_nullable=True),
+    _columns("island to", pa.int32()),
+    _columns("epoch births", pa.int64()),
+    _columns("sim_time_s", pa.float64(), "s", is_nullable=True),
+    _columns("birth_island", pa.int32()),
+    _columns("birth", pa.int64()),
+    _columns("fitness", pa.float64(), is_nullable=True),
 )
 """One row per migrant sent.
 
@@ -257,17 +251,12 @@ MIGRATIONS = _table(
 
 AUDITS = _table(
     "audits",
-    _column("island", pa.int32()),
-    _column("birth", pa.int64()),
-    _column("trial", pa.int32()),
-    _column("agrees", pa.bool_()),
-    _column("worker", pa.string()),
-    _column("platform", pa.string()),
-    _column("reason", pa.string()),
-    _column("fitness", pa.float64(), is_nullable=True),
-    _column("path_velocity", pa.float64(), "m/s", is_nullable=True),
-    _column("straight_velocity", pa.float64(), "m/s", is_nullable=True),
-    _column("simulated_s", pa.float64(), "s", is_nullable=True),
+    _ISLAND,
+    _columns("birth", pa.int64()),
+    _columns("trial", pa.int32()),
+    _columns("agrees", pa.bool_()),
+    _columns("worker platform reason", pa.string()),
+    _OUTCOME,
     is_repeatable=False,
 )
 """Two rows per evaluation that two workers did, one for the answer of each.
@@ -279,11 +268,9 @@ to audit, so no column is repeatable.
 
 DRIFTS = _table(
     "drifts",
-    _column("island", pa.int32()),
-    _column("step", pa.int64()),
-    _column("before", pa.string()),
-    _column("after", pa.string()),
-    _column("worker", pa.string()),
+    _ISLAND,
+    _columns("step", pa.int64()),
+    _columns("before after worker", pa.string()),
     is_repeatable=False,
 )
 """One row per arena that moved to a worker of another platform.
@@ -297,16 +284,13 @@ _INSTANT = pa.timestamp("ms", tz="UTC")
 
 RUNS = _table(
     "runs",
-    _column("name", pa.string()),
-    _column("run", pa.int32()),
-    _column("seed", pa.uint64()),
-    _column("document", pa.string()),
-    _column("state", pa.string()),
-    _column("versions", pa.string(), is_repeatable=False),
-    _column("platform", pa.string(), is_repeatable=False),
-    _column("cpu_flags", pa.string(), is_repeatable=False),
-    _column("start", _INSTANT, is_repeatable=False),
-    _column("end", _INSTANT, is_repeatable=False, is_nullable=True),
+    _columns("name", pa.string()),
+    _columns("run", pa.int32()),
+    _columns("seed", pa.uint64()),
+    _columns("document state", pa.string()),
+    _columns("versions platform cpu_flags", pa.string(), is_repeatable=False),
+    _columns("start", _INSTANT, is_repeatable=False),
+    _columns("end", _INSTANT, is_repeatable=False, is_nullable=True),
 )
 """One row, which describes the run.
 
@@ -319,21 +303,6 @@ RUNS = _table(
 No column may be named ``experiment``: a folder of finished runs has that name, and
 readers of a campaign make a column of it.
 """
-
-TABLES: dict[str, pa.Schema] = {
-    "births": BIRTHS,
-    "evaluations": EVALUATIONS,
-    "population": POPULATION,
-    "fitness": FITNESS,
-    "poses": POSES,
-    "deaths": DEATHS,
-    "touches": TOUCHES,
-    "migrations": MIGRATIONS,
-    "audits": AUDITS,
-    "drifts": DRIFTS,
-    "runs": RUNS,
-}
-"""Schemas by table name."""
 
 
 def read_columns(table: str, columns: bytes) -> pa.Table:

@@ -14,13 +14,14 @@ import pytest
 from analyzer.report import analyze
 from coordinator.evolution.generation import generate
 from schema.experiment.file import read_experiment
+from schema.experiment.settings import arena_settings_of
 from tests.benchmarks.arena_timing import (
     ArenaTiming,
     Stopwatch,
     even_places,
     time_arena,
 )
-from worker.bench.arena_bench import RobotSource, arena_settings_of
+from worker.bench.arena_bench import RobotSource
 from worker.bench.arena_timing import insertions, quadratic_fit
 
 EXPERIMENT = read_experiment("scenario3")
@@ -33,14 +34,18 @@ def measure(count: int, seconds: int, *, threads: int = 1, bare: bool) -> ArenaT
     """Time an arena of random robots with births, at 30 robots per disc of 2 m."""
     radius_m = 2.0 * math.sqrt(count / 30)
     born = math.ceil(seconds * count / 30 / BIRTH_S)
-    robots = RobotSource(generate, analyze).vetted(EXPERIMENT, count + born, seed=3)
+    robots = RobotSource(generate, analyze).robots(
+        EXPERIMENT, count + born, seed=3, is_vetted=True
+    )
     rng = np.random.default_rng(3)
+    places = even_places(rng, count, radius_m) + even_places(rng, born, radius_m)
+    inserted = insertions(robots, places)
     found = time_arena(
         SETTINGS,
-        insertions(robots[:count], even_places(rng, count, radius_m)),
+        inserted[:count],
         seconds=seconds,
         threads=threads,
-        spares=insertions(robots[count:], even_places(rng, born, radius_m), count),
+        spares=inserted[count:],
         warm_up_s=2,
         measures_bare=bare,
     )

@@ -20,7 +20,9 @@ SETTINGS = EvaluationSettings(
 @pytest.mark.benchmark
 @pytest.mark.slow
 def test_engine_steps_are_most_of_the_time_of_an_evaluation() -> None:
-    robots = RobotSource(generate, analyze).random(EXPERIMENT, 30, seed=1)
+    robots = RobotSource(generate, analyze).robots(
+        EXPERIMENT, 30, seed=1, is_vetted=False
+    )
     timing = time_evaluations(robots, SETTINGS)
     assert timing.ratio >= LEAST_RATIO, timing
 

@@ -69,7 +69,7 @@ class Oracle:
         types = body_space(settings.space)
         prefixes = [f"{number}/" for number in range(len(self._births))]
         specs = [
-            robot_spec(one.phenotype, types, settings.simulation).spec
+            robot_spec(one.body.robot, types, settings.simulation).spec
             for one in population.robots
         ]
         self._model = shared_model(

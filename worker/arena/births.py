@@ -7,15 +7,12 @@ import numpy as np
 
 from schema.errors import UnexpectedEvent, one_line
 from schema.experiment.document import body_space
-from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot, check_robot
 from schema.wire.arena import Casualty, Changes, Insertion
-from schema.wire.codec import encode_robot
-from worker.clusters.models import Body
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot, Window
-from worker.robot.controller import Widths, pack
+from worker.robot.controller import pack
 
 
 def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> None:
@@ -51,7 +48,7 @@ def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> N
         birth = change.birth
         if birth not in new and (birth in gone or birth not in population):
             raise UnexpectedEvent(f"apply: {birth} does not live here")
-        body = robots[birth] if birth in new else population.find(birth).phenotype
+        body = robots[birth] if birth in new else population.find(birth).body.robot
         robots[birth] = Robot(body.parts, change.brain)
     for robot in robots.values():
         check_robot(robot, body_space(population.model_cache.settings.space))
@@ -114,45 +111,5 @@ def newborn(
         reason = f"physics diverged: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, place)
     window = Window(cache.settings.simulation, step)
-    robot = arena_robot(insertion.birth, insertion.robot, body, window, population)
-    robot.brain_start, robot.place = step, place
     window.add(step, place)
-    return robot
-
-
-def arena_robot(
-    birth: BirthId,
-    phenotype: Robot,
-    body: Body,
-    window: Window,
-    population: ArenaPopulation,
-) -> ArenaRobot:
-    """Return a robot in its own cluster, its network at rest."""
-    return ArenaRobot(
-        birth=birth,
-        phenotype=phenotype,
-        encoded=encode_robot(phenotype),
-        body=body,
-        view=body.solo.views[0],
-        network=pack(phenotype.brain, population.model_cache.width),
-        states=np.zeros(population.model_cache.width.states),
-        brain_start=0,
-        window=window,
-        place=(0.0, 0.0, 0.0),
-    )
-
-
-def replace_brain(robot: ArenaRobot, brain: Brain, width: Widths, start: int) -> None:
-    """Replace a robot's brain; all neuron states are 0.
-
-    Args:
-        robot: the robot; its commands are held until its next tick.
-        brain: new brain, which fits its body.
-        width: of every network.
-        start: step of that tick, from which the brain's age counts.
-    """
-    robot.phenotype = Robot(robot.phenotype.parts, brain)
-    robot.encoded = encode_robot(robot.phenotype)
-    robot.network = pack(brain, width)
-    robot.states = np.zeros_like(robot.states)
-    robot.brain_start = start
+    return ArenaRobot(insertion.birth, body, cache.width, window, place)

@@ -2,7 +2,6 @@
 
 import math
 
-import mujoco
 import numpy as np
 
 from schema.robot.ids import BirthId
@@ -11,6 +10,7 @@ from schema.wire.arena import Casualty
 from worker.clusters.cluster import Cluster
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.rollout import PLAUSIBLE, Rollout
+from worker.robot.evaluation import warning_names
 
 FASTEST_CORE = 20.0
 """Core speed above which the physics is broken [m/s]; a fall from the thesis's
@@ -45,7 +45,7 @@ def diverged(
             problem = cluster.failure
         if reads_warnings or not is_plausible:
             reasons = {} if is_plausible else _reasons(cluster, moment)
-            problem = problem or _warnings(cluster, moment)
+            problem = problem or warning_names(cluster.history.warnings[moment])
         if problem and not reasons:
             reasons = dict.fromkeys(cluster.members, f"physics diverged: {problem}")
         found += [
@@ -80,13 +80,3 @@ def _reason(positions: Floats, velocities: Floats) -> str:
     if speed > FASTEST_CORE:
         return f"core at {speed:.3g} m/s, more than {FASTEST_CORE:g} m/s"
     return ""
-
-
-def _warnings(cluster: Cluster, moment: int) -> str:
-    counts = cluster.history.warnings[moment]
-    if not counts.any():
-        return ""
-    return ", ".join(
-        mujoco.mjtWarning(index).name.removeprefix("mjWARN_")
-        for index in counts.nonzero()[0].tolist()
-    )

@@ -38,8 +38,10 @@ class Poses:
             roots, angles = state[layout.roots], state[layout.joints]
             self._samples.append((step, layout, roots, angles))
 
-    def columns(self) -> bytes:
-        """Return all samples as an Arrow IPC stream; no bytes for no samples.
+    def take(self) -> bytes:
+        """Return all samples as an Arrow IPC stream and forget them.
+
+        Without samples there are no bytes.
 
         The columns name robots by birth only. The requester of the advance adds the
         arena.
@@ -47,6 +49,7 @@ class Poses:
         if not self._samples:
             return b""
         steps, layouts, roots, angles = zip(*self._samples, strict=True)
+        self._samples = []
         rows = [layout.robot_rows for layout in layouts]
         batch = pose_batch(
             islands=np.concatenate([each.islands for each in rows]),

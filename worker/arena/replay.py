@@ -65,8 +65,7 @@ def alone(
         positions.append(data.qpos.copy())
         times.append(float(data.time))
 
-    space, simulation, world = settings.space, settings.simulation, settings.environment
-    simulate(robot, space, simulation, world, identity=identity, watch=watch)
+    simulate(robot, settings, identity=identity, watch=watch)
     count, qpos = len(times), np.array(positions)
     rows = pose_batch(
         islands=np.full(count, identity.birth.island, dtype=np.int32),

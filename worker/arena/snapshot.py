@@ -15,11 +15,11 @@ from msgspec import Struct
 
 from schema.errors import MalformedMessage
 from schema.experiment.settings import ArenaSettings
+from schema.parts import Vector
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.wire.arena import Casualty
 from schema.wire.codec import decode_robot
-from worker.arena.births import arena_robot
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot, Window
 
@@ -30,7 +30,7 @@ FORMAT = 2
 class _RobotState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """State of one robot: phenotype, physics, sensors, network, window."""
 
-    birth: tuple[int, int]
+    birth: BirthId
     robot: bytes
     born: int
     brain_start: int
@@ -41,16 +41,7 @@ class _RobotState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
     velocities: bytes
     states: bytes
     window: bytes
-    place: tuple[float, float, float]
-
-
-class _CasualtyState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A robot that diverged and is not yet reported by an advance."""
-
-    birth: tuple[int, int]
-    step: int
-    reason: str
-    place: tuple[float, float, float]
+    place: Vector
 
 
 class _ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
@@ -60,7 +51,8 @@ class _ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
         settings: SHA-256 of the arena's settings.
         robots: by birth.
         clusters: members of each, as indices into the robots.
-        casualties: not yet reported.
+        casualties: birth, step, reason and place of robots that diverged and are not
+            yet reported by an advance.
     """
 
     format: int
@@ -68,7 +60,7 @@ class _ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
     step: int
     robots: list[_RobotState]
     clusters: list[list[int]]
-    casualties: list[_CasualtyState]
+    casualties: list[tuple[BirthId, int, str, Vector]]
 
 
 def write_snapshot(
@@ -92,10 +84,7 @@ def write_snapshot(
         step=step,
         robots=[_robot_state(robot) for robot in population.robots],
         clusters=[[rows[b] for b in c.members] for c in population.clusters],
-        casualties=[
-            _CasualtyState(_name(c.birth), c.step, c.reason, c.place)
-            for c in casualties
-        ],
+        casualties=[(c.birth, c.step, c.reason, c.place) for c in casualties],
     )
     return msgspec.msgpack.encode(state)
 
@@ -132,9 +121,7 @@ def read_snapshot(
     births = [robot.birth for robot in population.robots]
     population.regroup([tuple(births[row] for row in g) for g in state.clusters])
     population.merges = population.splits = 0
-    return state.step, [
-        Casualty(BirthId(*c.birth), c.step, c.reason, c.place) for c in state.casualties
-    ]
+    return state.step, [Casualty(*fields) for fields in state.casualties]
 
 
 def _digest(settings: ArenaSettings) -> bytes:
@@ -142,14 +129,10 @@ def _digest(settings: ArenaSettings) -> bytes:
     return hashlib.sha256(msgspec.json.encode(settings)).digest()
 
 
-def _name(birth: BirthId) -> tuple[int, int]:
-    return birth.island, birth.number
-
-
 def _robot_state(robot: ArenaRobot) -> _RobotState:
     view, sensors = robot.view, robot.view.sensors
     return _RobotState(
-        birth=_name(robot.birth),
+        birth=robot.birth,
         robot=robot.encoded,
         born=robot.window.born,
         brain_start=robot.brain_start,
@@ -165,12 +148,12 @@ def _robot_state(robot: ArenaRobot) -> _RobotState:
 
 
 def _restored(state: _RobotState, population: ArenaPopulation) -> ArenaRobot:
-    birth, phenotype = BirthId(*state.birth), decode_robot(state.robot)
-    body = population.model_cache.body(birth, phenotype)
-    window = Window(population.model_cache.settings.simulation, state.born)
+    cache = population.model_cache
+    body = cache.body(state.birth, decode_robot(state.robot))
+    window = Window(cache.settings.simulation, state.born)
     for x, y, z in _unpack(state.window, -1, 3).tolist():
         window.positions.append((x, y, z))
-    robot = arena_robot(birth, phenotype, body, window, population)
+    robot = ArenaRobot(state.birth, body, cache.width, window, state.place)
     view, sensors = robot.view, robot.view.sensors
     view.qpos[:] = _unpack(state.qpos, *view.qpos.shape)
     view.qvel[:] = _unpack(state.qvel, *view.qvel.shape)
@@ -180,7 +163,7 @@ def _restored(state: _RobotState, population: ArenaPopulation) -> ArenaRobot:
         (x, y, z) for x, y, z in _unpack(state.velocities, -1, 3).tolist()
     ]
     robot.states = _unpack(state.states, *robot.states.shape)
-    robot.brain_start, robot.place = state.brain_start, state.place
+    robot.brain_start = state.brain_start
     return robot
 
 

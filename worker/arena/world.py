@@ -19,7 +19,7 @@ from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.wire.arena import Advance, Casualty, Changes, Insertion, Judgement
 from worker.arena.batched_control import BatchedControllers, BatchedIO
-from worker.arena.births import check_changes, newborn, replace_brain
+from worker.arena.births import check_changes, newborn
 from worker.arena.divergence import diverged
 from worker.arena.light import read_light
 from worker.arena.records import Contacts, Poses
@@ -81,7 +81,7 @@ class World:
         """Return the present poses: Arrow IPC of ``columns.POSES``."""
         now = Poses(self._settings.simulation.timestep_s)
         now.add(self.step, self.population.layout, self.population.layout.read())
-        return now.columns()
+        return now.take()
 
     def apply(self, changes: Changes) -> None:
         """Remove robots, insert robots, replace brains, in this order.
@@ -107,7 +107,7 @@ class World:
             robot = self.population.find(change.birth)
             start = self._schedule.next_tick(self.step)
             width = self.population.model_cache.width
-            replace_brain(robot, change.brain, width, start)
+            robot.set_brain(change.brain, width, start)
         if changes.removals or changes.insertions or changes.brains:
             self._controllers.gather(self.population.robots)
 
@@ -186,7 +186,10 @@ class World:
         is_merge = on.is_merge(step)
         if not (is_tick or is_sample or is_merge):
             return
-        self._remove_diverged(rollout)
+        reads_warnings = on.is_split(step)
+        self._remove(
+            diverged(self.population, rollout, step, reads_warnings=reads_warnings)
+        )
         if is_tick:
             self._tick(rollout.state)
         if is_sample:
@@ -232,11 +235,6 @@ class World:
         self.population.kinematics()
         self.population.merge()
 
-    def _remove_diverged(self, rollout: Rollout) -> None:
-        is_split = self._schedule.is_split(self.step)
-        found = diverged(self.population, rollout, self.step, reads_warnings=is_split)
-        self._remove(found)
-
     def _remove(self, casualties: Sequence[Casualty]) -> None:
         """Remove robots, to be reported by the present advance."""
         self._casualties += casualties
@@ -248,12 +246,11 @@ class World:
         found = [r.judgement(self.step, self._settings) for r in self.population.robots]
         self._remove([each for each in found if isinstance(each, Casualty)])
         casualties, self._casualties = tuple(self._casualties), []
-        poses, self._poses = self._poses, Poses(self._settings.simulation.timestep_s)
         return Advance(
             step=self.step,
             digest=self.digest(),
             judgements=tuple(each for each in found if isinstance(each, Judgement)),
             casualties=casualties,
             touches=() if self._contacts is None else self._contacts.take(),
-            poses=poses.columns(),
+            poses=self._poses.take(),
         )

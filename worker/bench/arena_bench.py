@@ -4,29 +4,34 @@ Source: Hupkes 2016, figures 6.1 and 7.1; the code of the original.
 """
 
 import argparse
+import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 from msgspec.structs import replace
 
-from schema.errors import ExperimentError, RevolveError
+from schema.errors import RevolveError
 from schema.experiment.document import Experiment, Vetting, body_space
 from schema.experiment.file import read_experiment
-from schema.experiment.settings import ArenaSettings
+from schema.experiment.settings import arena_settings_of
 from schema.flags import add_count, whole_number
 from schema.parts import BodySpace
 from schema.robot.genome import Genome, develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Report
 from schema.robot.robot import Robot
-from worker.bench import arena_timing as timing
+from worker.bench.arena_timing import (
+    birth_places,
+    insertions,
+    quadratic_fit,
+    time_arena,
+)
 from worker.bench.spider import CLEARANCE_M, grid, spider
 
 THESIS = (-0.26, 34.78, 20.41)
@@ -63,31 +68,28 @@ class RobotSource:
     generate: Callable[[np.random.Generator, Experiment, BirthId], Genome]
     analyze: Callable[[Robot, BodySpace, Vetting], Report]
 
-    def random(self, experiment: Experiment, count: int, seed: int) -> list[Robot]:
-        """Return random robots that are not vetted."""
-        rng, space = np.random.default_rng(seed), body_space(experiment.space)
-        return [
-            develop(self.generate(rng, experiment, BirthId(0, number)), space)
-            for number in range(count)
-        ]
-
-    def vetted(self, experiment: Experiment, count: int, seed: int) -> list[Robot]:
-        """Return random robots that can be built, as founders are."""
+    def robots(
+        self, experiment: Experiment, count: int, seed: int, *, is_vetted: bool
+    ) -> list[Robot]:
+        """Return random robots; if vetted, only those that can be built."""
         rng, space = np.random.default_rng(seed), body_space(experiment.space)
         robots: list[Robot] = []
         while len(robots) < count:
             genome = self.generate(rng, experiment, BirthId(0, len(robots)))
             robot = develop(genome, space)
-            if self.analyze(robot, space, experiment.vetting).is_viable:
+            if (
+                not is_vetted
+                or self.analyze(robot, space, experiment.vetting).is_viable
+            ):
                 robots.append(robot)
         return robots
 
 
 def add_commands(kinds: Any) -> None:  # noqa: ANN401 - argparse hides its type
     """Add the two benchmarks to the sub-commands of ``revolve bench``."""
-    for name, text, seconds, repetitions in (
-        ("arena", "random robots in one arena, thesis figure 6.1", 10, 20),
-        ("spider", "spiders on a grid, thesis figure 7.1", 5, 20),
+    for name, text, seconds in (
+        ("arena", "random robots in one arena, thesis figure 6.1", 10),
+        ("spider", "spiders on a grid, thesis figure 7.1", 5),
     ):
         parser = kinds.add_parser(name, help=text)
         add_experiment(parser, "scenario3")
@@ -100,9 +102,7 @@ def add_commands(kinds: Any) -> None:  # noqa: ANN401 - argparse hides its type
             help="numbers of robots (default: 5 10 ... 50)",
         )
         add_count(parser, "--seconds", seconds, "simulated seconds per repetition")
-        add_count(
-            parser, "--repetitions", repetitions, "repetitions per number of robots"
-        )
+        add_count(parser, "--repetitions", 20, "repetitions per number of robots")
         add_count(parser, "--threads", 1, "threads that simulate the arena")
         add_count(parser, "--seed", 1, "seed of the robots and their places", least=0)
         parser.add_argument("--out", type=Path, help="Parquet file for the results")
@@ -135,20 +135,17 @@ def run(options: argparse.Namespace, robots: RobotSource) -> int:
     """
     experiment = read_experiment(options.experiment)
     rows: list[Row] = []
-    with _kept(options.out) as keep:
+    with (
+        _opened(options.out or Path(os.devnull)) as file,
+        pq.ParquetWriter(file, RESULTS) as writer,
+    ):
         for size in options.sizes:
-            timings = (
-                _spiders(experiment, size, options)
-                if options.what == "spider"
-                else _random(experiment, size, options, robots)
-            )
-            new = [_row(options, number, each) for number, each in enumerate(timings)]
-            keep(new)
+            new = list(_rows(experiment, size, options, robots))
+            writer.write(pa.Table.from_pylist(new, schema=RESULTS))
             rows += new
-            factors = [row["factor"] for row in new]
-            _say(_line(size, factors, options.what))
+            _say(_line(size, [row["factor"] for row in new], options.what))
     if options.what == "arena" and len(options.sizes) >= len(THESIS):
-        found = timing.quadratic_fit(
+        found = quadratic_fit(
             [row["population"] for row in rows], [row["factor"] for row in rows]
         )
         _say(f"fit:    {_formula(found)}", f"thesis: {_formula(THESIS)}")
@@ -157,84 +154,48 @@ def run(options: argparse.Namespace, robots: RobotSource) -> int:
     return 0
 
 
-@contextmanager
-def _kept(path: Path | None) -> Iterator[Callable[[Sequence[Row]], None]]:
-    """Yield a function that appends rows to the file, if there is one.
+def _opened(path: Path) -> BinaryIO:
+    """Return a new file, opened before the first measurement.
 
     Raises:
-        RevolveError: the file cannot be written; raised before the first measurement.
+        RevolveError: it cannot be written.
     """
-    if path is None:
-        yield lambda _rows: None
-        return
     try:
-        file = path.open("wb")
+        return path.open("wb")
     except OSError as error:
         raise RevolveError(f"{path}: cannot be written: {error.strerror}") from None
-    with file, pq.ParquetWriter(file, RESULTS) as writer:
-        yield lambda rows: writer.write(pa.Table.from_pylist(rows, schema=RESULTS))
 
 
-def arena_settings_of(experiment: Experiment) -> ArenaSettings:
-    """Return the settings of an experiment's arena.
-
-    Raises:
-        ExperimentError: it is off-line.
-    """
-    if experiment.arena is None:
-        raise ExperimentError(f"{experiment.name}: has no [arena]")
-    return ArenaSettings(
-        space=experiment.space,
-        simulation=experiment.simulation,
-        fitness=experiment.fitness,
-        arena=experiment.arena,
-        environment=experiment.environment,
-    )
-
-
-def _random(
+def _rows(
     experiment: Experiment, size: int, options: argparse.Namespace, source: RobotSource
-) -> Iterable[timing.ArenaTiming]:
+) -> Iterator[Row]:
+    """Yield the row of each repetition with a number of robots."""
     settings = arena_settings_of(experiment)
+    if options.what == "spider":
+        settings = replace(settings, arena=replace(settings.arena, drop_m=CLEARANCE_M))
     for number in range(options.repetitions):
-        seed = options.seed + 1000 * size + number
-        robots = source.vetted(experiment, size, seed)
-        rng = np.random.default_rng(seed)
-        places = timing.birth_places(rng, size, settings)
-        yield timing.time_arena(
+        if options.what == "spider":
+            robots, places = [spider()] * size, grid(size)
+        else:
+            seed = options.seed + 1000 * size + number
+            robots = source.robots(experiment, size, seed, is_vetted=True)
+            places = birth_places(np.random.default_rng(seed), size, settings)
+        simulated_s, wall_s = time_arena(
             settings,
-            timing.insertions(robots, places),
+            insertions(robots, places),
             seconds=options.seconds,
             threads=options.threads,
         )
-
-
-def _spiders(
-    experiment: Experiment, size: int, options: argparse.Namespace
-) -> Iterable[timing.ArenaTiming]:
-    settings = arena_settings_of(experiment)
-    settings = replace(settings, arena=replace(settings.arena, drop_m=CLEARANCE_M))
-    for _ in range(options.repetitions):
-        yield timing.time_arena(
-            settings,
-            timing.insertions([spider()] * size, grid(size)),
-            seconds=options.seconds,
-            threads=options.threads,
-        )
-
-
-def _row(options: argparse.Namespace, number: int, found: timing.ArenaTiming) -> Row:
-    experiment = read_experiment(options.experiment)
-    return {
-        "benchmark": options.what,
-        "population": found.robots,
-        "repetition": number,
-        "threads": options.threads,
-        "step_s": experiment.simulation.timestep_s,
-        "simulated_s": found.simulated_s,
-        "wall_s": found.wall_s,
-        "factor": found.factor,
-    }
+        yield {
+            "benchmark": options.what,
+            "population": size,
+            "repetition": number,
+            "threads": options.threads,
+            "step_s": settings.simulation.timestep_s,
+            "simulated_s": simulated_s,
+            "wall_s": wall_s,
+            "factor": simulated_s / wall_s,
+        }
 
 
 def _line(size: int, factors: Sequence[float], what: str) -> str:

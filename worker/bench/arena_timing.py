@@ -6,7 +6,6 @@ Only this file and ``worker.bench.command`` read a clock; the timed code never d
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,26 +17,6 @@ from schema.wire.arena import Changes, Insertion
 from worker.arena.world import World
 
 Place = tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class ArenaTiming:
-    """Time that an arena took.
-
-    Attributes:
-        robots: number of robots at the start.
-        simulated_s: simulated time [s].
-        wall_s: wall time; CPU time of the thread if there is one thread [s].
-    """
-
-    robots: int
-    simulated_s: float
-    wall_s: float
-
-    @property
-    def factor(self) -> float:
-        """Real-time factor: simulated over wall time."""
-        return self.simulated_s / self.wall_s
 
 
 def birth_places(
@@ -64,15 +43,11 @@ def birth_places(
 
 
 def insertions(
-    robots: Sequence[Robot], places: Sequence[Place], first: int = 0
+    robots: Sequence[Robot], places: Sequence[Place]
 ) -> tuple[Insertion, ...]:
-    """Return insertions of robots at places, numbered from ``first``."""
-    return tuple(
-        Insertion(BirthId(0, number), robot, place)
-        for number, (robot, place) in enumerate(
-            zip(robots, places, strict=True), start=first
-        )
-    )
+    """Return insertions of robots at places, numbered from 0."""
+    pairs = enumerate(zip(robots, places, strict=True))
+    return tuple(Insertion(BirthId(0, number), *pair) for number, pair in pairs)
 
 
 def time_arena(
@@ -80,9 +55,11 @@ def time_arena(
     robots: Sequence[Insertion],
     *,
     seconds: int,
-    threads: int = 1,
-) -> ArenaTiming:
-    """Return the time that an arena takes.
+    threads: int,
+) -> tuple[float, float]:
+    """Return the simulated time of an arena and the time that it takes [s].
+
+    That is wall time, or CPU time of the thread if there is one thread.
 
     Args:
         settings: of the arena.
@@ -99,8 +76,7 @@ def time_arena(
         world.advance(world.step + second)
     wall_s = clock() - start
     world.close()
-    simulated_s = world.step * settings.simulation.timestep_s
-    return ArenaTiming(len(robots), simulated_s, wall_s)
+    return world.step * settings.simulation.timestep_s, wall_s
 
 
 def quadratic_fit(sizes: Sequence[int], factors: Sequence[float]) -> Floats:

@@ -6,13 +6,13 @@ bench arena' and 'revolve bench spider' repeat the thesis's benchmarks.
 """
 
 import argparse
-import sys
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
+import numpy as np
 from msgspec.structs import replace
 from rich.console import Console
 from rich.progress import track
@@ -20,9 +20,9 @@ from rich.progress import track
 from schema.errors import SimulationDiverged
 from schema.experiment.document import Experiment, Simulation, body_space
 from schema.experiment.file import parse_experiment, read_experiment
-from schema.experiment.settings import EvaluationSettings
+from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.flags import Flags, add_count
-from schema.mjcf.model import solo_model
+from schema.mjcf.model import solo_spec
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.bench import arena_bench, fidelity
@@ -96,11 +96,7 @@ def _commands(robot: Robot, settings: EvaluationSettings) -> list[Floats]:
     """Return the controls of each tick of a robot's evaluation."""
     found: list[Floats] = []
     evaluation.simulate(
-        robot,
-        settings.space,
-        settings.simulation,
-        settings.environment,
-        watch=lambda data: found.append(data.ctrl.copy()),
+        robot, settings, watch=lambda data: found.append(data.ctrl.copy())
     )
     return found
 
@@ -111,7 +107,7 @@ def _replay(
     """Return the time of the engine's steps under recorded controls [s]."""
     clock = settings.simulation
     space = body_space(settings.space)
-    model = solo_model(robot, space, clock, settings.environment)
+    model = solo_spec(robot, space, clock, settings.environment).compile()
     data = mujoco.MjData(model)
     left = clock.warmup_steps + clock.window_steps
     start = time.thread_time()
@@ -168,20 +164,15 @@ def _parser() -> argparse.ArgumentParser:
 
 def _evaluate(options: argparse.Namespace, source: arena_bench.RobotSource) -> int:
     experiment = read_experiment(options.experiment)
-    robots = source.random(experiment, options.robots, options.seed)
-    settings = EvaluationSettings(
-        space=experiment.space,
-        simulation=experiment.simulation,
-        fitness=experiment.fitness,
-        environment=experiment.environment,
-    )
+    robots = source.robots(experiment, options.robots, options.seed, is_vetted=False)
+    settings = evaluation_settings_of(experiment)
     timing = time_evaluations(_shown(robots, "random robots"), settings)
     each_s = timing.evaluation_s / timing.robots
-    _say(
+    print(
         f"{timing.robots} random robots: {1000 * each_s:.1f} ms CPU each, "
-        f"{1 / each_s:.0f} per second and core",
-        f"bare engine / evaluation: {timing.ratio:.3f} (promised: {LEAST_RATIO})",
+        f"{1 / each_s:.0f} per second and core"
     )
+    print(f"bare engine / evaluation: {timing.ratio:.3f} (promised: {LEAST_RATIO})")
     return 0 if timing.ratio >= LEAST_RATIO else 1
 
 
@@ -201,22 +192,18 @@ def _fidelity(options: argparse.Namespace) -> int:
         )
         for which, name in ((chosen, "robots drawn"), (best, "winners"))
     )
-    size = options.per_third
-    thirds = [found.of(slice(k * size, (k + 1) * size)) for k in range(fidelity.THIRDS)]
-    _say(
-        f"{len(chosen)} robots of {options.run}: Spearman {found.spearman:.4f} "
-        f"(promised: {LEAST_SPEARMAN}); mean {found.first.mean():.4f} here, "
-        f"{found.second.mean():.4f} there",
-        "  by thirds, least fit first: "
-        + ", ".join(f"{third.spearman:.3f}" for third in thirds),
-        *(
-            f"  winner {rank}: {here:.4f} here, {there:.4f} there"
-            for rank, (here, there) in enumerate(
-                zip(top.first, top.second, strict=True), start=1
-            )
-        ),
+    spearman = fidelity.spearman(*found)
+    thirds = np.split(found, fidelity.THIRDS, axis=1)
+    print(
+        f"{len(chosen)} robots of {options.run}: Spearman {spearman:.4f} "
+        f"(promised: {LEAST_SPEARMAN}); mean {found[0].mean():.4f} here, "
+        f"{found[1].mean():.4f} there"
     )
-    return 0 if found.spearman >= LEAST_SPEARMAN else 1
+    by_third = ", ".join(f"{fidelity.spearman(*third):.3f}" for third in thirds)
+    print(f"  by thirds, least fit first: {by_third}")
+    for rank, (here, there) in enumerate(top.T, start=1):
+        print(f"  winner {rank}: {here:.4f} here, {there:.4f} there")
+    return 0 if spearman >= LEAST_SPEARMAN else 1
 
 
 def _changed(experiment: Experiment, settings: Sequence[str]) -> Simulation:
@@ -233,7 +220,3 @@ def _shown(robots: Sequence[Robot], what: str) -> Iterable[Robot]:
     # No automatic refresh, as its time would be measured.
     console = Console(stderr=True)
     return track(robots, what, console=console, transient=True, auto_refresh=False)
-
-
-def _say(*lines: str) -> None:
-    sys.stdout.write("\n".join(lines) + "\n")

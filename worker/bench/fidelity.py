@@ -35,23 +35,6 @@ class Population:
     fitness: Floats
 
 
-@dataclass(frozen=True, slots=True)
-class Agreement:
-    """Fitness of the same robots, (N,) each, in two simulations [m/s]."""
-
-    first: Floats
-    second: Floats
-
-    @property
-    def spearman(self) -> float:
-        """Rank correlation of the two, in [-1, 1]."""
-        return spearman(self.first, self.second)
-
-    def of(self, rows: slice) -> "Agreement":
-        """Return the agreement of some of the robots."""
-        return Agreement(self.first[rows], self.second[rows])
-
-
 def read_population(folder: Path) -> Population:
     """Return the robots of a run and their fitness.
 
@@ -71,12 +54,9 @@ def read_population(folder: Path) -> Population:
     genomes = {
         (row["island"], row["birth"]): row["genome"] for row in births.to_pylist()
     }
+    evaluations = read_table(folder, "evaluations")
     columns = ["island", "birth", "fitness"]
-    evaluated = [
-        row
-        for row in read_table(folder, "evaluations").select(columns).to_pylist()
-        if row["fitness"] is not None
-    ]
+    evaluated = evaluations.select(columns).drop_null().to_pylist()
     return Population(
         experiment,
         tuple(
@@ -129,8 +109,10 @@ def finer(simulation: Simulation, factor: int = 5) -> Simulation:
 
 def compare(
     robots: Iterable[Robot], experiment: Experiment, other: Simulation
-) -> Agreement:
-    """Return the fitness of robots in their experiment's simulation and in another.
+) -> Floats:
+    """Return the fitness of N robots in two simulations, (2, N) [m/s].
+
+    The first simulation is that of their experiment.
 
     Args:
         robots: checked robots.
@@ -141,8 +123,7 @@ def compare(
     found = [
         [_fitness(robot, experiment, world) for world in worlds] for robot in robots
     ]
-    first, second = np.array(found).reshape(-1, 2).T
-    return Agreement(first, second)
+    return np.array(found).reshape(-1, 2).T
 
 
 def _fitness(robot: Robot, experiment: Experiment, world: Simulation) -> float:

@@ -53,7 +53,7 @@ def bounding_spheres(model: mujoco.MjModel) -> BoundingSpheres:
     """Return the bounds of the one robot of a model.
 
     Args:
-        model: from ``schema.mjcf.model.solo_model``; static geoms do not count.
+        model: from ``schema.mjcf.model.solo_spec``; static geoms do not count.
     """
     root = int(model.jnt_bodyid[0])
     covers: list[list[_Sphere]] = []

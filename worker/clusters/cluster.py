@@ -12,32 +12,17 @@ import mujoco
 import numpy as np
 
 from schema.errors import one_line
-from schema.parts import BodySpace
+from schema.experiment.document import body_space
+from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.clusters.bounds import Indices
-from worker.robot.controller import Widths
 from worker.robot.motors import Servos
 from worker.robot.sensors import Sensors
 
 NEVER = 1 << 62
 """A moment later than all others."""
-
-
-@dataclass(frozen=True, slots=True)
-class ViewSettings:
-    """Settings that all engine views of one arena share.
-
-    Attributes:
-        types: that robots' parts may have.
-        width: of every network.
-        has_light: the arena writes the readings of light sensors.
-    """
-
-    types: BodySpace
-    width: Widths
-    has_light: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,11 +57,11 @@ class EngineView:
         member: Member,
         model: mujoco.MjModel,
         data: mujoco.MjData,
-        settings: ViewSettings,
+        settings: ArenaSettings,
     ) -> None:
         """Find a robot in a cluster by the prefix of its names."""
         self.model, self.data = model, data
-        prefix, solo = member.prefix, member.solo
+        prefix, solo, types = member.prefix, member.solo, body_space(settings.space)
         free = model.joint(f"{prefix}free").id
         body = model.body(f"{prefix}root").id
         start, dof = int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free])
@@ -88,14 +73,14 @@ class EngineView:
         self.geoms = (geom, geom + own_geoms)
         self.sensors = Sensors(
             member.robot,
-            settings.types,
+            types,
             model,
             data,
-            width=settings.width.inputs,
+            width=settings.space.max_inputs,
             prefix=prefix,
-            has_light=settings.has_light,
+            has_light=settings.arena.light is not None,
         )
-        self.servos = Servos(member.robot, settings.types, model, data, prefix=prefix)
+        self.servos = Servos(member.robot, types, model, data, prefix=prefix)
         self.qpos: Floats = data.qpos[self.joints]
         self.qvel: Floats = data.qvel[self.dofs]
         self.ctrl: Floats = data.ctrl[self.servos.actuators]
@@ -163,9 +148,7 @@ class Cluster:
         births: tuple[BirthId, ...],
         members: Sequence[Member],
         model: mujoco.MjModel,
-        settings: ViewSettings,
-        *,
-        records_contacts: bool = False,
+        settings: ArenaSettings,
     ) -> None:
         """Create the state of a model.
 
@@ -173,8 +156,7 @@ class Cluster:
             births: of the members, ascending.
             members: robots of the model.
             model: that holds them.
-            settings: of the arena's views.
-            records_contacts: the history records which members are in contact.
+            settings: of the arena.
         """
         self.members = births
         self.model, self.data = model, mujoco.MjData(model)
@@ -191,7 +173,7 @@ class Cluster:
         self.failure, self.failed_at = "", NEVER
         self.touched: frozenset[int] = frozenset()
         self._has_pads = any(view.sensors.pads for view in self.views)
-        self._records_contacts = records_contacts and len(births) > 1
+        self._records_contacts = settings.arena.record_touches and len(births) > 1
 
     def run(self, plan: Sequence[int], first: int = 0) -> None:
         """Step the physics from moment to moment with constant commands.

@@ -3,6 +3,7 @@
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import mujoco
 from msgspec.structs import replace
@@ -10,12 +11,12 @@ from msgspec.structs import replace
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
 from schema.mjcf.footing import footprint, standing_height
-from schema.mjcf.model import Furnish, robot_spec, shared_model, solo_model
+from schema.mjcf.model import robot_spec, shared_model, solo_spec
 from schema.mjcf.world import add_ring_wall
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from worker.clusters.bounds import BoundingSpheres, bounding_spheres
-from worker.clusters.cluster import Cluster, Member, ViewSettings
+from worker.clusters.cluster import Cluster, Member
 from worker.robot.controller import widths
 
 CACHE_SIZE = 64
@@ -27,7 +28,7 @@ class Body:
     """Engine models of one robot.
 
     Attributes:
-        robot: the robot; its brain is not used.
+        robot: its parts, and its brain at birth or in the snapshot.
         bounds: bounding spheres.
         solo: the cluster in which it is alone.
     """
@@ -50,11 +51,8 @@ class ModelCache:
         self.settings = settings
         self._simulation = replace(settings.simulation, drop_m=settings.arena.drop_m)
         self.width = widths(settings.space)
-        self._view_settings = ViewSettings(
-            types=body_space(settings.space),
-            width=self.width,
-            has_light=settings.arena.light is not None,
-        )
+        self._types = body_space(settings.space)
+        self._furnish = partial(add_ring_wall, arena=settings.arena)
         self._clusters: OrderedDict[tuple[BirthId, ...], Cluster] = OrderedDict()
         self._specs: dict[BirthId, mujoco.MjSpec] = {}
 
@@ -65,15 +63,14 @@ class ModelCache:
             ValueError: the engine cannot build it.
             ExperimentError: a sensor that has no stimulus in the arena.
         """
-        model = solo_model(
+        model = solo_spec(
             robot,
-            self._view_settings.types,
+            self._types,
             self._simulation,
             self.settings.environment,
             furnish=self._furnish,
-        )
-        members = [Member("", robot, model)]
-        solo = Cluster((birth,), members, model, self._view_settings)
+        ).compile()
+        solo = Cluster((birth,), [Member("", robot, model)], model, self.settings)
         return Body(robot, bounding_spheres(model), solo)
 
     def height(self, body: Body, place: tuple[float, float], heading: float) -> float:
@@ -127,20 +124,10 @@ class ModelCache:
         model = shared_model(
             specs, self._simulation, self.settings.environment, furnish=self._furnish
         )
-        records = self.settings.arena.record_touches
-        return Cluster(
-            births, members, model, self._view_settings, records_contacts=records
-        )
+        return Cluster(births, members, model, self.settings)
 
     def _spec(self, birth: BirthId, robot: Robot) -> mujoco.MjSpec:
         if birth not in self._specs:
-            types = self._view_settings.types
-            self._specs[birth] = robot_spec(robot, types, self._simulation).spec
+            built = robot_spec(robot, self._types, self._simulation)
+            self._specs[birth] = built.spec
         return self._specs[birth]
-
-    @property
-    def _furnish(self) -> Furnish | None:
-        arena, simulation = self.settings.arena, self._simulation
-        if not arena.wall_diameter_m:
-            return None
-        return lambda spec: add_ring_wall(spec, arena, simulation)

@@ -1,7 +1,6 @@
 """Robots of an arena: engine view, network, sliding window, window fitness."""
 
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,14 +8,15 @@ from schema.errors import FitnessUndefined
 from schema.experiment.document import Simulation
 from schema.experiment.settings import ArenaSettings
 from schema.parts import Vector
+from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats, Track
 from schema.robot.robot import Robot
 from schema.wire.arena import Casualty, Judgement
-from worker.clusters.cluster import EngineView
+from schema.wire.codec import encode_robot
 from worker.clusters.models import Body
 from worker.fitness import fitness_of, path_velocity, straight_velocity
-from worker.robot.controller import Network
+from worker.robot.controller import Widths, pack
 
 LEAST_SHARE = 0.25
 """Share of the window that a robot must have lived to have a fitness."""
@@ -72,33 +72,50 @@ class Window:
         return Track(interval_s, np.array(self.positions))
 
 
-@dataclass(slots=True)
 class ArenaRobot:
     """A living robot of an arena.
 
     Attributes:
         birth: its name.
-        phenotype: its body and its present brain.
-        encoded: bytes of the phenotype, for snapshots.
         body: its engine models.
         view: its present slice of the engine's state.
+        window: its latest positions.
+        place: of the core's centre at the last sample, world frame [m].
+        encoded: bytes of its body and present brain, for snapshots.
         network: its brain as arrays.
         states: (S,) of its neurons after the last tick; a row of the batch.
         brain_start: step from which the age of its brain counts.
-        window: its latest positions.
-        place: of the core's centre at the last sample, world frame [m].
     """
 
-    birth: BirthId
-    phenotype: Robot
-    encoded: bytes
-    body: Body
-    view: EngineView
-    network: Network
-    states: Floats
-    brain_start: int
-    window: Window
-    place: Vector
+    def __init__(
+        self, birth: BirthId, body: Body, width: Widths, window: Window, place: Vector
+    ) -> None:
+        """Initialise in its own cluster, with a brain that starts at its birth.
+
+        Args:
+            birth: its name.
+            body: its engine models.
+            width: of every network.
+            window: its latest positions.
+            place: of the core's centre, world frame [m].
+        """
+        self.birth, self.body, self.view = birth, body, body.solo.views[0]
+        self.window, self.place = window, place
+        self.set_brain(body.robot.brain, width, window.born)
+
+    def set_brain(self, brain: Brain, width: Widths, start: int) -> None:
+        """Replace the brain; all neuron states are 0.
+
+        Args:
+            brain: new brain, which fits the body.
+            width: of every network.
+            start: step of its first tick, until which commands are held and from
+                which its age counts.
+        """
+        self.encoded = encode_robot(Robot(self.body.robot.parts, brain))
+        self.network = pack(brain, width)
+        self.states: Floats = np.zeros(width.states)
+        self.brain_start = start
 
     def judgement(self, step: int, settings: ArenaSettings) -> Judgement | Casualty:
         """Return its window fitness, or a casualty if the fitness is undefined.

@@ -9,13 +9,13 @@ from functools import lru_cache
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from schema.errors import SimulationDiverged, one_line
-from schema.experiment.document import Simulation, Space, body_space
-from schema.experiment.environment import Environment
+from schema.experiment.document import body_space
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
-from schema.mjcf.model import solo_model
+from schema.mjcf.model import solo_spec
 from schema.robot.results import Evaluation, Track
 from schema.robot.robot import Robot
 from worker.fitness import fitness_of, path_velocity, straight_velocity
@@ -44,8 +44,8 @@ def evaluate(
             unknown fitness function.
         InvalidRobot: more neurons than the limits.
     """
-    space, clock = settings.space, settings.simulation
-    track = simulate(robot, space, clock, settings.environment, identity=identity)
+    clock = settings.simulation
+    track = simulate(robot, settings, identity=identity)
     return Evaluation(
         fitness_of(track, settings.fitness),
         path_velocity(track),
@@ -56,9 +56,7 @@ def evaluate(
 
 def simulate(
     robot: Robot,
-    space: Space,
-    simulation: Simulation,
-    environment: Environment,
+    settings: EvaluationSettings,
     *,
     watch: Watch | None = None,
     identity: Identity = NO_IDENTITY,
@@ -71,9 +69,7 @@ def simulate(
 
     Args:
         robot: a checked robot.
-        space: part types and limits.
-        simulation: physics parameters and clocks.
-        environment: ground, slope and scenery.
+        settings: body space, simulation and environment; fitness does not count.
         watch: called with the state after each tick, before the steps that follow.
         identity: of the evaluation; only noise depends on it.
 
@@ -84,13 +80,14 @@ def simulate(
         InvalidRobot: more neurons than the limits.
     """
     silence_engine()
+    clock, space = settings.simulation, body_space(settings.space)
     try:
-        model = solo_model(robot, body_space(space), simulation, environment)
+        model = solo_spec(robot, space, clock, settings.environment).compile()
     except ValueError as error:
         raise SimulationDiverged(f"cannot be built: {one_line(error)}") from None
-    loop = _ControlLoop(robot, space, simulation, model, identity=identity)
+    loop = _ControlLoop(robot, settings, model, identity)
     try:
-        return _run(loop, model, simulation, watch)
+        return loop.run(watch)
     except mujoco.FatalError as error:
         # The engine cannot continue, for example when contacts exceed its memory.
         raise SimulationDiverged(
@@ -98,62 +95,23 @@ def simulate(
         ) from None
 
 
-def _run(
-    loop: "_ControlLoop",
-    model: mujoco.MjModel,
-    simulation: Simulation,
-    watch: Watch | None,
-) -> Track:
-    """Step warm-up and window, and return the track of the window."""
-    start = simulation.warmup_steps
-    end = start + simulation.window_steps
-    positions: list[float] = []
-    step, next_tick, next_sample = 0, 0, start
-    while True:
-        if step == next_sample:
-            positions += loop.core.tolist()
-            next_sample += simulation.pose_steps
-        if step == end:
-            break
-        if step == next_tick:
-            loop.tick(step)
-            next_tick += simulation.brain_steps
-            if watch is not None:
-                watch(loop.data)
-        until = min(next_tick, next_sample)
-        mujoco.mj_step(model, loop.data, until - step)
-        step = until
-    data = loop.data
-    if data.warning.number.any() or not math.isfinite(
-        data.qvel.sum() + data.qpos.sum()
-    ):
-        _raise_diverged(data, end * simulation.timestep_s)
-    return Track(
-        simulation.pose_steps * simulation.timestep_s,
-        np.array(positions).reshape(-1, 3),
-    )
-
-
 class _ControlLoop:
     """Closed loop of one robot: sensors, controller, motors.
 
     Attributes:
         data: the engine's state.
-        core: position of the core's centre, a live view [m].
     """
 
     def __init__(
         self,
         robot: Robot,
-        space: Space,
-        simulation: Simulation,
+        settings: EvaluationSettings,
         model: mujoco.MjModel,
-        *,
         identity: Identity,
     ) -> None:
-        types, width = body_space(space), widths(space)
-        self.data = mujoco.MjData(model)
-        self.core = self.data.qpos[:3].data
+        types, width = body_space(settings.space), widths(settings.space)
+        simulation = settings.simulation
+        self._model, self.data = model, mujoco.MjData(model)
         self._velocities = self.data.qvel.data
         self._simulation = simulation
         self._tick_s = simulation.brain_steps * simulation.timestep_s
@@ -174,7 +132,38 @@ class _ControlLoop:
         inputs = sum(neuron.layer == "input" for neuron in robot.brain.neurons)
         self._inputs = self._controller.readings[:, :inputs]
 
-    def tick(self, step: int) -> None:
+    def run(self, watch: Watch | None) -> Track:
+        """Step warm-up and window, and return the track of the window."""
+        model, data, simulation = self._model, self.data, self._simulation
+        core = data.qpos[:3].data
+        start = simulation.warmup_steps
+        end = start + simulation.window_steps
+        positions: list[float] = []
+        step, next_tick, next_sample = 0, 0, start
+        while True:
+            if step == next_sample:
+                positions += core.tolist()
+                next_sample += simulation.pose_steps
+            if step == end:
+                break
+            if step == next_tick:
+                self._tick(step)
+                next_tick += simulation.brain_steps
+                if watch is not None:
+                    watch(data)
+            until = min(next_tick, next_sample)
+            mujoco.mj_step(model, data, until - step)
+            step = until
+        if data.warning.number.any() or not math.isfinite(
+            data.qvel.sum() + data.qpos.sum()
+        ):
+            _raise_diverged(data, end * simulation.timestep_s)
+        return Track(
+            simulation.pose_steps * simulation.timestep_s,
+            np.array(positions).reshape(-1, 3),
+        )
+
+    def _tick(self, step: int) -> None:
         """Read sensors, update the controller and command the motors."""
         if step:
             # A sum is finite only if all its terms are. No plausible state overflows
@@ -194,12 +183,16 @@ class _ControlLoop:
 
 
 def _raise_diverged(data: mujoco.MjData, time_s: float) -> None:
-    names = [
-        mujoco.mjtWarning(index).name.removeprefix("mjWARN_")
-        for index in data.warning.number.nonzero()[0].tolist()
-    ]
-    reason = ", ".join(names) or "state not finite"
+    reason = warning_names(data.warning.number) or "state not finite"
     raise SimulationDiverged(f"physics diverged by {time_s:.3f} s: {reason}")
+
+
+def warning_names(counts: npt.NDArray[np.integer]) -> str:
+    """Return the names of the engine's warnings whose counts are not 0."""
+    return ", ".join(
+        mujoco.mjtWarning(index).name.removeprefix("mjWARN_")
+        for index in counts.nonzero()[0].tolist()
+    )
 
 
 @lru_cache(maxsize=1)

@@ -20,7 +20,7 @@ from analysis.viewer.output import Output, Window, keep_serving
 from analysis.viewer.recording import ViewerError
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
-from schema.experiment.document import Arena, Experiment, Simulation
+from schema.experiment.document import Arena, Experiment
 from schema.experiment.file import read_experiment
 from schema.mjcf.world import add_ring_wall
 from schema.parts import BUILT_IN
@@ -87,7 +87,7 @@ def test_duplicate_messages_are_no_gap() -> None:
 def test_a_ring_wall_is_where_mujoco_has_it() -> None:
     arena = Arena(wall_diameter_m=3.0, wall_segments=5)
     spec = mujoco.MjSpec()
-    add_ring_wall(spec, arena, Simulation())
+    add_ring_wall(spec, arena)
     model = spec.compile()
     (walls,) = scene_of(Experiment(name="e", arena=arena)).walls
     assert len(walls) == model.ngeom == 5

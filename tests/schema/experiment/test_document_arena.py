@@ -46,7 +46,7 @@ def test_scenario_3_is_the_thesis() -> None:
 def test_off_line_is_the_default() -> None:
     assert parse("").arena is None
     assert parse("[arena]").arena is not None
-    with pytest.raises(ExperimentError, match="has no arena"):
+    with pytest.raises(ExperimentError, match=r"has no \[arena\]"):
         arena_settings(parse(""), Origin())
 
 

@@ -7,7 +7,7 @@ from schema.errors import ExperimentError
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.file import parse_experiment
-from schema.mjcf.model import solo_model
+from schema.mjcf.model import solo_spec
 from schema.parts import BUILT_IN
 from schema.robot.robot import Part, Robot
 
@@ -35,8 +35,8 @@ def scene(inside: str, outside: str = "") -> str:
 
 def test_scenery_adds_only_geoms_to_the_world() -> None:
     simulation = Simulation(friction=0.7, contact_time_s=0.02)
-    empty = solo_model(CORE, BUILT_IN, simulation, Environment())
-    model = solo_model(CORE, BUILT_IN, simulation, Environment(scenery=YARD))
+    empty = solo_spec(CORE, BUILT_IN, simulation, Environment()).compile()
+    model = solo_spec(CORE, BUILT_IN, simulation, Environment(scenery=YARD)).compile()
     assert (model.nbody, model.nq) == (empty.nbody, empty.nq)
     assert model.ngeom == empty.ngeom + 5
     names = [f"scenery/{index}" for index in range(5)]
@@ -61,7 +61,7 @@ def test_rotated_geoms_keep_their_rotation() -> None:
         scenery=scene('<body euler="0 0 30"><geom type="box" size="1 .1 .1" '
                       'pos="5 0 1" euler="0 0 15"/></body>')
     )  # fmt: skip
-    model = solo_model(CORE, BUILT_IN, Simulation(), environment)
+    model = solo_spec(CORE, BUILT_IN, Simulation(), environment).compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     axis = data.geom("scenery/0").xmat.reshape(3, 3)[:, 0]

@@ -12,7 +12,6 @@ from schema.formats.files import read_robot
 from schema.formats.robogen_json import robot_from_robogen_json
 from schema.formats.robogen_text import robot_from_robogen_text
 from schema.parts import BUILT_IN
-from schema.robogen_parts import ROBOGEN_2016
 from schema.robot.brain import Connection
 from schema.robot.frames import place_parts, shapes_of
 from schema.robot.robot import Robot
@@ -225,10 +224,25 @@ def test_ending_selects_the_format(tmp_path: Path) -> None:
     assert len(read_robot(tmp_path / "arm.json").parts) == 2
 
 
+SPACE_2016 = body_space(
+    Space(
+        part_types=(
+            "schema.robogen_parts:CORE",
+            "schema.robogen_parts:FIXED_BRICK",
+            "schema.robogen_parts:ACTIVE_HINGE",
+            "schema.robogen_parts:HINGE",
+            "schema.robogen_parts:PARAMETRIC_BAR_JOINT",
+            "schema.robogen_parts:TOUCH_SENSOR",
+            "schema.robogen_parts:LIGHT_SENSOR",
+        )
+    )
+)
+
+
 def test_dimensions_of_2016() -> None:
     # Grams and millimetres, as in RoboGen's sources.
     def mass_g(name: str, *values: float) -> float:
-        shape = ROBOGEN_2016[name].shape((*values, 0.5, 0.5, 0.5))
+        shape = SPACE_2016[name].shape((*values, 0.5, 0.5, 0.5))
         return 1000.0 * sum(box.mass for box in shape.boxes)
 
     assert mass_g("Core") == pytest.approx(44.5)
@@ -239,22 +253,14 @@ def test_dimensions_of_2016() -> None:
     # 50 mm of bar, 6 of stub and half of a 5 mm cylinder at 1.37 g/cm, two plates.
     bar = mass_g("ParametricBarJoint", 50.0, 0.3, 0.0)
     assert bar == pytest.approx(2 + 1.37 * (5.0 + 0.6 + 0.5))
-    straight = ROBOGEN_2016["ParametricBarJoint"].shape((50.0, 0.0, 0.0, 0, 0, 0))
+    straight = SPACE_2016["ParametricBarJoint"].shape((50.0, 0.0, 0.0, 0, 0, 0))
     reach = straight.slots[1].position[0] - straight.slots[0].position[0]
     assert reach == pytest.approx(0.0015 + 0.006 + 0.05 + 0.0015)
 
 
 def test_both_part_sets_accept_the_same_robots() -> None:
-    names = tuple(
-        f"schema.robogen_parts:{name}"
-        for name in (
-            "CORE", "FIXED_BRICK", "ACTIVE_HINGE", "HINGE", "PARAMETRIC_BAR_JOINT",
-            "TOUCH_SENSOR", "LIGHT_SENSOR",
-        )
-    )  # fmt: skip
-    space = body_space(Space(part_types=names))
-    assert robot_from_robogen_text(STARFISH, "it", space) == read(STARFISH)
-    for name, kind in space.items():
+    assert robot_from_robogen_text(STARFISH, "it", SPACE_2016) == read(STARFISH)
+    for name, kind in SPACE_2016.items():
         ours = BUILT_IN[name]
         values = tuple(parameter.default for parameter in ours.parameters)
         turned = [(s.normal, s.tangent, s.segment) for s in kind.shape(values).slots]

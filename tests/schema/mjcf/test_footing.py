@@ -10,7 +10,7 @@ import pytest
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment, relief
 from schema.mjcf.footing import footprint, standing_height
-from schema.mjcf.model import robot_spec, shared_model, solo_model
+from schema.mjcf.model import robot_spec, shared_model, solo_spec
 from schema.parts import BUILT_IN
 from schema.robot.robot import Part, Robot
 
@@ -53,7 +53,7 @@ def depths(
     robot: Robot, environment: Environment, pose: tuple[float, float, float, float]
 ) -> Iterator[float]:
     """Yield the penetration of a robot at x, y, z, heading [m]."""
-    model = solo_model(robot, BUILT_IN, WORLD, environment)
+    model = solo_spec(robot, BUILT_IN, WORLD, environment).compile()
     data = mujoco.MjData(model)
     x, y, z, heading = pose
     turn = (math.cos(heading / 2), 0.0, 0.0, math.sin(heading / 2))
@@ -101,7 +101,7 @@ def test_a_core_stands_on_the_highest_node_that_it_may_touch() -> None:
 
 
 def test_model_and_footing_use_the_same_heights() -> None:
-    model = solo_model(CORE, BUILT_IN, WORLD, ROUGH)
+    model = solo_spec(CORE, BUILT_IN, WORLD, ROUGH).compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     data.geom_xpos[model.geom_bodyid > 0] = (50.0, 0.0, 0.0)
@@ -133,7 +133,7 @@ def test_no_robot_starts_inside_of_ground_or_scenery(environment: Environment) -
 
 
 def test_single_robot_starts_on_the_ground_at_the_origin() -> None:
-    model = solo_model(LEGGED, BUILT_IN, Simulation(drop_m=0.5), ROUGH)
+    model = solo_spec(LEGGED, BUILT_IN, Simulation(drop_m=0.5), ROUGH).compile()
     assert model.qpos0[2] == pytest.approx(height(LEGGED, ROUGH) + 0.5, abs=1e-12)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -143,7 +143,9 @@ def test_single_robot_starts_on_the_ground_at_the_origin() -> None:
 @pytest.mark.parametrize("environment", [ROUGH, OBSTACLES], ids=["rough", "scenery"])
 def test_two_builds_are_equal_to_the_last_bit(environment: Environment) -> None:
     """Ground and scenery of a robot alone and of robots together, too."""
-    one, two = (solo_model(LEGGED, BUILT_IN, WORLD, environment) for _ in range(2))
+    one, two = (
+        solo_spec(LEGGED, BUILT_IN, WORLD, environment).compile() for _ in range(2)
+    )
     child = robot_spec(CORE, BUILT_IN, WORLD).spec
     many = shared_model([("a/", child), ("b/", child)], WORLD, environment)
     for name in ("qpos0", "geom_pos", "geom_quat", "geom_size", "hfield_data"):

@@ -9,7 +9,7 @@ import pytest
 
 from schema.experiment.document import Simulation
 from schema.experiment.environment import FLAT
-from schema.mjcf.model import robot_spec, solo_model
+from schema.mjcf.model import robot_spec, solo_spec
 from schema.mjcf.world import add_ground, set_options
 from schema.parts import BUILT_IN
 from schema.robot.robot import Part, Robot
@@ -32,7 +32,7 @@ def on_core(kind: str, slot: int = 0, turn: int = 0, parent_slot: int = 2) -> Ro
 
 
 def model_of(robot: Robot, simulation: Simulation = WORLD) -> mujoco.MjModel:
-    return solo_model(robot, BUILT_IN, simulation, FLAT)
+    return solo_spec(robot, BUILT_IN, simulation, FLAT).compile()
 
 
 def body_mass(model: mujoco.MjModel, name: str) -> float:

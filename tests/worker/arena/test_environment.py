@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from schema.experiment.document import Simulation, Space
+from schema.experiment.document import Fitness, Simulation, Space
 from schema.experiment.environment import Environment
-from schema.experiment.settings import ArenaSettings
+from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
@@ -49,6 +49,15 @@ WILD = Environment(
 WALL = scene('<geom type="box" size="0.05 2 0.3" pos="-1.05 0 0.3"/>')
 
 
+def alone(simulation: Simulation, environment: Environment) -> EvaluationSettings:
+    return EvaluationSettings(
+        space=Space(),
+        simulation=simulation,
+        fitness=Fitness(),
+        environment=environment,
+    )
+
+
 def arena(environment: Environment, **keys: object) -> ArenaSettings:
     return replace(settings_of(**keys), environment=environment)
 
@@ -75,7 +84,7 @@ def test_box_without_friction_accelerates_down_the_slope(
 ) -> None:
     """It moves by g sin(a) t^2 / 2 towards -x: 2.45 m in a second at 30 degrees."""
     clock = Simulation(friction=0.0, window_steps=400)
-    track = simulate(BOX, Space(), clock, Environment(slope_deg=slope_deg))
+    track = simulate(BOX, alone(clock, Environment(slope_deg=slope_deg)))
     times = np.arange(len(track.core_position)) * track.interval_s
     expected = -0.5 * G * math.sin(math.radians(slope_deg)) * times**2
     assert track.core_position[:, 0] == pytest.approx(expected, rel=0.01, abs=0.02)
@@ -118,7 +127,7 @@ def test_robots_stay_above_rough_ground(robot_of: Robots) -> None:
     for seed in (0, 2, 3):
         depths.clear()
         clock = Simulation(window_steps=800)
-        simulate(robot_of(seed), Space(), clock, environment, watch=watch)
+        simulate(robot_of(seed), alone(clock, environment), watch=watch)
         assert depths[0] == 0.0
         assert 0.0 < max(depths) < 0.004
 
@@ -131,7 +140,7 @@ def test_robot_alone_in_an_arena_has_the_off_line_track(robot_of: Robots) -> Non
     simulation = replace(
         settings.simulation, drop_m=settings.arena.drop_m, window_steps=800
     )
-    track = simulate(robot, settings.space, simulation, WILD)
+    track = simulate(robot, alone(simulation, WILD))
     own = world.population.find(A).window.track()
     positions = np.asarray(own.core_position)[-len(track.core_position) :]
     assert positions.tobytes() == track.core_position.tobytes()

@@ -51,8 +51,13 @@ def test_pool_without_threads_is_rejected() -> None:
 
 
 def test_close_stops_the_threads() -> None:
-    before = threading.enumerate()
+    before, gate = threading.enumerate(), threading.Barrier(3)
     pool = Pool(3)
+
+    def job() -> None:
+        gate.wait(timeout=30)
+
+    pool.run([job] * 3)
     others = [t for t in threading.enumerate() if t not in before]
     assert len(others) == 2
     pool.close()

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from schema.errors import UnexpectedEvent
 from schema.experiment.document import Space
-from schema.experiment.environment import FLAT
+from schema.experiment.settings import EvaluationSettings
 from schema.parts import LIGHT_SENSOR
 from schema.robot.brain import Brain, Neuron
 from schema.robot.ids import BirthId
@@ -65,7 +65,10 @@ def test_robot_alone_has_the_track_of_an_off_line_simulation(turtle: Robot) -> N
     world = populated(SETTINGS, [Insertion(A, turtle, (0.0, 0.0))])
     advance = world.advance(600 + 2400)
     simulation = replace(SETTINGS.simulation, drop_m=SETTINGS.arena.drop_m)
-    track = simulate(turtle, SETTINGS.space, simulation, FLAT)
+    settings = EvaluationSettings(
+        space=SETTINGS.space, simulation=simulation, fitness=SETTINGS.fitness
+    )
+    track = simulate(turtle, settings)
     own = world.population.find(A).window.track()
     assert np.array_equal(own.core_position, track.core_position)
     assert own.interval_s == track.interval_s

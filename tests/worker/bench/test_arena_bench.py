@@ -11,7 +11,7 @@ from coordinator.evolution.generation import generate
 from schema.errors import RevolveError
 from schema.experiment.document import Simulation
 from schema.experiment.environment import FLAT
-from schema.mjcf.model import solo_model
+from schema.mjcf.model import solo_spec
 from schema.parts import BUILT_IN
 from schema.robot.robot import check_robot
 from worker.bench import command as bench
@@ -25,7 +25,7 @@ def test_spider_has_mass_motors_and_height_of_the_thesis() -> None:
     """383 g, 8 servos, underside 2.25 cm below the core."""
     robot = spider()
     check_robot(robot, BUILT_IN)
-    model = solo_model(robot, BUILT_IN, Simulation(), FLAT)
+    model = solo_spec(robot, BUILT_IN, Simulation(), FLAT).compile()
     assert model.body_mass.sum() == pytest.approx(0.3832)
     assert model.nu == 8
     assert model.qpos0[2] == pytest.approx(0.0225)

@@ -8,8 +8,7 @@ from msgspec.structs import replace
 
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, Simulation
-from schema.experiment.environment import FLAT
-from schema.experiment.settings import evaluation_settings
+from schema.experiment.settings import evaluation_settings, evaluation_settings_of
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.wire.codec import (
@@ -54,7 +53,8 @@ def test_longer_evaluation_is_judged_by_its_last_window(turtle: Robot) -> None:
     assert found.simulated_s == pytest.approx(6.0)
     # All 6 s as one window, of which the last 2 s are the last 11 of 31 samples.
     whole = replace(WORLD, warmup_steps=0, window_steps=1200)
-    track = simulate(turtle, EXPERIMENT.space, whole, FLAT).core_position[-11:]
+    settings = replace(evaluation_settings_of(EXPERIMENT), simulation=whole)
+    track = simulate(turtle, settings).core_position[-11:]
     hops = [math.dist(a[:2], b[:2]) for a, b in pairwise(track)]
     assert found.path_velocity == pytest.approx(sum(hops) / 2.0, rel=1e-12)
     net = math.dist(track[0][:2], track[-1][:2])

@@ -20,7 +20,6 @@ from schema.errors import (
     SimulationDiverged,
 )
 from schema.experiment.document import Fitness, Simulation, Space
-from schema.experiment.environment import FLAT
 from schema.experiment.settings import EvaluationSettings
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.results import Track
@@ -33,11 +32,17 @@ from worker.serve.jobs import answer
 
 RobotOf = Callable[[int], Robot]
 WORLD = Simulation()
-SETTINGS = EvaluationSettings(space=Space(), simulation=WORLD, fitness=Fitness())
+
+
+def with_simulation(simulation: Simulation) -> EvaluationSettings:
+    return EvaluationSettings(space=Space(), simulation=simulation, fitness=Fitness())
+
+
+SETTINGS = with_simulation(WORLD)
 
 
 def test_evaluation_has_the_fitness_of_the_track(turtle: Robot) -> None:
-    track = simulate(turtle, Space(), WORLD, FLAT)
+    track = simulate(turtle, SETTINGS)
     found = evaluate(turtle, SETTINGS)
     assert found.path_velocity == path_velocity(track) > 0
     assert found.straight_velocity == straight_velocity(track) > 0
@@ -46,7 +51,7 @@ def test_evaluation_has_the_fitness_of_the_track(turtle: Robot) -> None:
 
 
 def test_track_includes_both_ends_of_its_window(turtle: Robot) -> None:
-    track = simulate(turtle, Space(), WORLD, FLAT)
+    track = simulate(turtle, SETTINGS)
     assert track.core_position.shape == (61, 3)
     assert track.interval_s == 0.2
     assert track.core_position[0] == pytest.approx([0, 0, 0.0225], abs=1e-12)
@@ -54,16 +59,16 @@ def test_track_includes_both_ends_of_its_window(turtle: Robot) -> None:
 
 def test_window_starts_after_the_warm_up(turtle: Robot) -> None:
     """The warm-up does not shorten the window."""
-    whole = simulate(turtle, Space(), replace(WORLD, window_steps=2400 + 600), FLAT)
-    late = simulate(turtle, Space(), replace(WORLD, warmup_steps=600), FLAT)
+    whole = simulate(turtle, with_simulation(replace(WORLD, window_steps=2400 + 600)))
+    late = simulate(turtle, with_simulation(replace(WORLD, warmup_steps=600)))
     assert late.core_position.shape == (61, 3)
     assert late.core_position.tobytes() == whole.core_position[15:].tobytes()
 
 
 def test_sampling_interval_does_not_change_the_motion(turtle: Robot) -> None:
     """Intervals need not divide each other."""
-    coarse = simulate(turtle, Space(), replace(WORLD, pose_steps=2400), FLAT)
-    fine = simulate(turtle, Space(), replace(WORLD, pose_steps=32), FLAT)
+    coarse = simulate(turtle, with_simulation(replace(WORLD, pose_steps=2400)))
+    fine = simulate(turtle, with_simulation(replace(WORLD, pose_steps=32)))
     assert coarse.core_position[-1].tobytes() == fine.core_position[-1].tobytes()
 
 
@@ -78,7 +83,7 @@ def test_number_of_physics_steps_is_warm_up_plus_window(
         step(model, data, nstep=nstep)
 
     monkeypatch.setattr(mujoco, "mj_step", counted)
-    simulate(turtle, Space(), replace(WORLD, warmup_steps=7), FLAT)
+    simulate(turtle, with_simulation(replace(WORLD, warmup_steps=7)))
     assert sum(steps) == 2407
 
 
@@ -98,28 +103,29 @@ def bits(track: Track) -> bytes:
 def test_simulation_is_repeatable(robot_of: RobotOf) -> None:
     for seed in range(5):
         robot = robot_of(seed)
-        first = simulate(robot, Space(), WORLD, FLAT)
-        assert bits(simulate(robot, Space(), WORLD, FLAT)) == bits(first)
+        first = simulate(robot, SETTINGS)
+        assert bits(simulate(robot, SETTINGS)) == bits(first)
 
 
 def test_simulation_is_independent_of_threads(robot_of: RobotOf) -> None:
     robots = [robot_of(seed) for seed in range(8)]
-    alone = [bits(simulate(robot, Space(), WORLD, FLAT)) for robot in robots]
+    alone = [bits(simulate(robot, SETTINGS)) for robot in robots]
     with ThreadPoolExecutor(4) as pool:
-        found = list(
-            pool.map(lambda r: bits(simulate(r, Space(), WORLD, FLAT)), robots)
-        )
+        found = list(pool.map(lambda r: bits(simulate(r, SETTINGS)), robots))
     assert found == alone
 
 
 ELSEWHERE = """
 import hashlib, sys
 from schema.wire.codec import decode_robot
-from schema.experiment.environment import FLAT
-from schema.experiment.document import Simulation, Space
+from schema.experiment.document import Fitness, Simulation, Space
+from schema.experiment.settings import EvaluationSettings
 from worker.robot.evaluation import simulate
+settings = EvaluationSettings(
+    space=Space(), simulation=Simulation(), fitness=Fitness()
+)
 for line in sys.stdin:
-    track = simulate(decode_robot(bytes.fromhex(line)), Space(), Simulation(), FLAT)
+    track = simulate(decode_robot(bytes.fromhex(line)), settings)
     print(hashlib.sha256(track.core_position.tobytes()).hexdigest())
 """
 
@@ -135,8 +141,7 @@ def test_simulation_is_equal_in_another_process(robot_of: RobotOf) -> None:
         cwd=Path(__file__).parents[3],
     ).stdout.split()
     assert found == [
-        hashlib.sha256(bits(simulate(robot, Space(), WORLD, FLAT))).hexdigest()
-        for robot in robots
+        hashlib.sha256(bits(simulate(robot, SETTINGS))).hexdigest() for robot in robots
     ]
 
 
@@ -152,17 +157,17 @@ def test_divergence_is_reported_with_reason_and_time(
         WORLD, timestep_s=0.5, servo_armature=0.0, armature=0.0, servo_stiffness=1e9
     )
     with pytest.raises(SimulationDiverged, match=r"diverged by \d+\.\d{3} s: .*BADQ"):
-        simulate(robot_of(3), Space(), absurd, FLAT)
+        simulate(robot_of(3), with_simulation(absurd))
     assert capfd.readouterr() == ("", "")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_divergence_does_not_affect_the_next_simulation(robot_of: RobotOf) -> None:
-    before = bits(simulate(robot_of(4), Space(), WORLD, FLAT))
+    before = bits(simulate(robot_of(4), SETTINGS))
     absurd = replace(WORLD, timestep_s=0.5, servo_armature=0.0, armature=0.0)
     with pytest.raises(SimulationDiverged):
-        simulate(robot_of(3), Space(), absurd, FLAT)
-    assert bits(simulate(robot_of(4), Space(), WORLD, FLAT)) == before
+        simulate(robot_of(3), with_simulation(absurd))
+    assert bits(simulate(robot_of(4), SETTINGS)) == before
 
 
 @pytest.mark.parametrize(
@@ -176,13 +181,13 @@ def test_engine_failure_is_reported_as_divergence(
     turtle: Robot, monkeypatch: pytest.MonkeyPatch, memory: int, message: str
 ) -> None:
     """Too many contacts for the engine's memory; the message has one line."""
-    before = bits(simulate(turtle, Space(), WORLD, FLAT))
+    before = bits(simulate(turtle, SETTINGS))
     with monkeypatch.context() as patch:
         patch.setattr("schema.mjcf.model.MEMORY_BYTES", memory)
         with pytest.raises(SimulationDiverged, match=message) as caught:
-            simulate(turtle, Space(), WORLD, FLAT)
+            simulate(turtle, SETTINGS)
     assert "\n" not in str(caught.value)
-    assert bits(simulate(turtle, Space(), WORLD, FLAT)) == before
+    assert bits(simulate(turtle, SETTINGS)) == before
 
 
 def test_light_sensor_in_a_world_without_light_is_rejected() -> None:
@@ -194,12 +199,12 @@ def test_light_sensor_in_a_world_without_light_is_rejected() -> None:
     inputs = tuple(Neuron("input", INPUT, part) for part in (0,) * 6 + (1,))
     space = Space(part_types=("schema.parts:CORE", "schema.parts:LIGHT_SENSOR"))
     with pytest.raises(ExperimentError, match="no light in this world"):
-        simulate(Robot(parts, Brain(inputs)), space, WORLD, FLAT)
+        simulate(Robot(parts, Brain(inputs)), replace(SETTINGS, space=space))
 
 
 def test_brain_beyond_the_limits_is_rejected(turtle: Robot) -> None:
     with pytest.raises(InvalidRobot, match="input neurons must be <= 6, got 8"):
-        simulate(turtle, Space(max_inputs=6), WORLD, FLAT)
+        simulate(turtle, replace(SETTINGS, space=Space(max_inputs=6)))
 
 
 def not_a_number(_track: Track, _fitness: Fitness) -> float:
@@ -237,5 +242,5 @@ def test_undefined_fitness_is_a_result(
 
 
 def test_track_has_the_positions_of_the_core(turtle: Robot) -> None:
-    track = simulate(turtle, Space(), replace(WORLD, window_steps=40), FLAT)
+    track = simulate(turtle, with_simulation(replace(WORLD, window_steps=40)))
     assert np.abs(track.core_position[0, :2]).max() == 0.0

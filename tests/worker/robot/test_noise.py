@@ -9,7 +9,6 @@ from msgspec.structs import replace
 
 from schema.errors import MalformedMessage
 from schema.experiment.document import Fitness, Simulation, Space
-from schema.experiment.environment import FLAT
 from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
 from schema.robot.brain import Brain, Connection, Neuron
@@ -53,6 +52,10 @@ NOISY = replace(
     origin=ORIGIN,
 )
 WIDTH = widths(Space())
+
+
+def with_simulation(simulation: Simulation) -> EvaluationSettings:
+    return EvaluationSettings(space=Space(), simulation=simulation, fitness=Fitness())
 
 
 def noise_of(
@@ -141,7 +144,7 @@ def bits(track: Track) -> bytes:
 def test_evaluations_of_one_identity_are_equal_and_others_differ(
     robot_of: Robots,
 ) -> None:
-    settings = EvaluationSettings(space=Space(), simulation=LOUD, fitness=Fitness())
+    settings = with_simulation(LOUD)
     robot = robot_of(3)
     found = evaluate(robot, settings, IDENTITY)
     assert evaluate(robot, settings, IDENTITY) == found
@@ -161,7 +164,7 @@ def test_without_noise_the_identity_has_no_effect(robot_of: Robots) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(np.random, "Philox", None)
         found = {
-            bits(simulate(robot_of(3), Space(), silent, FLAT, identity=identity))
+            bits(simulate(robot_of(3), with_simulation(silent), identity=identity))
             for identity in (NO_IDENTITY, IDENTITY, *OTHERS)
         }
     assert len(found) == 1
@@ -171,14 +174,15 @@ def test_sensor_noise_affects_only_robots_that_use_their_sensors(turtle: Robot) 
     """The turtle's motors follow oscillators; connected to its imu, they do not."""
     still = replace(LOUD, sensor_noise=0.0, actuator_noise=0.0)
     sensor_noise = replace(LOUD, actuator_noise=0.0)
-    plain = bits(simulate(turtle, Space(), still, FLAT))
+    plain = bits(simulate(turtle, with_simulation(still)))
     assert (
-        bits(simulate(turtle, Space(), sensor_noise, FLAT, identity=IDENTITY)) == plain
+        bits(simulate(turtle, with_simulation(sensor_noise), identity=IDENTITY))
+        == plain
     )
     connected = wired(turtle, [(0, 0.1)])
     assert bits(
-        simulate(connected, Space(), sensor_noise, FLAT, identity=IDENTITY)
-    ) != bits(simulate(connected, Space(), still, FLAT))
+        simulate(connected, with_simulation(sensor_noise), identity=IDENTITY)
+    ) != bits(simulate(connected, with_simulation(still)))
 
 
 def wired(turtle: Robot, edges: list[tuple[int, float]]) -> Robot:
@@ -202,7 +206,7 @@ def shares(robot: Robot, simulation: Simulation) -> Floats:
         target = data.ctrl / 0.9 + data.qpos[7:]
         found.append((target + np.pi / 4) / (np.pi / 2))
 
-    simulate(robot, Space(), simulation, FLAT, identity=IDENTITY, watch=watch)
+    simulate(robot, with_simulation(simulation), identity=IDENTITY, watch=watch)
     return np.array(found)
 
 
@@ -232,7 +236,7 @@ def test_outputs_are_clipped_after_the_noise(turtle: Robot) -> None:
 def test_extreme_noise_keeps_positions_finite(robot_of: Robots) -> None:
     loudest = replace(LOUD, sensor_noise=1e6, actuator_noise=1e6)
     for seed in range(4):
-        track = simulate(robot_of(seed), Space(), loudest, FLAT, identity=IDENTITY)
+        track = simulate(robot_of(seed), with_simulation(loudest), identity=IDENTITY)
         assert np.isfinite(track.core_position).all()
 
 
@@ -246,10 +250,10 @@ def test_noise_of_a_robot_alone_equals_that_off_line(robot_of: Robots) -> None:
         world.advance(600 + 800)
         simulation = replace(NOISY.simulation, drop_m=NOISY.arena.drop_m)
         identity = Identity(ORIGIN, A, 0)
-        track = simulate(robot_of(seed), Space(), simulation, FLAT, identity=identity)
+        track = simulate(robot_of(seed), with_simulation(simulation), identity=identity)
         own = world.population.find(A).window.track()
         assert np.array_equal(own.core_position, track.core_position)
-        calm = simulate(robot_of(seed), Space(), SETTINGS.simulation, FLAT)
+        calm = simulate(robot_of(seed), with_simulation(SETTINGS.simulation))
         assert not np.array_equal(
             own.core_position, calm.core_position[: len(own.core_position)]
         )

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from schema.experiment.document import Simulation
 from schema.experiment.environment import FLAT
-from schema.mjcf.model import robot_spec, solo_model
+from schema.mjcf.model import robot_spec, solo_spec
 from schema.mjcf.world import add_ground, set_options
 from schema.parts import BUILT_IN, CORE, BodySpace, PartType, Sensor
 from schema.robot.robot import Part, Robot
@@ -33,7 +33,7 @@ def alone(
     robot: Robot, simulation: Simulation = WORLD, space: BodySpace = BUILT_IN
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Return model and data of one robot on the ground."""
-    model = solo_model(robot, space, simulation, FLAT)
+    model = solo_spec(robot, space, simulation, FLAT).compile()
     return model, mujoco.MjData(model)
 
 
