@@ -19,7 +19,8 @@ from schema.agent.command import add_connect, add_network_flags, connect_of, tls
 from schema.agent.service import tell_user
 from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.flags import Flags
-from schema.tables.files import FINISHED, SEGMENTS
+from schema.tables.files import FINISHED
+from schema.tables.segments import SEGMENTS
 from schema.wire.operator import (
     GetStatus,
     OperatorReply,

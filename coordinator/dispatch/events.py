@@ -176,10 +176,17 @@ DispatchCommand = Assign | Deliver | Cancel
 
 @dataclass(frozen=True, slots=True)
 class ShardSeen:
-    """A shard was advanced on a platform, according to the journal."""
+    """A shard was advanced on a platform, according to the journal.
+
+    Attributes:
+        shard: the shard.
+        platform: empty if it was never advanced.
+        may_drift: it may move to another platform, if shards may.
+    """
 
     shard: int
     platform: str
+    may_drift: bool = True
 
 
 @dataclass(frozen=True, slots=True)

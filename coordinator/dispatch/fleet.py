@@ -105,17 +105,20 @@ class Fleet:
         """Request a job."""
         self._obey(self.dispatch.handle(Requested(job)))
 
-    def new_shard(self, client: Client, encode: Encode, platform: str) -> int:
+    def new_shard(
+        self, client: Client, encode: Encode, platform: str, *, may_drift: bool = True
+    ) -> int:
         """Return a number for an arena's shard.
 
         Args:
             client: the run of the arena.
             encode: returns the request of each advance when it is assigned.
             platform: on which the shard has been advanced; empty if never.
+            may_drift: it may move to another platform, if arenas may.
         """
         shard = next(self._shard_numbers)
         self._shard_clients[shard] = (client, encode)
-        self._move(ShardSeen(shard, platform))
+        self._move(ShardSeen(shard, platform, may_drift))
         return shard
 
     def advance(self, shard: int) -> None:
@@ -129,9 +132,13 @@ class Fleet:
             self._obey(self.dispatch.handle(Withdrawn(number)))
         for shard, (owner, _) in list(self._shard_clients.items()):
             if owner == client:
-                del self._shard_clients[shard]
-                self._advancing.discard(shard)
-                self._move(Released(shard))
+                self.release(shard)
+
+    def release(self, shard: int) -> None:
+        """Drop a shard, and its advance if one is requested."""
+        del self._shard_clients[shard]
+        self._advancing.discard(shard)
+        self._move(Released(shard))
 
     def listen(self, timeout_s: float, now_s: float) -> dict[Client, list[End]]:
         """Return what ended for each client, after waiting for something to end.

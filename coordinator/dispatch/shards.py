@@ -58,6 +58,7 @@ class _Shard:
     holder: str = ""
     has_state: bool = False
     is_wanted: bool = False
+    may_drift: bool = True
     number: int = -1
     is_whole: bool = False
     errors: int = 0
@@ -136,7 +137,8 @@ class ShardDispatch:
             case Ticked():
                 self._tick(event.now_s)
             case ShardSeen():
-                self._shard(event.shard).platform = event.platform
+                shard = self._shard(event.shard)
+                shard.platform, shard.may_drift = event.platform, event.may_drift
             case ShardRequested():
                 self._want(event.shard)
             case ShardReturned():
@@ -173,7 +175,7 @@ class ShardDispatch:
         for shard in self._shards.values():
             if shard.rests_until_s is not None and shard.rests_until_s <= now_s:
                 shard.rests_until_s = None
-            if self._allows_drift:
+            if self._allows_drift and shard.may_drift:
                 self._wait(shard)
 
     def _wait(self, shard: _Shard) -> None:

@@ -171,6 +171,13 @@ class OperatorServer:
 
     def _carry_out(self, request: OperatorRequest, run: RunSession) -> OperatorReply:
         """Return the reply of a run; a run that fails here is stopped."""
+        if run.recovery is not None:
+            done, total = run.recovery.progress
+            return OperatorReply(
+                f"lost poses are computed again (advance {done} of {total}): try again "
+                "when that is done",
+                is_refused=True,
+            )
         replies: list[OperatorReply] = []
         operator = RunOperator(run.loop, run.experiment)
         self._scheduler.guard(run, lambda: replies.append(operator.reply_to(request)))

@@ -119,7 +119,7 @@ class RunScheduler:
                 acting[self._run_of[client]] = ends
         now_s = clock()
         for run, ends in acting.items():
-            self.guard(run, partial(run.loop.act, now_s, ends))
+            self.guard(run, partial(run.act, now_s, ends))
 
     def _has_room(self) -> bool:
         if not self._places:

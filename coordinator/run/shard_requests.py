@@ -56,7 +56,8 @@ class _Past:
     Its state at ``step`` is that of the newest snapshot, at ``base`` (0 is the empty
     arena), after ``history``. ``platform`` is that of the last advance, empty before
     the first; ``places`` are those of the robots that lived after it. The requested
-    advance may have a snapshot in the store if ``may_be_kept``, as in any replay.
+    advance may have a snapshot in the store if ``may_be_kept``, as in any replay. It
+    must have the result of ``repeats``, if there is one.
     """
 
     step: int = 0
@@ -66,6 +67,7 @@ class _Past:
     history: list[PastAdvance] = field(default_factory=list)
     places: dict[BirthId, Vector] = field(default_factory=dict)
     requested: AdvanceShard | None = None
+    repeats: Advanced | None = None
     wants_snapshot: bool = False
     may_be_kept: bool = True
 
@@ -107,6 +109,7 @@ class ShardRequests:
         # A shard has its island's number here and another one in the fleet.
         self._numbers: dict[int, int] = {}
         self._islands: dict[int, int] = {}
+        self._repeated_on: dict[int, str] = {}
 
     @property
     def waiting(self) -> dict[int, str]:
@@ -126,6 +129,17 @@ class ShardRequests:
         """Return the step that a shard has reached."""
         return self._past(shard).step
 
+    def requested(self, shard: int) -> AdvanceShard | None:
+        """Return the advance of a shard that is requested, or noted."""
+        return self._past(shard).requested
+
+    def begin_at(self, event: Advanced) -> None:
+        """Let a shard begin with the snapshot of an advance, which the store has."""
+        past, advance = self._past(event.island), event.advance
+        past.step = past.base = advance.step
+        past.digest, past.platform = advance.digest, event.provenance.platform
+        past.places = {one.birth: one.place for one in advance.judgements}
+
     def past(self, shard: int) -> Rebuild:
         """Return what a worker needs to rebuild a shard's state."""
         past = self._past(shard)
@@ -142,14 +156,26 @@ class ShardRequests:
             if past.requested is not None:
                 self.send(past.requested)
 
-    def send(self, command: AdvanceShard) -> None:
-        """Request an advance."""
+    def send(self, command: AdvanceShard, repeats: Advanced | None = None) -> None:
+        """Request an advance.
+
+        Args:
+            command: the advance.
+            repeats: past result of this advance, to be computed again on the same
+                platform; another result is the worker's error.
+        """
         shard = command.island
         past = self._past(shard)
-        past.requested = command
+        past.requested, past.repeats = command, repeats
+        platform = past.platform
+        if repeats is not None:
+            platform = repeats.provenance.platform
+            if self._repeated_on.setdefault(shard, platform) != platform:
+                self._repeated_on[shard] = platform
+                self._fleet.release(self._numbers.pop(shard))
         if shard not in self._numbers:
             number = self._fleet.new_shard(
-                self._context.client, self._encode, past.platform
+                self._context.client, self._encode, platform, may_drift=repeats is None
             )
             self._numbers[shard], self._islands[number] = number, shard
         self._fleet.advance(self._numbers[shard])
@@ -240,6 +266,7 @@ class ShardRequests:
         read = partial(
             _read_answer,
             requested=past.requested,
+            repeats=past.repeats,
             expected=(request.epoch, request.number),
             provenance=Provenance(command.agent, command.platform),
             complete=complete,
@@ -251,6 +278,7 @@ def _read_answer(
     data: bytes,
     *,
     requested: AdvanceShard,
+    repeats: Advanced | None,
     expected: tuple[int, int],
     provenance: Provenance,
     complete: Callable[[Advance], Advance] | None,
@@ -260,6 +288,7 @@ def _read_answer(
     Args:
         data: bytes of the answer.
         requested: the arena's command.
+        repeats: past result that the answer must have; None for a new advance.
         expected: epoch and number of the request.
         provenance: of the answer, but for the time that it took.
         complete: adds what a drift between platforms lost; None without a drift.
@@ -284,6 +313,14 @@ def _read_answer(
         raise MalformedMessage("advance: a snapshot was wanted, got none")
     poses, rows = place_poses(advance.poses, island)
     advance = replace(advance, poses=poses)
+    if repeats is not None:
+        got, must = (advance.digest, rows), (repeats.advance.digest, repeats.pose_rows)
+        if got != must:
+            raise MalformedMessage(
+                f"advance to step {advance.step}: the digest of its state and its "
+                f"number of poses must be {must[0].hex()[:16]}... and {must[1]}, got "
+                f"{got[0].hex()[:16]}... and {got[1]}: this machine's results differ"
+            )
     if complete is not None:
         advance = complete(advance)
     signed = replace(provenance, wall_s=answer.wall_s)
