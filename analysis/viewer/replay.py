@@ -1,6 +1,5 @@
 """Reads the tables of a run, in the form of the messages of a live run."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
+from schema.tables.description import read_description
 from schema.tables.files import FINISHED, campaign, read_table
 from schema.wire.updates import (
     Update,
@@ -27,7 +27,6 @@ from schema.wire.updates import (
 CHUNK_S = 20.0
 """Simulated time of the poses that are read and shown at once [s]."""
 
-_DETAILS = "run.json"
 _BORN = ("island", "birth", "parents", "rank", "body", "sim_time_s")
 
 
@@ -72,7 +71,7 @@ def read_experiment(folder: Path) -> Experiment:
     """Return the experiment of a run.
 
     Raises:
-        RunFolderError: the folder has no run.
+        RunFolderError: the folder has no run, or its description is damaged.
         ExperimentError: its document has another version.
     """
     return experiment_from_text(_details(folder)["document"])
@@ -82,7 +81,7 @@ def read_origin(folder: Path) -> Origin:
     """Return seed and number of a run, which determine its noise, for island 0.
 
     Raises:
-        RunFolderError: the folder has no run.
+        RunFolderError: the folder has no run, or its description is damaged.
     """
     details = _details(folder)
     return Origin(seed=details["seed"], run=details["run"])
@@ -140,17 +139,10 @@ def _details(folder: Path) -> dict[str, Any]:
     """Return the description of a run.
 
     Raises:
-        RunFolderError: the folder has no run.
+        RunFolderError: the folder has no run, or its description is damaged.
     """
-    try:
-        details: dict[str, Any] = json.loads((folder / _DETAILS).read_text("utf-8"))
-        texts = {key: str(details[key]) for key in ("name", "document")}
-        return {**texts, **{key: int(details[key]) for key in ("seed", "run")}}
-    except OSError as error:
-        why = f"{_DETAILS}: {error.strerror}"
-    except (ValueError, KeyError, TypeError) as error:
-        why = f"{_DETAILS}: {error}"
-    raise RunFolderError(f"{folder}: no run found: {why}")
+    found = read_description(folder)
+    return {key: getattr(found, key) for key in ("name", "document", "seed", "run")}
 
 
 def _within(folder: Path, span: Span) -> pa.Table:

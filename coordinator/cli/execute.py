@@ -23,7 +23,6 @@ from coordinator.storage.folder import (
     RunFolder,
     holds_run,
     read_details,
-    read_state,
 )
 from coordinator.storage.folder_status import (
     check_rewritable,
@@ -34,9 +33,11 @@ from coordinator.storage.folder_status import (
 from coordinator.storage.hints import command, stopped
 from coordinator.storage.lock import FolderLock
 from schema.agent.service import tell_user
-from schema.errors import NetworkError, RevolveError
+from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text, experiment_text
+from schema.tables.description import STATE, read_state
+from schema.tables.files import is_sealed
 
 
 def start(
@@ -88,7 +89,7 @@ def resume(folder: Path, deployment: Deployment) -> int:
         with FolderLock(folder):
             planned, failed = _plan(folder, read_campaign(folder))
             return _execute_campaign(folder, planned, failed, deployment)
-    if read_state(folder) == "finished" and not _is_to_be_rewritten(folder):
+    if not _is_to_be_rewritten(folder) and read_state(folder) == "finished":
         tell_user(f"{folder}: already finished")
         return 0 if has_evaluated(folder) else 1
     return _execute_run(folder, RunFolder(folder), deployment)
@@ -158,13 +159,23 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
 
 
 def _is_to_be_rewritten(folder: Path) -> bool:
-    """Return whether a run is finished, but a table is damaged; tell the user so.
+    """Return whether a run's state or finished tables are damaged; tell the user so.
 
     Raises:
         RunFolderError: such a table cannot be written again.
     """
-    if read_state(folder) != "finished":
-        return False
+    try:
+        if read_state(folder) != "finished":
+            return False
+    except RunFolderError as error:
+        tell_user(f"{error}; continuing where the journal ends")
+        return True
+    if not is_sealed(folder):
+        tell_user(
+            f"{folder / STATE}: damaged: is 'finished', but the run has no finished "
+            "tables; continuing where the journal ends"
+        )
+        return True
     damages = table_damages(folder)
     for damage in damages:
         tell_user(damage)

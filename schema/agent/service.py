@@ -21,6 +21,7 @@ from schema.agent.request_handler import FairQueue, ReplyCounts, Server
 from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
+from schema.errors import without_controls
 
 _POLL_S = 0.2
 _RETRY_S = 0.3
@@ -31,8 +32,8 @@ UNSUPERVISED = ProcessSlot()
 
 
 def tell_user(line: str) -> None:
-    """Write a line to standard error."""
-    sys.stderr.write(f"{line}\n")
+    """Write a line to standard error; control characters become spaces."""
+    sys.stderr.write(f"{without_controls(line)}\n")
     sys.stderr.flush()
 
 

@@ -10,12 +10,13 @@ import pytest
 
 from coordinator.cli.status import main as status
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunDetails, RunFolder, read_state
+from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.folder_status import check_rewritable, folder_status
 from coordinator.storage.journal import Journal
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.tables.columns import TABLES
+from schema.tables.description import read_state
 
 pytestmark = pytest.mark.system
 
