@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 
 import numpy as np
 import pyarrow as pa
@@ -61,6 +61,9 @@ def measure_runs(
                 future.result()
                 on_measured()
         except BaseException:
+            # Not to wait for the runs that are being measured.
+            for child in active_children():
+                child.terminate()
             pool.shutdown(cancel_futures=True)
             raise
         return [future.result() for future in futures]

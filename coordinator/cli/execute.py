@@ -33,6 +33,7 @@ from coordinator.storage.folder_status import (
 from coordinator.storage.hints import command, stopped
 from coordinator.storage.lock import FolderLock
 from schema.agent.service import tell_user
+from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text, experiment_text
@@ -98,6 +99,7 @@ def resume(folder: Path, deployment: Deployment) -> int:
 def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:
     """Execute the run of a locked folder, print its summary, return the exit code."""
     conclusions: list[Conclusion] = []
+    advise(stopped(folder))
     with held:
         status = unbegun_status(folder, held.details)
         try:
@@ -114,8 +116,8 @@ def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:
     for _, error in scheduler.failed:
         raise error
     if not scheduler.is_finished:
-        tell_user(stopped(folder))
-        return 130
+        tell_stopped()
+        return STOPPED
     print(conclusions[0].text)
     return 0 if conclusions[0].has_evaluated else 1
 
@@ -200,6 +202,7 @@ def _execute_campaign(
         failed: folders of finished runs in which all evaluations failed.
         deployment: processes and network.
     """
+    advise(stopped(folder))
     finished = sum(one.status.state == "finished" for one in planned)
     if finished:
         tell_user(f"{finished} of {len(planned)} runs are already finished")
@@ -213,8 +216,8 @@ def _execute_campaign(
 
     scheduler = execute_runs(folder, planned, deployment, conclude_run, _report)
     if not scheduler.is_finished:
-        tell_user(stopped(folder))
-        return 130
+        tell_stopped()
+        return STOPPED
     if scheduler.failed:
         tell_user(
             f"{len(scheduler.failed)} of {len(planned)} runs failed; after fixing the "

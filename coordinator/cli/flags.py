@@ -4,7 +4,13 @@ import argparse
 
 from coordinator.storage.campaign import shipped_campaigns
 from schema.agent.address import FORMS
-from schema.agent.command import add_access, add_cpu_limit, add_network_flags
+from schema.agent.command import (
+    add_access,
+    add_cpu_limit,
+    add_give_up,
+    add_network_flags,
+    add_oversubscribe,
+)
 from schema.experiment.file import shipped_experiments
 from schema.flags import Flags, add_count, positive_number, share, whole_number
 
@@ -104,6 +110,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
             "--connect)",
             least=0,
         )
+        add_oversubscribe(flags)
         add_count(
             flags,
             "--threads",
@@ -140,6 +147,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         "--view", action="store_true", help="open a viewer, as revolve view does"
     )
     add_cpu_limit(flags)
+    add_give_up(flags)
     flags.add_argument(
         "--audit",
         type=share,

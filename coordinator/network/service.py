@@ -6,6 +6,7 @@ events in the order of their arrival.
 
 import json
 import logging
+import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
@@ -31,7 +32,7 @@ from schema.agent.network import (
     hub_config,
 )
 from schema.agent.platform_tag import wire_version
-from schema.agent.service import Outlet
+from schema.agent.service import HubWatch, Outlet, tell_user
 from schema.agent.topics import Member, agents_alive, check_name
 from schema.errors import MalformedMessage, NetworkError
 
@@ -41,6 +42,7 @@ _NOW = zenoh.ConsolidationMode.NONE
 _LONGEST_REASON = 1000
 _MOST_AT_ONCE = 1000
 _ASK_AGAIN_S = 1.0
+_LOOK_S = 1.0
 # Reply of the engine itself after a timeout.
 _TIMEOUT = b"Timeout"
 
@@ -98,6 +100,7 @@ class Network:
         connect: str = "",
         tls: Tls | None = None,
         certificates: Iterable[Certificate] | None = None,
+        give_up_after_s: float = math.inf,
     ) -> None:
         """Configure the session; ``with`` opens it.
 
@@ -109,6 +112,8 @@ class Network:
             connect: address of a hub elsewhere; then nothing listens here.
             tls: files for ``tls/`` addresses.
             certificates: those that may connect; None: all of the authority.
+            give_up_after_s: time without a hub elsewhere after which ``receive``
+                raises [s].
 
         Raises:
             NetworkError: invalid names or addresses, or an address that other
@@ -126,6 +131,8 @@ class Network:
             else hub_config((*listen, self.own_address), tls, certificates)
         )
         self._is_hub = not connect
+        self._hub = HubWatch(self.address, tell_user, give_up_after_s)
+        self._look_s = 0.0
         self._inbox: SimpleQueue[_News] = SimpleQueue()
         self._membership = Membership(wire_version())
         self._ask_again: list[tuple[float, str]] = []
@@ -234,9 +241,13 @@ class Network:
             pause_s: how long to let events collect first [s].
 
         Raises:
-            NetworkError: another coordinator has taken this one's run over.
+            NetworkError: another coordinator has taken this one's run over, or
+                ``HubLost``.
         """
         now_s = time.monotonic()
+        if not self._is_hub and now_s >= self._look_s:
+            self._look_s = now_s + _LOOK_S
+            self._hub.seen(is_there=bool(self._session.info.routers_zid()))
         while self._ask_again and self._ask_again[0][0] <= now_s:
             self._ask_info(self._ask_again.pop(0)[1])
         events: list[DispatchEvent] = []

@@ -5,6 +5,7 @@ discovery, and only addresses with certificates are reachable from other machine
 """
 
 import json
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from ipaddress import ip_address
@@ -59,6 +60,7 @@ class Agent:
         version: of Revolve Islands.
         threads: that advance one arena together.
         cpu_limit_s: CPU time limit of a job [s].
+        give_up_after_s: time without a hub after which the process ends [s].
     """
 
     role: Role
@@ -71,6 +73,7 @@ class Agent:
     version: str = ""
     threads: int = 1
     cpu_limit_s: float = CPU_LIMIT_S
+    give_up_after_s: float = math.inf
 
 
 def _is_loopback(host: str) -> bool:
