@@ -110,7 +110,9 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
         try:
             runs.append(_read_run(folder))
         except RunFolderError as error:
-            left_out.append(LeftOut(str(folder), "run", str(error)))
+            left_out.append(
+                LeftOut(str(folder), "run", str(error).removeprefix(f"{folder}/"))
+            )
     if not runs:
         first = left_out[0]
         raise RunFolderError(f"no run can be read: {first.folder}: {first.why}")
