@@ -251,9 +251,11 @@ def test_refused_resume_does_not_change_the_folder(
 def test_tables_are_rewritable_only_with_the_journal(tmp_path: Path) -> None:
     experiment = read_experiment("scenario3")
     details = RunDetails("scenario3", 0, 1, experiment_text(experiment))
-    with RunFolder(tmp_path, details):
-        pass
-    (tmp_path / "state").write_text("finished")
+    with RunFolder(tmp_path, details) as folder:
+        (tmp_path / "state").write_text("finished")
+        with pytest.raises(RunFolderError, match="state: damaged: is 'finished'"):
+            folder_status(tmp_path)
+        folder.seal({"births": "0" * 64})
     with pytest.raises(RunFolderError, match="put a copy of the tables in their place"):
         check_rewritable(tmp_path)
     with pytest.raises(RunFolderError, match="put a copy of the tables in their place"):

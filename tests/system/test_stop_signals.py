@@ -75,18 +75,33 @@ def start(folder: Path, *words: str, prefix: tuple[str, ...] = ()) -> Any:  # no
     )
 
 
-def begun(folder: Path, name: str, process: int) -> bool:
-    """Return whether a command does what it is to be stopped in."""
-    processes = {"run": 4, "worker": 3, "analyzer": 2, "bench dispatch": 6}
-    if name in ("run", "in-process"):
-        journal = folder / "run" / "journal.bin"
-        is_vetted = journal.exists() and journal.stat().st_size > 1000
-        return is_vetted and len(family(process)) >= processes.get(name, 1)
-    if name == "coordinator":
-        return (folder / "run" / "address").exists()
-    if name == "hub":
-        return _cpu_s(process) > 0.3
-    return len(family(process)) >= processes.get(name, 1) and _cpu_s(process) > 1.0
+def wait_until_begun(folder: Path, name: str, process: Any, until: Until) -> str:  # noqa: ANN401
+    """Wait until a command does what it is to be stopped in; return what it said."""
+
+    def is_begun() -> bool:
+        if process.poll() is not None:
+            return True
+        size = len(family(process.pid))
+        if name == "run":
+            journal = folder / "run" / "journal.bin"
+            is_vetted = journal.exists() and journal.stat().st_size > 1000
+            return is_vetted and size >= 4
+        if name == "coordinator":
+            return (folder / "run" / "address").exists()
+        if name == "bench dispatch":
+            return size > 6
+        return (name == "bench" or (folder / "run" / "state").exists()) and _cpu_s(
+            process.pid
+        ) > 3.0
+
+    told: str = ""
+    if name in ("worker", "analyzer", "hub"):
+        told = process.stderr.readline()
+        assert told.startswith(("no hub", "listening")), told
+    else:
+        until(is_begun, name)
+    assert process.poll() is None, process.stderr.read()
+    return told
 
 
 def _cpu_s(process: int) -> float:
@@ -116,10 +131,7 @@ def test_a_signal_ends_a_command_with_its_children(
     tmp_path: Path, until: Until, name: str, number: signal.Signals
 ) -> None:
     process = start(tmp_path, *COMMANDS[name])
-    until(
-        lambda: process.poll() is not None or begun(tmp_path, name, process.pid), name
-    )
-    assert process.poll() is None, process.stderr.read()
+    wait_until_begun(tmp_path, name, process, until)
     taken_s, told = stop(process, number, family(process.pid))
     sys.stdout.write(f"{name} {number.name}: {taken_s:.2f} s\n{told}\n")
     assert taken_s < LIMIT_S
@@ -132,7 +144,7 @@ def test_a_signal_ends_a_command_with_its_children(
 
 def test_a_command_under_nohup_ignores_hangups(tmp_path: Path, until: Until) -> None:
     process = start(tmp_path, *COMMANDS["worker"], prefix=("nohup",))
-    until(lambda: begun(tmp_path, "worker", process.pid), "worker")
+    wait_until_begun(tmp_path, "worker", process, until)
     processes = family(process.pid)
     for each in processes:
         os.kill(each, signal.SIGHUP)
