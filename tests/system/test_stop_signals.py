@@ -5,7 +5,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ LIMIT_S = 5.0
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 NOWHERE = "tcp/127.0.0.1:9"
 Workspace = Any
+_STARTED: list[int] = []
 Until = Callable[[Callable[[], bool], str], None]
 
 SLOW = """
@@ -63,7 +64,7 @@ def family(process: int) -> set[int]:
 
 def start(folder: Path, *words: str, prefix: tuple[str, ...] = ()) -> Any:  # noqa: ANN401
     (folder / "slow.toml").write_text(SLOW)
-    return subprocess.Popen(
+    process = subprocess.Popen(
         [*prefix, sys.executable, "-m", "revolve", *words],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -73,6 +74,17 @@ def start(folder: Path, *words: str, prefix: tuple[str, ...] = ()) -> Any:  # no
         env={**os.environ, "PYTHONPATH": str(ROOT), "XDG_RUNTIME_DIR": str(folder)},
         start_new_session=True,
     )
+    _STARTED.append(process.pid)
+    return process
+
+
+@pytest.fixture(autouse=True)
+def nothing_stays() -> Iterator[None]:
+    """Kill what a failed test has left."""
+    yield
+    while _STARTED:
+        for each in family(_STARTED.pop()):
+            os.kill(each, signal.SIGKILL)
 
 
 def wait_until_begun(folder: Path, name: str, process: Any, until: Until) -> str:  # noqa: ANN401
@@ -88,11 +100,8 @@ def wait_until_begun(folder: Path, name: str, process: Any, until: Until) -> str
             return is_vetted and size >= 4
         if name == "coordinator":
             return (folder / "run" / "address").exists()
-        if name == "bench dispatch":
-            return size > 6
-        return (name == "bench" or (folder / "run" / "state").exists()) and _cpu_s(
-            process.pid
-        ) > 3.0
+        is_there = name != "in-process" or (folder / "run" / "state").exists()
+        return is_there and _cpu_s(process.pid) > 3.0
 
     told: str = ""
     if name in ("worker", "analyzer", "hub"):
