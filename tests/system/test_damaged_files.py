@@ -83,7 +83,7 @@ def contents(name: str, sound: bytes) -> Iterator[bytes]:
     )
     rng = np.random.default_rng([15, *name.encode()])
     for _ in range(6):
-        yield rng.bytes(rng.integers(1, 200))
+        yield rng.bytes(int(rng.integers(1, 200)))
     bits = len(sound) * 8
     for bit in range(bits) if bits <= 100 else rng.integers(bits, size=12).tolist():
         at, mask = bit // 8, 1 << bit % 8
