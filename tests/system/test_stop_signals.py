@@ -200,7 +200,7 @@ def test_a_lost_hub_is_told_once_and_its_return(
     workspace: Workspace, until: Until
 ) -> None:
     """A coordinator and a worker go on when the hub is back."""
-    document = SLOW.replace("2000000", "100").replace("1000", "30000")
+    document = SLOW.replace("2000000", "120").replace("1000", "30000")
     (workspace.folder / "quick.toml").write_text(document)
     place = f"unixsock-stream/{workspace.folder}/h"
     words = ("quick.toml", "--connect", place, "--quiet", "--out", "run")
