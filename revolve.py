@@ -2,7 +2,6 @@
 
 import io
 import os
-import signal
 import sys
 from collections.abc import Iterable
 from importlib import import_module
@@ -45,15 +44,18 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         The command's exit code; 1 if the reader closed standard output, 2 for a
         user's error or output that cannot be written (one line on stderr), 130 after
-        Ctrl-C.
+        Ctrl-C, SIGTERM, SIGHUP or SIGUSR1.
     """
     if sys.stdout is None:
         # The next file to be opened would get its descriptor, and all output.
         print("revolve: standard output is closed", file=sys.stderr)
         return 2
     _ensure_buffer()
+    stopping = None
     if arguments is None:
         _separate_engine_log()
+        stopping = import_module("schema.agent.stopping")
+        stopping.prepare_stop(sys.argv[1:])
     try:
         try:
             return _run(sys.argv[1:] if arguments is None else arguments)
@@ -75,9 +77,9 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         return 130
     finally:
-        if arguments is None:
+        if stopping is not None:
             # The process ends now: another Ctrl-C must not print a traceback.
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            stopping.finish_stop()
 
 
 def _run(words: list[str]) -> int:

@@ -4,7 +4,13 @@ import argparse
 
 from coordinator.storage.campaign import shipped_campaigns
 from schema.agent.address import FORMS
-from schema.agent.command import add_access, add_job_limits, add_network_flags
+from schema.agent.command import (
+    add_access,
+    add_give_up,
+    add_job_limits,
+    add_network_flags,
+    add_oversubscribe,
+)
 from schema.experiment.file import shipped_experiments
 from schema.flags import (
     Flags,
@@ -111,6 +117,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
             "--connect)",
             least=0,
         )
+        add_oversubscribe(flags)
         add_count(
             flags,
             "--threads",
@@ -148,6 +155,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     )
     add_job_limits(flags)
     add_plugins(flags)
+    add_give_up(flags)
     flags.add_argument(
         "--audit",
         type=share,

@@ -10,16 +10,17 @@ from rich.table import Table
 from coordinator.cli.format import duration, fault_lines, run_details
 from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, read_campaign
-from coordinator.storage.folder import DETAILS, EPOCH, RunDetails, holds_run
+from coordinator.storage.folder import EPOCH, RunDetails, holds_run
 from coordinator.storage.folder_status import folder_status, unbegun_status
 from coordinator.storage.journal import NAME as JOURNAL
-from coordinator.storage.lock import LOCK
+from coordinator.storage.lock import LOCK, read_holder
 from schema.agent.address import read_address
 from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
 from schema.agent.service import tell_user
 from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.flags import Flags
 from schema.limits import printable
+from schema.tables.description import DETAILS
 from schema.tables.segments import FINISHED, SEGMENTS
 from schema.wire.operator import (
     GetStatus,
@@ -99,7 +100,9 @@ def _live(folder: Path, options: argparse.Namespace) -> Status | None:
     try:
         options.connect = read_address(folder)
         found = ask_status(options)
-    except NetworkError:
+    except NetworkError as error:
+        if read_holder(folder):
+            tell_user(f"its coordinator cannot be asked: {error}")
         return None
     here = folder.resolve()
     for status in found.values():

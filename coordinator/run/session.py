@@ -21,7 +21,7 @@ from coordinator.run.pose_recovery import TABLE as POSES
 from coordinator.run.pose_recovery import PoseRecovery, has_lost_poses
 from coordinator.run.run_context import RunContext
 from coordinator.run.throttle import RealTimeThrottle
-from coordinator.storage.folder import DETAILS, STATE, RunFolder
+from coordinator.storage.folder import RunFolder
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.journal import Journal, is_begun
 from coordinator.storage.recorder import Recorder
@@ -31,6 +31,7 @@ from schema.agent.service import tell_user
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_from_text
 from schema.tables.columns import TABLES
+from schema.tables.description import DETAILS, STATE
 from schema.tables.files import has_rows
 from schema.wire.status import IslandStatus, RunStatus
 
