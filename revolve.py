@@ -52,6 +52,8 @@ def main(arguments: list[str] | None = None) -> int:
         print("revolve: standard output is closed", file=sys.stderr)
         return 2
     _ensure_buffer()
+    if arguments is None:
+        _separate_engine_log()
     try:
         try:
             return _run(sys.argv[1:] if arguments is None else arguments)
@@ -125,6 +127,30 @@ def _ensure_buffer() -> None:
             errors=sys.stdout.errors,
             closefd=False,
         )
+
+
+def _separate_engine_log() -> None:
+    """Lead what Zenoh writes to descriptor 1 to standard error.
+
+    Standard output gets a descriptor of its own, so that it holds the command's results
+    only. Zenoh has no other setting for the destination of its log.
+    """
+    if sys.stderr is None:
+        return
+    try:
+        standard_output, standard_error = sys.stdout.fileno(), sys.stderr.fileno()
+    except OSError:
+        return  # replaced by an object without a descriptor
+    sys.stdout.flush()
+    own = os.dup(standard_output)
+    sys.stdout = open(  # noqa: PTH123, SIM115 - open until the process ends
+        own,
+        "w",
+        buffering=1 if sys.stdout.line_buffering else -1,
+        encoding=sys.stdout.encoding,
+        errors=sys.stdout.errors,
+    )
+    os.dup2(standard_error, standard_output)
 
 
 def _output_error() -> OSError | None:

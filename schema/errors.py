@@ -6,6 +6,8 @@ The class of an exception names the source of the fault, which decides its handl
 from difflib import get_close_matches
 from typing import Any
 
+from schema.limits import MOST_SHOWN
+
 
 class RevolveError(Exception):
     """Base of all errors, which commands print as one line."""
@@ -66,6 +68,19 @@ class StateDiffers(RevolveError):  # noqa: N818 - reads as what it says
 def one_line(error: Exception) -> str:
     """Return the message of an error as one line."""
     return " ".join(str(error).split())
+
+
+def printable(text: str, most: int = MOST_SHOWN) -> str:
+    """Return a foreign text as one line without control characters, cut if long.
+
+    Args:
+        text: any text of a peer; terminal escapes and line ends become spaces.
+        most: greatest number of characters, the dots at a cut included.
+    """
+    # Cut before the work: a text may have megabytes.
+    clean = "".join(c if c.isprintable() else " " for c in text[: 2 * most])
+    line = " ".join(clean.split())
+    return line if len(line) <= most else f"{line[: most - 3]}..."
 
 
 def nearest(word: Any, words: Any) -> str:  # noqa: ANN401 - any iterable of str

@@ -13,7 +13,7 @@ from typing import Self
 import zenoh
 
 from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
-from schema.agent.service import tell_user
+from schema.agent.service import log_engine, tell_user
 from schema.agent.topics import (
     Member,
     agents_alive,
@@ -102,7 +102,7 @@ class LiveSource:
         Raises:
             NetworkError: no hub answers.
         """
-        zenoh.init_log_from_env_or("error")
+        log_engine()
         with ExitStack() as opened:
             try:
                 config = zenoh.Config.from_json5(self._config)

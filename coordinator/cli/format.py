@@ -1,7 +1,10 @@
 """Figures of runs as text for a terminal."""
 
-from schema.wire.status import IslandStatus, RunStatus
+from collections.abc import Sequence
 
+from schema.wire.status import IslandStatus, PeerFault, RunStatus
+
+_MOST_PEERS = 5
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
 
 
@@ -48,3 +51,18 @@ def about_arenas(run: RunStatus) -> str:
     if run.simulated_per_s:
         pace = f"{pace}, {run.simulated_per_s:.1f} x real time"
     return f", {simulated_s:.0f} s simulated, {alive} alive{pace}"
+
+
+def fault_lines(faults: Sequence[PeerFault]) -> list[str]:
+    """Return a line for each kind of fault: its total, and the peers with the most."""
+    lines = []
+    for kind in sorted({each.kind for each in faults}):
+        of_kind = sorted(
+            (each for each in faults if each.kind == kind),
+            key=lambda each: (-each.count, each.peer),
+        )
+        total = sum(each.count for each in of_kind)
+        peers = ", ".join(f"{each.peer} {each.count}" for each in of_kind[:_MOST_PEERS])
+        more = f" and {len(of_kind) - _MOST_PEERS} more" * (len(of_kind) > _MOST_PEERS)
+        lines.append(f"not used: {total} {kind}: {peers}{more}")
+    return lines

@@ -8,6 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from coordinator.cli.deployment import Deployment, connected_agents
+from coordinator.cli.format import fault_lines
 from coordinator.cli.progress import Display
 from coordinator.dispatch.fleet import Fleet
 from coordinator.network.service import Network
@@ -15,6 +16,7 @@ from coordinator.run.live_server import LiveServer
 from coordinator.run.operators import answer_operator
 from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
+from schema.agent.service import tell_user
 from schema.agent.supervisor import stop_on_signals
 from schema.errors import RevolveError
 from schema.wire.status import RunStatus
@@ -51,7 +53,11 @@ def execute_runs(
         network = agents if isinstance(agents, Network) else None
         scheduler = RunScheduler(
             planned,
-            Fleet(agents, allows_drift=deployment.allows_drift),
+            Fleet(
+                agents,
+                allows_drift=deployment.allows_drift,
+                faults=None if network is None else network.faults,
+            ),
             open_run=lambda held, is_watched: RunSession(
                 held,
                 scheduler.fleet,
@@ -79,12 +85,22 @@ def execute_runs(
                 if now_s - done_s >= _CHORES_S:
                     done_s = now_s
                     scheduler.do_chores(now_s)
+                    _tell_faults(scheduler)
                     for pool in pools:
                         pool.look_after()
             if server is not None:
                 server.serve(time.monotonic())
         scheduler.stop()
+        _tell_faults(scheduler)
+    for line in fault_lines(scheduler.status(time.monotonic()).faults):
+        tell_user(line)
     return scheduler
+
+
+def _tell_faults(scheduler: RunScheduler) -> None:
+    """Tell the user what peers have begun to send that is not used."""
+    for line in scheduler.fleet.faults.lines():
+        tell_user(line)
 
 
 class _Server:

@@ -7,7 +7,7 @@ from uuid import uuid4
 from rich.console import Console
 from rich.table import Table
 
-from coordinator.cli.format import duration, run_details
+from coordinator.cli.format import duration, fault_lines, run_details
 from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, read_campaign
 from coordinator.storage.folder import DETAILS, EPOCH, RunDetails, holds_run
@@ -17,7 +17,7 @@ from coordinator.storage.lock import LOCK
 from schema.agent.address import read_address
 from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
 from schema.agent.service import tell_user
-from schema.errors import NetworkError, RevolveError, RunFolderError
+from schema.errors import NetworkError, RevolveError, RunFolderError, printable
 from schema.flags import Flags
 from schema.tables.files import FINISHED, SEGMENTS
 from schema.wire.operator import (
@@ -185,6 +185,7 @@ def _show(status: Status, title: str, root: Path | None = None) -> None:
         )
     elif done < len(status.runs):
         lines.append("no coordinator is running, or it has no workers and analyzers")
+    lines += [printable(line, _WIDEST) for line in fault_lines(status.faults)]
     # Wide: a narrow terminal wraps lines, but none is cut.
     console = Console(width=_WIDEST, highlight=False, markup=False)
     for line in lines:

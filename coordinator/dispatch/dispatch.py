@@ -6,9 +6,9 @@ next one is ready, and more of them while many short jobs wait. Jobs with lower 
 go first, so a lost job is repeated first. The least busy agent gets the job; ties break
 on its name.
 
-An agent that fails at a job, or loses one without leaving, gets no job until a backoff
-ends. The backoff grows with consecutive failures, so that a broken agent cannot empty
-the queue.
+An agent that fails at a job, loses one without leaving, or declines the same one twice
+gets no job until a backoff ends. The backoff grows with consecutive failures, so that a
+broken agent cannot empty the queue.
 
 Overdue jobs are duplicated on idle agents; the first answer counts. A job that crashed
 several processes is given up.
@@ -36,6 +36,7 @@ from coordinator.dispatch.events import (
     Ticked,
     Withdrawn,
 )
+from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pool import (
     AgentState,
     Backoff,
@@ -45,6 +46,7 @@ from coordinator.dispatch.pool import (
     Stragglers,
 )
 from schema.errors import MalformedMessage, UnexpectedEvent
+from schema.wire.packing import fingerprint
 
 AGENT_OF: dict[JobKind, AgentKind] = {"vet": "analyzer", "evaluate": "worker"}
 MAX_ERRORS = 3
@@ -54,14 +56,15 @@ VETS_AT_HAND = 16
 
 
 class Dispatch:
-    """State machine of jobs; events enter only through ``handle``.
+    """State machine of jobs; events enter only through ``handle``."""
 
-    Attributes:
-        malformed: answers that did not decode or did not fit their job.
-    """
+    def __init__(self, faults: PeerFaults | None = None) -> None:
+        """Initialise without agents and jobs.
 
-    def __init__(self) -> None:
-        self.malformed = 0
+        Args:
+            faults: counts unfit and late answers; None: counts of its own.
+        """
+        self._faults = faults or PeerFaults()
         self._jobs: dict[int, Pending] = {}
         self._pools: dict[AgentKind, Pool] = {
             "worker": Pool(),
@@ -85,9 +88,19 @@ class Dispatch:
         }
 
     @property
+    def malformed(self) -> int:
+        """Answers that did not decode or did not fit their job."""
+        return self._faults.total("malformed")
+
+    @property
     def pending(self) -> int:
         """Number of jobs that are requested and not delivered."""
         return len(self._jobs)
+
+    def client(self, number: int) -> Client | None:
+        """Return the client of a job; None if the job has ended."""
+        pending = self._jobs.get(number)
+        return pending.job.client if pending else None
 
     def jobs_of(self, client: Client) -> list[int]:
         """Return the numbers of a client's jobs that are not delivered."""
@@ -160,6 +173,7 @@ class Dispatch:
         pool = self._pools[kind]
         for number in pool.agents.pop(event.agent).held:
             if pending := self._jobs.get(number):
+                pending.lost[event.agent] = None
                 self._put_back(pending, event.agent)
         yield from self._assign(pool)
 
@@ -199,6 +213,7 @@ class Dispatch:
         pool = self._pools[kind]
         agent = pool.agents[event.agent]
         if event.number not in agent.held:
+            self._note_late(event)
             return
         del agent.held[event.number]
         # A late copy only shows that the agent is free.
@@ -211,19 +226,30 @@ class Dispatch:
                 yield Deliver(pending.job, event.agent, platform, answer)
                 yield from self._close(pending)
             else:
+                is_declined = event.outcome in ("fenced", "cancelled")
+                is_fault = not is_declined or event.agent in pending.avoid
                 yield from self._fail(pending, event, reason)
-                self._backoff.begin(agent, self._now_s or 0.0)
+                if is_fault:
+                    self._backoff.begin(agent, self._now_s or 0.0)
+        else:
+            self._note_late(event)
         pool.offer(event.agent, next(self._stamps))
         yield from self._assign(pool)
+
+    def _note_late(self, event: Returned) -> None:
+        if event.outcome == "ok":
+            self._faults.note("late", event.agent, f"job {event.number}")
 
     def _read(self, job: Job, event: Returned) -> tuple[object, str]:
         """Return the decoded answer, or the reason why there is none."""
         if event.outcome != "ok":
+            if event.outcome == "error":
+                self._faults.note("refused", event.agent, event.reason)
             return None, event.reason
         try:
             return job.read(event.answer), ""
         except MalformedMessage as error:
-            self.malformed += 1
+            self._faults.note("malformed", event.agent, str(error))
             return None, str(error)
 
     def _learn(self, pending: Pending, agent: AgentState) -> None:
@@ -238,7 +264,9 @@ class Dispatch:
         self, pending: Pending, event: Returned, reason: str
     ) -> Iterator[DispatchCommand]:
         """Give a job to another agent, or give it up after several errors."""
-        pending.errors += event.outcome != "lost"
+        if event.outcome == "lost":
+            pending.lost[event.agent] = None
+        pending.errors += event.outcome in ("ok", "error")
         if pending.errors == MAX_ERRORS:
             del pending.holders[event.agent]
             yield Deliver(pending.job, event.agent, reason=reason)
@@ -260,6 +288,12 @@ class Dispatch:
     def _died(self, event: Died) -> Iterator[DispatchCommand]:
         pending = self._jobs.get(event.number)
         if pending is None or pending.job.client != (event.run, event.epoch):
+            return
+        is_same = event.request == fingerprint(pending.job.payload)
+        if event.agent not in pending.lost or not is_same:
+            # A job crashes only a process that had it. That process may have died of
+            # another one's request with the name of this job.
+            self._faults.note("death", event.agent, f"job {event.number}")
             return
         pending.killed[event.agent] = event.cause
         if len(pending.killed) < MAX_DEATHS:

@@ -91,14 +91,15 @@ class Returned:
         number: of the job.
         agent: that had it.
         outcome: "ok" with an answer, "error" with a reason (the agent could not
-            do it), or "lost" (no reply: the agent died, froze or was cut off).
+            do it), "lost" (no reply: the agent died, froze or was cut off),
+            "fenced" (the agent knows a later coordinator of the run) or "cancelled".
         answer: encoded answer; empty unless ok.
-        reason: empty unless error.
+        reason: of the agent; empty if ok or lost.
     """
 
     number: int
     agent: str
-    outcome: Literal["ok", "error", "lost"]
+    outcome: Literal["ok", "error", "lost", "fenced", "cancelled"]
     answer: bytes = b""
     reason: str = ""
 
@@ -112,6 +113,7 @@ class Died:
         number: of the job.
         agent: name of the process, which is never used again.
         cause: such as "SIGSEGV".
+        request: fingerprint of the request that it did.
     """
 
     run: str
@@ -119,6 +121,7 @@ class Died:
     number: int
     agent: str
     cause: str
+    request: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)

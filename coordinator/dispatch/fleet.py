@@ -6,6 +6,7 @@ An answer is returned to the client that requested the job, which interprets it.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import count
 from typing import Protocol
 
@@ -35,8 +36,10 @@ from coordinator.dispatch.events import (
     Ticked,
     Withdrawn,
 )
+from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.shards import ShardDispatch
 from schema.errors import MalformedMessage
+from schema.wire.packing import fingerprint
 
 
 class Agents(Protocol):
@@ -61,36 +64,56 @@ End = Deliver | ShardDone | ShardFailed
 """Result of a job or an advance, as its client receives it."""
 
 
+@dataclass(frozen=True, slots=True)
+class Fenced:
+    """An agent refused a client's job as that of a replaced coordinator."""
+
+    client: Client
+    agent: str
+    reason: str
+
+
 class Fleet:
     """Workers and analyzers, the jobs of all runs, and the routing between them.
 
     Attributes:
         dispatch: assigns jobs about single robots.
         shards: assigns arena shards; their numbers are unique within this process.
+        faults: counts of what agents sent and nothing used.
     """
 
-    def __init__(self, agents: Agents, *, allows_drift: bool = False) -> None:
+    def __init__(
+        self,
+        agents: Agents,
+        *,
+        allows_drift: bool = False,
+        faults: PeerFaults | None = None,
+    ) -> None:
         """Connect to agents.
 
         Args:
             agents: the connection to them.
             allows_drift: an arena may move to another platform if its own is gone.
+            faults: counts that the connection shares; None: counts of its own.
         """
         self._numbers = count(1)
-        self.dispatch = Dispatch()
+        self.faults = faults or PeerFaults()
+        self.dispatch = Dispatch(self.faults)
         self.shards = ShardDispatch(self._numbers, allows_drift=allows_drift)
-        self._malformed = 0
+        self._fenced: list[Fenced] = []
         self._agents = agents
         self._shard_numbers = count()
         self._shard_clients: dict[int, tuple[Client, Encode]] = {}
         self._advance_reads: dict[int, Read] = {}
+        # Shard and request of each job of an advance that has not ended.
+        self._advances: dict[int, tuple[int, bytes]] = {}
         self._ends: dict[Client, list[End]] = {}
         self._advancing: set[int] = set()
 
     @property
     def malformed(self) -> int:
         """Answers that did not decode or did not fit their request."""
-        return self._malformed + self.dispatch.malformed
+        return self.faults.total("malformed")
 
     @property
     def open(self) -> int:
@@ -131,6 +154,7 @@ class Fleet:
             if owner == client:
                 del self._shard_clients[shard]
                 self._advancing.discard(shard)
+                self._forget_advances(shard)
                 self._move(Released(shard))
 
     def listen(self, timeout_s: float, now_s: float) -> dict[Client, list[End]]:
@@ -157,15 +181,18 @@ class Fleet:
     def tell(self, event: DispatchEvent) -> None:
         """Handle an event of agents, of jobs or of time."""
         if isinstance(event, Returned):
+            if event.outcome in ("fenced", "cancelled"):
+                self._note_declined(event)
             read = self._advance_reads.pop(event.number, None)
             if read is not None:
+                if event.outcome == "ok" and self.shards.shard_of(event.number) is None:
+                    self.faults.note("late", event.agent, f"job {event.number}")
                 self._move(self._read_advance(event, read))
                 return
         elif isinstance(event, Died):
             shard = self.shards.shard_that_lost(event.number)
             if shard is not None:
-                if self._shard_clients[shard][0] == (event.run, event.epoch):
-                    self._move(Killed(event.number, event.agent, event.cause))
+                self._advance_killed(event, shard)
                 return
         # Without shards time changes nothing for them.
         elif isinstance(event, Joined | Left) or (
@@ -174,14 +201,46 @@ class Fleet:
             self._move(event)
         self._obey(self.dispatch.handle(event))
 
+    def _advance_killed(self, event: Died, shard: int) -> None:
+        """Pass on that an advance crashed its worker, if it was this client's."""
+        client, _ = self._shard_clients[shard]
+        if client != (event.run, event.epoch):
+            return
+        if self._advances.get(event.number) == (shard, event.request):
+            self._move(Killed(event.number, event.agent, event.cause))
+        else:
+            self.faults.note("death", event.agent, f"job {event.number}")
+
+    def fenced(self) -> list[Fenced]:
+        """Return the jobs refused since the last call as of replaced coordinators."""
+        fenced, self._fenced = self._fenced, []
+        return fenced
+
+    def _note_declined(self, event: Returned) -> None:
+        """Note a job that its agent did not try, if the job is still wanted."""
+        shard = self.shards.shard_of(event.number)
+        if shard is None:
+            client = self.dispatch.client(event.number)
+        else:
+            client, _ = self._shard_clients[shard]
+        if client is None:
+            return
+        if event.outcome == "fenced":
+            self._fenced.append(Fenced(client, event.agent, event.reason))
+        else:
+            self.faults.note("cancelled", event.agent, f"job {event.number}")
+
     def _read_advance(self, event: Returned, read: Read) -> ShardReturned:
         """Return the outcome of an advance; an unfit answer is the worker's error."""
         if event.outcome != "ok":
-            return ShardReturned(event.number, event.outcome, event.reason)
+            if event.outcome != "error":
+                return ShardReturned(event.number, "lost")
+            self.faults.note("refused", event.agent, event.reason)
+            return ShardReturned(event.number, "error", event.reason)
         try:
             answer = read(event.answer)
         except MalformedMessage as error:
-            self._malformed += 1
+            self.faults.note("malformed", event.agent, str(error))
             return ShardReturned(event.number, "error", str(error))
         if answer is None:
             return ShardReturned(event.number, "stateless")
@@ -204,7 +263,13 @@ class Fleet:
             if isinstance(command, AssignShard):
                 payload, read = encode(command)
                 self._advance_reads[command.number] = read
+                self._advances[command.number] = (command.shard, fingerprint(payload))
                 self._agents.send(command.number, command.agent, payload)
             else:
                 self._advancing.discard(command.shard)
+                self._forget_advances(command.shard)
                 self._ends.setdefault(client, []).append(command)
+
+    def _forget_advances(self, shard: int) -> None:
+        for number in [n for n, (of, _) in self._advances.items() if of == shard]:
+            del self._advances[number]

@@ -29,6 +29,7 @@ class Pending:
             [s], and its place in the queue of a slot (1.0 is first).
         errors: number of agents that could not do it.
         avoid: agents that failed at it.
+        lost: agents that had it and gave no reply.
         killed: processes that it crashed, with the causes.
     """
 
@@ -36,6 +37,7 @@ class Pending:
     holders: dict[str, tuple[float, float]] = field(default_factory=dict)
     errors: int = 0
     avoid: tuple[str, ...] = ()
+    lost: dict[str, None] = field(default_factory=dict)
     killed: dict[str, str] = field(default_factory=dict)
 
     @property

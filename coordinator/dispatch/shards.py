@@ -48,7 +48,7 @@ class _Shard:
         errors: number of workers that could not make the advance.
         failures: errors and losses since the last advance.
         avoid: workers that failed at the advance.
-        lost: numbers of its jobs that got no reply.
+        lost: numbers of its jobs that got no reply, with the workers that had them.
         killed: workers that it crashed, with the causes.
         rests_until_s: end of the backoff [s].
         drifts_at_s: when it may drift to another platform [s].
@@ -63,7 +63,7 @@ class _Shard:
     errors: int = 0
     failures: int = 0
     avoid: tuple[str, ...] = ()
-    lost: tuple[int, ...] = ()
+    lost: dict[int, str] = field(default_factory=dict)
     killed: dict[str, str] = field(default_factory=dict)
     rests_until_s: float | None = None
     drifts_at_s: float | None = None
@@ -110,6 +110,10 @@ class ShardDispatch:
         """Return the name of the worker that holds a shard; empty if none does."""
         known = self._shards.get(shard)
         return known.holder if known else ""
+
+    def shard_of(self, number: int) -> int | None:
+        """Return the shard that a job advances at present."""
+        return self._out.get(number)
 
     def shard_that_lost(self, number: int) -> int | None:
         """Return the shard whose present advance lost a job without reply."""
@@ -165,7 +169,7 @@ class ShardDispatch:
 
     def _unbind(self, shard: _Shard) -> None:
         if self._out.pop(shard.number, None) is not None:
-            shard.lost = (*shard.lost, shard.number)
+            shard.lost[shard.number] = shard.holder
         shard.holder, shard.has_state, shard.number = "", False, -1
 
     def _tick(self, now_s: float) -> None:
@@ -201,7 +205,7 @@ class ShardDispatch:
             return []
         self._unbind(shard)
         if event.outcome == "lost":
-            shard.lost = (*shard.lost, event.number)
+            shard.lost[event.number] = agent
         shard.avoid = (*shard.avoid, agent)
         shard.rests_until_s = self._now_s + min(
             REST_S * 2**shard.failures, LONGEST_REST_S
@@ -216,6 +220,9 @@ class ShardDispatch:
     def _killed(self, event: Killed) -> list[ShardCommand]:
         number = self.shard_that_lost(event.number)
         if number is None:
+            return []
+        if self._shards[number].lost[event.number] != event.agent:
+            # A job crashes only a process that had it.
             return []
         killed = self._shards[number].killed
         killed[event.agent] = event.cause
@@ -235,7 +242,7 @@ class ShardDispatch:
 
     def _forgive(self, shard: _Shard) -> None:
         """Forget the failures at an advance that has ended."""
-        shard.errors, shard.avoid, shard.lost, shard.killed = 0, (), (), {}
+        shard.errors, shard.avoid, shard.lost, shard.killed = 0, (), {}, {}
 
     def _assignments(self) -> Iterator[ShardCommand]:
         """Assign the shards that wait and have a worker."""

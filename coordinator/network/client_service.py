@@ -3,10 +3,12 @@
 import zenoh
 
 from schema.agent.network import ASK_TIMEOUT_S, DEFAULT_FLEET, Tls, client_config
-from schema.agent.topics import agents_alive, check_name, member_of
+from schema.agent.service import log_engine
+from schema.agent.topics import Member, agents_alive, check_name, member_of
 from schema.errors import NetworkError
 
 _NOW = zenoh.ConsolidationMode.NONE
+_MOST_COORDINATORS = 1000
 
 
 def ask_coordinators(
@@ -31,29 +33,43 @@ def ask_coordinators(
     """
     config = client_config(connect, tls)
     check_name(fleet, "fleet")
-    zenoh.init_log_from_env_or("error")
+    log_engine()
     try:
         session = zenoh.open(zenoh.Config.from_json5(config))
     except zenoh.ZError:
         raise NetworkError(f"no coordinator at {connect}") from None
     replies_of: dict[str, bytes] = {}
     with session:
-        tokens = session.liveliness().get(agents_alive(fleet, "coordinator"))
-        there = [member_of(str(each.ok.key_expr)) for each in tokens if each.ok]
+        # The default channel blocks for ever with many tokens; this one drops some.
+        room: zenoh.handlers.RingChannel[zenoh.Reply] = zenoh.handlers.RingChannel(
+            _MOST_COORDINATORS
+        )
+        tokens = session.liveliness().get(agents_alive(fleet, "coordinator"), room)
+        there = {member_of(str(each.ok.key_expr)) for each in tokens if each.ok}
         for member in sorted(there, key=lambda each: each.name):
-            if only not in ("", member.name):
-                continue
-            replies = session.get(
-                member.command,
-                payload=data,
-                timeout=ASK_TIMEOUT_S,
-                consolidation=_NOW,
-            )
-            for reply in replies:
-                if reply.ok is not None:
-                    replies_of[member.name] = reply.ok.payload.to_bytes()
+            if only in ("", member.name):
+                reply = _reply_of(member, session, data)
+                if reply is not None:
+                    replies_of[member.name] = reply
     if not replies_of:
         raise NetworkError(
             f"{connect}: none of {len(there)} coordinators of fleet {fleet} replies"
         )
     return replies_of
+
+
+def _reply_of(member: Member, session: zenoh.Session, data: bytes) -> bytes | None:
+    """Return a coordinator's own reply; None without one."""
+    replies = session.get(
+        member.command,
+        payload=data,
+        timeout=ASK_TIMEOUT_S,
+        target=zenoh.QueryTarget.ALL,
+        consolidation=_NOW,
+    )
+    for reply in replies:
+        replier = reply.replier_id
+        is_own = replier is not None and str(replier.zid) == member.session
+        if is_own and reply.ok is not None:
+            return reply.ok.payload.to_bytes()
+    return None

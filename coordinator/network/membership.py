@@ -1,42 +1,76 @@
 """Agents of a fleet: which ones are alive, their properties, and which may join.
 
-State only: liveliness tokens and agent infos in, dispatch events out.
+State only: liveliness tokens and agent infos in, dispatch events out. Any process that
+reaches the hub can declare tokens, so their number is limited, and a token says only
+that the agent of its own key, role included, is to be asked.
 """
 
 from google.protobuf.message import DecodeError
 
 from coordinator.dispatch.events import AgentKind, Died, Joined, Left
-from schema.agent.topics import Member, member_of
-from schema.errors import MalformedMessage
+from coordinator.dispatch.faults import PeerFaults
+from schema.agent.topics import Member, member_of, slot_of
+from schema.errors import MalformedMessage, printable
+from schema.limits import MOST_DEATHS, MOST_MEMBERS, MOST_PLATFORM, MOST_SLOTS
 from schema.wire import revolve_pb2 as pb
+
+_CAUSE_LENGTH = 100
 
 
 class Membership:
     """All agents of a fleet whose token exists.
 
     Attributes:
-        members: the agents by name, refused ones included.
         refused: agents that may not join, with the reasons.
     """
 
-    def __init__(self, version: str) -> None:
-        """Initialise without agents; ``version`` is the one that they must have."""
-        self.members: dict[str, Member] = {}
+    def __init__(self, version: str, faults: PeerFaults | None = None) -> None:
+        """Initialise without agents.
+
+        Args:
+            version: that agents must have.
+            faults: counts what is dropped; None: counts of its own.
+        """
         self.refused: dict[str, str] = {}
+        self._faults = faults or PeerFaults()
         self._version = version
-        self._joined: set[str] = set()
-        self._known_deaths: set[str] = set()
+        self._alive: set[Member] = set()
+        # How often they were asked without an answer.
+        self._silent: dict[Member, int] = {}
+        self._joined: dict[str, Member] = {}
+        self._refused_members: dict[str, Member] = {}
+        # Agents that left and may have died of their job, oldest first.
+        self._gone: dict[str, None] = {}
+
+    def __len__(self) -> int:
+        """Return the number of agents whose token exists."""
+        return len(self._alive)
+
+    def member(self, agent: str) -> Member | None:
+        """Return an agent that has joined; None if none of that name has."""
+        return self._joined.get(agent)
 
     def appear(self, key: str) -> Member | None:
-        """Note a token; return its agent if that is new, else None.
+        """Note a token; return its agent if that is to be asked for its properties.
+
+        Beyond the limit it takes the place of an agent that does not answer; without
+        such an agent it is dropped and counted.
 
         Raises:
             MalformedMessage: not the token of an agent.
         """
         member = member_of(key)
-        if member.name in self.members:
+        if member in self._alive:
             return None
-        self.members[member.name] = member
+        if len(self._alive) >= MOST_MEMBERS:
+            silent = next(iter(self._silent), None)
+            self._faults.note(
+                "crowd", (silent or member).name, f"{MOST_MEMBERS} agents"
+            )
+            if silent is None:
+                return None
+            self._forget(silent)
+        self._alive.add(member)
         return member
 
     def vanish(self, key: str) -> Left | None:
@@ -45,18 +79,28 @@ class Membership:
         Raises:
             MalformedMessage: not the token of an agent.
         """
-        name = member_of(key).name
-        self.members.pop(name, None)
-        self.refused.pop(name, None)
-        if name not in self._joined:
-            return None
-        self._joined.remove(name)
-        return Left(name)
+        member = member_of(key)
+        self._forget(member)
+        name = member.name
+        if self._refused_members.get(name) == member:
+            del self._refused_members[name], self.refused[name]
+        return self._leave(member)
 
-    def is_stranger(self, agent: str) -> bool:
+    def is_stranger(self, member: Member) -> bool:
         """Return whether an agent is alive but its properties are not known yet."""
-        known = agent in self._joined or agent in self.refused
-        return agent in self.members and not known
+        known = (self._joined.get(member.name), self._refused_members.get(member.name))
+        return member in self._alive and member not in known
+
+    def note_silence(self, member: Member) -> Left | None:
+        """Note that an agent does not answer; return the event if it had joined."""
+        if member not in self._alive:
+            return None
+        self._silent[member] = self._silent.get(member, 0) + 1
+        return self._leave(member)
+
+    def silences(self, member: Member) -> int:
+        """Return how often an agent was asked without an answer."""
+        return self._silent.get(member, 0)
 
     def refuse(self, agent: str, why: str) -> Left | None:
         """Exclude an agent; return the event if it had joined.
@@ -65,47 +109,101 @@ class Membership:
             agent: its name.
             why: for the user.
         """
-        if agent not in self._joined:
+        member = self._joined.get(agent)
+        if member is None:
             return None
-        self._joined.remove(agent)
-        self.refused[agent] = why
-        return Left(agent)
+        self._exclude(member, why)
+        return self._leave(member)
 
-    def introduce(self, agent: str, data: bytes) -> list[Died | Joined]:
+    def introduce(self, member: Member, data: bytes) -> list[Died | Joined]:
         """Take an agent's description of itself and of the processes it replaces.
 
         Args:
-            agent: a member without properties so far.
+            member: an agent without properties so far.
             data: bytes of an ``AgentInfo``.
 
         Returns:
             Deaths that were not known; last, if the agent may join, that it joined.
 
         Raises:
-            MalformedMessage: not such bytes, no slots, or another name or kind.
+            MalformedMessage: not such bytes, a number or text beyond its limit, another
+                name or kind, or a name that an agent of the other kind has.
         """
-        member = self.members[agent]
-        try:
-            info = pb.AgentInfo.FromString(data)
-        except DecodeError as error:
-            raise MalformedMessage(f"not the bytes of an AgentInfo: {error}") from None
-        if (info.agent, info.kind) != (agent, member.role) or info.slots < 1:
-            says = f"{info.kind} {info.agent!r} with {info.slots} slots"
-            raise MalformedMessage(f"{member.role} {agent!r} says it is {says}")
+        info = _parsed(member, data)
+        agent = member.name
+        if agent in self._joined or agent in self._refused_members:
+            raise MalformedMessage(f"{member.role} {agent!r} has another agent's name")
+        self._silent.pop(member, None)
         if info.version != self._version:
-            self.refused[agent] = (
-                f"is of version {info.version!r}, the coordinator of {self._version!r}"
+            version = printable(info.version)
+            self._exclude(
+                member,
+                f"is of version {version!r}, the coordinator of {self._version!r}",
             )
             return []
-        self._joined.add(agent)
+        self._joined[agent] = member
         kind: AgentKind = "analyzer" if member.role == "analyzer" else "worker"
         joined = Joined(agent, kind, info.slots, info.platform)
-        return [*self._new_dead(info), joined]
+        return [*self._new_deaths(member, info), joined]
 
-    def _new_dead(self, info: pb.AgentInfo) -> list[Died]:
-        new = [each for each in info.deaths if each.agent not in self._known_deaths]
-        self._known_deaths.update(each.agent for each in new)
-        return [
-            Died(each.run, each.epoch, each.number, each.agent, each.cause[:100])
-            for each in new
-        ]
+    def _forget(self, member: Member) -> None:
+        self._alive.discard(member)
+        self._silent.pop(member, None)
+
+    def _exclude(self, member: Member, why: str) -> None:
+        self.refused[member.name] = why
+        self._refused_members[member.name] = member
+
+    def _leave(self, member: Member) -> Left | None:
+        if self._joined.get(member.name) != member:
+            return None
+        del self._joined[member.name]
+        self._gone[member.name] = None
+        if len(self._gone) > MOST_MEMBERS:
+            del self._gone[next(iter(self._gone))]
+        return Left(member.name)
+
+    def _new_deaths(self, member: Member, info: pb.AgentInfo) -> list[Died]:
+        """Return the deaths of an agent's predecessors, each once.
+
+        Deaths of agents that never joined happened before this coordinator began.
+        """
+        died: list[Died] = []
+        for death in info.deaths:
+            is_same_slot = slot_of(death.agent) == slot_of(member.name) != ""
+            if death.agent in self._joined or (
+                death.agent in self._gone and not is_same_slot
+            ):
+                self._faults.note("death", member.name, f"of {death.agent}")
+            elif death.agent in self._gone:
+                del self._gone[death.agent]
+                cause = printable(death.cause, _CAUSE_LENGTH)
+                job = (death.run, death.epoch, death.number)
+                died.append(Died(*job, death.agent, cause, death.request))
+        return died
+
+
+def _parsed(member: Member, data: bytes) -> pb.AgentInfo:
+    """Return the message of an agent's own properties.
+
+    Raises:
+        MalformedMessage: see ``Membership.introduce``.
+    """
+    try:
+        info = pb.AgentInfo.FromString(data)
+    except DecodeError as error:
+        raise MalformedMessage(f"not the bytes of an AgentInfo: {error}") from None
+    role, agent = member.role, member.name
+    if (info.agent, info.kind) != (agent, role) or not 1 <= info.slots <= MOST_SLOTS:
+        says = f"{printable(info.kind)} {printable(info.agent)!r}"
+        raise MalformedMessage(f"{role} {agent!r} says: {says}, {info.slots} slots")
+    if len(info.platform) > MOST_PLATFORM or not info.platform.isprintable():
+        raise MalformedMessage(
+            f"{role} {agent!r}: platform must be at most {MOST_PLATFORM} printable "
+            f"characters, got {printable(info.platform)!r}"
+        )
+    if len(info.deaths) > MOST_DEATHS:
+        raise MalformedMessage(
+            f"{role} {agent!r}: at most {MOST_DEATHS} deaths, got {len(info.deaths)}"
+        )
+    return info

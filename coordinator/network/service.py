@@ -5,22 +5,25 @@ events in the order of their arrival.
 """
 
 import json
-import logging
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import count
 from queue import Empty, SimpleQueue
-from typing import Self
+from typing import Literal, Self
 
 import zenoh
 
-from coordinator.dispatch.events import AgentKind, DispatchEvent, Left, Returned
+from coordinator.dispatch.events import AgentKind, DispatchEvent, Returned
+from coordinator.dispatch.faults import FaultKind, PeerFaults
 from coordinator.network.membership import Membership
 from schema.agent.access import Certificate
 from schema.agent.address import new_socket, parse_address
 from schema.agent.network import (
     ASK_TIMEOUT_S,
+    CANCELLED,
     DEFAULT_FLEET,
     FENCED,
     JOB_TIMEOUT_S,
@@ -31,38 +34,68 @@ from schema.agent.network import (
     hub_config,
 )
 from schema.agent.platform_tag import wire_version
-from schema.agent.service import Outlet
+from schema.agent.service import Outlet, log_engine, session_config
 from schema.agent.topics import Member, agents_alive, check_name
-from schema.errors import MalformedMessage, NetworkError
+from schema.errors import MalformedMessage, NetworkError, printable
+from schema.limits import MOST_ASKED_INFOS, MOST_REASON
 
-_LOG = logging.getLogger(__name__)
 _KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 _NOW = zenoh.ConsolidationMode.NONE
-_LONGEST_REASON = 1000
-_MOST_AT_ONCE = 1000
+_MOST_EVENTS = 1000
+_MOST_NEWS = 10_000
 _ASK_AGAIN_S = 1.0
-# Reply of the engine itself after a timeout.
-_TIMEOUT = b"Timeout"
+_LONGEST_PAUSE_S = 32.0
 
 
 @dataclass(slots=True)
 class _Asked:
-    """A query to an agent; ``number`` is the job's, -1 asks for its ``AgentInfo``."""
+    """A query to an agent; ``number`` is the job's, -1 asks for its ``AgentInfo``.
 
-    agent: str
+    Any process can serve the agent's key. All that do get the query, so that none can
+    keep it from the agent, and only the reply of the agent's own session counts.
+    """
+
+    member: Member
     number: int
     inbox: "SimpleQueue[_News]"
     reply: zenoh.Reply | None = None
+    has_stray: bool = False
 
     def take(self, reply: zenoh.Reply) -> None:
-        self.reply = reply
+        """Pass the first reply on at once: another process may never end its own."""
+        replier = reply.replier_id
+        if replier is None:
+            return  # of the engine itself, after the timeout
+        if str(replier.zid) != self.member.session:
+            self._pass_on("foreign")
+        elif self.reply is not None:
+            self._pass_on("late")
+        else:
+            self.reply = reply
+            self.inbox.put(self)
 
     def end(self) -> None:
         """End the query; called exactly once, with a reply or without."""
-        self.inbox.put(self)
+        if self.reply is None:
+            self.inbox.put(self)
+
+    def _pass_on(self, kind: FaultKind) -> None:
+        """Report a reply that does not count, once for each query."""
+        if not self.has_stray:
+            self.has_stray = True
+            self.inbox.put(_Stray(self.member.name, kind, self.number))
 
 
-_News = _Asked | zenoh.Sample | zenoh.Query
+@dataclass(frozen=True, slots=True)
+class _Stray:
+    """A reply that does not count."""
+
+    agent: str
+    kind: FaultKind
+    number: int
+
+
+_News = _Asked | _Stray | zenoh.Sample | zenoh.Query
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,8 +118,7 @@ class Network:
     Attributes:
         address: where agents connect to.
         own_address: where this user's processes on this machine connect to.
-        malformed: messages about agents that did not decode and were dropped; answers
-            to jobs are not decoded here.
+        faults: counts of what agents sent and nothing used.
     """
 
     def __init__(
@@ -116,7 +148,7 @@ class Network:
         """
         self.own_address = connect or new_socket()
         self.address = connect or (*listen, self.own_address)[0]
-        self.malformed = 0
+        self.faults = PeerFaults()
         self._me = Member(
             check_name(fleet, "fleet"), "coordinator", check_name(name, "name")
         )
@@ -127,11 +159,18 @@ class Network:
         )
         self._is_hub = not connect
         self._inbox: SimpleQueue[_News] = SimpleQueue()
-        self._membership = Membership(wire_version())
-        self._ask_again: list[tuple[float, str]] = []
+        self._membership = Membership(wire_version(), self.faults)
+        self._ask_again: list[tuple[float, int, Member]] = []
+        self._order = count()
+        self._asked_infos: set[Member] = set()
         self._orders: list[Order] = []
         self._onlookers: list[Order] = []
         self._outlet = Outlet()
+
+    @property
+    def malformed(self) -> int:
+        """Messages that did not decode and were dropped."""
+        return self.faults.total("malformed")
 
     @property
     def refused(self) -> Mapping[str, str]:
@@ -144,10 +183,10 @@ class Network:
         Raises:
             NetworkError: an address in use, or no hub.
         """
-        zenoh.init_log_from_env_or("error")
+        log_engine()
         with ExitStack() as opened:
             try:
-                config = zenoh.Config.from_json5(self._config)
+                config = session_config(self._config, self._me)
                 self._session = opened.enter_context(zenoh.open(config))
             except zenoh.ZError as error:
                 if not self._is_hub:
@@ -197,20 +236,21 @@ class Network:
             agent: that has joined; if it has left since, the job is lost.
             payload: an encoded request.
         """
-        asked = _Asked(agent, number, self._inbox)
-        if member := self._membership.members.get(agent):
+        if member := self._membership.member(agent):
+            asked = _Asked(member, number, self._inbox)
             self._ask(asked, member.jobs, payload, JOB_TIMEOUT_S)
         else:
-            asked.end()
+            gone = Member(self._me.fleet, "worker", agent)
+            _Asked(gone, number, self._inbox).end()
 
     def cancel(self, agent: str, payload: bytes) -> None:
         """Tell an agent that a job is no longer wanted; it may have started it.
 
         Args:
             agent: that was given the job, and may have left.
-            payload: an encoded request, of which only the name of the job is needed.
+            payload: the encoded request.
         """
-        if member := self._membership.members.get(agent):
+        if member := self._membership.member(agent):
             self._session.put(member.cancelled, payload)
 
     def _ask(
@@ -223,6 +263,7 @@ class Network:
             # Agents share their time between coordinators.
             attachment=self._me.name,
             timeout=timeout_s,
+            target=zenoh.QueryTarget.ALL,
             consolidation=_NOW,
         )
 
@@ -232,24 +273,23 @@ class Network:
         Args:
             timeout_s: how long to wait for the first event, after the pause [s].
             pause_s: how long to let events collect first [s].
-
-        Raises:
-            NetworkError: another coordinator has taken this one's run over.
         """
         now_s = time.monotonic()
         while self._ask_again and self._ask_again[0][0] <= now_s:
-            self._ask_info(self._ask_again.pop(0)[1])
+            self._ask_info(heappop(self._ask_again)[2])
         events: list[DispatchEvent] = []
         time.sleep(pause_s)
         try:
             news = self._inbox.get(timeout=timeout_s)
-            while True:
+            # Limited: the runs must act even if messages never stop coming.
+            for _ in range(_MOST_NEWS):
                 events += self._understand(news)
-                if len(events) >= _MOST_AT_ONCE:
-                    return events
+                if len(events) >= _MOST_EVENTS:
+                    break
                 news = self._inbox.get_nowait()
         except Empty:
-            return events
+            pass
+        return events
 
     def orders(self) -> list[Order]:
         """Return the operators' queries since the last call; ``receive`` takes them."""
@@ -279,15 +319,19 @@ class Network:
             key = self._me.state if is_onlooker else self._me.command
             asked.append(Order(data, news, key))
             return []
+        if isinstance(news, _Stray):
+            about = "properties" if news.number < 0 else f"job {news.number}"
+            self.faults.note(news.kind, news.agent, about)
+            return []
         try:
             if isinstance(news, zenoh.Sample):
                 return self._token_changed(news)
             if news.number < 0:
                 return self._introduced(news)
-            return [self._returned(news)]
+            return self._returned(news)
         except MalformedMessage as error:
-            self.malformed += 1
-            _LOG.warning("dropped a malformed message: %s", error)
+            peer = news.member.name if isinstance(news, _Asked) else "a token"
+            self.faults.note("malformed", peer, str(error))
             return []
 
     def _token_changed(self, sample: zenoh.Sample) -> list[DispatchEvent]:
@@ -296,47 +340,76 @@ class Network:
             left = self._membership.vanish(key)
             return [left] if left else []
         if member := self._membership.appear(key):
-            self._ask_info(member.name)
+            self._ask_info(member)
         return []
 
-    def _ask_info(self, agent: str) -> None:
-        if member := self._membership.members.get(agent):
-            asked = _Asked(agent, -1, self._inbox)
-            self._ask(asked, member.info, None, ASK_TIMEOUT_S)
+    def _ask_info(self, member: Member) -> None:
+        """Ask an agent for its properties, later if too many are asked."""
+        if member in self._asked_infos:
+            return
+        if len(self._asked_infos) >= MOST_ASKED_INFOS:
+            self._ask_later(member, _ASK_AGAIN_S)
+            return
+        self._asked_infos.add(member)
+        asked = _Asked(member, -1, self._inbox)
+        self._ask(asked, member.info, None, ASK_TIMEOUT_S)
+
+    def _ask_later(self, member: Member, pause_s: float) -> None:
+        due_s = time.monotonic() + pause_s
+        heappush(self._ask_again, (due_s, next(self._order), member))
 
     def _introduced(self, asked: _Asked) -> Sequence[DispatchEvent]:
         """Let an agent join if its properties are valid and its version is equal."""
-        agent, reply = asked.agent, asked.reply
-        if not self._membership.is_stranger(agent):
-            return []
+        member, reply, membership = asked.member, asked.reply, self._membership
+        self._asked_infos.discard(member)
         if reply is None or reply.ok is None:
             # It is alive but does not answer (yet).
-            self._ask_again.append((time.monotonic() + _ASK_AGAIN_S, agent))
+            left = membership.note_silence(member)
+            if membership.is_stranger(member):
+                pause_s = _ASK_AGAIN_S * 2.0 ** min(membership.silences(member) - 1, 9)
+                self._ask_later(member, min(pause_s, _LONGEST_PAUSE_S))
+            return [left] if left else []
+        if not membership.is_stranger(member):
             return []
-        events = self._membership.introduce(agent, reply.ok.payload.to_bytes())
-        if agent in self.refused:
-            self._say_refused(agent)
+        try:
+            events = membership.introduce(member, reply.ok.payload.to_bytes())
+        except MalformedMessage:
+            membership.note_silence(member)
+            self._ask_later(member, _LONGEST_PAUSE_S)
+            raise
+        if member.name in self.refused:
+            self._note_refused(member.name)
         return events
 
-    def _say_refused(self, agent: str) -> None:
-        _LOG.warning("refused: %s: %s", agent, self.refused[agent])
+    def _note_refused(self, agent: str) -> None:
+        self.faults.note("refused", agent, self.refused[agent])
 
-    def _returned(self, asked: _Asked) -> Returned | Left:
-        number, agent, reply = asked.number, asked.agent, asked.reply
+    def _returned(self, asked: _Asked) -> list[DispatchEvent]:
+        number, agent, reply = asked.number, asked.member.name, asked.reply
         if reply is None:
-            return Returned(number, agent, "lost")
+            if self._membership.member(agent):
+                # It may be gone although its token is not: another process can
+                # declare the same one.
+                self._ask_info(asked.member)
+            return [Returned(number, agent, "lost")]
         if reply.ok is not None:
-            return Returned(number, agent, "ok", reply.ok.payload.to_bytes())
+            return [Returned(number, agent, "ok", reply.ok.payload.to_bytes())]
         assert reply.err is not None
-        told = reply.err.payload.to_bytes()
-        if told == _TIMEOUT:
-            return Returned(number, agent, "lost")
-        reason = told.decode("utf-8", "replace")[:_LONGEST_REASON]
-        if reason.startswith(FENCED):
-            raise NetworkError(f"this coordinator stops: {reason[len(FENCED) :]}")
-        if reason.startswith(UNFIT):
-            if left := self._membership.refuse(agent, reason[len(UNFIT) :]):
-                self._say_refused(agent)
-                return left
-            return Returned(number, agent, "lost")
-        return Returned(number, agent, "error", reason=reason or "no reason given")
+        told = reply.err.payload.to_bytes()[: 4 * MOST_REASON].decode(
+            "utf-8", "replace"
+        )
+        reason = printable(told, MOST_REASON) or "no reason given"
+        if not told.startswith(UNFIT):
+            return [Returned(number, agent, _outcome(told), reason=reason)]
+        left = self._membership.refuse(agent, reason[len(UNFIT) :])
+        if left is None:
+            return [Returned(number, agent, "lost")]
+        self._note_refused(agent)
+        return [left]
+
+
+def _outcome(told: str) -> Literal["fenced", "cancelled", "error"]:
+    """Return the outcome of a job with a reason instead of an answer."""
+    if told.startswith(FENCED):
+        return "fenced"
+    return "cancelled" if told == CANCELLED else "error"

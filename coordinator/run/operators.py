@@ -18,8 +18,9 @@ from coordinator.islands.events import (
 from coordinator.run.loop import Loop
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
-from schema.errors import MalformedMessage, RevolveError
+from schema.errors import MalformedMessage, RevolveError, printable
 from schema.experiment.document import body_space
+from schema.limits import MOST_REASON
 from schema.robot.inverse_development import genome_of
 from schema.robot.robot import check_robot
 from schema.wire.codec import decode_robot
@@ -139,7 +140,10 @@ def answer_operator(scheduler: RunScheduler, data: bytes, now_s: float) -> bytes
             reply = OperatorReply("", status=scheduler.status(now_s))
         else:
             reply = _carry_out(request, scheduler)
-    except (MalformedMessage, Refused) as error:
+    except MalformedMessage as error:
+        scheduler.fleet.faults.note("malformed", "operators", str(error))
+        reply = OperatorReply(printable(str(error), MOST_REASON), is_refused=True)
+    except Refused as error:
         reply = OperatorReply(str(error), is_refused=True)
     return encode_operator_reply(reply)
 

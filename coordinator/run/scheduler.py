@@ -18,7 +18,7 @@ from coordinator.dispatch.fleet import End, Fleet
 from coordinator.run.session import RateMeter, RunSession
 from coordinator.storage.folder import RunFolder
 from schema.errors import RevolveError
-from schema.wire.status import RunStatus, Status
+from schema.wire.status import PeerFault, RunStatus, Status
 
 SLACK = 2
 """Open requests per job that the workers may hold at a time."""
@@ -108,9 +108,25 @@ class RunScheduler:
         for client, ends in self.fleet.listen(timeout_s, now_s).items():
             if client in self._run_of:
                 acting[self._run_of[client]] = ends
+        self._check_fenced()
         now_s = clock()
         for run, ends in acting.items():
-            self.guard(run, partial(run.loop.act, now_s, ends))
+            if run in self._places:
+                self.guard(run, partial(run.loop.act, now_s, ends))
+
+    def _check_fenced(self) -> None:
+        """Stop the runs that another coordinator took over, as agents say.
+
+        Only the run's own folder decides: any process can tell agents that it is a
+        later coordinator.
+        """
+        for fenced in self.fleet.fenced():
+            run = self._run_of.get(fenced.client)
+            if run is None:
+                continue
+            self.guard(run, run.held.confirm)
+            if run in self._places:
+                self.fleet.faults.note("fenced", fenced.agent, fenced.reason)
 
     def _has_room(self) -> bool:
         if not self._places:
@@ -195,6 +211,10 @@ class RunScheduler:
             workers=self.fleet.dispatch.agents("worker"),
             analyzers=self.fleet.dispatch.agents("analyzer"),
             births_per_s=self._rate.per_s,
+            faults=tuple(
+                PeerFault(each.kind, each.peer, each.count)
+                for each in self.fleet.faults.counts
+            ),
         )
 
 

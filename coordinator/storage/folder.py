@@ -21,6 +21,7 @@ from coordinator.storage.journal import newest_epoch
 from coordinator.storage.lock import LOCK, FolderLock
 from schema.errors import RunFolderError
 from schema.experiment.identity import Origin
+from schema.limits import MOST_EPOCH
 
 State = Literal["running", "stopped", "finished"]
 STATES: tuple[State, ...] = ("running", "stopped", "finished")
@@ -94,6 +95,7 @@ class RunFolder:
             # The journal's epoch counts, too: with a lower one, as a lost or older
             # file gives, all new records would be void.
             self.epoch = max(_read_epoch(path), newest_epoch(path)) + 1
+            _check_epoch(path / EPOCH, self.epoch)
             replace_text(path / EPOCH, str(self.epoch))
         except BaseException:
             self.close()
@@ -118,7 +120,8 @@ class RunFolder:
             raise RunFolderError(
                 f"{self.path}: the folder or its file {EPOCH!r} was moved or removed"
             )
-        if epoch != self.epoch:
+        # Not a lower one: that is an older copy of the file, and no coordinator.
+        if epoch > self.epoch:
             raise RunFolderError(
                 f"{self.path}: this is coordinator {self.epoch} of the run, but "
                 f"coordinator {epoch} has taken it over"
@@ -225,6 +228,14 @@ def _refuse_foreign(path: Path) -> None:
     if foreign and DETAILS not in names:
         raise RunFolderError(
             f"{path}: not empty (contains {foreign[0]!r}): choose another folder"
+        )
+
+
+def _check_epoch(file: Path, epoch: int) -> None:
+    if epoch > MOST_EPOCH:
+        raise RunFolderError(
+            f"{file}: an epoch must be below {MOST_EPOCH}, got {epoch - 1}: replace it "
+            "by a number that is greater than any before"
         )
 
 

@@ -20,6 +20,8 @@ DEFAULT_FLEET = "default"
 
 # Prefix of an agent's refusal if a newer coordinator has taken the run over.
 FENCED = "fenced: "
+# Reply for a job that its coordinator has cancelled.
+CANCELLED = "the job was cancelled"
 # Prefix of a refusal if the agent lacks the plug-ins of the run.
 UNFIT = "unfit: "
 # Effectively no limit: a week is longer than any job [s].

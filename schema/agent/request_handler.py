@@ -2,6 +2,11 @@
 
 Requests of replaced coordinators, requests that need other plug-ins and cancelled jobs
 are refused and counted. Any bytes from a peer and any error of a plug-in get a reply.
+
+Any process that reaches the hub may claim to be a newer coordinator of a run, or cancel
+a job. Neither can stop a run: a coordinator is refused once, and a job is cancelled
+once. A coordinator that was really replaced finds that in its run folder and stops; one
+that was not repeats the job.
 """
 
 from collections import deque
@@ -11,15 +16,19 @@ from typing import Generic, TypeVar
 
 from google.protobuf.message import DecodeError
 
-from schema.agent.network import FENCED, UNFIT, Agent
+from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.supervision import ProcessSlot, Task
 from schema.errors import MalformedMessage, PluginDiffers, RevolveError, UnknownPlugin
 from schema.experiment.plugin_source import check_plugins
+from schema.limits import MOST_EPOCH, MOST_RUN_NAME
 from schema.wire import revolve_pb2 as pb
+from schema.wire.packing import fingerprint
 
-_MOST_CANCELLED = 1000
+_MOST_REMEMBERED = 1000
 
+K = TypeVar("K")
 T = TypeVar("T")
+V = TypeVar("V")
 
 MOST_SOURCES = 1000
 """Most accounts that are kept of sources without waiting items."""
@@ -124,7 +133,9 @@ class Server:
     slot: ProcessSlot = field(default_factory=ProcessSlot)
     counts: ReplyCounts = field(default_factory=ReplyCounts)
     _epochs: dict[str, int] = field(default_factory=dict)
+    _fenced: dict[tuple[str, int], None] = field(default_factory=dict)
     _cancelled: dict[Task, None] = field(default_factory=dict)
+    _skipped: dict[Task, None] = field(default_factory=dict)
 
     @property
     def info(self) -> bytes:
@@ -145,6 +156,7 @@ class Server:
                 epoch=task.epoch,
                 number=task.number,
                 cause=death.cause,
+                request=task.request,
             )
         return info.SerializeToString()
 
@@ -152,26 +164,25 @@ class Server:
         """Note that a job is cancelled; may be called from any thread.
 
         Args:
-            data: bytes of a ``Request``, of which only the name of the job is needed.
+            data: bytes of the job's ``Request``.
         """
         try:
-            task = self._task(pb.Request.FromString(data))
-        except DecodeError:
+            task = self._task(_parsed(data), data)
+        except MalformedMessage:
             self.counts.malformed += 1
             return
-        self._cancelled[task] = None
-        if len(self._cancelled) > _MOST_CANCELLED:
-            del self._cancelled[next(iter(self._cancelled))]
+        _remember(task, None, self._cancelled)
 
     def reply(self, data: bytes) -> Reply:
         """Return the reply to any bytes."""
         try:
             request = self._checked(data)
-            task = self._task(request)
-            if task in self._cancelled:
-                del self._cancelled[task]
+            task = self._task(request, data)
+            # A job that comes again is wanted, whatever cancelled it before.
+            if task in self._cancelled and task not in self._skipped:
+                _remember(task, None, self._skipped)
                 self.counts.skipped += 1
-                return Reply(reason="the job was cancelled")
+                return Reply(reason=CANCELLED)
             with self.slot.doing(task, self.agent.cpu_limit_s):
                 answer = self.compute(data)
         except (UnknownPlugin, PluginDiffers) as error:
@@ -187,29 +198,59 @@ class Server:
         self.counts.answered += 1
         return Reply(answer)
 
-    def _task(self, request: pb.Request) -> Task:
-        return Task(self.agent.name, request.run, request.epoch, request.number)
+    def _task(self, request: pb.Request, data: bytes) -> Task:
+        name = (request.run, request.epoch, request.number)
+        return Task(self.agent.name, *name, fingerprint(data))
 
     def _checked(self, data: bytes) -> pb.Request:
         """Return the fields that requests of all kinds share.
 
         Raises:
-            MalformedMessage: not the bytes of a request, or one without a run.
+            MalformedMessage: see ``_parsed``.
             PluginDiffers: a plug-in that is missing or has another source here.
             RevolveError: an older epoch than the newest one of its run.
         """
-        try:
-            request = pb.Request.FromString(data)
-        except DecodeError as error:
-            raise MalformedMessage(f"not the bytes of a Request: {error}") from None
-        if not request.run:
-            raise MalformedMessage("Request: names no run")
-        newest = self._epochs.get(request.run, 0)
-        if request.epoch < newest:
+        request = _parsed(data)
+        newest = max(self._epochs.pop(request.run, 0), request.epoch)
+        _remember(request.run, newest, self._epochs)
+        coordinator = (request.run, request.epoch)
+        if request.epoch < newest and coordinator not in self._fenced:
+            _remember(coordinator, None, self._fenced)
             raise RevolveError(
                 f"{FENCED}epoch {request.epoch} of run {request.run} is over: "
                 f"epoch {newest} has begun"
             )
-        self._epochs[request.run] = request.epoch
         check_plugins(request.plugins)
         return request
+
+
+def _parsed(data: bytes) -> pb.Request:
+    """Return a request of any kind with a valid name of a job.
+
+    Raises:
+        MalformedMessage: not the bytes of a request, no run, or a run's name or an
+            epoch beyond its limit.
+    """
+    try:
+        request = pb.Request.FromString(data)
+    except DecodeError as error:
+        raise MalformedMessage(f"not the bytes of a Request: {error}") from None
+    if not request.run:
+        raise MalformedMessage("Request: names no run")
+    if len(request.run) > MOST_RUN_NAME:
+        raise MalformedMessage(
+            f"Request: a run's name must have at most {MOST_RUN_NAME} characters, got "
+            f"{len(request.run)}"
+        )
+    if request.epoch > MOST_EPOCH:
+        raise MalformedMessage(
+            f"Request: epoch must be at most {MOST_EPOCH}, got {request.epoch}"
+        )
+    return request
+
+
+def _remember(key: K, value: V, known: dict[K, V]) -> None:
+    """Add an entry to a limited number of them; the oldest is forgotten."""
+    known[key] = value
+    if len(known) > _MOST_REMEMBERED:
+        del known[next(iter(known))]

@@ -5,6 +5,8 @@ callbacks of the network only enqueue. Bad requests are refused with a reason an
 counted; they never end the loop.
 """
 
+import json
+import os
 import sys
 import threading
 import time
@@ -28,6 +30,36 @@ _SAY_S = 5.0
 
 UNSUPERVISED = ProcessSlot()
 """Slot of a process without a supervisor."""
+
+
+_ENGINE_LOG = "warn,zenoh::net::runtime::orchestrator=error"
+"""Levels of Zenoh's log; the commands themselves tell of a hub that is missing."""
+
+
+def log_engine() -> None:
+    """Start Zenoh's log, which the engine writes to descriptor 1, at level "warn".
+
+    RUST_LOG has no effect: at lower levels the log shows secrets. Commands lead the
+    descriptor to standard error, see ``revolve.main``.
+    """
+    chosen = os.environ.pop("RUST_LOG", None)
+    try:
+        zenoh.init_log_from_env_or(_ENGINE_LOG)
+    finally:
+        if chosen is not None:
+            os.environ["RUST_LOG"] = chosen
+
+
+def session_config(text: str, member: Member) -> zenoh.Config:
+    """Return the configuration of a process's session, with its id.
+
+    Args:
+        text: of a hub or a client, as JSON5.
+        member: the process.
+    """
+    config = zenoh.Config.from_json5(text)
+    config.insert_json5("id", json.dumps(member.session))
+    return config
 
 
 def tell_user(line: str) -> None:
@@ -102,16 +134,17 @@ def serve(
     """
     check_name(agent.name, "name")
     check_name(agent.fleet, "fleet")
-    config = client_config(agent.connect, agent.tls)
+    me = Member(agent.fleet, agent.role, agent.name)
+    config = session_config(client_config(agent.connect, agent.tls), me)
     server = Server(answer, agent, slot)
     hub = _Hub(agent.connect, say)
-    zenoh.init_log_from_env_or("error")
+    log_engine()
     session = _open(config, hub, stop)
     if session is not None:
         with session:
             if outlet is not None:
                 outlet.lead_to(session)
-            _serve_session(session, server, hub, stop)
+            _serve_session(session, server, hub, stop, me)
             if outlet is not None:
                 outlet.lead_to(None)
     return server.counts
@@ -162,11 +195,13 @@ def _keep_quiet(_line: str) -> None:
     """Write nothing: the first process of the pool does."""
 
 
-def _open(config: str, hub: "_Hub", stop: threading.Event) -> zenoh.Session | None:
+def _open(
+    config: zenoh.Config, hub: "_Hub", stop: threading.Event
+) -> zenoh.Session | None:
     """Return a session as soon as there is a hub; None if stopped before."""
     while not stop.is_set():
         try:
-            return zenoh.open(zenoh.Config.from_json5(config))
+            return zenoh.open(config)
         except zenoh.ZError:
             hub.seen(is_there=False)
         stop.wait(_RETRY_S)
@@ -174,9 +209,12 @@ def _open(config: str, hub: "_Hub", stop: threading.Event) -> zenoh.Session | No
 
 
 def _serve_session(
-    session: zenoh.Session, server: Server, hub: "_Hub", stop: threading.Event
+    session: zenoh.Session,
+    server: Server,
+    hub: "_Hub",
+    stop: threading.Event,
+    me: Member,
 ) -> None:
-    me = Member(server.agent.fleet, server.agent.role, server.agent.name)
     inbox: SimpleQueue[zenoh.Query] = SimpleQueue()
     take = zenoh.handlers.Callback(inbox.put, indirect=False)
 

@@ -20,7 +20,7 @@ LAST_DEATHS = 8
 """Number of deaths that are remembered for each slot of a pool."""
 
 _SIZE = 2048
-_HEAD = struct.Struct("<HHQQ")
+_HEAD = struct.Struct("<HHQQ8s")
 _OUT_OF_TIME = signal.SIGPROF
 # Signals that a process causes itself.
 _OWN_DOING = (
@@ -41,12 +41,15 @@ class Task:
     Attributes:
         agent: the process's name.
         run, epoch, number: of the job.
+        request: fingerprint of the job's request. Any process can send a request with
+            the name of another one's job.
     """
 
     agent: str
     run: str
     epoch: int
     number: int
+    request: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +78,8 @@ class CurrentJob:
         # The lengths come last: half a note does not count.
         view = self._view
         view[_HEAD.size : end] = name + run
-        _HEAD.pack_into(view, 0, len(name), len(run), task.epoch, task.number)
+        numbers = (len(name), len(run), task.epoch, task.number)
+        _HEAD.pack_into(view, 0, *numbers, task.request)
 
     def end(self) -> None:
         """Note that the job is done."""
@@ -84,7 +88,7 @@ class CurrentJob:
     def read(self) -> Task | None:
         """Return the job that was started and has not ended, if there is one."""
         view = self._view
-        name, run, epoch, number = _HEAD.unpack_from(view)
+        name, run, epoch, number, request = _HEAD.unpack_from(view)
         if not name:
             return None
         text = bytes(view[_HEAD.size : _HEAD.size + name + run])
@@ -93,6 +97,7 @@ class CurrentJob:
             text[name:].decode(errors="replace"),
             epoch,
             number,
+            request,
         )
 
 

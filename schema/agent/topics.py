@@ -9,9 +9,10 @@ for its predecessor.
 import re
 import secrets
 from dataclasses import dataclass, field
+from hashlib import sha256
 from typing import Literal
 
-from schema.errors import MalformedMessage, NetworkError
+from schema.errors import MalformedMessage, NetworkError, printable
 
 Role = Literal["worker", "analyzer", "coordinator"]
 
@@ -42,6 +43,16 @@ class Member:
         object.__setattr__(self, "jobs", f"{self._prefix}/jobs")
 
     @property
+    def session(self) -> str:
+        """Id of the process's Zenoh session, hexadecimal.
+
+        A hub accepts one session of an id at a time, and a reply carries the id of the
+        session that gave it. Only the process itself can thus reply in its name.
+        """
+        # An id must not begin with 0.
+        return f"a{sha256(self._prefix.encode()).hexdigest()[:31]}"
+
+    @property
     def alive(self) -> str:
         """Key of the liveliness token of the process."""
         return f"{self._prefix}/alive"
@@ -53,7 +64,7 @@ class Member:
 
     @property
     def cancelled(self) -> str:
-        """Key that takes a ``Request`` of which only the job's name is needed."""
+        """Key that takes the ``Request`` of a job that is no longer wanted."""
         return f"{self._prefix}/cancelled"
 
     @property
@@ -106,7 +117,9 @@ def member_of(key: str) -> Member:
         _, fleet, chunk, name, _ = chunks
         if chunk in _ROLES and _NAME.fullmatch(fleet) and _NAME.fullmatch(name):
             return Member(fleet, _ROLES[chunk], name)
-    raise MalformedMessage(f"must be revolve/FLEET/w|an|co/NAME/alive, got {key!r}")
+    raise MalformedMessage(
+        f"must be revolve/FLEET/w|an|co/NAME/alive, got {printable(key)!r}"
+    )
 
 
 def check_name(name: str, what: str) -> str:
@@ -125,6 +138,15 @@ def check_name(name: str, what: str) -> str:
             f"beginning with a letter or digit, got {name!r}"
         )
     return name
+
+
+def slot_of(name: str) -> str:
+    """Return what the names of a process and of its successors have in common.
+
+    Args:
+        name: made by ``unique_name``; for another one the result is empty.
+    """
+    return name.rpartition(".")[0]
 
 
 def unique_name(name: str) -> str:

@@ -6,6 +6,7 @@ finite are refused.
 """
 
 import sys
+from hashlib import blake2b
 from typing import Annotated, TypeVar
 
 from msgspec import Meta, Struct
@@ -22,6 +23,11 @@ Finite = Annotated[float, Meta(ge=-_GREATEST, le=_GREATEST)]
 
 class Message(Struct, frozen=True, forbid_unknown_fields=True):
     """Base of the messages: immutable, without unknown fields."""
+
+
+def fingerprint(data: bytes) -> bytes:
+    """Return 8 bytes that identify a request: no other content has them by chance."""
+    return blake2b(data, digest_size=8).digest()
 
 
 def unpack(decoder: Decoder[T], data: bytes) -> T:

@@ -209,18 +209,20 @@ class Answer(_message.Message):
     def __init__(self, epoch: _Optional[int] = ..., number: _Optional[int] = ..., wall_s: _Optional[float] = ..., report: _Optional[_Union[Report, _Mapping]] = ..., evaluation: _Optional[_Union[Evaluation, _Mapping]] = ..., failure: _Optional[str] = ...) -> None: ...
 
 class Death(_message.Message):
-    __slots__ = ("agent", "run", "epoch", "number", "cause")
+    __slots__ = ("agent", "run", "epoch", "number", "cause", "request")
     AGENT_FIELD_NUMBER: _ClassVar[int]
     RUN_FIELD_NUMBER: _ClassVar[int]
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     NUMBER_FIELD_NUMBER: _ClassVar[int]
     CAUSE_FIELD_NUMBER: _ClassVar[int]
+    REQUEST_FIELD_NUMBER: _ClassVar[int]
     agent: str
     run: str
     epoch: int
     number: int
     cause: str
-    def __init__(self, agent: _Optional[str] = ..., run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., cause: _Optional[str] = ...) -> None: ...
+    request: bytes
+    def __init__(self, agent: _Optional[str] = ..., run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., cause: _Optional[str] = ..., request: _Optional[bytes] = ...) -> None: ...
 
 class AgentInfo(_message.Message):
     __slots__ = ("agent", "kind", "slots", "platform", "version", "deaths")

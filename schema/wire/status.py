@@ -1,6 +1,11 @@
 """Progress of runs, as a coordinator reports it or a run folder shows it."""
 
+from typing import Annotated
+
+from msgspec import Meta
+
 from schema.experiment.section import Count
+from schema.limits import MOST_SHOWN
 from schema.wire.packing import Finite, Message
 
 
@@ -56,6 +61,20 @@ class RunStatus(Message, frozen=True):
         return sum(island.wanted for island in self.islands)
 
 
+class PeerFault(Message, frozen=True):
+    """How often a peer sent something that the coordinator did not use.
+
+    Attributes:
+        kind: such as "malformed", "refused" or "late".
+        peer: name of the agent, or what several peers are counted as.
+        count: number of such messages.
+    """
+
+    kind: Annotated[str, Meta(max_length=MOST_SHOWN)]
+    peer: Annotated[str, Meta(max_length=MOST_SHOWN)]
+    count: Count
+
+
 class Status(Message, frozen=True):
     """Progress of all runs of a coordinator.
 
@@ -63,12 +82,14 @@ class Status(Message, frozen=True):
         runs: in the order in which they start.
         workers, analyzers: number of connected agents.
         births_per_s: recent rate of all runs [1/s].
+        faults: what peers sent and nothing used, by kind and peer.
     """
 
     runs: tuple[RunStatus, ...]
     workers: Count
     analyzers: Count
     births_per_s: Finite
+    faults: tuple[PeerFault, ...] = ()
 
     @property
     def births(self) -> int:

@@ -14,6 +14,7 @@ import zenoh
 
 from schema.agent.network import Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
+from schema.agent.service import session_config
 from schema.agent.supervisor import prepare_process
 from schema.agent.topics import Member, unique_name
 from schema.wire import revolve_pb2 as pb
@@ -45,7 +46,7 @@ def main(address: str, behaviour: str) -> None:
         with query:
             query.reply(member.info, info)
 
-    with zenoh.open(zenoh.Config.from_json5(client_config(address))) as session:
+    with zenoh.open(session_config(client_config(address), member)) as session:
         on_job = zenoh.handlers.Callback(inbox.put, indirect=False)
         on_info = zenoh.handlers.Callback(reply_info)
         _jobs = session.declare_queryable(member.jobs, on_job, complete=True)

@@ -26,6 +26,7 @@ from coordinator.dispatch.events import (
     Ticked,
     Withdrawn,
 )
+from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pool import (
     LEAST_S,
     LONGEST_REST_S,
@@ -35,6 +36,7 @@ from coordinator.dispatch.pool import (
     REST_S,
 )
 from schema.errors import UnexpectedEvent
+from schema.wire.packing import fingerprint
 
 
 def job(number: int, kind: JobKind = "evaluate") -> Job:
@@ -58,11 +60,11 @@ def lost(number: int, agent: str) -> Returned:
 
 
 def died(number: int, agent: str, cause: str = "SIGSEGV") -> Died:
-    return Died("run", 1, number, agent, cause)
+    return Died("run", 1, number, agent, cause, fingerprint(b"%d" % number))
 
 
-def told(*events: DispatchEvent) -> Dispatch:
-    dispatch = Dispatch()
+def told(*events: DispatchEvent, faults: PeerFaults | None = None) -> Dispatch:
+    dispatch = Dispatch(faults)
     for event in events:
         dispatch.handle(event)
     return dispatch
@@ -383,8 +385,41 @@ def test_job_that_crashed_three_processes_is_given_up() -> None:
     assert dispatch.handle(died(0, "d")) == []
 
 
+def test_deaths_of_agents_that_did_not_lose_the_job_do_not_count() -> None:
+    faults = PeerFaults()
+    dispatch = told(worker("a"), worker("b"), *requests(0), faults=faults)
+    # "a" has the job and is there, "b" and "x" never had it.
+    for name in ("a", "b", "x", "y", "z"):
+        assert dispatch.handle(died(0, name)) == []
+    assert faults.total("death") == 5
+    assert dispatch.handle(ok(0, "a")) == [Deliver(job(0), "a", "p", b"a0")]
+
+
+def test_a_death_by_another_request_with_the_jobs_name_does_not_count() -> None:
+    faults = PeerFaults()
+    dispatch = told(*requests(0), faults=faults)
+    for name in ("a", "b", "c", "d"):
+        dispatch.handle(worker(name))
+        dispatch.handle(Left(name))
+        event = Died("run", 1, 0, name, "SIGSEGV", fingerprint(b"deadly"))
+        assert dispatch.handle(event) == []
+    assert faults.total("death") == 4
+    assert dispatch.pending == 1
+
+
+def test_late_and_second_answers_are_counted_as_late() -> None:
+    faults = PeerFaults()
+    answers = (ok(0, "a"), ok(0, "a"), ok(7, "a"))
+    told(worker("a"), *requests(0), *answers, faults=faults)
+    assert (faults.total("late"), faults.total("malformed")) == (2, 0)
+
+
 def test_deadly_job_is_cancelled_where_it_still_runs() -> None:
-    dispatch = told(worker("z"), *requests(0))
+    dispatch = told(*requests(0))
+    for name in ("a", "b", "c", "z"):
+        dispatch.handle(worker(name))
+        if name != "z":
+            dispatch.handle(Left(name))
     commands = [dispatch.handle(died(0, name)) for name in ("a", "b", "c")]
     assert commands[2][1:] == [Cancel(job(0), "z")]
 

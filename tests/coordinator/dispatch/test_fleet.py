@@ -1,5 +1,7 @@
 """One fleet for several runs: answers are routed to the clients of their jobs."""
 
+from typing import Literal
+
 import pytest
 
 from coordinator.dispatch.events import (
@@ -19,8 +21,10 @@ from coordinator.dispatch.events import (
 )
 from coordinator.dispatch.fleet import Fleet
 from schema.errors import MalformedMessage
+from schema.wire.packing import fingerprint
 
 CLIENT, OTHER, ARENA = Client("run", 1), Client("other", 1), Client("arena", 1)
+EMPTY = fingerprint(b"")
 
 
 def read(data: bytes) -> object:
@@ -127,7 +131,7 @@ def test_a_deadly_job_of_a_client_that_left_is_not_repeated(
     fleet.leave(CLIENT)
     (number, agent, _), *rest = agents.sent
     fleet.tell(Left(agent))
-    fleet.tell(Died("run", 1, number, agent, "SIGSEGV"))
+    fleet.tell(Died("run", 1, number, agent, "SIGSEGV", EMPTY))
     fleet.tell(Joined("three", "worker", 9, "p"))
     again = [each for each, _, _ in agents.sent[1 + len(rest) :]]
     assert number not in again
@@ -139,15 +143,68 @@ def test_deaths_by_jobs_of_other_coordinators_do_not_count(
     fleet: Fleet, agents: Agents
 ) -> None:
     number = request(fleet)
-    for name in ("x", "y", "z"):
-        fleet.tell(Died("another run", 1, number, name, "SIGSEGV"))
+    names = ["one", "two", "x"]
+    fleet.tell(Left("one"))
+    fleet.tell(Left("two"))
+    fleet.tell(Joined("x", "worker", 1, "p"))
+    fleet.tell(Left("x"))
+    assert [agent for _, agent, _ in agents.sent] == names
+    for name in names:
+        fleet.tell(Died("another run", 1, number, name, "SIGSEGV", EMPTY))
     assert fleet.listen(0.0, 1.0) == {}
-    for name in ("x", "y", "z"):
-        fleet.tell(Died("run", 1, number, name, "SIGSEGV"))
+    for name in names:
+        fleet.tell(Died("run", 1, number, name, "SIGSEGV", EMPTY))
     (end,) = fleet.listen(0.0, 1.0)[CLIENT]
     assert isinstance(end, Deliver)
     assert end.is_deadly
     assert agents.sent
+
+
+@pytest.mark.parametrize("outcome", ["fenced", "cancelled"])
+def test_a_job_that_its_agent_declined_is_given_to_another(
+    fleet: Fleet, agents: Agents, outcome: Literal["fenced", "cancelled"]
+) -> None:
+    """Nobody's word about epochs ends a job, and it never counts as an error."""
+    request(fleet)
+    for now_s in range(1, 7):
+        number, agent, _ = agents.sent[-1]
+        agents.news = [Returned(number, agent, outcome, reason="epoch 9 has begun")]
+        assert fleet.listen(0.0, 10.0 * now_s) == {}
+        fleet.tell(Ticked(10.0 * now_s + 5.0))
+    assert len(agents.sent) == 7
+    told = fleet.fenced()
+    assert fleet.fenced() == []
+    if outcome == "fenced":
+        assert {each.client for each in told} == {CLIENT}
+        assert len(told) == 6
+    else:
+        assert fleet.faults.total("cancelled") == 6
+
+
+@pytest.mark.parametrize("outcome", ["fenced", "cancelled"])
+def test_an_advance_that_its_worker_declined_is_repeated(
+    fleet: Fleet, agents: Agents, outcome: Literal["fenced", "cancelled"]
+) -> None:
+    fleet.advance(new_shard(fleet))
+    for now_s in range(1, 7):
+        number, agent, _ = agents.sent[-1]
+        agents.news = [Returned(number, agent, outcome)]
+        assert fleet.listen(0.0, 10.0 * now_s) == {}
+        fleet.tell(Ticked(10.0 * now_s + 5.0))
+    assert len(agents.sent) == 7
+    clients = [each.client for each in fleet.fenced()]
+    assert clients == [ARENA] * (6 if outcome == "fenced" else 0)
+
+
+def test_a_cancelled_copy_that_is_not_wanted_is_no_fault(
+    fleet: Fleet, agents: Agents
+) -> None:
+    request(fleet)
+    fleet.leave(CLIENT)
+    number, agent, _ = agents.sent[0]
+    agents.news = [Returned(number, agent, "cancelled")]
+    fleet.listen(0.0, 1.0)
+    assert fleet.faults.counts == ()
 
 
 def test_arenas_of_all_runs_share_the_workers(fleet: Fleet, agents: Agents) -> None:
@@ -196,12 +253,18 @@ def test_an_advance_that_crashes_three_workers_is_given_up(
     shard = new_shard(fleet)
     fleet.advance(shard)
     for name in ("three", "four", "five"):
-        number, agent, _ = agents.sent[-1]
+        number, agent, payload = agents.sent[-1]
         fleet.tell(Joined(name, "worker", 1, "p"))
         fleet.tell(Left(agent))
-        fleet.tell(Died("another run", 1, number, agent, "SIGSEGV"))
+        same = fingerprint(payload)
+        for died in (
+            Died("another run", 1, number, agent, "SIGSEGV", same),
+            Died("arena", 1, number, f"not {agent}", "SIGSEGV", same),
+            Died("arena", 1, number, agent, "SIGSEGV", EMPTY),
+        ):
+            fleet.tell(died)
         assert fleet.listen(0.0, 1.0) == {}
-        fleet.tell(Died("arena", 1, number, agent, "SIGSEGV"))
+        fleet.tell(Died("arena", 1, number, agent, "SIGSEGV", same))
     (end,) = fleet.listen(0.0, 1.0)[ARENA]
     assert isinstance(end, ShardFailed)
     assert (end.shard, end.agent) == (shard, agent)

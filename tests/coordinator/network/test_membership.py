@@ -5,53 +5,65 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordinator.dispatch.events import Died, Joined, Left
+from coordinator.dispatch.faults import PeerFaults
 from coordinator.network.membership import Membership
 from schema.agent.topics import Member
 from schema.errors import MalformedMessage
+from schema.limits import MOST_MEMBERS, MOST_PEERS
 from schema.wire import revolve_pb2 as pb
 
-WORKER = Member("f", "worker", "w")
+WORKER = Member("f", "worker", "host-0.w")
+NAME = WORKER.name
 
 
 def info(
-    agent: str = "w", kind: str = "worker", slots: int = 2, version: str = "1"
+    agent: str = NAME,
+    kind: str = "worker",
+    slots: int = 2,
+    version: str = "1",
+    platform: str = "p",
 ) -> bytes:
     message = pb.AgentInfo(
-        agent=agent, kind=kind, slots=slots, platform="p", version=version
+        agent=agent, kind=kind, slots=slots, platform=platform, version=version
     )
     return message.SerializeToString()
 
 
 @pytest.fixture
-def membership() -> Membership:
-    membership = Membership("1")
+def faults() -> PeerFaults:
+    return PeerFaults()
+
+
+@pytest.fixture
+def membership(faults: PeerFaults) -> Membership:
+    membership = Membership("1", faults)
     assert membership.appear(WORKER.alive) == WORKER
     return membership
 
 
 def test_agent_joins_with_its_info_and_leaves(membership: Membership) -> None:
-    assert membership.is_stranger("w")
-    assert membership.introduce("w", info()) == [Joined("w", "worker", 2, "p")]
-    assert not membership.is_stranger("w")
+    assert membership.is_stranger(WORKER)
+    assert membership.introduce(WORKER, info()) == [Joined(NAME, "worker", 2, "p")]
+    assert not membership.is_stranger(WORKER)
     assert membership.appear(WORKER.alive) is None
-    assert membership.vanish(WORKER.alive) == Left("w")
-    assert "w" not in membership.members
+    assert membership.vanish(WORKER.alive) == Left(NAME)
+    assert membership.member(NAME) is None
 
 
 def test_unknown_agent_that_vanishes_gives_no_event(membership: Membership) -> None:
     assert membership.vanish(WORKER.alive) is None
-    assert not membership.is_stranger("w")
+    assert not membership.is_stranger(WORKER)
     # A thawed one stands there again under the same token.
     assert membership.appear(WORKER.alive) == WORKER
-    assert membership.introduce("w", info()) != []
+    assert membership.introduce(WORKER, info()) != []
 
 
 def test_agent_of_another_version_is_refused_until_it_vanishes(
     membership: Membership,
 ) -> None:
-    assert membership.introduce("w", info(version="2")) == []
-    assert membership.refused == {"w": "is of version '2', the coordinator of '1'"}
-    assert not membership.is_stranger("w")
+    assert membership.introduce(WORKER, info(version="2")) == []
+    assert membership.refused == {NAME: "is of version '2', the coordinator of '1'"}
+    assert not membership.is_stranger(WORKER)
     assert membership.vanish(WORKER.alive) is None
     assert membership.refused == {}
 
@@ -59,40 +71,139 @@ def test_agent_of_another_version_is_refused_until_it_vanishes(
 def test_refused_agent_joins_again_only_after_it_vanished(
     membership: Membership,
 ) -> None:
-    assert membership.refuse("w", "too early") is None
-    membership.introduce("w", info())
-    assert membership.refuse("w", "has no plug-in") == Left("w")
-    assert membership.refused == {"w": "has no plug-in"}
-    assert membership.refuse("w", "told twice") is None
-    assert not membership.is_stranger("w")
+    assert membership.refuse(NAME, "too early") is None
+    membership.introduce(WORKER, info())
+    assert membership.refuse(NAME, "has no plug-in") == Left(NAME)
+    assert membership.refused == {NAME: "has no plug-in"}
+    assert membership.refuse(NAME, "told twice") is None
+    assert not membership.is_stranger(WORKER)
     assert membership.vanish(WORKER.alive) is None
-    assert (membership.refused, membership.members) == ({}, {})
+    assert (membership.refused, len(membership)) == ({}, 0)
+
+
+def with_death(member: Member, of: str, cause: str = "SIGSEGV") -> bytes:
+    message = pb.AgentInfo.FromString(info(agent=member.name, kind=member.role))
+    message.deaths.add(agent=of, run="r", epoch=3, number=7, cause=cause)
+    return message.SerializeToString()
+
+
+def successor(member: Member, letter: str) -> Member:
+    return Member("f", member.role, f"host-0.{letter}")
 
 
 def test_each_death_is_reported_once_and_before_the_successor_joins(
     membership: Membership,
 ) -> None:
-    message = pb.AgentInfo.FromString(info())
-    message.deaths.add(agent="v", run="r", epoch=3, number=7, cause="SIGSEGV")
-    joined = Joined("w", "worker", 2, "p")
-    told = membership.introduce("w", message.SerializeToString())
-    assert told == [Died("r", 3, 7, "v", "SIGSEGV"), joined]
+    membership.introduce(WORKER, info())
     membership.vanish(WORKER.alive)
-    membership.appear(WORKER.alive)
-    message.deaths.add(agent="u", run="r", epoch=3, number=7, cause="x" * 999)
-    told = membership.introduce("w", message.SerializeToString())
-    assert told == [Died("r", 3, 7, "u", "x" * 100), joined]
+    second, third = successor(WORKER, "x"), successor(WORKER, "y")
+    for member in (second, third):
+        membership.appear(member.alive)
+    cause = "SIG\x1b[31m" + "x" * 999
+    joined = Joined(second.name, "worker", 2, "p")
+    (died, after) = membership.introduce(second, with_death(second, NAME, cause))
+    assert isinstance(died, Died)
+    assert (died.run, died.epoch, died.number, died.agent) == ("r", 3, 7, NAME)
+    assert len(died.cause) == 100
+    assert died.cause.isprintable()
+    assert after == joined
+    assert membership.introduce(third, with_death(third, NAME)) == [
+        Joined(third.name, "worker", 2, "p")
+    ]
+
+
+@pytest.mark.parametrize("state", ["unknown", "alive", "of another slot"])
+def test_a_death_that_did_not_happen_is_dropped(
+    membership: Membership, faults: PeerFaults, state: str
+) -> None:
+    if state != "unknown":
+        membership.introduce(WORKER, info())
+    if state == "of another slot":
+        membership.vanish(WORKER.alive)
+        liar = Member("f", "worker", "host-1.x")
+    else:
+        liar = successor(WORKER, "x")
+    membership.appear(liar.alive)
+    events = membership.introduce(liar, with_death(liar, NAME))
+    assert events == [Joined(liar.name, "worker", 2, "p")]
+    # An earlier coordinator may have known an unknown one.
+    assert faults.total("death") == (state != "unknown")
+
+
+def test_a_token_counts_only_under_its_own_roles_prefix(membership: Membership) -> None:
+    forged = Member("f", "analyzer", NAME)
+    membership.introduce(WORKER, info())
+    assert membership.appear(forged.alive) == forged
+    assert membership.vanish(forged.alive) is None
+    assert membership.member(NAME) == WORKER
+    membership.appear(forged.alive)
+    with pytest.raises(MalformedMessage, match="another agent's name"):
+        membership.introduce(forged, info(kind="analyzer"))
+    assert membership.vanish(forged.alive) is None
+    assert membership.vanish(WORKER.alive) == Left(NAME)
+
+
+def test_a_forged_token_that_came_first_does_not_keep_the_worker_out(
+    faults: PeerFaults,
+) -> None:
+    membership = Membership("1", faults)
+    membership.appear(Member("f", "analyzer", NAME).alive)
+    assert membership.appear(WORKER.alive) == WORKER
+    assert membership.introduce(WORKER, info()) == [Joined(NAME, "worker", 2, "p")]
+
+
+def test_agents_that_do_not_answer_make_room_for_others(
+    membership: Membership, faults: PeerFaults
+) -> None:
+    membership.introduce(WORKER, info())
+    for number in range(3 * MOST_MEMBERS):
+        fake = Member("f", "worker", f"fake{number}")
+        assert membership.appear(fake.alive) == fake
+        membership.note_silence(fake)
+    assert len(membership) == MOST_MEMBERS
+    assert faults.total("crowd") == 2 * MOST_MEMBERS + 1
+    assert len(faults.counts) <= MOST_PEERS + 1
+    late = Member("f", "worker", "host-0.late")
+    assert membership.appear(late.alive) == late
+    data = info(agent=late.name)
+    assert membership.introduce(late, data) == [Joined(late.name, "worker", 2, "p")]
+    assert membership.member(NAME) == WORKER
+
+
+def test_an_agent_that_stops_answering_leaves_and_may_join_again(
+    membership: Membership,
+) -> None:
+    """A token stays while another process declares the same one."""
+    membership.introduce(WORKER, info())
+    assert membership.note_silence(WORKER) == Left(NAME)
+    assert membership.note_silence(WORKER) is None
+    assert membership.silences(WORKER) == 2
+    assert membership.introduce(WORKER, info()) == [Joined(NAME, "worker", 2, "p")]
+    assert membership.silences(WORKER) == 0
 
 
 @pytest.mark.parametrize(
-    "data", [b"", b"\xff", info(agent="x"), info(kind="analyzer"), info(slots=0)]
+    "data",
+    [
+        b"",
+        b"\xff",
+        info(agent="x"),
+        info(kind="analyzer"),
+        info(slots=0),
+        info(slots=2**32 - 1),
+        info(platform="p" * 1000),
+        info(platform="\x1b[2J"),
+        pb.AgentInfo(
+            agent=NAME, kind="worker", slots=1, version="1", deaths=[pb.Death()] * 9
+        ).SerializeToString(),
+    ],
 )
 def test_false_info_is_malformed_and_changes_nothing(
     membership: Membership, data: bytes
 ) -> None:
     with pytest.raises(MalformedMessage):
-        membership.introduce("w", data)
-    assert membership.is_stranger("w")
+        membership.introduce(WORKER, data)
+    assert membership.is_stranger(WORKER)
 
 
 @settings(derandomize=True)
@@ -101,9 +212,9 @@ def test_any_bytes_introduce_or_are_malformed(data: bytes) -> None:
     membership = Membership("1")
     membership.appear(WORKER.alive)
     try:
-        membership.introduce("w", data)
+        membership.introduce(WORKER, data)
     except MalformedMessage:
-        assert membership.is_stranger("w")
+        assert membership.is_stranger(WORKER)
 
 
 @pytest.mark.parametrize("key", ["", "revolve/f/w/alive", "revolve/f/x/w/alive"])

@@ -6,6 +6,7 @@ import pytest
 from msgspec.structs import replace
 
 from coordinator.dispatch.events import (
+    AgentKind,
     Client,
     Deliver,
     Died,
@@ -43,6 +44,7 @@ from schema.wire.codec import (
     encode_body,
     encode_robot,
 )
+from schema.wire.packing import fingerprint
 
 EPOCH = 3
 CLIENT = Client("run", EPOCH)
@@ -214,10 +216,20 @@ def test_robot_that_crashes_three_processes_is_quarantined(
 ) -> None:
     ask = Vet(BIRTH, 2, ROBOT) if kind == "vet" else Evaluate(BIRTH, ROBOT)
     sent_requests.requests.send(ask)
-    (number, agent, _) = sent_requests.sent[0]
-    of_others = [Died("another", EPOCH, number, "x", "SIGBUS")]
-    of_others += [Died("run", EPOCH - 1, number, "x", "SIGBUS")]
-    own = [Died("run", EPOCH, number, each, "SIGSEGV") for each in ("a", "b", "c")]
+    (number, first, _) = sent_requests.sent[0]
+    # Three processes lose it; another one still has it.
+    role: AgentKind = "analyzer" if kind == "vet" else "worker"
+    sent_requests.tell(Left(first))
+    for name in ("b", "c", "d"):
+        sent_requests.tell(Joined(name, role, 1, "p"))
+        if name != "d":
+            sent_requests.tell(Left(sent_requests.sent[-1][1]))
+    killed = [agent for _, agent, _ in sent_requests.sent[:3]]
+    _, agent, payload = sent_requests.sent[3]
+    same = fingerprint(payload)
+    of_others = [Died("another", EPOCH, number, killed[0], "SIGBUS", same)]
+    of_others += [Died("run", EPOCH - 1, number, killed[0], "SIGBUS", same)]
+    own = [Died("run", EPOCH, number, each, "SIGSEGV", same) for each in killed]
     told = [sent_requests.tell(event) for event in (*of_others, *own)]
     assert told[:-1] == [[]] * 4
     ((event,),) = told[-1:]
@@ -225,7 +237,7 @@ def test_robot_that_crashes_three_processes_is_quarantined(
     if kind == "vet":
         assert event == VettingFailed(BIRTH, 2, f"the analyzer {why}")
     else:
-        signed = Provenance("c")
+        signed = Provenance(killed[-1])
         assert event == EvaluationFailed(BIRTH, f"{QUARANTINED}{why}", signed)
     assert sent_requests.cancelled == [(number, agent)]
     assert sent_requests.tell(sent_requests.reply(JUDGED)) == []

@@ -1,6 +1,6 @@
 """Runs of a campaign in parallel: results as alone, all workers busy."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 import analyzer.report
 import worker.serve.null
-from coordinator.dispatch.events import DispatchEvent, Joined
+from coordinator.dispatch.events import DispatchEvent, Joined, Returned
 from coordinator.dispatch.fleet import Agents, Fleet
 from coordinator.network.local import LocalAgents
 from coordinator.run.scheduler import SLACK, Planned, RunScheduler
@@ -134,6 +134,55 @@ def test_error_in_a_run_that_was_taken_over_is_the_takeover(tmp_path: Path) -> N
     ((_, error),) = scheduler.failed
     assert "coordinator 2 has taken it over" in str(error)
     assert scheduler.active == []
+
+
+class Fencing(LocalAgents):
+    """Agents that refuse the first jobs as those of a replaced coordinator."""
+
+    fenced = 5
+
+    def receive(
+        self, timeout_s: float, _pause_s: float = 0.0, /
+    ) -> Sequence[DispatchEvent]:
+        events = super().receive(timeout_s)
+        for place, event in enumerate(events):
+            if self.fenced and isinstance(event, Returned):
+                self.fenced -= 1
+                told = Returned(event.number, event.agent, "fenced", reason="epoch 9")
+                return [*events[:place], told]
+        return events
+
+
+def fencing() -> Fencing:
+    answers = {"analyzer": analyzer.report.answer, "worker": worker.serve.null.answer}
+    return Fencing(answers, "any")  # type: ignore[arg-type]
+
+
+def test_a_run_goes_on_if_agents_say_without_reason_that_it_was_taken_over(
+    tmp_path: Path, alone: Path
+) -> None:
+    scheduler = scheduler_of(plan(tmp_path)[:1], fencing())
+    conduct(scheduler)
+    assert scheduler.failed == []
+    ((path, _), *_) = CAMPAIGN.runs(alone)
+    assert compare(path, tmp_path / path.name) == []
+    faults = scheduler.status(0.0).faults
+    assert {fault.kind for fault in faults} == {"fenced"}
+    assert sum(fault.count for fault in faults) == 5
+
+
+def test_a_run_stops_at_once_if_agents_say_so_and_its_folder_too(
+    tmp_path: Path,
+) -> None:
+    scheduler = scheduler_of(plan(tmp_path)[:1], fencing())
+    scheduler.turn(0.0, CLOCK)
+    (run,) = scheduler.active
+    (run.held.path / LOCK).unlink()
+    with RunFolder(run.held.path):
+        conduct(scheduler, 3)
+    ((_, error),) = scheduler.failed
+    assert "coordinator 2 has taken it over" in str(error)
+    assert scheduler.status(0.0).faults == ()
 
 
 def broken() -> None:

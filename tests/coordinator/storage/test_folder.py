@@ -211,6 +211,25 @@ def test_a_replaced_coordinator_notices_it(
                 old.confirm()
 
 
+def test_a_lower_epoch_in_the_folder_is_no_takeover(tmp_path: Path) -> None:
+    for _ in range(2):
+        with RunFolder(
+            tmp_path / "run", None if (tmp_path / "run").exists() else DETAILS
+        ):
+            pass
+    with RunFolder(tmp_path / "run") as folder:
+        assert folder.epoch == 3
+        (tmp_path / "run" / "epoch").write_text("2")
+        folder.confirm()
+
+
+def test_an_epoch_has_a_limit(tmp_path: Path) -> None:
+    RunFolder(tmp_path / "run", DETAILS).close()
+    (tmp_path / "run" / "epoch").write_text(str(2**32))
+    with pytest.raises(RunFolderError, match=f"must be below {2**32}, got {2**32}"):
+        RunFolder(tmp_path / "run")
+
+
 def test_a_folder_without_a_run_is_refused_and_nothing_is_made(tmp_path: Path) -> None:
     for path in (tmp_path / "none", tmp_path):
         with pytest.raises(RunFolderError, match="no run is there"):

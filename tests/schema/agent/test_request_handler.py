@@ -6,11 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from schema.agent.network import FENCED, UNFIT, Agent
+from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.request_handler import MOST_SOURCES, FairQueue, Reply, Server
 from schema.agent.supervision import Death, ProcessSlot, Task
 from schema.errors import InvalidRobot, UnknownPlugin
 from schema.experiment.plugin_source import check_plugins, plugins_of
+from schema.limits import MOST_EPOCH
 from schema.wire import revolve_pb2 as pb
 
 
@@ -29,12 +30,57 @@ def test_request_gets_its_answer() -> None:
     assert (made.counts.answered, made.counts.refused) == (1, 0)
 
 
-def test_an_older_epoch_is_fenced() -> None:
+def test_an_older_epoch_is_fenced_once() -> None:
+    """A coordinator that repeats the job has found its run folder unchanged."""
     made = server()
-    made.reply(request(epoch=2))
-    reply = made.reply(request(epoch=1))
-    assert reply.reason.startswith(FENCED)
     assert made.reply(request(epoch=2)) == Reply(b"answer")
+    assert made.reply(request(epoch=1)).reason.startswith(FENCED)
+    for forged in (2, 3, MOST_EPOCH):
+        assert made.reply(request(epoch=1)) == Reply(b"answer")
+        assert made.reply(request(epoch=forged)) == Reply(b"answer")
+
+
+def test_the_coordinator_that_replaced_another_is_not_fenced() -> None:
+    made = server()
+    for epoch in (1, 2):
+        assert made.reply(request(epoch=epoch)) == Reply(b"answer")
+    assert made.reply(request(epoch=1)).reason.startswith(FENCED)
+    assert made.reply(request(epoch=2)) == Reply(b"answer")
+
+
+@pytest.mark.parametrize(
+    ("data", "story"),
+    [
+        (request(epoch=MOST_EPOCH + 1), "epoch must be at most"),
+        (request(epoch=2**64 - 1), "epoch must be at most"),
+        (pb.Request(run="r" * 10_000).SerializeToString(), "at most 5000 characters"),
+    ],
+)
+def test_what_is_beyond_a_limit_is_malformed_and_not_remembered(
+    data: bytes, story: str
+) -> None:
+    made = server()
+    assert story in made.reply(data).reason
+    made.cancel(data)
+    assert made.counts.malformed == 2
+    assert made.reply(request(epoch=1)) == Reply(b"answer")
+
+
+def test_number_of_remembered_runs_is_limited() -> None:
+    made = server()
+    for number in range(3000):
+        message = pb.Request(run=f"r{number}", epoch=5)
+        made.reply(message.SerializeToString())
+    assert len(made._epochs) == 1000
+
+
+def test_a_job_that_comes_again_is_done_however_often_it_is_cancelled() -> None:
+    made = server()
+    made.cancel(request(7))
+    assert made.reply(request(7)) == Reply(reason=CANCELLED)
+    for _ in range(3):
+        made.cancel(request(7))
+        assert made.reply(request(7)) == Reply(b"answer")
 
 
 def test_cancelled_job_is_skipped_once() -> None:
@@ -45,6 +91,12 @@ def test_cancelled_job_is_skipped_once() -> None:
     assert made.reply(request(7)).reason == "the job was cancelled"
     assert made.reply(request(7)) == Reply(b"answer")
     assert (made.counts.skipped, made.counts.malformed) == (1, 1)
+
+
+def test_a_cancellation_needs_the_request_of_the_job() -> None:
+    made = server()
+    made.cancel(request(7, plugins="x"))
+    assert made.reply(request(7)) == Reply(b"answer")
 
 
 def test_number_of_cancelled_jobs_is_limited() -> None:
@@ -89,14 +141,14 @@ def test_any_bytes_get_a_reply(data: bytes) -> None:
 
 
 def test_agent_info_holds_the_deaths() -> None:
-    death = Death(Task("v", "r", 3, 7), "SIGSEGV")
+    death = Death(Task("v", "r", 3, 7, b"12345678"), "SIGSEGV")
     agent = Agent("worker", "w", "tcp/h:1", version="1", platform="p")
     info = pb.AgentInfo.FromString(
         Server(bytes, agent, ProcessSlot(0, None, (death,))).info
     )
     (told,) = info.deaths
     assert (told.agent, told.run, told.epoch, told.number) == ("v", "r", 3, 7)
-    assert told.cause == "SIGSEGV"
+    assert (told.cause, told.request) == ("SIGSEGV", b"12345678")
 
 
 def test_plugins_are_identified_by_their_source(

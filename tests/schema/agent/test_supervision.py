@@ -12,7 +12,7 @@ import pytest
 from schema.agent.supervision import CurrentJob, Death, ProcessSlot, Task, crash_cause
 from schema.agent.supervisor import ProcessPool
 
-TASK = Task("worker-0.ab", "host:some/folder", 3, 2**40)
+TASK = Task("worker-0.ab", "host:some/folder", 3, 2**40, b"12345678")
 PATIENCE_S = 30.0
 
 

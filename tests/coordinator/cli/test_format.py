@@ -1,0 +1,46 @@
+"""Lines about faults of peers."""
+
+import pytest
+
+from coordinator.cli.format import fault_lines
+from coordinator.cli.status import _show
+from schema.errors import MalformedMessage
+from schema.limits import MOST_SHOWN
+from schema.wire.operator import (
+    OperatorReply,
+    decode_operator_reply,
+    encode_operator_reply,
+)
+from schema.wire.status import PeerFault, Status
+
+FAULTS = (
+    PeerFault("late", "a", 1),
+    PeerFault("late", "b", 3),
+    *(PeerFault("malformed", f"peer{number}", 2) for number in range(8)),
+)
+
+
+def test_faults_are_summed_by_kind_with_the_most_frequent_peers() -> None:
+    late, malformed = fault_lines(FAULTS)
+    assert late == "not used: 4 late: b 3, a 1"
+    assert malformed == (
+        "not used: 16 malformed: peer0 2, peer1 2, peer2 2, peer3 2, peer4 2 and 3 more"
+    )
+    assert fault_lines(()) == []
+
+
+def test_status_shows_the_faults(capsys: pytest.CaptureFixture[str]) -> None:
+    status = Status((), 1, 1, 0.0, FAULTS)
+    data = encode_operator_reply(OperatorReply("", status=status))
+    received = decode_operator_reply(data).status
+    assert received == status
+    _show(received, "title")
+    shown = capsys.readouterr().out
+    assert all(line in shown for line in fault_lines(FAULTS))
+
+
+def test_a_status_with_a_long_name_is_malformed() -> None:
+    status = Status((), 1, 1, 0.0, (PeerFault("late", "x" * (MOST_SHOWN + 1), 1),))
+    data = encode_operator_reply(OperatorReply("", status=status))
+    with pytest.raises(MalformedMessage):
+        decode_operator_reply(data)

@@ -1,0 +1,44 @@
+"""Counts of faults: by kind and peer, limited, in printable lines."""
+
+from coordinator.dispatch.faults import OTHERS, FaultCount, PeerFaults
+from schema.limits import MOST_PEERS, MOST_REASON, MOST_SHOWN
+
+
+def test_faults_are_counted_by_kind_and_peer_and_told_once() -> None:
+    faults = PeerFaults()
+    for kind, peer in (("late", "a"), ("late", "a"), ("malformed", "a"), ("late", "b")):
+        assert kind in ("late", "malformed")
+        faults.note("late" if kind == "late" else "malformed", peer, "job 7")
+    assert faults.counts == (
+        FaultCount("late", "a", 2),
+        FaultCount("late", "b", 1),
+        FaultCount("malformed", "a", 1),
+    )
+    assert (faults.total("late"), faults.total("refused")) == (3, 0)
+    lines = faults.lines()
+    assert [line.partition(":")[0] for line in lines] == ["a", "a", "b"]
+    assert "(job 7)" in lines[0]
+    faults.note("late", "a")
+    assert faults.lines() == []
+
+
+def test_peers_beyond_a_limit_are_counted_together() -> None:
+    faults = PeerFaults()
+    for number in range(10 * MOST_PEERS):
+        faults.note("crowd", f"peer{number}")
+        faults.note("late", f"peer{number}")
+    assert len(faults.counts) == 2 * (MOST_PEERS + 1)
+    assert len(faults.lines()) == 2 * (MOST_PEERS + 1)
+    assert faults.total("crowd") == 10 * MOST_PEERS
+    assert FaultCount("late", OTHERS, 9 * MOST_PEERS) in faults.counts
+
+
+def test_names_and_details_are_cut_and_printable() -> None:
+    faults = PeerFaults()
+    faults.note("malformed", "\x1b[2J\x1b]0;x\x07\n" + "p" * 10**6, "\x9b31m" * 10**6)
+    (counted,) = faults.counts
+    (line,) = faults.lines()
+    assert len(counted.peer) == MOST_SHOWN
+    assert len(line) < MOST_SHOWN + MOST_REASON + 100
+    assert counted.peer.isprintable()
+    assert line.isprintable()
