@@ -32,7 +32,10 @@ UNSUPERVISED = ProcessSlot()
 """Slot of a process without a supervisor."""
 
 
-_ENGINE_LOG = "warn,zenoh::net::runtime::orchestrator=error"
+_ENGINE_LOG = (
+    "warn,zenoh::net::runtime::orchestrator=error,"
+    "zenoh_link_unixsock_stream::unicast=error"
+)
 """Levels of Zenoh's log; the commands themselves tell of a hub that is missing."""
 
 
