@@ -150,6 +150,7 @@ def _deployment(
         cpu_limit_s=options.cpu_limit,
         checks=Checks(options.audit, options.on_quarantine == "pause"),
         allows_drift=options.allow_drift,
+        metrics=options.metrics,
     )
 
 

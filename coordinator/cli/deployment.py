@@ -43,6 +43,7 @@ class Deployment:
         cpu_limit_s: CPU time of a job after which its process here is ended [s].
         checks: cross-checks of workers, and the reaction to quarantined robots.
         allows_drift: an arena may continue on another platform if its own is gone.
+        metrics: address at which to serve metrics; None: nowhere.
     """
 
     workers: int
@@ -61,6 +62,7 @@ class Deployment:
     checks: Checks = NO_CHECKS
     certificates: tuple[Certificate, ...] | None = None
     allows_drift: bool = False
+    metrics: str | None = None
 
 
 @contextmanager

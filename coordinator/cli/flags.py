@@ -163,6 +163,12 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     )
     flags.add_argument("--quiet", action="store_true", help="show no progress")
     flags.add_argument(
+        "--metrics",
+        metavar="ADDRESS",
+        help="serve metrics for Prometheus at PORT of this machine, or at HOST:PORT, "
+        "where every host that reaches it can read them (default: no metrics)",
+    )
+    flags.add_argument(
         "--fsync", action="store_true", help="survive power loss, too; slower"
     )
 

@@ -237,3 +237,16 @@ def test_shard_does_not_drift_unless_allowed() -> None:
     dispatch = drifting(allows_drift=False)
     assert dispatch.wake_s is None
     assert dispatch.handle(Ticked(1e9)) == []
+
+
+def test_advances_are_counted_while_they_wait_and_while_a_worker_has_them() -> None:
+    dispatch = fleet()
+    dispatch.handle(ShardRequested(0))
+    dispatch.handle(ShardRequested(1))
+    assert (dispatch.unassigned, dispatch.assigned) == (2, 0)
+    dispatch.handle(joined("a"))
+    assert (dispatch.unassigned, dispatch.assigned) == (0, 2)
+    dispatch.handle(ShardReturned(1, "done"))
+    assert (dispatch.unassigned, dispatch.assigned) == (0, 1)
+    dispatch.handle(Left("a"))
+    assert (dispatch.unassigned, dispatch.assigned) == (1, 0)
