@@ -14,6 +14,7 @@ COMMANDS = {
     "coordinator": (_COORDINATOR, "run experiments for remote workers"),
     "hub": ("coordinator.cli.hub", "connect coordinators, workers and viewers"),
     "cluster": ("coordinator.cluster.command", "make certificates for a lab"),
+    "doctor": ("coordinator.doctor.command", "check this machine and its fleet"),
     "status": ("coordinator.cli.status", "show the progress of runs"),
     "log": ("coordinator.cli.log", "print the journal of a run"),
     "arena": ("coordinator.cli.arena", "inspect and control a running arena"),

@@ -48,7 +48,7 @@ def ask_coordinators(
         there = {member_of(str(each.ok.key_expr)) for each in tokens if each.ok}
         for member in sorted(there, key=lambda each: each.name):
             if only in ("", member.name):
-                reply = _reply_of(member, session, data)
+                reply = reply_of(member, session, data)
                 if reply is not None:
                     replies_of[member.name] = reply
     if not replies_of:
@@ -58,12 +58,24 @@ def ask_coordinators(
     return replies_of
 
 
-def _reply_of(member: Member, session: zenoh.Session, data: bytes) -> bytes | None:
-    """Return a coordinator's own reply; None without one."""
+def reply_of(
+    member: Member,
+    session: zenoh.Session,
+    data: bytes,
+    timeout_s: float = ASK_TIMEOUT_S,
+) -> bytes | None:
+    """Return a coordinator's own reply; None without one.
+
+    Args:
+        member: the coordinator.
+        session: of this process.
+        data: an encoded ``OperatorRequest``.
+        timeout_s: how long to wait [s].
+    """
     replies = session.get(
         member.command,
         payload=data,
-        timeout=ASK_TIMEOUT_S,
+        timeout=timeout_s,
         target=zenoh.QueryTarget.ALL,
         consolidation=_NOW,
     )
