@@ -21,6 +21,7 @@ from coordinator.storage.compare import compare
 from coordinator.storage.folder import holds_run, read_details
 from coordinator.storage.hints import stopped
 from schema.agent.address import HUB, listen_address
+from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.command import access_of, connect_of, tls_of
 from schema.agent.service import tell_user
 from schema.agent.supervisor import cores
@@ -126,9 +127,11 @@ def _deployment(
     # One arena runs in one process; several arenas, or robots, spread over them.
     is_one_arena = len(experiments) == 1 and _has_one_arena(experiments[0], options)
     threads = options.threads or (cores() if is_one_arena else 1)
+    shards = shards_that_fit(memory_bytes(), processes=1)
+    in_process = worker.serve.jobs.Jobs(most_shards=shards, threads=threads)
     answers: dict[AgentKind, Callable[[bytes], bytes]] = {
         "analyzer": analyzer.report.answer,
-        "worker": worker.serve.jobs.Jobs(threads=threads).answer,
+        "worker": in_process.answer,
     }
     return Deployment(
         workers=workers,
@@ -148,6 +151,7 @@ def _deployment(
         speed=options.speed,
         view=options.view,
         cpu_limit_s=options.cpu_limit,
+        wait_limit_s=options.wait_limit,
         checks=Checks(options.audit, options.on_quarantine == "pause"),
         allows_drift=options.allow_drift,
         metrics=options.metrics,

@@ -4,9 +4,9 @@ The class of an exception names the source of the fault, which decides its handl
 """
 
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, Literal
 
-from schema.limits import MOST_SHOWN
+from schema.limits import LONGEST_REASON, printable
 
 
 class RevolveError(Exception):
@@ -37,8 +37,29 @@ class NetworkError(RevolveError):
     """An address that cannot be listened on or reached."""
 
 
+MessageFault = Literal["malformed", "too large", "stale", "impossible", "differs"]
+"""What is wrong with a message, for counts.
+
+- ``malformed``: it does not decode, or breaks a rule of its own type.
+- ``too large``: it exceeds a limit of ``schema.limits``, or one of its request.
+- ``stale``: it belongs to another request.
+- ``impossible``: it contradicts its request or the state of the run.
+- ``differs``: it repeats a past result with another outcome, as a machine that
+  computes differently does; like an error, this can stop a run.
+"""
+
+
 class MalformedMessage(RevolveError):  # noqa: N818 - reads as what it says
-    """Bytes of a peer that do not decode; they are counted and dropped."""
+    """A message of a peer that is not believed; it is counted and dropped.
+
+    Attributes:
+        kind: what is wrong, for counts.
+    """
+
+    def __init__(self, why: str, kind: MessageFault = "malformed") -> None:
+        """Initialise with a reason, which may quote the peer and is cut."""
+        super().__init__(printable(why, LONGEST_REASON))
+        self.kind: MessageFault = kind
 
 
 class UnexpectedEvent(RevolveError):  # noqa: N818 - reads as what it says
@@ -68,19 +89,6 @@ class StateDiffers(RevolveError):  # noqa: N818 - reads as what it says
 def one_line(error: Exception) -> str:
     """Return the message of an error as one line."""
     return " ".join(str(error).split())
-
-
-def printable(text: str, most: int = MOST_SHOWN) -> str:
-    """Return a foreign text as one line without control characters, cut if long.
-
-    Args:
-        text: any text of a peer; terminal escapes and line ends become spaces.
-        most: greatest number of characters, the dots at a cut included.
-    """
-    # Cut before the work: a text may have megabytes.
-    clean = "".join(c if c.isprintable() else " " for c in text[: 2 * most])
-    line = " ".join(clean.split())
-    return line if len(line) <= most else f"{line[: most - 3]}..."
 
 
 def nearest(word: Any, words: Any) -> str:  # noqa: ANN401 - any iterable of str

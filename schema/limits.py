@@ -1,9 +1,81 @@
-"""Limits of what comes from outside: files of other people, and messages."""
+"""Limits of everything that comes from another process.
+
+Every decoder uses these. The length of a message is checked before it is parsed, the
+number of its submessages before they are made, and texts are cut. What a request or
+the state of an arena limits further is checked by ``coordinator.run``.
+"""
+
+KIB = 1024
+MIB = 1024 * KIB
+
+# Texts in characters
 
 MOST_SHOWN = 80
-"""Characters of a foreign text in a message to the user."""
-MOST_REASON = 1000
-"""Characters of an agent's reason for not doing a job."""
+"""Names and other foreign texts in a message to the user."""
+LONGEST_REASON = 1000
+"""Reasons of failures, refusals and deaths; longer ones are cut."""
+LONGEST_NAME = 1000
+"""Names and identifiers in messages of MessagePack; longer ones are refused."""
+
+# Messages in bytes
+
+ROBOT_BYTES = 1 * MIB
+"""A robot, a body or a genome."""
+REQUEST_BYTES = 16 * MIB
+"""A request about one robot; its settings may contain a scenery."""
+ADVANCE_REQUEST_BYTES = 256 * MIB
+"""A request about an arena; it may contain a snapshot and a history."""
+ANSWER_BYTES = 16 * KIB
+"""An answer about one robot, without the intersections of its report."""
+PAIR_BYTES = 16
+"""An intersection in a report."""
+ADVANCE_BYTES = 256 * MIB
+"""An answer about an arena, of any arena."""
+LIVE_BYTES = 64 * MIB
+"""A message to viewers about an arena."""
+UPDATE_BYTES = 64 * MIB
+"""A message to viewers about a run."""
+OPERATOR_REQUEST_BYTES = 2 * MIB
+"""A request of an operator; it may contain a robot."""
+OPERATOR_REPLY_BYTES = 16 * MIB
+"""The reply to an operator."""
+
+# Parts of an answer about an arena in bytes
+
+JUDGEMENT_BYTES = 4 * LONGEST_REASON + 256
+"""A living robot, or one that diverged, with its reason."""
+TOUCH_BYTES = 64
+"""A pair of robots that touched."""
+COLUMNS_BYTES = 16 * KIB
+"""Columns without rows."""
+POSE_BYTES = 128
+"""A pose without joint angles."""
+ANGLE_BYTES = 8
+"""A joint angle."""
+SNAPSHOT_BYTES = 1 * MIB
+"""A snapshot without robots."""
+SNAPSHOT_ROBOT_BYTES = 256 * KIB
+"""A robot in a snapshot, without its window."""
+SNAPSHOT_SAMPLE_BYTES = 32
+"""A sample of a robot's window in a snapshot."""
+
+# Counts
+
+MOST_PARTS = 1000
+MOST_NEURONS = 10_000
+MOST_CONNECTIONS = 50_000
+"""Parts, neurons and connections of a robot, or of a genome."""
+MOST_LIVE_ROWS = 500_000
+"""Poses in a message to viewers."""
+UNCOUNTED_BYTES = 1 * MIB
+"""Messages up to this length are parsed without counting their submessages first."""
+MOST_SUBMESSAGES = 500_000
+"""Submessages of a message; each takes some 100 bytes of memory."""
+MOST_FIELDS = 4_000_000
+"""Fields of a message, those of submessages included."""
+
+# Agents and what they say
+
 MOST_EPOCH = 2**32
 """Greatest epoch: a run is never resumed more often."""
 MOST_RUN_NAME = 5000
@@ -14,9 +86,52 @@ MOST_MEMBERS = 10_000
 """Agents whose tokens a coordinator keeps; a hub has no more connections."""
 MOST_ASKED_INFOS = 1000
 """Open queries of a coordinator for properties of agents."""
+MOST_QUERIES = 1000
+"""Queries of operators, and of viewers, that wait for a coordinator's reply."""
 MOST_SLOTS = 1024
 """Jobs that an agent does at a time."""
 MOST_PLATFORM = 300
 """Characters of a platform tag."""
 MOST_DEATHS = 8
 """Crashed predecessors that an agent reports."""
+MOST_SHARDS = 10_000
+MOST_CORES = 4096
+"""Arenas that an agent keeps, and cores that it uses for one."""
+LONGEST_QUIET_S = 5.0
+"""A job that used CPU time within this time makes progress [s]."""
+
+# Numbers
+
+GREATEST_COORDINATE = 1e10
+"""Coordinate above which the physics engine resets its state [m]."""
+GREATEST_VELOCITY = 1e12
+"""Mean velocity over one sample interval between such coordinates [m/s]."""
+GREATEST_MASS = 1e9
+"""Mass of a robot [kg]."""
+LONGEST_WALL_S = 1e9
+"""Duration of a job by the clock [s]."""
+
+
+def printable_lines(text: str) -> str:
+    """Return a text with ``?`` in place of control characters other than line ends."""
+    return "".join(c if c.isprintable() or c == "\n" else "?" for c in text)
+
+
+def printable(text: str, most: int = MOST_SHOWN) -> str:
+    """Return a text as one line without control characters, cut at a length.
+
+    Each run of white space becomes a space; a character that is not printable becomes
+    ``?``, so that no text can move a terminal's cursor or reverse its direction.
+
+    Args:
+        text: from another process, of any length.
+        most: characters to keep; a longer text ends in ``...``.
+    """
+    if len(text) <= most and text.isprintable() and "  " not in text:
+        return text.strip()
+    # White space may fill a text: what is split is bounded first.
+    words = text[: 4 * most].split()
+    line = "".join(c if c.isprintable() else "?" for c in " ".join(words))
+    if len(line) <= most and len(text) <= 4 * most:
+        return line
+    return f"{line[: most - 3]}..."

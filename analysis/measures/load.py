@@ -16,7 +16,7 @@ from pyarrow.parquet import read_schema
 
 from schema.errors import RunFolderError
 from schema.tables.columns import TABLES, VERSION
-from schema.tables.files import FINISHED, has_rows, read_table
+from schema.tables.files import FINISHED, finished_path, has_rows, read_table
 
 TABLE = "table "
 """Prefix of the name of a table that was left out."""
@@ -255,7 +255,7 @@ def _check_there(run: Run, name: str) -> None:
 
 def _check_version(folder: Path, name: str) -> None:
     """Raise if a finished table has another schema version than this program."""
-    for path in (folder / FINISHED).glob(f"*/*/{name}.parquet"):
+    if path := finished_path(folder, name):
         metadata = read_schema(path).metadata or {}
         version = metadata.get(b"revolve.schema_version", b"none").decode()
         if version != str(VERSION):

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
+import pyarrow.compute
 
+from schema.errors import MalformedMessage
 from schema.parts import BodySpace, Box
 from schema.robot.frames import place_parts, shapes_of
 from schema.robot.results import Floats
@@ -94,14 +96,23 @@ def place(model: BoxModel, roots: Floats, angles: Floats) -> tuple[Float32s, Flo
 
 
 def place_rows(model: BoxModel, rows: pa.Table) -> tuple[Float32s, Float32s]:
-    """Return the places of a model's boxes, as ``place`` does, from rows of poses."""
+    """Return the places of a model's boxes, as ``place`` does, from rows of poses.
+
+    Raises:
+        MalformedMessage: the rows have other numbers of angles than the body has
+            joints.
+    """
+    joints = len(model.parents) - 1
+    counts = pyarrow.compute.list_value_length(rows["angles"]).to_numpy()
+    if (counts != joints).any():
+        raise MalformedMessage(f"poses: must have {joints} angles each", "impossible")
     axes = ("x", "y", "z", "qw", "qx", "qy", "qz")
     roots = np.stack([rows[axis].to_numpy() for axis in axes], axis=1)
     angles = rows["angles"].combine_chunks().flatten().to_numpy()
     return place(
         model,
         roots.astype(np.float64),
-        angles.astype(np.float64).reshape(len(roots), -1),
+        angles.astype(np.float64).reshape(len(roots), joints),
     )
 
 

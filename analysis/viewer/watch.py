@@ -16,8 +16,9 @@ from analysis.viewer.show import Show
 from schema.agent.service import tell_user
 from schema.errors import MalformedMessage, NetworkError
 from schema.experiment.file import experiment_from_text
+from schema.limits import LIVE_BYTES, MOST_LIVE_ROWS
 from schema.robot.ids import BirthId
-from schema.tables.columns import read_columns
+from schema.tables.received import received_columns
 from schema.wire.arena_codec import Live
 from schema.wire.updates import Update
 
@@ -124,13 +125,25 @@ class LiveView:
         for each in messages:
             if isinstance(each, Live) and each.run == self._run:
                 try:
-                    poses = read_columns("poses", each.advance.poses)
+                    poses = received_columns(
+                        "poses",
+                        each.advance.poses,
+                        most_bytes=LIVE_BYTES,
+                        most_rows=MOST_LIVE_ROWS,
+                    )
                 except MalformedMessage:
                     continue
                 self._move(each.shard, poses, has_all=True)
             self.has_ended = self.has_ended or isinstance(each, Ended)
 
     def _move(self, arena: int, poses: pa.Table, *, has_all: bool) -> None:
-        """Record poses; keep those of unknown robots for later."""
-        if (unknown := self._show.move(arena, poses, has_all=has_all)) is not None:
+        """Record poses; keep those of unknown robots for later.
+
+        Poses that do not fit their robots are dropped.
+        """
+        try:
+            unknown = self._show.move(arena, poses, has_all=has_all)
+        except MalformedMessage:
+            return
+        if unknown is not None:
             self._unknown.append((arena, unknown))

@@ -17,7 +17,7 @@ from schema.agent.address import ADDRESS
 from schema.agent.network import Agent, Tls
 from schema.agent.platform_tag import platform_tag
 from schema.agent.service import tell_user
-from schema.agent.supervision import CPU_LIMIT_S, ProcessSlot
+from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, ProcessSlot
 from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name
 
@@ -41,6 +41,7 @@ class Deployment:
         speed: limit of simulated seconds per second for arenas; None: no limit.
         view: open a viewer; the run does not wait for it.
         cpu_limit_s: CPU time of a job after which its process here is ended [s].
+        wait_limit_s: time that a job here may wait without using CPU time [s].
         checks: cross-checks of workers, and the reaction to quarantined robots.
         allows_drift: an arena may continue on another platform if its own is gone.
         metrics: address at which to serve metrics; None: nowhere.
@@ -59,6 +60,7 @@ class Deployment:
     speed: float | None = None
     view: bool = False
     cpu_limit_s: float = CPU_LIMIT_S
+    wait_limit_s: float = WAIT_LIMIT_S
     checks: Checks = NO_CHECKS
     certificates: tuple[Certificate, ...] | None = None
     allows_drift: bool = False
@@ -106,6 +108,7 @@ def connected_agents(
                 kind, f"own-{kind}", network.own_address, deployment.fleet,
                 tls=deployment.tls, threads=deployment.threads,
                 cpu_limit_s=deployment.cpu_limit_s,
+                wait_limit_s=deployment.wait_limit_s, processes=size,
             )  # fmt: skip
             pool = ProcessPool(deployment.bodies[kind], (agent,), size=size)
             pools.append(stack.enter_context(pool))

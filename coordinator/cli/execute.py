@@ -28,6 +28,7 @@ from coordinator.storage.folder import (
 from coordinator.storage.folder_status import (
     check_rewritable,
     folder_status,
+    table_damages,
     unbegun_status,
 )
 from coordinator.storage.hints import command, stopped
@@ -36,7 +37,6 @@ from schema.agent.service import tell_user
 from schema.errors import NetworkError, RevolveError
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text, experiment_text
-from schema.tables.files import has_rows
 from schema.wire.status import RunStatus
 
 
@@ -89,12 +89,9 @@ def resume(folder: Path, deployment: Deployment) -> int:
         with FolderLock(folder):
             planned, failed = _plan(folder, read_campaign(folder))
             return _execute_campaign(folder, planned, failed, deployment)
-    if read_state(folder) == "finished":
-        if has_rows(folder, "births"):
-            tell_user(f"{folder}: already finished")
-            return 0 if has_evaluated(folder) else 1
-        check_rewritable(folder, read_details(folder))
-        tell_user(f"{folder}: tables are missing; writing them again from the journal")
+    if read_state(folder) == "finished" and not _is_to_be_rewritten(folder):
+        tell_user(f"{folder}: already finished")
+        return 0 if has_evaluated(folder) else 1
     return _execute_run(folder, RunFolder(folder), deployment)
 
 
@@ -141,7 +138,12 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
             if not holds_run(path):
                 planned.append(Planned(status, partial(RunFolder, path, details)))
                 continue
-            found, status = read_details(path), folder_status(path)
+            found = read_details(path)
+            status = (
+                unbegun_status(path, found)
+                if _is_to_be_rewritten(path)
+                else folder_status(path)
+            )
             if status.state == "finished" and not has_evaluated(path):
                 failed.append(path)
         except RevolveError as error:
@@ -156,6 +158,23 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
             tell_user(f"{path}: keeps its own number of births, {theirs} (not {ours})")
         planned.append(Planned(status, partial(RunFolder, path)))
     return planned, failed
+
+
+def _is_to_be_rewritten(folder: Path) -> bool:
+    """Return whether a run is finished, but a table is damaged; tell the user so.
+
+    Raises:
+        RunFolderError: such a table cannot be written again.
+    """
+    if read_state(folder) != "finished":
+        return False
+    damages = table_damages(folder)
+    for damage in damages:
+        tell_user(damage)
+    if damages:
+        check_rewritable(folder)
+        tell_user(f"{folder}: writing such tables again from the journal")
+    return bool(damages)
 
 
 def _raise(error: RevolveError) -> RunFolder:

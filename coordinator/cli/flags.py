@@ -4,7 +4,7 @@ import argparse
 
 from coordinator.storage.campaign import shipped_campaigns
 from schema.agent.address import FORMS
-from schema.agent.command import add_access, add_cpu_limit, add_network_flags
+from schema.agent.command import add_access, add_job_limits, add_network_flags
 from schema.experiment.file import shipped_experiments
 from schema.flags import Flags, add_count, positive_number, share, whole_number
 
@@ -139,7 +139,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     flags.add_argument(
         "--view", action="store_true", help="open a viewer, as revolve view does"
     )
-    add_cpu_limit(flags)
+    add_job_limits(flags)
     flags.add_argument(
         "--audit",
         type=share,

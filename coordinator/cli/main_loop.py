@@ -1,5 +1,6 @@
 """Main loop of a coordinator process: runs, operators, viewers, display."""
 
+import logging
 import math
 import resource
 import time
@@ -21,6 +22,7 @@ from schema.agent.supervisor import stop_on_signals
 from schema.errors import RevolveError
 from schema.wire.status import RunStatus, Status
 
+_LOG = logging.getLogger(__name__)
 _TURN_S = 0.2
 _CHORES_S = 1.0
 # Journal, lock and table segments of a run; and what the process itself needs.
@@ -57,6 +59,7 @@ def execute_runs(
             Fleet(
                 agents,
                 allows_drift=deployment.allows_drift,
+                warn=_LOG.warning,
                 faults=None if network is None else network.faults,
             ),
             open_run=lambda held, is_watched: RunSession(

@@ -64,12 +64,22 @@ class Display:
             self._draw(status)
         elif now_s >= self._next_line_s:
             self._next_line_s = now_s + SPAN_S
-            self._print(_line(status))
+            self._print(", ".join([_line(status), *self._recoveries()]))
         self._warn_of_missing(status, now_s)
+
+    def _recoveries(self) -> list[str]:
+        """Describe the runs whose lost poses are computed again."""
+        return [
+            "recomputing poses of {}: advance {} of {}".format(
+                run.held.path.name, *run.recovery.progress
+            )
+            for run in self._scheduler.active
+            if run.recovery is not None
+        ]
 
     def _draw(self, status: Status) -> None:
         rows: dict[str, tuple[IslandStatus | RunStatus | Status, str]] = {}
-        about = _rates(status)
+        about = ", ".join([_rates(status), *self._recoveries()])
         if len(status.runs) > 1:
             name = _runs_done(status)
             rows[""] = (status, about)
@@ -110,7 +120,7 @@ class Display:
         waiting = {
             f"arena {shard} of {run.held.path.name}": platform
             for run in self._scheduler.active
-            for shard, platform in run.loop.shard_requests.waiting.items()
+            for shard, platform in run.waiting.items()
         }
         if "worker" not in missing and waiting != self._shown_waiting:
             self._shown_waiting = waiting

@@ -18,9 +18,11 @@ from coordinator.storage.lock import LOCK
 from schema.agent.address import read_address
 from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
 from schema.agent.service import tell_user
-from schema.errors import NetworkError, RevolveError, RunFolderError, printable
+from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.flags import Flags
-from schema.tables.files import FINISHED, SEGMENTS
+from schema.limits import printable
+from schema.tables.files import FINISHED
+from schema.tables.segments import SEGMENTS
 from schema.wire.operator import (
     GetStatus,
     OperatorReply,

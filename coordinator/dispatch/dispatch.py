@@ -10,16 +10,18 @@ An agent that fails at a job, loses one without leaving, or declines the same on
 gets no job until a backoff ends. The backoff grows with consecutive failures, so that a
 broken agent cannot empty the queue.
 
-Overdue jobs are duplicated on idle agents; the first answer counts. A job that crashed
-several processes is given up.
+Overdue jobs are duplicated on idle agents; the first answer counts. If all agents that
+have a copy are silent, too, another one gets it, each time after twice the time. A job
+that crashed several processes is given up.
 """
 
 from collections.abc import Callable, Iterator
 from heapq import heappop, heappush
-from itertools import count
 
+from coordinator.dispatch.deadlines import FIRST_S, LOOK_S, Deadlines
 from coordinator.dispatch.events import (
     AgentKind,
+    Ask,
     Assign,
     Cancel,
     Client,
@@ -31,32 +33,33 @@ from coordinator.dispatch.events import (
     JobKind,
     Joined,
     Left,
+    Progressed,
     Requested,
     Returned,
     Ticked,
     Withdrawn,
 )
 from coordinator.dispatch.faults import PeerFaults
-from coordinator.dispatch.pool import (
-    AgentState,
-    Backoff,
-    PairedJobs,
-    Pending,
-    Pool,
-    Stragglers,
-)
+from coordinator.dispatch.pending import PairedJobs, Pending
+from coordinator.dispatch.pool import REPLY_S, AgentState, Pool
 from schema.errors import MalformedMessage, UnexpectedEvent
 from schema.wire.packing import fingerprint
 
 AGENT_OF: dict[JobKind, AgentKind] = {"vet": "analyzer", "evaluate": "worker"}
 MAX_ERRORS = 3
 MAX_DEATHS = 3
+LEAST_S = 1.0
+"""A job is never late before this time [s]: a second copy would cost more."""
 VETS_AT_HAND = 16
 """Vettings that an analyzer holds beyond the current one: some milliseconds' work."""
 
 
 class Dispatch:
-    """State machine of jobs; events enter only through ``handle``."""
+    """State machine of jobs; events enter only through ``handle``.
+
+    Attributes:
+        workers: the workers and their load, which the arenas share.
+    """
 
     def __init__(self, faults: PeerFaults | None = None) -> None:
         """Initialise without agents and jobs.
@@ -66,14 +69,14 @@ class Dispatch:
         """
         self._faults = faults or PeerFaults()
         self._jobs: dict[int, Pending] = {}
+        self.workers = Pool()
         self._pools: dict[AgentKind, Pool] = {
-            "worker": Pool(),
+            "worker": self.workers,
             "analyzer": Pool(VETS_AT_HAND),
         }
         self._kind_of: dict[str, AgentKind] = {}
-        self._backoff = Backoff()
-        self._stamps = count(1)
-        self._stragglers = Stragglers()
+        self._deadlines = Deadlines(LEAST_S)
+        self._next_look_s = self._next_check_s = 0.0
         self._pairs = PairedJobs()
         self._highest = -1
         self._now_s: float | None = None
@@ -85,6 +88,7 @@ class Dispatch:
             Returned: self._returned,
             Died: self._died,
             Ticked: self._ticked,
+            Progressed: self._progressed,
         }
 
     @property
@@ -125,7 +129,7 @@ class Dispatch:
     @property
     def credits(self) -> int:
         """How many jobs all workers together hold while enough jobs wait."""
-        workers = self._pools["worker"].agents.values()
+        workers = self.workers.agents.values()
         return sum(worker.joined.slots + 1 for worker in workers)
 
     def platform(self, agent: str) -> str:
@@ -136,12 +140,13 @@ class Dispatch:
     @property
     def leisure_s(self) -> float:
         """Estimated time until some worker runs out of jobs [s]."""
-        return self._pools["worker"].leisure_s
+        return self.workers.leisure_s
 
     @property
     def wake_s(self) -> float | None:
         """Time at which the next ``Ticked`` is needed [s]; None: it is not."""
-        return self._backoff.wake_s
+        wakes = [pool.wake_s for pool in self._pools.values()]
+        return min((wake_s for wake_s in wakes if wake_s is not None), default=None)
 
     def handle(self, event: DispatchEvent) -> list[DispatchCommand]:
         """Handle an event and return the commands, in order of execution.
@@ -167,7 +172,7 @@ class Dispatch:
         pool = self._pools[event.kind]
         self._kind_of[event.agent] = event.kind
         pool.agents[event.agent] = AgentState(event)
-        pool.offer(event.agent, next(self._stamps))
+        pool.offer(event.agent)
         yield from self._assign(pool)
 
     def _left(self, event: Left) -> Iterator[DispatchCommand]:
@@ -216,10 +221,16 @@ class Dispatch:
             return
         pool = self._pools[kind]
         agent = pool.agents[event.agent]
-        if event.number not in agent.held:
+        agent.is_heard()
+        is_advance = event.number in agent.advances
+        if is_advance:
+            del agent.advances[event.number]
+            agent.occupy()
+        elif event.number in agent.held:
+            del agent.held[event.number]
+        else:
             self._note_late(event)
             return
-        del agent.held[event.number]
         # A late copy only shows that the agent is free.
         if pending := self._jobs.get(event.number):
             answer, reason = self._read(pending.job, event)
@@ -234,10 +245,10 @@ class Dispatch:
                 is_fault = not is_declined or event.agent in pending.avoid
                 yield from self._fail(pending, event, reason)
                 if is_fault:
-                    self._backoff.begin(agent, self._now_s or 0.0)
-        else:
+                    pool.rest(event.agent, self._now_s or 0.0)
+        elif not is_advance:
             self._note_late(event)
-        pool.offer(event.agent, next(self._stamps))
+        pool.offer(event.agent)
         yield from self._assign(pool)
 
     def _note_late(self, event: Returned) -> None:
@@ -261,16 +272,19 @@ class Dispatch:
         since_s, place = pending.holders.pop(agent.joined.agent)
         if self._now_s is not None:
             elapsed_s = self._now_s - since_s
-            self._stragglers.learn(pending.job.kind, elapsed_s)
+            self._deadlines.learn(pending.job.kind, elapsed_s)
             agent.learn(elapsed_s / place)
 
     def _fail(
         self, pending: Pending, event: Returned, reason: str
     ) -> Iterator[DispatchCommand]:
-        """Give a job to another agent, or give it up after several errors."""
+        """Give a job to another agent, or give it up after several errors.
+
+        A malformed answer is a fault of its agent alone, so it is no such error.
+        """
         if event.outcome == "lost":
             pending.lost[event.agent] = None
-        pending.errors += event.outcome in ("ok", "error")
+        pending.errors += event.outcome == "error"
         if pending.errors == MAX_ERRORS:
             del pending.holders[event.agent]
             yield Deliver(pending.job, event.agent, reason=reason)
@@ -314,34 +328,73 @@ class Dispatch:
         if self._now_s is not None and event.now_s < self._now_s:
             raise UnexpectedEvent(f"{event.now_s} s comes after {self._now_s} s")
         self._now_s = event.now_s
-        for name in self._backoff.over(event.now_s):
-            if kind := self._kind_of.get(name):
-                pool = self._pools[kind]
-                pool.agents[name].rests = False
-                pool.offer(name, next(self._stamps))
+        for pool in self._pools.values():
+            if pool.end_rests(event.now_s):
                 yield from self._assign(pool)
-        if self._stragglers.is_time(event.now_s):
-            for pool in self._pools.values():
-                yield from self._copy(pool, event.now_s)
+        if event.now_s >= self._next_look_s:
+            self._next_look_s = event.now_s + LOOK_S
+            yield from self._look(event.now_s)
 
-    def _copy(self, pool: Pool, now_s: float) -> Iterator[DispatchCommand]:
-        """Duplicate overdue jobs on idle agents, oldest first."""
-        idle = pool.idle()
-        if not idle:
-            return
-        for pending in list(self._jobs.values()):
-            kind = pending.job.kind
-            if len(pending.holders) != 1:
+    def _progressed(self, event: Progressed) -> Iterator[DispatchCommand]:
+        if kind := self._kind_of.get(event.agent):
+            agent = self._pools[kind].agents[event.agent]
+            agent.worked_s = self._now_s or 0.0
+            agent.is_heard()
+        yield from ()
+
+    def _look(self, now_s: float) -> Iterator[DispatchCommand]:
+        """Duplicate overdue jobs on idle agents, oldest first; find silent agents."""
+        limits_s = {kind: self._deadlines.limit_s(kind) for kind in AGENT_OF}
+        is_check = now_s >= self._next_check_s
+        if is_check:
+            self._next_check_s = now_s + REPLY_S
+        for kind, pool in self._pools.items():
+            idle = pool.idle()
+            if idle:
+                jobs = [j for j in self._jobs.values() if AGENT_OF[j.job.kind] == kind]
+            elif is_check:
+                jobs = self._oldest(pool)
+            else:
                 continue
-            if not self._stragglers.is_late(kind, now_s - pending.since_s):
-                continue
-            if self._pools[AGENT_OF[kind]] is not pool:
-                continue
-            avoid = {*self._pairs.avoided(pending), *pending.holders}
-            name = next((each for each in idle if each not in avoid), "")
-            if name:
-                idle.remove(name)
-                yield self._give(pending, pool, name)
+            for pending in jobs:
+                limit_s = limits_s[pending.job.kind]
+                if pending.holders and now_s - pending.since_s > limit_s:
+                    yield from self._copy(pending, pool, idle, limit_s)
+
+    def _oldest(self, pool: Pool) -> list[Pending]:
+        """Return the oldest job of each agent that is not delivered."""
+        jobs = self._jobs
+        numbers = (
+            next((number for number in agent.held if number in jobs), -1)
+            for agent in pool.agents.values()
+        )
+        return [jobs[number] for number in numbers if number >= 0]
+
+    def _copy(
+        self, pending: Pending, pool: Pool, idle: list[str], limit_s: float
+    ) -> Iterator[DispatchCommand]:
+        """Give an overdue job to an idle agent, which is removed from the list."""
+        now_s = self._now_s or 0.0
+        avoid = {*self._pairs.avoided(pending), *pending.holders}
+        name = next((each for each in idle if each not in avoid), "")
+        copies = len(pending.holders)
+        # The second copy may only be faster; more of them need silent agents.
+        if copies > 1 or not name:
+            latest_s = max(since_s for since_s, _ in pending.holders.values())
+            limit_s = max(limit_s, FIRST_S) * 2 ** (copies - 1)
+            is_silent = True
+            for holder in pending.holders:
+                verdict = pool.judge(holder, latest_s, limit_s, now_s)
+                is_silent &= verdict == "silent"
+                if verdict == "ask":
+                    yield Ask(holder)
+            if not is_silent:
+                return
+            for holder, (since_s, _) in pending.holders.items():
+                yield from pool.tell(holder, now_s - since_s, name)
+        if name:
+            idle.remove(name)
+            yield self._give(pending, pool, name)
 
     def _give(self, pending: Pending, pool: Pool, name: str) -> Assign:
         """Assign a job to an agent."""
@@ -351,7 +404,7 @@ class Dispatch:
         agent.held[job.number] = None
         place = max(1.0, len(agent.held) / agent.joined.slots)
         pending.holders[name] = (self._now_s or 0.0, place)
-        pool.offer(name, next(self._stamps))
+        pool.offer(name)
         return Assign(job, name)
 
     def _assign(self, pool: Pool) -> Iterator[DispatchCommand]:
@@ -365,4 +418,4 @@ class Dispatch:
                 continue
             yield self._give(pending, pool, name)
         for name in passed:
-            pool.offer(name, next(self._stamps))
+            pool.offer(name)

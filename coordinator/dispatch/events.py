@@ -54,12 +54,23 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Joined:
-    """A worker or an analyzer is ready for jobs."""
+    """A worker or an analyzer is ready for jobs.
+
+    Attributes:
+        agent: its name.
+        kind: of agent.
+        slots: jobs that it does at a time.
+        platform: on which its results depend.
+        shards: arenas whose state it keeps.
+        cores: that it uses for one arena.
+    """
 
     agent: str
     kind: AgentKind
     slots: int
     platform: str
+    shards: int = 1
+    cores: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +142,16 @@ class Ticked:
     now_s: float
 
 
-DispatchEvent = Joined | Left | Requested | Withdrawn | Returned | Died | Ticked
+@dataclass(frozen=True, slots=True)
+class Progressed:
+    """An agent that was asked reports that its current job uses CPU time."""
+
+    agent: str
+
+
+DispatchEvent = (
+    Joined | Left | Requested | Withdrawn | Returned | Died | Ticked | Progressed
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +191,29 @@ class Cancel:
     agent: str
 
 
-DispatchCommand = Assign | Deliver | Cancel
+@dataclass(frozen=True, slots=True)
+class Ask:
+    """Ask an agent whether it works: one of its jobs is past its deadline."""
+
+    agent: str
+
+
+@dataclass(frozen=True, slots=True)
+class Overdue:
+    """Tell the user that an agent neither answers nor reports progress.
+
+    Attributes:
+        agent: its name.
+        waited_s: time since it was given the job [s].
+        to: the agent that takes the job; empty if there is none.
+    """
+
+    agent: str
+    waited_s: float
+    to: str = ""
+
+
+DispatchCommand = Assign | Deliver | Cancel | Ask | Overdue
 
 
 # --- Shards
@@ -179,10 +221,17 @@ DispatchCommand = Assign | Deliver | Cancel
 
 @dataclass(frozen=True, slots=True)
 class ShardSeen:
-    """A shard was advanced on a platform, according to the journal."""
+    """A shard was advanced on a platform, according to the journal.
+
+    Attributes:
+        shard: the shard.
+        platform: empty if it was never advanced.
+        may_drift: it may move to another platform, if shards may.
+    """
 
     shard: int
     platform: str
+    may_drift: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,13 +248,14 @@ class ShardReturned:
     Attributes:
         number: of the ``AssignShard``.
         outcome: "done"; "stateless" (the worker does not have the state); "error"
-            with a reason; "lost" (no reply).
-        reason: empty unless error.
+            with a reason; "malformed" (an answer that is not believed) with a reason;
+            "lost" (no reply).
+        reason: empty unless error or malformed.
         answer: decoded; None unless done.
     """
 
     number: int
-    outcome: Literal["done", "stateless", "error", "lost"]
+    outcome: Literal["done", "stateless", "error", "malformed", "lost"]
     reason: str = ""
     answer: object = None
 
@@ -287,4 +337,34 @@ class ShardFailed:
     reason: str
 
 
-ShardCommand = AssignShard | ShardDone | ShardFailed
+@dataclass(frozen=True, slots=True)
+class CancelShard:
+    """An assigned advance goes to another worker.
+
+    Attributes:
+        number: of the ``AssignShard``.
+        shard: that it advances.
+        agent: the worker that had it.
+    """
+
+    number: int
+    shard: int
+    agent: str
+
+
+@dataclass(frozen=True, slots=True)
+class Crowded:
+    """Tell the user that there are more shards than the workers keep.
+
+    Attributes:
+        shards: number of shards.
+        kept: number of states that all workers keep.
+    """
+
+    shards: int
+    kept: int
+
+
+ShardCommand = (
+    AssignShard | ShardDone | ShardFailed | CancelShard | Ask | Overdue | Crowded
+)

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from schema.errors import printable
-from schema.limits import MOST_PEERS, MOST_REASON
+from schema.limits import LONGEST_REASON, MOST_PEERS, printable
 
 FaultKind = Literal[
     "malformed", "refused", "late", "foreign", "fenced", "cancelled", "death", "crowd"
@@ -13,13 +12,13 @@ FaultKind = Literal[
 
 MEANINGS: Mapping[FaultKind, str] = {
     "malformed": "malformed messages, dropped",
-    "refused": "jobs or coordinators refused",
+    "refused": "cannot do jobs, or may not take part",
     "late": "late or second answers, dropped",
     "foreign": "replies by another process in the agent's name, dropped",
     "fenced": "jobs refused for a forged epoch; no other coordinator has the run",
     "cancelled": "jobs cancelled by another process",
     "death": "crashes reported that did not happen, dropped",
-    "crowd": "agents beyond the limit, dropped",
+    "crowd": "tokens or queries beyond the limit, dropped",
 }
 OTHERS = "other peers"
 
@@ -81,5 +80,5 @@ class PeerFaults:
 
 def _first_line(key: tuple[FaultKind, str], detail: str) -> str:
     kind, peer = key
-    cause = f" ({printable(detail, MOST_REASON)})" if detail else ""
-    return f"{peer}: {MEANINGS[kind]}{cause}; more of them are only counted"
+    cause = f" ({printable(detail, LONGEST_REASON)})" if detail else ""
+    return f"{kind}: {peer}: {MEANINGS[kind]}{cause}; more of them are only counted"

@@ -5,16 +5,20 @@ machines. Runs are therefore independent of each other, and none can take all wo
 An answer is returned to the client that requested the job, which interprets it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import count
-from typing import Protocol
+from typing import Literal, Protocol
 
 from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
+    Ask,
     Assign,
     AssignShard,
+    Cancel,
+    CancelShard,
     Client,
+    Crowded,
     Deliver,
     Died,
     DispatchCommand,
@@ -23,10 +27,12 @@ from coordinator.dispatch.events import (
     Joined,
     Killed,
     Left,
+    Overdue,
     Read,
     Released,
     Requested,
     Returned,
+    ShardCommand,
     ShardDone,
     ShardEvent,
     ShardFailed,
@@ -50,6 +56,9 @@ class Agents(Protocol):
 
     def cancel(self, _agent: str, _payload: bytes, /) -> None:
         """Tell an agent, by the job's request, that a job is no longer wanted."""
+
+    def ask(self, agent: str, /) -> None:
+        """Ask an agent for its progress; ``receive`` returns a report, if any."""
 
     def receive(
         self, timeout_s: float, pause_s: float = 0.0, /
@@ -87,6 +96,7 @@ class Fleet:
         agents: Agents,
         *,
         allows_drift: bool = False,
+        warn: Callable[[str], None] = lambda _line: None,
         faults: PeerFaults | None = None,
     ) -> None:
         """Connect to agents.
@@ -94,12 +104,16 @@ class Fleet:
         Args:
             agents: the connection to them.
             allows_drift: an arena may move to another platform if its own is gone.
+            warn: called with each line for the user.
             faults: counts that the connection shares; None: counts of its own.
         """
+        self._warn = warn
         self._numbers = count(1)
         self.faults = faults or PeerFaults()
         self.dispatch = Dispatch(self.faults)
-        self.shards = ShardDispatch(self._numbers, allows_drift=allows_drift)
+        self.shards = ShardDispatch(
+            self._numbers, self.dispatch.workers, allows_drift=allows_drift
+        )
         self._fenced: list[Fenced] = []
         self._agents = agents
         self._shard_numbers = count()
@@ -116,6 +130,11 @@ class Fleet:
         return self.faults.total("malformed")
 
     @property
+    def late(self) -> int:
+        """Answers that came after another agent's, or after their run had ended."""
+        return self.faults.total("late")
+
+    @property
     def open(self) -> int:
         """How many jobs and advances are requested and not done."""
         return self.dispatch.pending + len(self._advancing)
@@ -128,17 +147,20 @@ class Fleet:
         """Request a job."""
         self._obey(self.dispatch.handle(Requested(job)))
 
-    def new_shard(self, client: Client, encode: Encode, platform: str) -> int:
+    def new_shard(
+        self, client: Client, encode: Encode, platform: str, *, may_drift: bool = True
+    ) -> int:
         """Return a number for an arena's shard.
 
         Args:
             client: the run of the arena.
             encode: returns the request of each advance when it is assigned.
             platform: on which the shard has been advanced; empty if never.
+            may_drift: it may move to another platform, if arenas may.
         """
         shard = next(self._shard_numbers)
         self._shard_clients[shard] = (client, encode)
-        self._move(ShardSeen(shard, platform))
+        self._move(ShardSeen(shard, platform, may_drift))
         return shard
 
     def advance(self, shard: int) -> None:
@@ -152,10 +174,14 @@ class Fleet:
             self._obey(self.dispatch.handle(Withdrawn(number)))
         for shard, (owner, _) in list(self._shard_clients.items()):
             if owner == client:
-                del self._shard_clients[shard]
-                self._advancing.discard(shard)
-                self._forget_advances(shard)
-                self._move(Released(shard))
+                self.release(shard)
+
+    def release(self, shard: int) -> None:
+        """Drop a shard, and its advance if one is requested."""
+        del self._shard_clients[shard]
+        self._advancing.discard(shard)
+        self._forget_advances(shard)
+        self._move(Released(shard))
 
     def listen(self, timeout_s: float, now_s: float) -> dict[Client, list[End]]:
         """Return what ended for each client, after waiting for something to end.
@@ -180,33 +206,33 @@ class Fleet:
 
     def tell(self, event: DispatchEvent) -> None:
         """Handle an event of agents, of jobs or of time."""
-        if isinstance(event, Returned):
-            if event.outcome in ("fenced", "cancelled"):
-                self._note_declined(event)
-            read = self._advance_reads.pop(event.number, None)
-            if read is not None:
-                if event.outcome == "ok" and self.shards.shard_of(event.number) is None:
-                    self.faults.note("late", event.agent, f"job {event.number}")
-                self._move(self._read_advance(event, read))
-                return
-        elif isinstance(event, Died):
+        if isinstance(event, Returned) and event.outcome in ("fenced", "cancelled"):
+            self._note_declined(event)
+        if isinstance(event, Died):
             shard = self.shards.shard_that_lost(event.number)
             if shard is not None:
                 self._advance_killed(event, shard)
                 return
+        if isinstance(event, Returned) and event.number in self._advance_reads:
+            read = self._advance_reads.pop(event.number)
+            if self.shards.shard_of(event.number) is not None:
+                self._move(self._read_advance(event, read))
+            elif event.outcome == "ok":
+                self.faults.note("late", event.agent, f"job {event.number}")
+        self._obey(self.dispatch.handle(event))
         # Without shards time changes nothing for them.
-        elif isinstance(event, Joined | Left) or (
+        if isinstance(event, Joined | Left) or (
             self._shard_clients and isinstance(event, Ticked)
         ):
             self._move(event)
-        self._obey(self.dispatch.handle(event))
 
     def _advance_killed(self, event: Died, shard: int) -> None:
         """Pass on that an advance crashed its worker, if it was this client's."""
         client, _ = self._shard_clients[shard]
         if client != (event.run, event.epoch):
             return
-        if self._advances.get(event.number) == (shard, event.request):
+        of, payload = self._advances.get(event.number, (-1, b""))
+        if (of, fingerprint(payload)) == (shard, event.request):
             self._move(Killed(event.number, event.agent, event.cause))
         else:
             self.faults.note("death", event.agent, f"job {event.number}")
@@ -231,7 +257,7 @@ class Fleet:
             self.faults.note("cancelled", event.agent, f"job {event.number}")
 
     def _read_advance(self, event: Returned, read: Read) -> ShardReturned:
-        """Return the outcome of an advance; an unfit answer is the worker's error."""
+        """Return the outcome of an advance."""
         if event.outcome != "ok":
             if event.outcome != "error":
                 return ShardReturned(event.number, "lost")
@@ -241,35 +267,58 @@ class Fleet:
             answer = read(event.answer)
         except MalformedMessage as error:
             self.faults.note("malformed", event.agent, str(error))
-            return ShardReturned(event.number, "error", str(error))
+            # A machine that computes differently lies no more than one that fails.
+            differs = error.kind == "differs"
+            outcome: Literal["error", "malformed"] = "error" if differs else "malformed"
+            return ShardReturned(event.number, outcome, str(error))
         if answer is None:
             return ShardReturned(event.number, "stateless")
         return ShardReturned(event.number, "done", answer=answer)
 
-    def _obey(self, commands: Sequence[DispatchCommand]) -> None:
+    def _obey(self, commands: Iterable[DispatchCommand | ShardCommand]) -> None:
         for command in commands:
-            job = command.job
-            if isinstance(command, Assign):
-                self._agents.send(job.number, command.agent, job.payload)
-            elif isinstance(command, Deliver):
-                self._ends.setdefault(job.client, []).append(command)
-            else:
-                self._agents.cancel(command.agent, job.payload)
+            match command:
+                case Assign(job, agent):
+                    self._agents.send(job.number, agent, job.payload)
+                case Cancel(job, agent):
+                    self._agents.cancel(agent, job.payload)
+                case Deliver(job):
+                    self._ends.setdefault(job.client, []).append(command)
+                case AssignShard(number, shard, agent):
+                    payload, read = self._shard_clients[shard][1](command)
+                    self._advance_reads[number] = read
+                    self._advances[number] = (shard, payload)
+                    self._agents.send(number, agent, payload)
+                case CancelShard(number, _, agent):
+                    self._agents.cancel(agent, self._advances[number][1])
+                case ShardDone(shard) | ShardFailed(shard):
+                    self._advancing.discard(shard)
+                    self._forget_advances(shard)
+                    client = self._shard_clients[shard][0]
+                    self._ends.setdefault(client, []).append(command)
+                case Ask(agent):
+                    self._agents.ask(agent)
+                case Crowded() | Overdue():
+                    self._warn(_line(command))
 
     def _move(self, event: ShardEvent) -> None:
         """Pass an event to ``shards``, and carry out its commands."""
-        for command in self.shards.handle(event):
-            client, encode = self._shard_clients[command.shard]
-            if isinstance(command, AssignShard):
-                payload, read = encode(command)
-                self._advance_reads[command.number] = read
-                self._advances[command.number] = (command.shard, fingerprint(payload))
-                self._agents.send(command.number, command.agent, payload)
-            else:
-                self._advancing.discard(command.shard)
-                self._forget_advances(command.shard)
-                self._ends.setdefault(client, []).append(command)
+        self._obey(self.shards.handle(event))
 
     def _forget_advances(self, shard: int) -> None:
         for number in [n for n, (of, _) in self._advances.items() if of == shard]:
             del self._advances[number]
+
+
+def _line(command: Crowded | Overdue) -> str:
+    """Return what the user is told."""
+    if isinstance(command, Crowded):
+        return (
+            f"the workers keep {command.kept} arenas and have {command.shards}: those "
+            "in excess are rebuilt each time; start more workers"
+        )
+    then = f"{command.to} takes" if command.to else "no other agent can take"
+    return (
+        f"{command.agent} has not answered for {command.waited_s:.0f} s and reports no "
+        f"progress: {then} its job"
+    )

@@ -1,12 +1,19 @@
-"""Agents of one kind, their load, and the jobs that wait for them."""
+"""Agents of one kind, their load, and the jobs that wait for them.
+
+Jobs and advances of arenas share one account of load, one backoff, and one judgement of
+which agents are silent.
+"""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
 from itertools import count
 from math import inf
+from typing import Literal
 
-from coordinator.dispatch.events import Job, JobKind, Joined
+from coordinator.dispatch.deadlines import NEWEST_WEIGHT
+from coordinator.dispatch.events import Joined, Overdue
+from coordinator.dispatch.pending import Pending
 
 MOST_AHEAD = 16
 """Most jobs that an agent holds beyond the one that is always ready."""
@@ -14,36 +21,14 @@ AHEAD_S = 0.8
 """Most time that these jobs may take together [s]: other agents cannot have them."""
 PAUSE_S = 0.2
 """Longest time that the coordinator lets answers collect [s]."""
-_NEWEST_WEIGHT = 0.1
+REST_S = 0.05
+LONGEST_REST_S = 3.2
+REPLY_S = 5.0
+"""Time that an agent has to report progress when it is asked [s]."""
 _PROVIDED = 1e6
 """Above the load of any agent that needs jobs."""
 
-
-@dataclass(slots=True)
-class Pending:
-    """A job that is not delivered yet.
-
-    Attributes:
-        job: the job.
-        holders: agents that have it, two if the first is late: time of assignment
-            [s], and its place in the queue of a slot (1.0 is first).
-        errors: number of agents that could not do it.
-        avoid: agents that failed at it.
-        lost: agents that had it and gave no reply.
-        killed: processes that it crashed, with the causes.
-    """
-
-    job: Job
-    holders: dict[str, tuple[float, float]] = field(default_factory=dict)
-    errors: int = 0
-    avoid: tuple[str, ...] = ()
-    lost: dict[str, None] = field(default_factory=dict)
-    killed: dict[str, str] = field(default_factory=dict)
-
-    @property
-    def since_s(self) -> float:
-        """Time of the first assignment that still holds [s]."""
-        return min(since_s for since_s, _ in self.holders.values())
+Verdict = Literal["in time", "ask", "silent"]
 
 
 @dataclass(slots=True)
@@ -53,23 +38,43 @@ class AgentState:
     Attributes:
         joined: its properties.
         held: numbers of its jobs, oldest first.
+        advances: numbers of its advances of arenas.
+        busy: slots that these occupy; jobs get the next one, so that they never starve.
         job_s: typical time that a slot takes for a job [s]; 0 before the first.
         failures: errors and losses since its last answer.
         rests: it gets no jobs until its backoff ends.
         stamp: of its only valid entry in the pool's heap.
+        worked_s: time of its last report of progress [s].
+        asked_s: time of the last question about it [s].
+        is_silent: it is silent until its next answer or report.
+        is_told: the user knows that it is silent.
     """
 
     joined: Joined
     held: dict[int, None] = field(default_factory=dict)
+    advances: dict[int, None] = field(default_factory=dict)
+    busy: int = 0
     job_s: float = 0.0
     failures: int = 0
     rests: bool = False
     stamp: int = 0
+    worked_s: float = -inf
+    asked_s: float = -inf
+    is_silent: bool = False
+    is_told: bool = False
+
+    def occupy(self) -> None:
+        """Update the number of slots that its advances occupy."""
+        self.busy = min(len(self.advances), self.joined.slots)
+
+    def is_heard(self) -> None:
+        """Note an answer or a report of progress."""
+        self.is_silent = self.is_told = False
 
     def learn(self, duration_s: float) -> None:
         """Note the time that a slot took for a job [s]."""
         known = self.job_s or duration_s
-        self.job_s = known + _NEWEST_WEIGHT * (duration_s - known)
+        self.job_s = known + NEWEST_WEIGHT * (duration_s - known)
 
     @property
     def most_ahead(self) -> int:
@@ -93,17 +98,77 @@ class Pool:
     agents: dict[str, AgentState] = field(default_factory=dict)
     free: list[tuple[float, str, int]] = field(default_factory=list)
     waiting: list[int] = field(default_factory=list)
+    _rests: list[tuple[float, int, str]] = field(default_factory=list)
+    _stamps: Iterator[int] = field(default_factory=lambda: count(1))
 
-    def offer(self, name: str, stamp: int) -> None:
+    @property
+    def wake_s(self) -> float | None:
+        """Time at which the next backoff ends [s]; None if there is none."""
+        return self._rests[0][0] if self._rests else None
+
+    def rest(self, name: str, now_s: float) -> None:
+        """Start the backoff of an agent that failed, unless it rests already."""
+        agent = self.agents[name]
+        if agent.rests:
+            return
+        agent.rests = True
+        rest_s = min(REST_S * 2 ** min(agent.failures, 10), LONGEST_REST_S)
+        agent.failures += 1
+        heappush(self._rests, (now_s + rest_s, next(self._stamps), name))
+
+    def end_rests(self, now_s: float) -> bool:
+        """End the backoffs that are over; return whether there were any."""
+        is_any = False
+        while self._rests and self._rests[0][0] <= now_s:
+            _, _, name = heappop(self._rests)
+            if name in self.agents:
+                self.agents[name].rests = False
+                self.offer(name)
+                is_any = True
+        return is_any
+
+    def judge(self, name: str, since_s: float, limit_s: float, now_s: float) -> Verdict:
+        """Return whether an agent is silent, or must be asked for its progress first.
+
+        An agent is silent if a job is past its deadline and the agent, asked since
+        then, has not reported progress in time. A report restarts the deadline.
+
+        Args:
+            name: of the agent.
+            since_s: time at which it was given the job [s].
+            limit_s: how long such a job may take [s].
+            now_s: the time [s].
+        """
+        agent = self.agents[name]
+        due_s = max(since_s, agent.worked_s) + limit_s
+        if now_s < due_s:
+            return "in time"
+        # An old verdict does not count: the agent may work again.
+        if agent.asked_s < max(due_s, now_s - 2.0 * REPLY_S):
+            agent.asked_s = now_s
+            return "ask"
+        if now_s < agent.asked_s + REPLY_S:
+            return "in time"
+        agent.is_silent = True
+        return "silent"
+
+    def tell(self, name: str, waited_s: float, to: str = "") -> Iterator[Overdue]:
+        """Yield the line about a silent agent, once for each silence."""
+        agent = self.agents[name]
+        if not agent.is_told:
+            agent.is_told = True
+            yield Overdue(name, waited_s, to)
+
+    def offer(self, name: str) -> None:
         """Note the load of an agent; its earlier entry becomes invalid."""
         agent = self.agents[name]
-        agent.stamp = stamp
+        agent.stamp = next(self._stamps)
         if agent.rests:
             return
         if len(self.free) > 4 * len(self.agents) + 64:
             self.free = [entry for entry in self.free if self._is_live(entry)]
             heapify(self.free)
-        heappush(self.free, (self._load(agent), name, stamp))
+        heappush(self.free, (self._load(agent), name, agent.stamp))
 
     def _load(self, agent: AgentState) -> float:
         """Return the load of an agent; 0 is idle.
@@ -113,7 +178,7 @@ class Pool:
         """
         spare = self._spare(agent)
         if spare < 0:
-            return len(agent.held) / agent.joined.slots
+            return (len(agent.held) + agent.busy) / agent.joined.slots
         return _PROVIDED + (spare / agent.most_ahead if agent.most_ahead else inf)
 
     def best(self) -> str:
@@ -133,7 +198,7 @@ class Pool:
 
     def _spare(self, agent: AgentState) -> int:
         """Return how many jobs an agent has beyond those it must hold."""
-        return len(agent.held) - agent.joined.slots - self.at_hand
+        return len(agent.held) + agent.busy - agent.joined.slots - self.at_hand
 
     def _ahead(self, agent: AgentState) -> int:
         """Return how many jobs beyond that an agent may have: fewer near the end.
@@ -167,7 +232,7 @@ class Pool:
         return sorted(
             name
             for name, agent in self.agents.items()
-            if not agent.held and not agent.rests
+            if not (agent.held or agent.advances or agent.rests)
         )
 
     def _is_live(self, entry: tuple[float, str, int]) -> bool:
@@ -210,93 +275,3 @@ class Pool:
         """Remove a waiting job."""
         self.waiting.remove(number)
         heapify(self.waiting)
-
-
-REST_S = 0.05
-LONGEST_REST_S = 3.2
-
-
-class Backoff:
-    """Backoff of agents that failed."""
-
-    def __init__(self) -> None:
-        self._until: list[tuple[float, int, str]] = []
-        self._order = count()
-
-    @property
-    def wake_s(self) -> float | None:
-        """Time at which the next rest ends [s]; None if there is none."""
-        return self._until[0][0] if self._until else None
-
-    def begin(self, agent: AgentState, now_s: float) -> None:
-        """Start the rest of an agent, unless it rests already."""
-        if agent.rests:
-            return
-        agent.rests = True
-        rest_s = min(REST_S * 2**agent.failures, LONGEST_REST_S)
-        agent.failures += 1
-        heappush(self._until, (now_s + rest_s, next(self._order), agent.joined.agent))
-
-    def over(self, now_s: float) -> Iterator[str]:
-        """Yield the agents whose rest is over; some may have left."""
-        while self._until and self._until[0][0] <= now_s:
-            yield heappop(self._until)[2]
-
-
-class PairedJobs:
-    """Agents that were given a job whose twin another agent is to do."""
-
-    def __init__(self) -> None:
-        self._agents: dict[int, dict[str, None]] = {}
-
-    def note(self, job: Job, agent: str) -> None:
-        """Note that a job is assigned to an agent."""
-        if job.twin >= 0:
-            self._agents.setdefault(job.number, {})[agent] = None
-
-    def avoided(self, pending: Pending) -> tuple[str, ...]:
-        """Return the agents that a job avoids if there are others."""
-        others = self._agents.get(pending.job.twin)
-        if not others:
-            return pending.avoid
-        return (*pending.avoid, *(each for each in others if each not in pending.avoid))
-
-    def forget(self, job: Job) -> None:
-        """Remove a pair, both jobs of which have ended."""
-        self._agents.pop(job.number, None)
-        self._agents.pop(job.twin, None)
-
-
-PATIENCE = 4.0
-"""A job is late after this multiple of the typical duration of its kind."""
-LEAST_S = 1.0
-"""A job is never late before this time [s]: a second copy would cost more."""
-LOOK_S = 0.25
-"""Interval between checks for late jobs [s]."""
-
-
-class Stragglers:
-    """Typical duration of the jobs of each kind, from their assignment [s]."""
-
-    def __init__(self) -> None:
-        self._typical_s: dict[JobKind, float] = {}
-        self._next_look_s = 0.0
-
-    def learn(self, kind: JobKind, duration_s: float) -> None:
-        """Note the duration of a job."""
-        known = self._typical_s.get(kind, duration_s)
-        self._typical_s[kind] = known + _NEWEST_WEIGHT * (duration_s - known)
-
-    def is_time(self, now_s: float) -> bool:
-        """Return whether a check for late jobs is due; starts the next interval."""
-        if now_s < self._next_look_s:
-            return False
-        self._next_look_s = now_s + LOOK_S
-        return True
-
-    def is_late(self, kind: JobKind, elapsed_s: float) -> bool:
-        """Return whether an assigned job is late; False before one was done."""
-        typical_s = self._typical_s.get(kind)
-        if typical_s is None:
-            return False
-        return elapsed_s > max(LEAST_S, PATIENCE * typical_s)

@@ -1,17 +1,26 @@
 """State machine that assigns arena shards to workers.
 
 One worker holds the state of a shard and makes its advances. If that worker is gone,
-fails or lacks the state, the advance goes, with all that is needed to rebuild the
-state, to another worker of an equal platform: the one with the fewest shards; ties
-break on the name. A shard without such a worker waits. If the user allows a drift, a
-worker of another platform gets it after a while.
+fails, lacks the state or is silent, the advance goes, with all that is needed to
+rebuild the state, to another worker of an equal platform: one that keeps more states
+than it has, with the lowest load; ties break on the name. A shard without such a worker
+waits. If the user allows a drift, a worker of another platform gets it after a while.
+
+An advance has a deadline. A silent worker loses it only to an idle one, and the next
+deadline is twice as long, so that an advance that takes long everywhere ends. A worker
+that joins takes over shards of those that hold more.
 """
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
+from coordinator.dispatch.deadlines import FIRST_S, LOOK_S, Deadlines
 from coordinator.dispatch.events import (
+    Ask,
     AssignShard,
+    CancelShard,
+    Crowded,
     Joined,
     Killed,
     Left,
@@ -25,13 +34,14 @@ from coordinator.dispatch.events import (
     ShardSeen,
     Ticked,
 )
+from coordinator.dispatch.pool import Pool
 from schema.errors import UnexpectedEvent
 
 MAX_ERRORS = 3
-REST_S = 0.05
-LONGEST_REST_S = 3.2
 DRIFT_S = 30.0
 """Time that a shard waits for its own platform before it may drift [s]."""
+LEAST_S = 10.0
+"""An advance is never late before this time [s]: to rebuild a state is expensive."""
 
 
 @dataclass(slots=True)
@@ -41,56 +51,70 @@ class _Shard:
     Attributes:
         platform: of the last advance; empty before the first.
         holder: the worker that is bound to it; empty if none is.
+        heir: the worker that takes over after the present advance; empty if none does.
         has_state: the holder has its state.
         is_wanted: an advance is requested.
         number: of the job that is assigned; -1 if none is.
         is_whole: that job includes what is needed to rebuild the state.
+        since_s: time at which that job was assigned [s].
+        misses: deadlines that the advance has passed.
         errors: number of workers that could not make the advance.
-        failures: errors and losses since the last advance.
         avoid: workers that failed at the advance.
         lost: numbers of its jobs that got no reply, with the workers that had them.
         killed: workers that it crashed, with the causes.
-        rests_until_s: end of the backoff [s].
         drifts_at_s: when it may drift to another platform [s].
     """
 
     platform: str = ""
     holder: str = ""
+    heir: str = ""
     has_state: bool = False
     is_wanted: bool = False
+    may_drift: bool = True
     number: int = -1
     is_whole: bool = False
+    since_s: float = 0.0
+    misses: int = 0
     errors: int = 0
-    failures: int = 0
     avoid: tuple[str, ...] = ()
     lost: dict[int, str] = field(default_factory=dict)
     killed: dict[str, str] = field(default_factory=dict)
-    rests_until_s: float | None = None
     drifts_at_s: float | None = None
 
 
 class ShardDispatch:
-    """State machine of shards; events enter only through ``handle``."""
+    """State machine of shards; events enter only through ``handle``.
 
-    def __init__(self, numbers: Iterator[int], *, allows_drift: bool = False) -> None:
+    ``Dispatch`` handles events that both take first: who joins, who leaves, the time.
+
+    Attributes:
+        rebuilt: number of assigned advances that start from a rebuilt state.
+    """
+
+    def __init__(
+        self, numbers: Iterator[int], workers: Pool, *, allows_drift: bool = False
+    ) -> None:
         """Initialise without shards.
 
         Args:
             numbers: of jobs, each used once.
+            workers: of ``Dispatch``; their load includes advances.
             allows_drift: a shard may move to another platform if its own is gone.
         """
+        self.rebuilt = 0
         self._numbers = numbers
         self._allows_drift = allows_drift
         self._shards: dict[int, _Shard] = {}
-        self._workers: dict[str, Joined] = {}
+        self._workers = workers
+        self._deadlines = Deadlines(LEAST_S)
         self._out: dict[int, int] = {}
-        self._now_s = 0.0
+        self._now_s = self._next_look_s = 0.0
+        self._is_crowded = False
 
     @property
     def wake_s(self) -> float | None:
         """Time at which the next ``Ticked`` is needed [s]; None: it is not."""
-        shards = self._shards.values()
-        wakes = [*(s.rests_until_s for s in shards), *(s.drifts_at_s for s in shards)]
+        wakes = (shard.drifts_at_s for shard in self._shards.values())
         # A shard that may drift by now waits for a worker, not for a time.
         return min(
             (wake for wake in wakes if wake is not None and wake > self._now_s),
@@ -146,13 +170,14 @@ class ShardDispatch:
             case Joined():
                 if event.kind != "worker":
                     return []
-                self._workers[event.agent] = event
+                return [*self._assignments(), *self._share(event)]
             case Left():
                 self._leave(event.agent)
             case Ticked():
-                self._tick(event.now_s)
+                return [*self._tick(event.now_s), *self._assignments()]
             case ShardSeen():
-                self._shard(event.shard).platform = event.platform
+                shard = self._shard(event.shard)
+                shard.platform, shard.may_drift = event.platform, event.may_drift
             case ShardRequested():
                 self._want(event.shard)
             case ShardReturned():
@@ -161,6 +186,7 @@ class ShardDispatch:
                 return [*self._killed(event), *self._assignments()]
             case Released():
                 self._unbind(self._shard(event.shard))
+                self._deadlines.forget(event.shard)
                 del self._shards[event.shard]
         return list(self._assignments())
 
@@ -174,23 +200,89 @@ class ShardDispatch:
         shard.is_wanted = True
 
     def _leave(self, agent: str) -> None:
-        self._workers.pop(agent, None)
         for shard in self._shards.values():
+            if shard.heir == agent:
+                shard.heir = ""
             if shard.holder == agent:
                 self._unbind(shard)
 
     def _unbind(self, shard: _Shard) -> None:
         if self._out.pop(shard.number, None) is not None:
             shard.lost[shard.number] = shard.holder
-        shard.holder, shard.has_state, shard.number = "", False, -1
+        shard.holder, shard.heir = shard.heir, ""
+        shard.has_state, shard.number = False, -1
 
-    def _tick(self, now_s: float) -> None:
+    def _tick(self, now_s: float) -> Iterator[ShardCommand]:
         self._now_s = now_s
         for shard in self._shards.values():
-            if shard.rests_until_s is not None and shard.rests_until_s <= now_s:
-                shard.rests_until_s = None
-            if self._allows_drift:
+            if self._allows_drift and shard.may_drift:
                 self._wait(shard)
+        if now_s >= self._next_look_s:
+            self._next_look_s = now_s + LOOK_S
+            yield from self._look()
+
+    def _look(self) -> Iterator[ShardCommand]:
+        """Move advances from silent workers to idle ones."""
+        pool, idle = self._workers, set(self._workers.idle())
+        for number, shard in sorted(self._shards.items()):
+            if shard.number < 0:
+                continue
+            limit_s = self._deadlines.limit_s(number, shard.misses)
+            if shard.is_whole:
+                limit_s = max(limit_s, FIRST_S * 2**shard.misses)
+            name = shard.holder
+            verdict = pool.judge(name, shard.since_s, limit_s, self._now_s)
+            if verdict == "ask":
+                yield Ask(name)
+            if verdict != "silent":
+                continue
+            waited_s = self._now_s - shard.since_s
+            crowding = self._crowding()
+            free = [n for n in self._fit(shard) if n in idle and not crowding(n)[0]]
+            to = min(free, key=crowding, default="")
+            yield from pool.tell(name, waited_s, to)
+            if to:
+                shard.misses += 1
+                shard.avoid = (*shard.avoid, name)
+                yield from self._move(number, to)
+
+    def _move(self, number: int, to: str) -> Iterator[ShardCommand]:
+        """Take a shard from its worker, with the advance that is assigned."""
+        shard = self._shards[number]
+        if shard.number >= 0:
+            yield CancelShard(shard.number, number, shard.holder)
+        shard.heir = to
+        self._unbind(shard)
+
+    def _share(self, joined: Joined) -> Iterator[ShardCommand]:
+        """Give a worker that has joined shards of those that hold more."""
+        to = joined.agent
+        agents = self._workers.agents
+        while True:
+            bound = self._bound()
+            places = {
+                number: shard.heir or shard.holder
+                for number, shard in self._shards.items()
+                if shard.holder and to in self._fit(shard)
+            }
+            # What its present worker would keep; those without a state are cheap.
+            fit = (
+                ((bound[name] - 1) / agents[name].joined.cores, number)
+                for number, name in places.items()
+            )
+            kept, number = max(
+                fit, key=lambda f: (f[0], not self._shards[f[1]].has_state, f[1]),
+                default=(0.0, 0),
+            )  # fmt: skip
+            share = (bound[to] + 1) / joined.cores
+            if bound[to] >= joined.shards or kept < share:
+                return
+            shard = self._shards[number]
+            if shard.has_state and shard.number >= 0:
+                shard.heir = to
+            else:
+                yield from self._move(number, to)
+                yield from self._assignments()
 
     def _wait(self, shard: _Shard) -> None:
         """Set when a shard without a worker of its platform may drift."""
@@ -207,10 +299,14 @@ class ShardDispatch:
         shard = self._shards[number]
         agent, shard.number = shard.holder, -1
         if event.outcome == "done":
-            shard.platform = self._workers[agent].platform
+            worker = self._workers.agents[agent]
+            shard.platform, worker.failures = worker.joined.platform, 0
             shard.has_state, shard.is_wanted = True, False
+            if not shard.is_whole:
+                self._deadlines.learn(number, self._now_s - shard.since_s)
             self._forgive(shard)
-            shard.failures = 0
+            if shard.heir:
+                self._unbind(shard)
             return [ShardDone(number, agent, event.answer)]
         if event.outcome == "stateless" and not shard.is_whole:
             shard.has_state = False
@@ -219,11 +315,9 @@ class ShardDispatch:
         if event.outcome == "lost":
             shard.lost[event.number] = agent
         shard.avoid = (*shard.avoid, agent)
-        shard.rests_until_s = self._now_s + min(
-            REST_S * 2**shard.failures, LONGEST_REST_S
-        )
-        shard.failures += 1
-        shard.errors += event.outcome != "lost"
+        self._workers.rest(agent, self._now_s)
+        # A malformed answer is a fault of its worker alone.
+        shard.errors += event.outcome not in ("lost", "malformed")
         if shard.errors < MAX_ERRORS:
             return []
         reason = event.reason or "lacks the state that it was given"
@@ -255,45 +349,83 @@ class ShardDispatch:
     def _forgive(self, shard: _Shard) -> None:
         """Forget the failures at an advance that has ended."""
         shard.errors, shard.avoid, shard.lost, shard.killed = 0, (), {}, {}
+        shard.misses = 0
 
     def _assignments(self) -> Iterator[ShardCommand]:
         """Assign the shards that wait and have a worker."""
         for number, shard in sorted(self._shards.items()):
-            is_ready = shard.is_wanted and shard.number < 0
-            if not is_ready or shard.rests_until_s is not None:
+            if not shard.is_wanted or shard.number >= 0:
                 continue
             if not shard.holder:
                 shard.holder = self._choice(shard)
+                yield from self._count()
             if shard.holder:
-                shard.drifts_at_s = None
-                shard.number = next(self._numbers)
-                shard.is_whole = not shard.has_state
-                self._out[shard.number] = number
-                platform = self._workers[shard.holder].platform
-                yield AssignShard(
-                    shard.number, number, shard.holder, platform, shard.is_whole
-                )
+                yield self._assign(number, shard)
+
+    def _count(self) -> Iterator[ShardCommand]:
+        """Tell the user, once, if the workers cannot keep all shards."""
+        kept = sum(a.joined.shards for a in self._workers.agents.values())
+        bound = sum(bool(shard.holder) for shard in self._shards.values())
+        if bound <= kept:
+            self._is_crowded = False
+        elif not self._is_crowded:
+            self._is_crowded = True
+            yield Crowded(bound, kept)
+
+    def _assign(self, number: int, shard: _Shard) -> AssignShard:
+        """Send a shard's advance to its holder."""
+        worker = self._workers.agents[shard.holder]
+        shard.drifts_at_s = None
+        shard.number, shard.since_s = next(self._numbers), self._now_s
+        shard.is_whole = not shard.has_state
+        self.rebuilt += shard.is_whole and bool(shard.platform)
+        self._out[shard.number] = number
+        worker.advances[shard.number] = None
+        worker.occupy()
+        self._workers.offer(shard.holder)
+        platform = worker.joined.platform
+        return AssignShard(shard.number, number, shard.holder, platform, shard.is_whole)
 
     def _fit(self, shard: _Shard) -> list[str]:
         """Return the workers that may hold a shard, by name."""
         fit = self._equal(shard)
         if fit or shard.drifts_at_s is None or self._now_s < shard.drifts_at_s:
             return fit
-        return sorted(self._workers)
+        return sorted(self._workers.agents)
 
     def _equal(self, shard: _Shard) -> list[str]:
         """Return the workers of a shard's platform, by name."""
         return [
             name
-            for name, worker in sorted(self._workers.items())
-            if shard.platform in ("", worker.platform)
+            for name, worker in sorted(self._workers.agents.items())
+            if shard.platform in ("", worker.joined.platform)
         ]
 
     def _choice(self, shard: _Shard) -> str:
-        """Return the best worker for a shard; those that failed come last."""
+        """Return the best worker for a shard; "" if all of them rest.
+
+        Workers that failed at the advance come last.
+        """
         fit = self._fit(shard)
-        fresh = [name for name in fit if name not in shard.avoid]
-        holders = [each.holder for each in self._shards.values()]
-        return min(
-            fresh or fit, key=lambda name: (holders.count(name), name), default=""
-        )
+        fresh = [name for name in fit if name not in shard.avoid] or fit
+        awake = (name for name in fresh if not self._workers.agents[name].rests)
+        return min(awake, key=self._crowding(), default="")
+
+    def _bound(self) -> Counter[str]:
+        """Return how many shards each worker holds or takes over."""
+        return Counter(shard.heir or shard.holder for shard in self._shards.values())
+
+    def _crowding(self) -> Callable[[str], tuple[bool, bool, float, int, str]]:
+        """Return by what workers compare: the least one gets the next shard.
+
+        Whether it holds as many as it keeps is first.
+        """
+        bound, agents = self._bound(), self._workers.agents
+
+        def crowding(name: str) -> tuple[bool, bool, float, int, str]:
+            worker = agents[name]
+            is_full = bound[name] >= worker.joined.shards
+            share = bound[name] / worker.joined.cores
+            return is_full, worker.is_silent, share, len(worker.held), name
+
+        return crowding

@@ -2,7 +2,7 @@
 
 from coordinator.doctor.finding import Finding
 from coordinator.network.probe_service import ROLES, HubProbe
-from schema.errors import printable
+from schema.limits import printable
 
 _SLOW_S = 0.2
 _MOST_OFFSET_S = 5.0

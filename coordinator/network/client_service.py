@@ -1,11 +1,14 @@
 """Queries to coordinators: for operators and for the status command."""
 
+from contextlib import suppress
+from threading import Event
+
 import zenoh
 
 from schema.agent.network import ASK_TIMEOUT_S, DEFAULT_FLEET, Tls, client_config
 from schema.agent.service import log_engine
 from schema.agent.topics import Member, agents_alive, check_name, member_of
-from schema.errors import NetworkError
+from schema.errors import MalformedMessage, NetworkError
 
 _NOW = zenoh.ConsolidationMode.NONE
 _MOST_COORDINATORS = 1000
@@ -40,12 +43,7 @@ def ask_coordinators(
         raise NetworkError(f"no coordinator at {connect}") from None
     replies_of: dict[str, bytes] = {}
     with session:
-        # The default channel blocks for ever with many tokens; this one drops some.
-        room: zenoh.handlers.RingChannel[zenoh.Reply] = zenoh.handlers.RingChannel(
-            _MOST_COORDINATORS
-        )
-        tokens = session.liveliness().get(agents_alive(fleet, "coordinator"), room)
-        there = {member_of(str(each.ok.key_expr)) for each in tokens if each.ok}
+        there = coordinators(session, fleet)
         for member in sorted(there, key=lambda each: each.name):
             if only in ("", member.name):
                 reply = reply_of(member, session, data)
@@ -56,6 +54,31 @@ def ask_coordinators(
             f"{connect}: none of {len(there)} coordinators of fleet {fleet} replies"
         )
     return replies_of
+
+
+def coordinators(
+    session: zenoh.Session, fleet: str, timeout_s: float = ASK_TIMEOUT_S
+) -> set[Member]:
+    """Return the coordinators whose token exists, up to a limit."""
+    # Not by a channel: a full one blocks the session, or loses what is not read yet.
+    keys: list[str] = []
+    is_done = Event()
+
+    def take(reply: zenoh.Reply) -> None:
+        if reply.ok is not None and len(keys) < _MOST_COORDINATORS:
+            keys.append(str(reply.ok.key_expr))
+
+    session.liveliness().get(
+        agents_alive(fleet, "coordinator"),
+        zenoh.handlers.Callback(take, is_done.set, indirect=False),
+        timeout=timeout_s,
+    )
+    is_done.wait()
+    there = set()
+    for key in keys:
+        with suppress(MalformedMessage):
+            there.add(member_of(key))
+    return there
 
 
 def reply_of(

@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
 from coordinator.dispatch.events import AgentKind, DispatchEvent, Joined, Returned
+from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.errors import RevolveError
 
 
@@ -19,8 +20,10 @@ class LocalAgents:
         """Initialise agents with functions from encoded request to encoded answer."""
         self._answers = {f"local-{kind}": answers[kind] for kind in sorted(answers)}
         self._asked: deque[tuple[int, str, bytes]] = deque()
+        shards = shards_that_fit(memory_bytes(), processes=1)
         self._news: list[DispatchEvent] = [
-            Joined(f"local-{kind}", kind, 1, platform) for kind in sorted(answers)
+            Joined(f"local-{kind}", kind, 1, platform, shards)
+            for kind in sorted(answers)
         ]
 
     def send(self, number: int, agent: str, payload: bytes) -> None:
@@ -29,6 +32,9 @@ class LocalAgents:
 
     def cancel(self, _agent: str, _payload: bytes) -> None:
         """Do nothing: one worker's jobs have no copies to cancel."""
+
+    def ask(self, _agent: str, /) -> None:
+        """Do nothing: no job is on its way between two calls of ``receive``."""
 
     def receive(
         self, timeout_s: float, _pause_s: float = 0.0, /

@@ -7,11 +7,20 @@ that the agent of its own key, role included, is to be asked.
 
 from google.protobuf.message import DecodeError
 
-from coordinator.dispatch.events import AgentKind, Died, Joined, Left
+from coordinator.dispatch.events import AgentKind, Died, Joined, Left, Progressed
 from coordinator.dispatch.faults import PeerFaults
 from schema.agent.topics import Member, member_of, slot_of
-from schema.errors import MalformedMessage, printable
-from schema.limits import MOST_DEATHS, MOST_MEMBERS, MOST_PLATFORM, MOST_SLOTS
+from schema.errors import MalformedMessage
+from schema.limits import (
+    LONGEST_QUIET_S,
+    MOST_CORES,
+    MOST_DEATHS,
+    MOST_MEMBERS,
+    MOST_PLATFORM,
+    MOST_SHARDS,
+    MOST_SLOTS,
+    printable,
+)
 from schema.wire import revolve_pb2 as pb
 
 _CAUSE_LENGTH = 100
@@ -45,6 +54,10 @@ class Membership:
     def __len__(self) -> int:
         """Return the number of agents whose token exists."""
         return len(self._alive)
+
+    def __contains__(self, member: Member) -> bool:
+        """Return whether the token of an agent exists."""
+        return member in self._alive
 
     def member(self, agent: str) -> Member | None:
         """Return an agent that has joined; None if none of that name has."""
@@ -141,10 +154,29 @@ class Membership:
                 f"is of version {version!r}, the coordinator of {self._version!r}",
             )
             return []
-        self._joined[agent] = member
         kind: AgentKind = "analyzer" if member.role == "analyzer" else "worker"
-        joined = Joined(agent, kind, info.slots, info.platform)
+        if kind == "worker":
+            _check("shards", info.shards, MOST_SHARDS)
+            _check("cores", info.cores, MOST_CORES)
+        self._joined[agent] = member
+        joined = Joined(agent, kind, info.slots, info.platform, info.shards, info.cores)
         return [*self._new_deaths(member, info), joined]
+
+    def progress(self, member: Member, data: bytes) -> Progressed | None:
+        """Return the event if an agent that has joined reports progress.
+
+        Args:
+            member: the agent; it may have left.
+            data: bytes of an ``AgentInfo``.
+
+        Raises:
+            MalformedMessage: as for ``introduce``.
+        """
+        if self._joined.get(member.name) != member:
+            return None
+        info = _parsed(member, data)
+        works = info.HasField("quiet_s") and 0.0 <= info.quiet_s <= LONGEST_QUIET_S
+        return Progressed(member.name) if works else None
 
     def _forget(self, member: Member) -> None:
         self._alive.discard(member)
@@ -207,3 +239,13 @@ def _parsed(member: Member, data: bytes) -> pb.AgentInfo:
             f"{role} {agent!r}: at most {MOST_DEATHS} deaths, got {len(info.deaths)}"
         )
     return info
+
+
+def _check(what: str, value: int, most: int) -> None:
+    """Check a number that an agent says about itself.
+
+    Raises:
+        MalformedMessage: it is not from 1 to ``most``.
+    """
+    if not 1 <= value <= most:
+        raise MalformedMessage(f"{what} of an agent must be 1 to {most}, got {value}")

@@ -11,11 +11,11 @@ from uuid import uuid4
 
 import zenoh
 
-from coordinator.network.client_service import reply_of
+from coordinator.network.client_service import coordinators, reply_of
 from schema.agent.address import UNIX, parse_address
 from schema.agent.network import Tls, client_config
 from schema.agent.service import log_engine
-from schema.agent.topics import Member, Role, agents_alive, member_of
+from schema.agent.topics import Member, Role
 from schema.errors import MalformedMessage
 from schema.wire.operator import (
     GetStatus,
@@ -140,13 +140,7 @@ def _look(session: zenoh.Session, fleet: str) -> tuple[float | None, list[Member
     members: set[Member] = set()
     for _ in range(3):
         asked_s = time.monotonic()
-        room: zenoh.handlers.RingChannel[zenoh.Reply] = zenoh.handlers.RingChannel(1000)
-        key = agents_alive(fleet, "coordinator")
-        for reply in session.liveliness().get(key, room, timeout=_STEP_S):
-            # A key that is no coordinator's is of a process that lies.
-            with suppress(MalformedMessage):
-                if reply.ok is not None:
-                    members.add(member_of(str(reply.ok.key_expr)))
+        members |= coordinators(session, fleet, _STEP_S)
         elapsed_s = time.monotonic() - asked_s
         if elapsed_s >= _STEP_S:
             break  # the engine has ended the query

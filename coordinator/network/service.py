@@ -9,8 +9,6 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from heapq import heappop, heappush
-from itertools import count
 from queue import Empty, SimpleQueue
 from typing import Literal, Self
 
@@ -18,6 +16,7 @@ import zenoh
 
 from coordinator.dispatch.events import AgentKind, DispatchEvent, Returned
 from coordinator.dispatch.faults import FaultKind, PeerFaults
+from coordinator.network.info_queue import InfoQueue
 from coordinator.network.membership import Membership
 from schema.agent.access import Certificate
 from schema.agent.address import new_socket, parse_address
@@ -36,15 +35,15 @@ from schema.agent.network import (
 from schema.agent.platform_tag import wire_version
 from schema.agent.service import Outlet, log_engine, session_config
 from schema.agent.topics import Member, agents_alive, check_name
-from schema.errors import MalformedMessage, NetworkError, printable
-from schema.limits import MOST_ASKED_INFOS, MOST_REASON
+from schema.errors import MalformedMessage, NetworkError
+from schema.limits import LONGEST_REASON, MOST_ASKED_INFOS, MOST_QUERIES, printable
 
 _KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 _NOW = zenoh.ConsolidationMode.NONE
 _MOST_EVENTS = 1000
 _MOST_NEWS = 10_000
-_ASK_AGAIN_S = 1.0
-_LONGEST_PAUSE_S = 32.0
+# Properties that are malformed are hardly better after a second.
+_MALFORMED_SILENCES = 5
 
 
 @dataclass(slots=True)
@@ -160,8 +159,7 @@ class Network:
         self._is_hub = not connect
         self._inbox: SimpleQueue[_News] = SimpleQueue()
         self._membership = Membership(wire_version(), self.faults)
-        self._ask_again: list[tuple[float, int, Member]] = []
-        self._order = count()
+        self._info_queue = InfoQueue()
         self._asked_infos: set[Member] = set()
         self._orders: list[Order] = []
         self._onlookers: list[Order] = []
@@ -253,6 +251,11 @@ class Network:
         if member := self._membership.member(agent):
             self._session.put(member.cancelled, payload)
 
+    def ask(self, agent: str, /) -> None:
+        """Ask an agent for its progress; ``receive`` returns a report, if any."""
+        if member := self._membership.member(agent):
+            self._ask_info(member)
+
     def _ask(
         self, asked: _Asked, key: str, payload: bytes | None, timeout_s: float
     ) -> None:
@@ -274,9 +277,9 @@ class Network:
             timeout_s: how long to wait for the first event, after the pause [s].
             pause_s: how long to let events collect first [s].
         """
-        now_s = time.monotonic()
-        while self._ask_again and self._ask_again[0][0] <= now_s:
-            self._ask_info(heappop(self._ask_again)[2])
+        while member := self._info_queue.take(began_s := time.monotonic()):
+            self._ask_info(member)
+            self._info_queue.spent(began_s, time.monotonic())
         events: list[DispatchEvent] = []
         time.sleep(pause_s)
         try:
@@ -313,11 +316,7 @@ class Network:
     def _understand(self, news: _News) -> Sequence[DispatchEvent]:
         """Return the dispatch events of a message, if any."""
         if isinstance(news, zenoh.Query):
-            data = b"" if news.payload is None else news.payload.to_bytes()
-            is_onlooker = str(news.key_expr) == self._me.state
-            asked = self._onlookers if is_onlooker else self._orders
-            key = self._me.state if is_onlooker else self._me.command
-            asked.append(Order(data, news, key))
+            self._queried(news)
             return []
         if isinstance(news, _Stray):
             about = "properties" if news.number < 0 else f"job {news.number}"
@@ -334,29 +333,38 @@ class Network:
             self.faults.note("malformed", peer, str(error))
             return []
 
+    def _queried(self, query: zenoh.Query) -> None:
+        """Keep a query of an operator or a viewer until it is asked for."""
+        is_onlooker = str(query.key_expr) == self._me.state
+        asked = self._onlookers if is_onlooker else self._orders
+        if len(asked) >= MOST_QUERIES:
+            peers = "viewers" if is_onlooker else "operators"
+            self.faults.note("crowd", peers, f"{MOST_QUERIES} queries wait")
+            query.drop()  # type: ignore[no-untyped-call]
+            return
+        data = b"" if query.payload is None else query.payload.to_bytes()
+        key = self._me.state if is_onlooker else self._me.command
+        asked.append(Order(data, query, key))
+
     def _token_changed(self, sample: zenoh.Sample) -> list[DispatchEvent]:
         key = str(sample.key_expr)
         if sample.kind != zenoh.SampleKind.PUT:
             left = self._membership.vanish(key)
             return [left] if left else []
         if member := self._membership.appear(key):
-            self._ask_info(member)
+            self._info_queue.add(member)
         return []
 
     def _ask_info(self, member: Member) -> None:
         """Ask an agent for its properties, later if too many are asked."""
-        if member in self._asked_infos:
+        if member in self._asked_infos or member not in self._membership:
             return
         if len(self._asked_infos) >= MOST_ASKED_INFOS:
-            self._ask_later(member, _ASK_AGAIN_S)
+            self._info_queue.add_again(member, 1, time.monotonic())
             return
         self._asked_infos.add(member)
         asked = _Asked(member, -1, self._inbox)
         self._ask(asked, member.info, None, ASK_TIMEOUT_S)
-
-    def _ask_later(self, member: Member, pause_s: float) -> None:
-        due_s = time.monotonic() + pause_s
-        heappush(self._ask_again, (due_s, next(self._order), member))
 
     def _introduced(self, asked: _Asked) -> Sequence[DispatchEvent]:
         """Let an agent join if its properties are valid and its version is equal."""
@@ -366,16 +374,19 @@ class Network:
             # It is alive but does not answer (yet).
             left = membership.note_silence(member)
             if membership.is_stranger(member):
-                pause_s = _ASK_AGAIN_S * 2.0 ** min(membership.silences(member) - 1, 9)
-                self._ask_later(member, min(pause_s, _LONGEST_PAUSE_S))
+                silences = membership.silences(member)
+                self._info_queue.add_again(member, silences, time.monotonic())
             return [left] if left else []
         if not membership.is_stranger(member):
-            return []
+            # It has joined already: it was asked for its progress, or whether it lives.
+            event = membership.progress(member, reply.ok.payload.to_bytes())
+            return [event] if event else []
         try:
             events = membership.introduce(member, reply.ok.payload.to_bytes())
         except MalformedMessage:
             membership.note_silence(member)
-            self._ask_later(member, _LONGEST_PAUSE_S)
+            silences = membership.silences(member) + _MALFORMED_SILENCES
+            self._info_queue.add_again(member, silences, time.monotonic())
             raise
         if member.name in self.refused:
             self._note_refused(member.name)
@@ -390,15 +401,15 @@ class Network:
             if self._membership.member(agent):
                 # It may be gone although its token is not: another process can
                 # declare the same one.
-                self._ask_info(asked.member)
+                self._info_queue.add(asked.member)
             return [Returned(number, agent, "lost")]
         if reply.ok is not None:
             return [Returned(number, agent, "ok", reply.ok.payload.to_bytes())]
         assert reply.err is not None
-        told = reply.err.payload.to_bytes()[: 4 * MOST_REASON].decode(
+        told = reply.err.payload.to_bytes()[: 4 * LONGEST_REASON].decode(
             "utf-8", "replace"
         )
-        reason = printable(told, MOST_REASON) or "no reason given"
+        reason = printable(told, LONGEST_REASON) or "no reason given"
         if not told.startswith(UNFIT):
             return [Returned(number, agent, _outcome(told), reason=reason)]
         left = self._membership.refuse(agent, reason[len(UNFIT) :])

@@ -2,16 +2,23 @@
 
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from coordinator.dispatch.fleet import Fleet
-from coordinator.islands.events import Append, JournalledEvent, Record
+from coordinator.islands.events import (
+    Advanced,
+    AdvanceShard,
+    Append,
+    JournalledEvent,
+    Record,
+)
 from coordinator.network.local import LocalAgents
 from coordinator.run.archipelago import archipelago
 from coordinator.run.loop import Loop
 from coordinator.run.run_context import RunContext
-from coordinator.storage.folder import read_details
+from coordinator.run.shard_requests import SnapshotStore
+from coordinator.storage.folder import RunDetails, read_details
 from coordinator.storage.journal import NAME, Journal
 from coordinator.storage.snapshots import Snapshots
 from schema.errors import RunFolderError
@@ -40,21 +47,52 @@ def arena_history(folder: Path, island: int, from_s: float) -> tuple[bytes, Rebu
     context = RunContext.of(str(folder), 0, experiment, details.origin)
     if island not in context.arena:
         raise RunFolderError(f"{folder}: island {island} has no arena")
-    until = steps_of(from_s, experiment.simulation)
-    loop = Loop(
-        archipelago(experiment, details.seed, details.run),
-        context=context,
-        fleet=Fleet(LocalAgents({}, "")),
-        log=_Nothing(),
-        rows=_Nothing(),
-        snapshot_store=Snapshots(folder, until=until),
-    )
+    store = Snapshots(folder, until=steps_of(from_s, experiment.simulation))
     with tempfile.TemporaryDirectory() as place:
         # A copy: opening a journal repairs it, and its run may be active.
         shutil.copy(folder / NAME, place)
         with Journal.open(Path(place)) as journal:
-            loop.start(journal.replay())
+            loop = replayed(details, context, journal.replay(), store=store)
     return context.arena[island], loop.shard_requests.past(island)
+
+
+def replayed(
+    details: RunDetails,
+    context: RunContext,
+    events: Iterable[JournalledEvent],
+    *,
+    store: SnapshotStore,
+    note: Callable[[Advanced, AdvanceShard | None], None] = lambda *_: None,
+) -> Loop:
+    """Return the islands of a run after a journal, without any effect.
+
+    Args:
+        details: description of the run.
+        context: what all requests have in common.
+        events: content of the journal.
+        store: snapshots on disk, read-only.
+        note: called with each advance and the command that it answers.
+
+    Raises:
+        UnexpectedEvent: the journal of another kind of run.
+    """
+    loop = Loop(
+        archipelago(experiment_from_text(details.document), details.seed, details.run),
+        context=context,
+        fleet=Fleet(LocalAgents({}, "")),
+        log=_Nothing(),
+        rows=_Nothing(),
+        snapshot_store=store,
+    )
+
+    def noted() -> Iterator[JournalledEvent]:
+        for event in events:
+            if isinstance(event, Advanced):
+                note(event, loop.shard_requests.requested(event.island))
+            yield event
+
+    loop.start(noted())
+    return loop
 
 
 class _Nothing:

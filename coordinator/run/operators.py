@@ -20,9 +20,9 @@ from coordinator.islands.events import (
 from coordinator.run.loop import Loop
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
-from schema.errors import MalformedMessage, RevolveError, printable
+from schema.errors import MalformedMessage, RevolveError
 from schema.experiment.document import body_space
-from schema.limits import MOST_REASON
+from schema.limits import LONGEST_REASON, printable
 from schema.robot.inverse_development import genome_of
 from schema.robot.robot import check_robot
 from schema.wire.codec import decode_robot
@@ -145,7 +145,7 @@ def answer_operator(scheduler: RunScheduler, data: bytes, now_s: float) -> bytes
             reply = _carry_out(request, scheduler)
     except MalformedMessage as error:
         scheduler.fleet.faults.note("malformed", "operators", str(error))
-        reply = OperatorReply(printable(str(error), MOST_REASON), is_refused=True)
+        reply = OperatorReply(printable(str(error), LONGEST_REASON), is_refused=True)
     except Refused as error:
         reply = OperatorReply(str(error), is_refused=True)
     return encode_operator_reply(reply)
@@ -158,6 +158,13 @@ def _carry_out(request: OperatorRequest, scheduler: RunScheduler) -> OperatorRep
         Refused: no running run with an arena has the given name, or several have.
     """
     run = _run(request.run, scheduler)
+    if run.recovery is not None:
+        done, total = run.recovery.progress
+        return OperatorReply(
+            f"lost poses are computed again (advance {done} of {total}): try again "
+            "when that is done",
+            is_refused=True,
+        )
     replies: list[OperatorReply] = []
     scheduler.guard(run, lambda: replies.append(reply_to(request, run.loop)))
     if replies:

@@ -4,7 +4,7 @@ from functools import partial
 
 from msgspec import structs
 
-from coordinator.dispatch.events import Deliver, Job, JobKind
+from coordinator.dispatch.events import Deliver, Job, JobKind, Read
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import (
     Advanced,
@@ -19,6 +19,7 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
+from coordinator.run.answer_checks import read_evaluation, read_vetting
 from coordinator.run.cross_checks import CrossChecks
 from coordinator.run.run_context import RunContext
 from schema.errors import JobRefused
@@ -29,7 +30,6 @@ from schema.robot.results import Evaluation, Provenance, Report
 from schema.robot.robot import Robot
 from schema.wire.codec import (
     Answer,
-    decode_answer_to,
     encode_body,
     encode_brain,
     encode_request,
@@ -87,11 +87,31 @@ class Requests:
                 identity=identity,
                 plugins=plugins_of(settings),
             )
-            unfit = Evaluation if kind == "vet" else Report
-            read = partial(decode_answer_to, epoch=epoch, number=number, unfit=unfit)
+            read = self._reader(command, (epoch, number))
             self._fleet.request(
                 Job(number, kind, payload, twin, context.client, command, read)
             )
+
+    def _reader(self, command: Vet | Evaluate, expected: tuple[int, int]) -> Read:
+        """Return what decodes the answer to a job, and checks it against the job.
+
+        Args:
+            command: of the job.
+            expected: epoch and number of the job.
+        """
+        context = self._context
+        if isinstance(command, Vet):
+            return partial(
+                read_vetting,
+                expected=expected,
+                robot=command.robot,
+                space=context.space,
+            )
+        clock = context.experiments[requester_of(command)].simulation
+        steps = command.steps or clock.warmup_steps + clock.window_steps
+        return partial(
+            read_evaluation, expected=expected, simulated_s=steps * clock.timestep_s
+        )
 
     def _body(self, command: Vet) -> bytes:
         """Return the bytes of a body, and keep them for its robot's evaluation."""

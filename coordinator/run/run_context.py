@@ -1,19 +1,25 @@
 """What all requests of a run have in common."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Self
 
 from msgspec import structs
 
 from coordinator.dispatch.events import Client
-from schema.experiment.document import Experiment, island_count, island_experiment
+from schema.experiment.document import (
+    Experiment,
+    body_space,
+    island_count,
+    island_experiment,
+)
 from schema.experiment.identity import Origin
 from schema.experiment.settings import (
     arena_settings,
     evaluation_settings,
     vetting_settings,
 )
+from schema.parts import BodySpace
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,13 +31,17 @@ class RunContext:
         origin: seeds the noise; each request sets its own island.
         vetting: settings for analyzers, as JSON.
         evaluation, arena: settings for workers, as JSON, by island.
+        experiments: settings of each island, for checks of answers.
+        space: part types of the bodies that analyzers vet.
     """
 
     client: Client
     origin: Origin
     vetting: bytes
     evaluation: Mapping[int, bytes]
-    arena: Mapping[int, bytes] = field(default_factory=dict)
+    arena: Mapping[int, bytes]
+    experiments: Mapping[int, Experiment]
+    space: BodySpace
 
     @classmethod
     def of(cls, run: str, epoch: int, experiment: Experiment, origin: Origin) -> Self:
@@ -50,4 +60,6 @@ class RunContext:
                 for number, own in experiments.items()
                 if own.arena
             },
+            experiments,
+            body_space(experiment.space),
         )

@@ -112,7 +112,7 @@ class RunScheduler:
         now_s = clock()
         for run, ends in acting.items():
             if run in self._places:
-                self.guard(run, partial(run.loop.act, now_s, ends))
+                self.guard(run, partial(run.act, now_s, ends))
 
     def _check_fenced(self) -> None:
         """Stop the runs that another coordinator took over, as agents say.

@@ -2,7 +2,7 @@
 
 import json
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict
 from datetime import UTC, datetime
@@ -10,13 +10,15 @@ from importlib import metadata
 from pathlib import Path
 
 from coordinator.arena.arena import Arena
-from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.fleet import End, Fleet
 from coordinator.islands.events import JournalledEvent, Record
 from coordinator.islands.island import Island
 from coordinator.run.archipelago import archipelago
 from coordinator.run.cross_checks import NO_CHECKS, Checks
 from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
+from coordinator.run.pose_recovery import TABLE as POSES
+from coordinator.run.pose_recovery import PoseRecovery, has_lost_poses
 from coordinator.run.run_context import RunContext
 from coordinator.run.throttle import RealTimeThrottle
 from coordinator.storage.folder import DETAILS, STATE, RunFolder
@@ -71,6 +73,7 @@ class RunSession:
         experiment: the document.
         loop: its islands and their connections.
         feed: collects its rows for viewers; None without a network.
+        recovery: computes lost poses before the run continues; None: nothing is lost.
     """
 
     def __init__(
@@ -109,16 +112,20 @@ class RunSession:
                     f"{held.path}: journal: dropped a cut record of "
                     f"{self._journal.dropped} bytes at its end"
                 )
-            self._recorder = Recorder(held.path, details, fsync=fsync)
+            self._recorder = Recorder(held.path, details, fsync=fsync, seal=held.seal)
             stack.callback(self._recorder.close)
             self.experiment = experiment_from_text(details.document)
             self.feed = Feed(held.name, held.epoch, details) if is_watched else None
+            self.recovery: PoseRecovery | None = None
+            self._events: Sequence[JournalledEvent] = ()
+            self._fleet = fleet
             timestep_s = self.experiment.simulation.timestep_s
+            self._context = RunContext.of(
+                held.name, held.epoch, self.experiment, details.origin
+            )
             self.loop = Loop(
                 archipelago(self.experiment, details.seed, details.run),
-                context=RunContext.of(
-                    held.name, held.epoch, self.experiment, details.origin
-                ),
+                context=self._context,
                 fleet=fleet,
                 log=self._journal,
                 rows=self._recorder,
@@ -132,17 +139,59 @@ class RunSession:
             self._opened = stack.pop_all()
 
     def start(self) -> None:
-        """Start, or resume where the journal ends.
+        """Start, or resume where the journal ends, or first recover lost poses.
 
         Raises:
             RevolveError: the run cannot continue; see ``Loop.start``.
         """
-        self.loop.start(self._replay())
+        self._events = self._journal.replay()
+        if has_lost_poses(self._events, self._recorder.stored(POSES)):
+            self._recover()
+        else:
+            self._begin()
         self.held.set_state("running")
+
+    def _recover(self) -> None:
+        """Start the recovery of lost poses."""
+        self.recovery = PoseRecovery(
+            self.held.details,
+            self._context,
+            self._events,
+            fleet=self._fleet,
+            recorder=self._recorder,
+            snapshots=Snapshots(self.held.path),
+        )
+        _, total = self.recovery.progress
+        tell_user(
+            f"{self.held.path}: poses of arenas are lost; computing them again: "
+            f"{total} advances"
+        )
+        self.recovery.start()
+
+    def act(self, now_s: float, ends: Iterable[End]) -> None:
+        """Act on the ends of jobs and advances; see ``Loop.act``.
+
+        Args:
+            now_s: the time, of a monotonic clock [s].
+            ends: what the fleet returned for this run.
+        """
+        if self.recovery is None:
+            self.loop.act(now_s, ends)
+            return
+        self.held.confirm()
+        self.recovery.act(ends)
+        if self.recovery.is_done:
+            self.recovery = None
+            self._begin()
+
+    def _begin(self) -> None:
+        """Replay the journal, then send the requests that are open."""
+        self.loop.start(self._replay())
 
     def _replay(self) -> Iterator[JournalledEvent]:
         """Yield the journalled events; the feed condenses the rows of each."""
-        for event in self._journal.replay():
+        events, self._events = self._events, ()
+        for event in events:
             yield event
             if self.feed is not None:
                 self.feed.read()
@@ -181,6 +230,13 @@ class RunSession:
         """Drop open requests; close the folder and all files."""
         self.loop.leave()
         self._opened.close()
+
+    @property
+    def waiting(self) -> dict[int, str]:
+        """Platforms of the arenas that wait for a worker; "" is any platform."""
+        if self.recovery is not None:
+            return self.recovery.waiting
+        return self.loop.shard_requests.waiting
 
     def status(self, now_s: float) -> RunStatus:
         """Return the progress of the run.

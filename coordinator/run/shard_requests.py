@@ -9,22 +9,29 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Protocol
 
-import pyarrow as pa
-import pyarrow.compute
 from msgspec import structs
 
 from coordinator.dispatch.events import AssignShard, Read, ShardFailed
 from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import Advanced, AdvanceShard
+from coordinator.run.advance_checks import (
+    ExpectedAdvance,
+    Inserted,
+    check_advance,
+    check_snapshot,
+    inserted,
+)
+from coordinator.run.answer_checks import check_job
 from coordinator.run.drift import Drift, with_losses
+from coordinator.run.pose_checks import place_poses, read_poses
 from coordinator.run.run_context import RunContext
 from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
+from schema.experiment.document import body_space
 from schema.experiment.plugin_source import plugins_of
-from schema.parts import Vector
+from schema.parts import BodySpace, Vector
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
-from schema.tables.columns import read_columns
-from schema.wire.arena import Advance
+from schema.wire.arena import Advance, Changes
 from schema.wire.arena_codec import (
     AdvanceRequest,
     PastAdvance,
@@ -56,8 +63,10 @@ class _Past:
 
     Its state at ``step`` is that of the newest snapshot, at ``base`` (0 is the empty
     arena), after ``history``. ``platform`` is that of the last advance, empty before
-    the first; ``places`` are those of the robots that lived after it. The requested
-    advance may have a snapshot in the store if ``may_be_kept``, as in any replay.
+    the first; ``places`` are those of the robots that lived after it, and ``born``
+    their steps of insertion. The requested advance may have a snapshot in the store if
+    ``may_be_kept``, as in any replay. It must have the result of ``repeats``, if there
+    is one.
     """
 
     step: int = 0
@@ -67,8 +76,19 @@ class _Past:
     history: list[PastAdvance] = field(default_factory=list)
     places: dict[BirthId, Vector] = field(default_factory=dict)
     requested: AdvanceShard | None = None
+    repeats: Advanced | None = None
     wants_snapshot: bool = False
     may_be_kept: bool = True
+    born: dict[BirthId, Inserted] = field(default_factory=dict)
+
+    def born_after(self, changes: Changes, space: BodySpace) -> dict[BirthId, Inserted]:
+        """Return the robots that live after changes."""
+        gone = set(changes.removals)
+        born = {birth: at for birth, at in self.born.items() if birth not in gone}
+        return born | {
+            each.birth: inserted(each.robot, space, self.step)
+            for each in changes.insertions
+        }
 
     def drifts_to(self, platform: str) -> bool:
         """Return whether a platform differs from that of the last advance."""
@@ -108,6 +128,7 @@ class ShardRequests:
         # A shard has its island's number here and another one in the fleet.
         self._numbers: dict[int, int] = {}
         self._islands: dict[int, int] = {}
+        self._repeated_on: dict[int, str] = {}
 
     @property
     def waiting(self) -> dict[int, str]:
@@ -127,6 +148,22 @@ class ShardRequests:
         """Return the step that a shard has reached."""
         return self._past(shard).step
 
+    def requested(self, shard: int) -> AdvanceShard | None:
+        """Return the advance of a shard that is requested, or noted."""
+        return self._past(shard).requested
+
+    def begin_at(self, event: Advanced) -> None:
+        """Let a shard begin with the snapshot of an advance, which the store has."""
+        past, advance = self._past(event.island), event.advance
+        past.step = past.base = advance.step
+        past.digest, past.platform = advance.digest, event.provenance.platform
+        past.places = {one.birth: one.place for one in advance.judgements}
+        timestep_s = self._context.experiments[event.island].simulation.timestep_s
+        past.born = {
+            one.birth: Inserted(advance.step - round(one.age_s / timestep_s), None)
+            for one in advance.judgements
+        }
+
     def past(self, shard: int) -> Rebuild:
         """Return what a worker needs to rebuild a shard's state."""
         past = self._past(shard)
@@ -143,14 +180,26 @@ class ShardRequests:
             if past.requested is not None:
                 self.send(past.requested)
 
-    def send(self, command: AdvanceShard) -> None:
-        """Request an advance."""
+    def send(self, command: AdvanceShard, repeats: Advanced | None = None) -> None:
+        """Request an advance.
+
+        Args:
+            command: the advance.
+            repeats: past result of this advance, to be computed again on the same
+                platform; another result is the worker's error.
+        """
         shard = command.island
         past = self._past(shard)
-        past.requested = command
+        past.requested, past.repeats = command, repeats
+        platform = past.platform
+        if repeats is not None:
+            platform = repeats.provenance.platform
+            if self._repeated_on.setdefault(shard, platform) != platform:
+                self._repeated_on[shard] = platform
+                self._fleet.release(self._numbers.pop(shard))
         if shard not in self._numbers:
             number = self._fleet.new_shard(
-                self._context.client, self._encode, past.platform
+                self._context.client, self._encode, platform, may_drift=repeats is None
             )
             self._numbers[shard], self._islands[number] = number, shard
         self._fleet.advance(self._numbers[shard])
@@ -173,6 +222,9 @@ class ShardRequests:
         if requested is None or requested.number != event.number:
             raise UnexpectedEvent(f"no such advance was requested: {event}")
         past.requested = None
+        born = past.born_after(requested.changes, self._space(event.island))
+        living = {one.birth for one in advance.judgements}
+        past.born = {birth: at for birth, at in born.items() if birth in living}
         past.step, past.digest = advance.step, advance.digest
         agent, platform = event.provenance.agent, event.provenance.platform
         drift: Drift | None = None
@@ -197,6 +249,9 @@ class ShardRequests:
             f"arena {self._islands[end.shard]}: several workers cannot advance it, the "
             f"last of them {end.agent}: {end.reason}; fix that and resume"
         )
+
+    def _space(self, shard: int) -> BodySpace:
+        return body_space(self._context.experiments[shard].space)
 
     def _past(self, shard: int) -> _Past:
         return self._pasts.setdefault(shard, _Past())
@@ -240,8 +295,16 @@ class ShardRequests:
             )
         read = partial(
             _read_answer,
-            requested=past.requested,
-            expected=(request.epoch, request.number),
+            request=request,
+            advance_number=requested.number,
+            repeats=past.repeats,
+            expected=ExpectedAdvance(
+                past.step,
+                requested.until,
+                past.born_after(requested.changes, self._space(shard)),
+                self._context.experiments[shard],
+                wants_snapshot,
+            ),
             provenance=Provenance(command.agent, command.platform),
             complete=complete,
         )
@@ -251,8 +314,10 @@ class ShardRequests:
 def _read_answer(
     data: bytes,
     *,
-    requested: AdvanceShard,
-    expected: tuple[int, int],
+    request: AdvanceRequest,
+    advance_number: int,
+    repeats: Advanced | None,
+    expected: ExpectedAdvance,
     provenance: Provenance,
     complete: Callable[[Advance], Advance] | None,
 ) -> Reached | None:
@@ -260,62 +325,56 @@ def _read_answer(
 
     Args:
         data: bytes of the answer.
-        requested: the arena's command.
-        expected: epoch and number of the request.
+        request: that it answers.
+        advance_number: number of the arena's command.
+        repeats: past result that the answer must have; None for a new advance.
+        expected: what a correct answer has.
         provenance: of the answer, but for the time that it took.
         complete: adds what a drift between platforms lost; None without a drift.
 
     Raises:
-        MalformedMessage: no answer, or the answer to another request.
+        MalformedMessage: no answer, the answer to another request, or one that
+            contradicts the request or the state of the arena.
     """
-    answer = decode_advance_answer(data)
-    if (answer.epoch, answer.number) != expected:
-        raise MalformedMessage(
-            f"answer must be to (epoch, job) {expected}, got "
-            f"{(answer.epoch, answer.number)}"
-        )
-    advance, island = answer.advance, requested.island
+    answer = decode_advance_answer(data, expected.most_bytes)
+    check_job(answer.epoch, answer.number, (request.epoch, request.number))
+    advance = answer.advance
     if advance is None:
+        if request.rebuild is not None:
+            raise MalformedMessage(
+                "answer: lacks the state that came with the request", "impossible"
+            )
         return None
-    if advance.step != requested.until:
-        raise MalformedMessage(
-            f"advance: must reach step {requested.until}, got {advance.step}"
-        )
-    if requested.wants_snapshot and not answer.snapshot:
-        raise MalformedMessage("advance: a snapshot was wanted, got none")
-    poses, rows = place_poses(advance.poses, island)
-    advance = replace(advance, poses=poses)
+    check_snapshot(answer, expected)
     if complete is not None:
         advance = complete(advance)
+    check_advance(advance, expected)
+    rows = read_poses(advance.poses, advance, expected)
+    if repeats is not None:
+        _check_repeated(advance, rows.num_rows, repeats)
+    poses = place_poses(advance.poses, rows, request.shard)
     signed = replace(provenance, wall_s=answer.wall_s)
-    event = Advanced(island, requested.number, advance, rows, signed)
+    event = Advanced(
+        request.shard,
+        advance_number,
+        replace(advance, poses=poses),
+        rows.num_rows,
+        signed,
+    )
     return Reached(event, answer.snapshot)
 
 
-def place_poses(columns: bytes, island: int) -> tuple[bytes, int]:
-    """Return the poses of an arena as the table has them, and their number.
-
-    Args:
-        columns: Arrow IPC stream; ``island`` is where each robot was born.
-        island: where the robots live; ``birth_island`` is set for immigrants only.
+def _check_repeated(advance: Advance, rows: int, repeats: Advanced) -> None:
+    """Raise unless an advance has a past result.
 
     Raises:
-        MalformedMessage: the columns are not those of poses.
+        MalformedMessage: another digest or number of poses.
     """
-    poses = read_columns("poses", columns)
-    born = poses["island"]
-    if pa.compute.all(pa.compute.equal(born, island), min_count=0).as_py():
-        return columns, poses.num_rows
-    is_immigrant = pa.compute.not_equal(born, island)
-    absent = pa.scalar(None, pa.int32())
-    schema = poses.schema
-    here = pa.repeat(pa.scalar(island, pa.int32()), poses.num_rows)
-    poses = poses.set_column(
-        schema.get_field_index("birth_island"),
-        schema.field("birth_island"),
-        pa.compute.if_else(is_immigrant, born, absent),
-    ).set_column(schema.get_field_index("island"), schema.field("island"), here)
-    sink = pa.BufferOutputStream()
-    with pa.ipc.new_stream(sink, schema) as writer:
-        writer.write_table(poses)
-    return bytes(sink.getvalue().to_pybytes()), poses.num_rows
+    got, must = (advance.digest, rows), (repeats.advance.digest, repeats.pose_rows)
+    if got != must:
+        raise MalformedMessage(
+            f"advance to step {advance.step}: the digest of its state and its "
+            f"number of poses must be {must[0].hex()[:16]}... and {must[1]}, got "
+            f"{got[0].hex()[:16]}... and {got[1]}: this machine's results differ",
+            "differs",
+        )

@@ -37,7 +37,7 @@ class AppendedFile:
             if fsync:
                 _sync_folder(path.parent)
 
-    def append(self, piece: bytes) -> None:
+    def append(self, piece: bytes | memoryview) -> None:
         """Append a piece; remove it again if a part of it cannot be written.
 
         It stays if another process has appended to the file meanwhile.
@@ -88,18 +88,48 @@ def replace_durably(path: Path, write: Callable[[Path], object]) -> None:
     Raises:
         RunFolderError: the disk is full or failed; an old file is unchanged.
     """
-    temporary = path.with_name(f".{path.name}.new")
+    write_durably(path, write)
+    install_durably(path)
+
+
+def write_durably(path: Path, write: Callable[[Path], object]) -> None:
+    """Write the new content of a file under another name, for ``install_durably``.
+
+    Raises:
+        RunFolderError: the disk is full or failed; an old file is unchanged.
+    """
+    temporary = new_path(path)
     with storage_errors(path):
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             write(temporary)
             _sync(temporary, os.O_RDONLY)
+        except OSError:
+            with contextlib.suppress(OSError):
+                temporary.unlink(missing_ok=True)
+            raise
+
+
+def install_durably(path: Path) -> None:
+    """Give a file its new content, which ``write_durably`` wrote.
+
+    Raises:
+        RunFolderError: the disk failed; an old file is unchanged.
+    """
+    temporary = new_path(path)
+    with storage_errors(path):
+        try:
             temporary.replace(path)
             _sync_folder(path.parent)
         except OSError:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
             raise
+
+
+def new_path(path: Path) -> Path:
+    """Return where the new content of a file is written."""
+    return path.with_name(f".{path.name}.new")
 
 
 def replace_text(path: Path, text: str) -> None:

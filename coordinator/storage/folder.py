@@ -6,15 +6,18 @@ coordinator that was replaced while it was suspended notices it.
 """
 
 import json
+import os
 import secrets
 import socket
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal, Self
 
 import msgspec
+from msgspec import structs
 
-from coordinator.storage.disk import replace_text, storage_errors
+from coordinator.storage.disk import replace_durably, replace_text, storage_errors
 from coordinator.storage.hints import command
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.journal import newest_epoch
@@ -87,7 +90,8 @@ class RunFolder:
         try:
             if details is not None:
                 _refuse_used(path)
-                entries = {**asdict(details), "nonce": secrets.token_hex(4)}
+                nonce = secrets.token_hex(4)
+                entries = {**asdict(details), "nonce": nonce, "checksums": True}
                 replace_text(path / DETAILS, json.dumps(entries, indent=1))
             self.details = read_details(path)
             nonce = _read_description(path).nonce
@@ -108,6 +112,30 @@ class RunFolder:
             RunFolderError: the disk is full or failed.
         """
         replace_text(self.path / STATE, state)
+
+    def seal(self, digests: Mapping[str, str]) -> None:
+        """Write the SHA-256 of finished tables to the run's description.
+
+        Its time of change stays: it is when the run began.
+
+        Args:
+            digests: in hexadecimal, by name of the table; others stay.
+
+        Raises:
+            RunFolderError: the description is damaged, or the disk is full or failed.
+        """
+        file = self.path / DETAILS
+        known = _read_description(self.path)
+        sealed = structs.replace(known, digests={**known.digests, **digests})
+        text = json.dumps(msgspec.to_builtins(sealed), indent=1)
+        with storage_errors(file):
+            began = file.stat().st_mtime_ns
+
+        def write(path: Path) -> None:
+            path.write_text(text, encoding="utf-8")
+            os.utime(path, ns=(began, began))
+
+        replace_durably(file, write)
 
     def confirm(self) -> None:
         """Check that no other coordinator has taken over the run.
@@ -170,13 +198,19 @@ def read_details(path: Path) -> RunDetails:
 
 
 class _Description(msgspec.Struct, forbid_unknown_fields=True):
-    """Content of ``run.json``; runs of older versions have no nonce."""
+    """Content of ``run.json``.
+
+    Runs of older versions have no nonce; ``schema.tables.checksums.Seal`` describes the
+    fields about tables.
+    """
 
     name: str
     run: int
     seed: int
     document: str
     nonce: str = ""
+    checksums: bool = False
+    digests: dict[str, str] = {}
 
 
 def _read_description(path: Path) -> _Description:

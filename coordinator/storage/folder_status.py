@@ -12,7 +12,8 @@ from coordinator.storage.lock import read_holder
 from schema.errors import RunFolderError
 from schema.experiment.document import island_count, island_experiment
 from schema.experiment.file import experiment_from_text
-from schema.tables.files import has_rows, read_table
+from schema.tables.columns import TABLES
+from schema.tables.files import damage_of, has_rows, read_table
 from schema.wire.status import IslandStatus, RunStatus
 
 
@@ -28,13 +29,13 @@ def folder_status(folder: Path) -> RunStatus:
     if state == "running" and not read_holder(folder):
         state = "stopped"
     status = unbegun_status(folder, details)
-    births = Counter(read_table(folder, "births")["island"].to_pylist())
-    if state == "finished" and not births:
-        check_rewritable(folder, details)
+    if state == "finished" and not has_rows(folder, "births"):
+        check_rewritable(folder)
         raise RunFolderError(
             f"{folder}: is finished, but its tables are missing; to write them again: "
             f"{command('resume', folder)}"
         )
+    births = Counter(read_table(folder, "births")["island"].to_pylist())
     populations = read_table(folder, "population").group_by(["island", "births"])
     summaries = populations.aggregate([("fitness", "max"), ([], "count_all")])
     newest = {row["island"]: row for row in summaries.sort_by("births").to_pylist()}
@@ -50,27 +51,32 @@ def folder_status(folder: Path) -> RunStatus:
     return replace(status, state=state, islands=islands)
 
 
-def check_rewritable(folder: Path, details: RunDetails) -> None:
-    """Raise unless missing tables of a finished run can be written again.
+def table_damages(folder: Path) -> list[str]:
+    """Return a line about each damaged or lost table of a finished run.
 
-    The journal determines all rows except an arena's poses.
+    Raises:
+        RunFolderError: the disk fails.
+    """
+    if not has_rows(folder, "births"):
+        return [f"{folder}: is finished, but its tables are missing"]
+    return [why for name in TABLES if (why := damage_of(folder, name))]
+
+
+def check_rewritable(folder: Path) -> None:
+    """Raise unless damaged or lost tables of a finished run can be written again.
+
+    The journal determines all rows; those of an arena's poses are computed again.
 
     Args:
         folder: run folder.
-        details: description of the run.
 
     Raises:
-        RunFolderError: the journal or an arena's poses are missing, too.
+        RunFolderError: the journal is missing, too.
     """
-    experiment = experiment_from_text(details.document)
-    has_arena = any(
-        island_experiment(experiment, number).arena is not None
-        for number in range(island_count(experiment))
-    )
-    if not is_begun(folder) or (has_arena and not has_rows(folder, "poses")):
+    if not is_begun(folder):
         raise RunFolderError(
-            f"{folder}: is finished, but its tables are missing, and the journal "
-            "cannot restore them: put a copy of the tables in their place"
+            f"{folder}: is finished, but its tables are missing or damaged, and there "
+            "is no journal to restore them: put a copy of the tables in their place"
         )
 
 

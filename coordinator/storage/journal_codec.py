@@ -21,6 +21,7 @@ from coordinator.islands.events import (
     VettingFailed,
 )
 from schema.errors import MalformedMessage
+from schema.limits import ADVANCE_BYTES
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.wire import revolve_pb2 as pb
@@ -43,8 +44,8 @@ from schema.wire.messages import (
     finite,
     genome_from_message,
     genome_to_message,
-    parsed,
 )
+from schema.wire.parsing import parsed
 
 
 def encode_entry(event: JournalledEvent) -> bytes:
@@ -58,7 +59,7 @@ def decode_entry(data: bytes) -> JournalledEvent:
     Raises:
         MalformedMessage: the bytes are no entry, or it holds no event.
     """
-    entry = parsed(data, pb.Entry())
+    entry = parsed(data, pb.Entry(), ADVANCE_BYTES)
     is_audit = entry.WhichOneof("event") == "audited"
     return _audited(entry.audited) if is_audit else _event(entry)
 

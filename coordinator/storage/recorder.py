@@ -5,14 +5,17 @@ those that are already on disk are skipped by their number.
 """
 
 import contextlib
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from coordinator.islands.events import Append, Record
 from coordinator.storage.disk import storage_errors
 from coordinator.storage.folder import RunDetails
+from coordinator.storage.segment import remove_segment
 from coordinator.storage.table_file import TableFile
 from schema.tables.columns import TABLES
-from schema.tables.files import SEGMENTS, parquet_path, segments_of
+from schema.tables.files import parquet_path
+from schema.tables.segments import SEGMENTS, segments_of
 
 BUFFERED = 64
 """Rows of a table that are buffered before they are written together."""
@@ -22,19 +25,28 @@ class Recorder:
     """Writer of a run's tables; rows arrive in their repeatable order."""
 
     def __init__(
-        self, folder: Path, details: RunDetails, *, fsync: bool = False
+        self,
+        folder: Path,
+        details: RunDetails,
+        *,
+        fsync: bool = False,
+        seal: Callable[[Mapping[str, str]], None] = lambda _: None,
     ) -> None:
         """Open the tables of a run folder that this process has locked.
+
+        Damaged rows are removed, and all rows behind them in their table.
 
         Args:
             folder: run folder.
             details: description of the run; names the Parquet files.
             fsync: survive power loss, too.
+            seal: stores the SHA-256 of finished tables before they get their names.
 
         Raises:
             RunFolderError: a segment has another version, or the disk fails.
         """
         self._folder = folder
+        self._seal = seal
         with storage_errors(folder):
             (folder / SEGMENTS).mkdir(exist_ok=True)
         self._tables = {
@@ -83,6 +95,27 @@ class Recorder:
         """
         self._tables[rows.table].take_columns(rows.rows, rows.columns)
 
+    def stored(self, table: str) -> int:
+        """Return how many rows of a table are on disk."""
+        return self._tables[table].stored
+
+    def keep(self, table: str, rows: int) -> None:
+        """Remove the bulk rows on disk from a number on, which must start a batch.
+
+        Raises:
+            RunFolderError: it does not start a batch, or the disk failed.
+        """
+        self._tables[table].keep(rows)
+
+    def restore(self, rows: Append) -> None:
+        """Write bulk rows that are missing on disk, before a replay counts any.
+
+        Raises:
+            MalformedMessage: the columns are not those of the table.
+            RunFolderError: the disk is full or failed.
+        """
+        self._tables[rows.table].restore(rows.rows, rows.columns)
+
     def flush(self) -> None:
         """Write all buffered rows to disk.
 
@@ -102,13 +135,16 @@ class Recorder:
             RunFolderError: the disk is full or failed; the segments are intact.
         """
         self.flush()
+        prepared = {name: table.prepare() for name, table in self._tables.items()}
+        digests = {name: digest for name, digest in prepared.items() if digest}
+        if digests:
+            self._seal(digests)
         for table in self._tables.values():
             table.finish()
         self.close()
-        with storage_errors(self._folder / SEGMENTS):
-            for name in TABLES:
-                for _, path in segments_of(self._folder, name):
-                    path.unlink()
+        for name in TABLES:
+            for _, path in segments_of(self._folder, name):
+                remove_segment(path)
         # Fails if the folder holds foreign files; they stay.
         with contextlib.suppress(OSError):
             (self._folder / SEGMENTS).rmdir()

@@ -1,6 +1,6 @@
 """One table of a run on disk: Arrow segments while it runs, Parquet at its end."""
 
-import os
+import logging
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -8,18 +8,20 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet
 
-from coordinator.storage.disk import AppendedFile, replace_durably, storage_errors
-from schema.errors import MalformedMessage, RunFolderError
-from schema.tables.columns import TABLES, read_columns
-from schema.tables.files import (
-    SEGMENTS,
-    batch_ends,
-    batches_by_island,
-    read_table,
-    segment_path,
-    segments_of,
-    stored_rows,
+from coordinator.storage.disk import (
+    install_durably,
+    new_path,
+    storage_errors,
+    write_durably,
 )
+from coordinator.storage.segment import Segment, cut_segment, remove_segment
+from schema.errors import MalformedMessage, RunFolderError
+from schema.tables.checksums import digest_of
+from schema.tables.columns import TABLES, read_columns
+from schema.tables.files import batches_by_island, damage_of, read_table, stored_rows
+from schema.tables.segments import SEGMENTS, read_segment, segment_path, segments_of
+
+_LOG = logging.getLogger(__name__)
 
 ROW_GROUP = 50_000
 
@@ -39,17 +41,37 @@ class TableFile:
         self._parquet = parquet
         self._fsync = fsync
         self._schema = TABLES[name]
-        self._segment: AppendedFile | None = None
+        self._segment: Segment | None = None
         self._seen = 0
         self._ahead = 0
         self.buffered: list[Mapping[str, Any]] = []
-        if parquet.exists():
+        if parquet.exists() and not self._set_aside():
             self._stored: int = read_table(folder, name).num_rows
             return
-        self._stored, unused = stored_rows(folder, name)
-        with storage_errors(folder):
-            for _, path in unused:
-                path.unlink()
+        stored = stored_rows(folder, name)
+        self._stored = stored.rows
+        for path, last in stored.used.items():
+            cut_segment(path, last)
+        for path in stored.unused:
+            remove_segment(path)
+
+    @property
+    def stored(self) -> int:
+        """Number of rows on disk."""
+        return self._stored
+
+    def _set_aside(self) -> bool:
+        """Rename the finished file if it is damaged; return whether it is.
+
+        The rows are written again.
+        """
+        if not (why := damage_of(self._folder, self._name)):
+            return False
+        aside = _aside(self._parquet)
+        with storage_errors(self._parquet):
+            self._parquet.replace(aside)
+        _LOG.warning("%s; until then it is kept as %s", why, aside.name)
+        return True
 
     def take(self, row: Mapping[str, Any]) -> None:
         """Add the next row, unless it is already on disk."""
@@ -59,10 +81,7 @@ class TableFile:
 
     def store(self, rows: int, columns: bytes) -> None:
         """Write bulk rows ahead of the count; remove rows on disk that do not count."""
-        known = self._seen + self._ahead
-        if self._stored > known:
-            _remove_rows(self._folder, self._name, known)
-            self._stored = known
+        self.keep(self._seen + self._ahead)
         if rows:
             self._write(self._bulk(rows, columns))
             self._ahead += rows
@@ -75,11 +94,21 @@ class TableFile:
                 raise RunFolderError(
                     f"{self._folder / SEGMENTS}: {self._name}: rows {self._stored} to "
                     f"{end - 1} are missing, and the journal does not hold them: "
-                    "restore a sound copy of the segments"
+                    "resume the run to compute them again"
                 )
             self.store(rows, columns)
         self._seen = end
         self._ahead = max(0, self._ahead - rows)
+
+    def restore(self, rows: int, columns: bytes) -> None:
+        """Write the next bulk rows behind those on disk, before any is counted."""
+        self._write(self._bulk(rows, columns))
+
+    def keep(self, rows: int) -> None:
+        """Remove all rows on disk from a number on, which must start a batch."""
+        if self._stored > rows:
+            _remove_rows(self._folder, self._name, rows)
+            self._stored = rows
 
     def flush(self) -> None:
         """Write the buffered rows as one batch, all or none."""
@@ -87,17 +116,31 @@ class TableFile:
             self._write(self._batch())
             self.buffered = []
 
-    def finish(self) -> None:
-        """Write all rows as Parquet, unless the file exists."""
+    def prepare(self) -> str:
+        """Write all rows as Parquet under another name; return the file's SHA-256.
+
+        Returns:
+            In hexadecimal; empty if the table has its final form already.
+        """
         if self._parquet.exists():
-            return
-        rows, _ = stored_rows(self._folder, self._name)
+            return ""
+        rows = stored_rows(self._folder, self._name).rows
         if rows != self._stored:
             raise RunFolderError(
                 f"{self._folder / SEGMENTS}: {self._name}: must hold {self._stored} "
                 f"rows, got {rows}: resume the run to write them again"
             )
-        replace_durably(self._parquet, self._write_parquet)
+        write_durably(self._parquet, self._write_parquet)
+        return digest_of(new_path(self._parquet))
+
+    def finish(self) -> None:
+        """Give the Parquet file its final name."""
+        if not self._parquet.exists():
+            install_durably(self._parquet)
+        aside = _aside(self._parquet)
+        with storage_errors(aside):
+            if aside.exists():
+                aside.unlink()
 
     def close(self) -> None:
         """Close the segment."""
@@ -106,7 +149,9 @@ class TableFile:
 
     def _write_parquet(self, path: Path) -> None:
         """Write all rows, one row group in memory at a time."""
-        with pa.parquet.ParquetWriter(path, self._schema, compression="zstd") as file:
+        with pa.parquet.ParquetWriter(
+            path, self._schema, compression="zstd", write_page_checksum=True
+        ) as file:
             rows = self._schema.empty_table()
             for batch in batches_by_island(self._folder, self._name):
                 rows = pa.concat_tables([rows, pa.Table.from_batches([batch])])
@@ -124,7 +169,7 @@ class TableFile:
             )
         if self._segment is None:
             self._segment = self._opened()
-        self._segment.append(batch.serialize().to_pybytes())
+        self._segment.append(batch)
         self._stored += batch.num_rows
 
     def _bulk(self, rows: int, columns: bytes) -> pa.RecordBatch:
@@ -138,14 +183,11 @@ class TableFile:
         arrays = [numbers, *(column.combine_chunks() for column in table.columns)]
         return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
 
-    def _opened(self) -> AppendedFile:
+    def _opened(self) -> Segment:
         """Return a new segment that contains the schema."""
         numbers = [number for number, _ in segments_of(self._folder, self._name)]
-        number = max(numbers, default=-1) + 1
-        path = segment_path(self._folder, self._name, number)
-        segment = AppendedFile(path, fsync=self._fsync)
-        segment.append(self._schema.serialize().to_pybytes())
-        return segment
+        path = segment_path(self._folder, self._name, max(numbers, default=-1) + 1)
+        return Segment(path, self._schema, fsync=self._fsync)
 
     def _batch(self) -> pa.RecordBatch:
         """Return the buffered rows as one batch with record numbers."""
@@ -158,6 +200,11 @@ class TableFile:
         return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
 
 
+def _aside(parquet: Path) -> Path:
+    """Return the name of a damaged file until it is written again."""
+    return parquet.with_name(f"{parquet.name}.damaged")
+
+
 def _remove_rows(folder: Path, table: str, rows: int) -> None:
     """Remove all rows of a table from a number on, which must start a batch.
 
@@ -165,16 +212,12 @@ def _remove_rows(folder: Path, table: str, rows: int) -> None:
         RunFolderError: it does not start a batch, or the disk fails.
     """
     seen = 0
-    with storage_errors(folder / SEGMENTS):
-        for _, path in segments_of(folder, table):
-            size = 0
-            for end, numbers in batch_ends(path, TABLES[table]):
-                if numbers.start < rows:
-                    size, seen = end, max(seen, numbers.stop)
-            if size:
-                os.truncate(path, size)
-            else:
-                path.unlink()
+    for _, path in segments_of(folder, table):
+        kept = None
+        for batch in read_segment(folder, table, path):
+            if batch.numbers.start < rows:
+                kept, seen = batch, max(seen, batch.numbers.stop)
+        cut_segment(path, kept)
     if seen != rows:
         raise RunFolderError(
             f"{folder / SEGMENTS}: {table}: row {rows} must start a batch, got {seen}"

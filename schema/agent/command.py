@@ -22,7 +22,7 @@ from schema.agent.address import (
     parse_address,
 )
 from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config
-from schema.agent.supervision import CPU_LIMIT_S, Death, ProcessSlot
+from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, Death, ProcessSlot
 from schema.agent.supervisor import ProcessPool, stop_on_signals, stop_with_input
 from schema.agent.topics import Role, check_name
 from schema.errors import NetworkError, RevolveError
@@ -104,14 +104,22 @@ def access_of(options: argparse.Namespace) -> tuple[Certificate, ...] | None:
     return tuple(read_certificates(Path(options.access))) if options.access else None
 
 
-def add_cpu_limit(flags: argparse.ArgumentParser) -> None:
-    """Add the flag for the CPU time limit of a job."""
+def add_job_limits(flags: argparse.ArgumentParser) -> None:
+    """Add the flags for the time limits of a job."""
     flags.add_argument(
         "--cpu-limit",
         type=positive_number,
         default=CPU_LIMIT_S,
         metavar="S",
         help=f"CPU time limit of one job in seconds (default: {CPU_LIMIT_S:.0f})",
+    )
+    flags.add_argument(
+        "--wait-limit",
+        type=positive_number,
+        default=WAIT_LIMIT_S,
+        metavar="S",
+        help="time that one job may wait without using CPU time in seconds (default: "
+        f"{WAIT_LIMIT_S:.0f})",
     )
 
 
@@ -164,6 +172,8 @@ def run_pool(
             tls=tls,
             threads=options.threads,
             cpu_limit_s=options.cpu_limit,
+            wait_limit_s=options.wait_limit,
+            processes=options.processes,
         )
         client_config(connect, tls)
     except RevolveError as error:
@@ -238,7 +248,7 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
         action="store_true",
         help="stop when standard input is closed, too",
     )
-    add_cpu_limit(flags)
+    add_job_limits(flags)
     flags.set_defaults(threads=1)
     if role == "worker":
         flags.add_argument(

@@ -12,7 +12,7 @@ from typing import Any
 
 from schema.agent.access import Certificate, access_control
 from schema.agent.address import UNIX, parse_address
-from schema.agent.supervision import CPU_LIMIT_S
+from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S
 from schema.agent.topics import Role
 from schema.errors import NetworkError
 
@@ -61,6 +61,9 @@ class Agent:
         version: of Revolve Islands.
         threads: that advance one arena together.
         cpu_limit_s: CPU time limit of a job [s].
+        wait_limit_s: time that a job may wait without using CPU time [s].
+        processes: that share the memory of this machine.
+        shards: arenas whose state the process keeps.
     """
 
     role: Role
@@ -73,6 +76,9 @@ class Agent:
     version: str = ""
     threads: int = 1
     cpu_limit_s: float = CPU_LIMIT_S
+    wait_limit_s: float = WAIT_LIMIT_S
+    processes: int = 1
+    shards: int = 1
 
 
 def _is_loopback(host: str) -> bool:

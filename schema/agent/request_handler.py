@@ -9,22 +9,31 @@ once. A coordinator that was really replaced finds that in its run folder and st
 that was not repeats the job.
 """
 
+import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
-from google.protobuf.message import DecodeError
-
+from schema.agent.job_watch import JobWatch, thread_clock
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.supervision import ProcessSlot, Task
 from schema.errors import MalformedMessage, PluginDiffers, RevolveError, UnknownPlugin
 from schema.experiment.plugin_source import check_plugins
-from schema.limits import MOST_EPOCH, MOST_RUN_NAME
+from schema.limits import (
+    ADVANCE_REQUEST_BYTES,
+    LONGEST_REASON,
+    MOST_EPOCH,
+    MOST_RUN_NAME,
+    printable,
+)
 from schema.wire import revolve_pb2 as pb
 from schema.wire.packing import fingerprint
+from schema.wire.parsing import parsed, require_most
 
 _MOST_REMEMBERED = 1000
+_CANCELLED_S = 10.0
+"""Time after which a cancelled job that waits loses its process [s]."""
 
 K = TypeVar("K")
 T = TypeVar("T")
@@ -120,18 +129,24 @@ class Reply:
 class Server:
     """Answers single requests; knows the newest coordinator of each run.
 
+    The thread that makes it does the jobs.
+
     Attributes:
         compute: bytes of a ``Request`` to bytes of an ``Answer``; it raises if the
             request is bad.
         agent: this agent.
         slot: its slot in a pool.
         counts: counts of its replies.
+        watch: over the current job.
     """
 
     compute: Callable[[bytes], bytes]
     agent: Agent
     slot: ProcessSlot = field(default_factory=ProcessSlot)
     counts: ReplyCounts = field(default_factory=ReplyCounts)
+    watch: JobWatch = field(
+        default_factory=lambda: JobWatch(thread_clock(threading.get_ident()))
+    )
     _epochs: dict[str, int] = field(default_factory=dict)
     _fenced: dict[tuple[str, int], None] = field(default_factory=dict)
     _cancelled: dict[Task, None] = field(default_factory=dict)
@@ -147,6 +162,9 @@ class Server:
             slots=agent.slots,
             platform=agent.platform,
             version=agent.version,
+            shards=agent.shards,
+            cores=agent.threads,
+            quiet_s=self.watch.quiet_s,
         )
         for death in self.slot.deaths:
             task = death.task
@@ -183,20 +201,39 @@ class Server:
                 _remember(task, None, self._skipped)
                 self.counts.skipped += 1
                 return Reply(reason=CANCELLED)
+            self.watch.begin(task)
             with self.slot.doing(task, self.agent.cpu_limit_s):
                 answer = self.compute(data)
         except (UnknownPlugin, PluginDiffers) as error:
             self.counts.refused += 1
-            return Reply(reason=f"{UNFIT}{error}")
+            return Reply(reason=printable(f"{UNFIT}{error}", LONGEST_REASON))
         except RevolveError as error:
             self.counts.refused += 1
             self.counts.malformed += isinstance(error, MalformedMessage)
-            return Reply(reason=str(error))
+            return Reply(reason=printable(str(error), LONGEST_REASON))
         except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
             self.counts.refused += 1
-            return Reply(reason=f"{type(error).__name__}: {error}")
+            why = f"{type(error).__name__}: {error}"
+            return Reply(reason=printable(why, LONGEST_REASON))
+        finally:
+            self.watch.end()
         self.counts.answered += 1
         return Reply(answer)
+
+    def look(self) -> None:
+        """End this process if its job waits for too long; call it regularly.
+
+        A job that was cancelled has less time and is not blamed: another process may
+        have done it.
+        """
+        self.watch.measure()
+        task, quiet_s = self.watch.task, self.watch.quiet_s
+        if task is None or quiet_s is None:
+            return
+        if task in self._cancelled and quiet_s > _CANCELLED_S:
+            self.slot.end_process(is_blamed=False)
+        elif quiet_s > self.agent.wait_limit_s:
+            self.slot.end_process(is_blamed=True)
 
     def _task(self, request: pb.Request, data: bytes) -> Task:
         name = (request.run, request.epoch, request.number)
@@ -225,27 +262,17 @@ class Server:
 
 
 def _parsed(data: bytes) -> pb.Request:
-    """Return a request of any kind with a valid name of a job.
+    """Return the fields that requests of all kinds share.
 
     Raises:
         MalformedMessage: not the bytes of a request, no run, or a run's name or an
             epoch beyond its limit.
     """
-    try:
-        request = pb.Request.FromString(data)
-    except DecodeError as error:
-        raise MalformedMessage(f"not the bytes of a Request: {error}") from None
+    request = parsed(data, pb.Request(), ADVANCE_REQUEST_BYTES)
     if not request.run:
         raise MalformedMessage("Request: names no run")
-    if len(request.run) > MOST_RUN_NAME:
-        raise MalformedMessage(
-            f"Request: a run's name must have at most {MOST_RUN_NAME} characters, got "
-            f"{len(request.run)}"
-        )
-    if request.epoch > MOST_EPOCH:
-        raise MalformedMessage(
-            f"Request: epoch must be at most {MOST_EPOCH}, got {request.epoch}"
-        )
+    require_most(len(request.run), MOST_RUN_NAME, "characters of Request.run")
+    require_most(request.epoch, MOST_EPOCH, "as Request.epoch")
     return request
 
 

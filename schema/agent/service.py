@@ -17,6 +17,8 @@ from typing import Any
 
 import zenoh
 
+from schema.agent.capacity import memory_bytes, shards_that_fit
+from schema.agent.job_watch import LOOK_S
 from schema.agent.network import Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.request_handler import FairQueue, ReplyCounts, Server
@@ -33,8 +35,7 @@ UNSUPERVISED = ProcessSlot()
 
 
 _ENGINE_LOG = (
-    "warn,zenoh::net::runtime::orchestrator=error,"
-    "zenoh_link_unixsock_stream::unicast=error"
+    "warn,zenoh::net::runtime::orchestrator=error,zenoh_link_unixsock_stream=error"
 )
 """Levels of Zenoh's log; the commands themselves tell of a hub that is missing."""
 
@@ -165,6 +166,7 @@ def own_agent(agent: Agent, index: int) -> Agent:
         name=unique_name(f"{agent.name}-{index}"),
         platform=platform_tag(),
         version=wire_version(),
+        shards=shards_that_fit(memory_bytes(), agent.processes),
     )
 
 
@@ -228,6 +230,11 @@ def _serve_session(
     def cancel(sample: zenoh.Sample) -> None:
         server.cancel(sample.payload.to_bytes())
 
+    def look() -> None:
+        while not stop.wait(LOOK_S):
+            server.look()
+
+    threading.Thread(target=look, daemon=True).start()
     # The token comes last: a coordinator that sees it sends jobs at once.
     with (
         session.declare_queryable(me.jobs, take, complete=True),

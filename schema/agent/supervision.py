@@ -1,11 +1,12 @@
 """Detection of jobs that crash their process.
 
 A process notes each job in memory that it shares with its parent, and limits the CPU
-time of the job. If the process then ends by a signal that only its own code can cause,
-the job is to blame. SIGKILL, SIGTERM and a machine that goes down say nothing about
-the job.
+time of the job, and the time that the job waits without using any. If the process then
+ends by a signal that only its own code can cause, the job is to blame. SIGKILL, SIGTERM
+and a machine that goes down say nothing about the job.
 """
 
+import os
 import signal
 import struct
 from collections.abc import Iterator
@@ -16,12 +17,16 @@ from multiprocessing import get_context
 
 CPU_LIMIT_S = 3600.0
 """CPU time limit of one job [s]: far above that of any job that ends."""
+WAIT_LIMIT_S = 600.0
+"""Time that a job may wait without using CPU time [s]: far above any delay of a disk or
+an overloaded machine."""
 LAST_DEATHS = 8
 """Number of deaths that are remembered for each slot of a pool."""
 
 _SIZE = 2048
 _HEAD = struct.Struct("<HHQQ8s")
 _OUT_OF_TIME = signal.SIGPROF
+_WAITED = signal.SIGVTALRM
 # Signals that a process causes itself.
 _OWN_DOING = (
     signal.SIGABRT,
@@ -31,6 +36,7 @@ _OWN_DOING = (
     signal.SIGSEGV,
     signal.SIGSYS,
     _OUT_OF_TIME,
+    _WAITED,
 )
 
 
@@ -113,6 +119,8 @@ def crash_cause(exit_code: int) -> str:
     number = -exit_code
     if number == _OUT_OF_TIME:
         return "use of too much CPU time"
+    if number == _WAITED:
+        return "waiting too long without use of CPU time"
     return signal.Signals(number).name if number in _OWN_DOING else ""
 
 
@@ -129,6 +137,18 @@ class ProcessSlot:
     index: int = 0
     note: CurrentJob | None = None
     deaths: tuple[Death, ...] = ()
+
+    def end_process(self, *, is_blamed: bool) -> None:
+        """End this process, whose job waits without end; its supervisor restarts it.
+
+        Args:
+            is_blamed: the job counts as the cause.
+        """
+        if self.note is None:
+            return
+        if not is_blamed:
+            self.note.end()
+        os.kill(os.getpid(), _WAITED if is_blamed else signal.SIGKILL)
 
     @contextmanager
     def doing(self, task: Task, cpu_limit_s: float) -> Iterator[None]:

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Literal
 
-from schema.errors import MalformedMessage, NetworkError, printable
+from schema.errors import MalformedMessage, NetworkError
+from schema.limits import printable
 
 Role = Literal["worker", "analyzer", "coordinator"]
 

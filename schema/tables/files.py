@@ -7,21 +7,43 @@ partitioning), so that one call reads a campaign, such as DuckDB's
 ``read_parquet('runs/**/births.parquet', hive_partitioning = true)``.
 """
 
-import contextlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 from urllib.parse import quote
 
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset
+from pyarrow.dataset import ParquetFileFormat, ParquetFragmentScanOptions
 from pyarrow.parquet import ParquetFile
 
 from schema.errors import RunFolderError
-from schema.tables.columns import TABLES, completed, is_earlier
+from schema.tables.checksums import digest_of, read_seal
+from schema.tables.columns import TABLES, completed
+from schema.tables.segments import (
+    Batch,
+    note_unchecked,
+    read_segment,
+    segments_of,
+    warn_once,
+)
 
-SEGMENTS = "segments"
 FINISHED = "tables"
+
+
+class Stored(NamedTuple):
+    """Rows of a table's segments.
+
+    Attributes:
+        rows: their number before the first gap.
+        used: segments before the gap, each with its last sound batch, None without one.
+        unused: the segments behind the gap.
+    """
+
+    rows: int
+    used: dict[Path, Batch | None]
+    unused: list[Path]
 
 
 def parquet_path(folder: Path, experiment: str, run: int, table: str) -> Path:
@@ -37,60 +59,6 @@ def parquet_path(folder: Path, experiment: str, run: int, table: str) -> Path:
     return place / f"run={run}" / f"{table}.parquet"
 
 
-def segment_path(folder: Path, table: str, number: int) -> Path:
-    """Return the path of a segment of a table."""
-    return folder / SEGMENTS / f"{table}-{number:03d}.arrows"
-
-
-def segments_of(folder: Path, table: str) -> list[tuple[int, Path]]:
-    """Return number and path of each segment of a table, in order."""
-    found = (folder / SEGMENTS).glob(f"{table}-*.arrows")
-    return sorted((int(path.stem.removeprefix(f"{table}-")), path) for path in found)
-
-
-def batch_ends(path: Path, schema: pa.Schema) -> list[tuple[int, range]]:
-    """Return the end of each complete batch of a segment, and its record numbers.
-
-    Raises:
-        RunFolderError: the segment is of another version of its table, or the disk
-            fails.
-    """
-    return [(end, _numbers(batch)) for end, batch in _batches(path, schema)]
-
-
-def _numbers(batch: pa.RecordBatch) -> range:
-    """Return the record numbers of a batch; they are consecutive."""
-    first = batch["record"][0].as_py() if batch.num_rows else 0
-    return range(first, first + batch.num_rows)
-
-
-def _batches(path: Path, schema: pa.Schema) -> Iterator[tuple[int, pa.RecordBatch]]:
-    """Yield the end of each complete batch of a segment, and the batch."""
-    try:
-        source = pa.OSFile(str(path))
-    except OSError as error:
-        raise RunFolderError(f"{path}: cannot be read: {error.strerror}") from None
-    with source, contextlib.suppress(pa.ArrowInvalid, OSError, MemoryError):
-        # A truncated or damaged tail raises one of these; the batches before are whole.
-        reader = pa.ipc.open_stream(source)
-        if not is_earlier(reader.schema, schema):
-            raise RunFolderError(
-                f"{path}: was written by another version of Revolve: finish the run "
-                "with that version"
-            )
-        for batch in reader:
-            yield source.tell(), _whole(batch, schema)
-
-
-def _whole(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
-    """Return a batch with all columns of its table."""
-    if batch.schema.names == schema.names:
-        return batch
-    columns = completed(pa.Table.from_batches([batch]), schema).columns
-    arrays = [column.combine_chunks() for column in columns]
-    return pa.RecordBatch.from_arrays(arrays, schema=schema)
-
-
 def stored_batches(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
     """Yield the rows of a table's segments up to the first gap.
 
@@ -104,9 +72,9 @@ def stored_batches(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
     Raises:
         RunFolderError: a segment of another version.
     """
-    for _, batch in _chain(folder, table):
-        if batch is not None:
-            yield batch
+    for _, batch, new in _chain(folder, table):
+        if new:
+            yield batch.rows.slice(batch.rows.num_rows - new)
 
 
 def batches_by_island(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
@@ -132,43 +100,87 @@ def batches_by_island(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
             yield pa.RecordBatch.from_arrays(columns, schema=TABLES[table])
 
 
-def stored_rows(folder: Path, table: str) -> tuple[int, list[tuple[int, Path]]]:
-    """Return the number of rows before the first gap, and the unused segments.
+def stored_rows(folder: Path, table: str) -> Stored:
+    """Return which rows the segments of a table hold.
 
     Raises:
         RunFolderError: a segment of another version.
     """
-    rows, unused = 0, []
-    for index, batch in _chain(folder, table):
-        if batch is None:
-            unused = segments_of(folder, table)[index:]
-        else:
-            rows += batch.num_rows
-    return rows, unused
+    rows = 0
+    paths = [path for _, path in segments_of(folder, table)]
+    used: dict[Path, Batch | None] = dict.fromkeys(paths)
+    for path, batch, new in _chain(folder, table):
+        if new is None:
+            place = paths.index(path)
+            return Stored(rows, {p: used[p] for p in paths[:place]}, paths[place:])
+        used[path] = batch
+        rows += new
+    return Stored(rows, used, [])
 
 
-def _chain(folder: Path, table: str) -> Iterator[tuple[int, pa.RecordBatch | None]]:
-    """Yield (index of the segment, batch); the batch is None at a gap.
+def _chain(folder: Path, table: str) -> Iterator[tuple[Path, Batch, int | None]]:
+    """Yield (segment, batch, number of its rows that are new); None at a gap, the end.
 
-    Duplicate rows are yielded once: a coordinator that was suspended while another
-    took over the run may finish a write. Both copies are equal.
+    Duplicate rows count once: a coordinator that was suspended while another took over
+    the run may finish a write. Both copies are equal.
     """
     rows = 0
-    for index, (_, path) in enumerate(segments_of(folder, table)):
-        for _, batch in _batches(path, TABLES[table]):
-            numbers = _numbers(batch)
+    for _, path in segments_of(folder, table):
+        for batch in read_segment(folder, table, path):
+            numbers = batch.numbers
             if numbers.start > rows:
-                yield index, None
+                warn_once(
+                    f"{path}: rows {rows} to {numbers.start - 1} of {table} are lost; "
+                    "those from there on are left out: to compute them again, resume "
+                    "the run"
+                )
+                yield path, batch, None
                 return
-            if new := max(0, numbers.stop - rows):
-                rows += new
-                yield index, batch.slice(batch.num_rows - new)
+            new = max(0, numbers.stop - rows)
+            rows += new
+            yield path, batch, new
 
 
 def has_rows(folder: Path, table: str) -> bool:
     """Return whether a run has any file of a table."""
     finished = (folder / FINISHED).glob(f"*/*/{table}.parquet")
     return any(finished) or bool(segments_of(folder, table))
+
+
+def finished_path(folder: Path, table: str) -> Path | None:
+    """Return the Parquet file of a table, compared with its digest; None without one.
+
+    Raises:
+        RunFolderError: it is damaged, or lost and no segment is in its place.
+    """
+    if why := damage_of(folder, table):
+        raise RunFolderError(why)
+    found = sorted((folder / FINISHED).glob(f"*/*/{table}.parquet"))
+    return found[0] if found else None
+
+
+def damage_of(folder: Path, table: str) -> str:
+    """Return what is wrong with the Parquet file of a table; empty if nothing is.
+
+    A file of an earlier version has no digest; it must be a Parquet file.
+    """
+    digest = read_seal(folder).digests.get(table)
+    found = sorted((folder / FINISHED).glob(f"*/*/{table}.parquet"))
+    if not found:
+        if not digest or segments_of(folder, table):
+            return ""
+        lost = folder / FINISHED / f"{table}.parquet"
+        return f"{lost}: is lost: resume the run to write it again"
+    why = ""
+    try:
+        if digest is None:
+            note_unchecked(folder)
+            ParquetFile(found[0]).close()
+        elif digest_of(found[0]) != digest:
+            why = "damaged (its SHA-256 is not the one in run.json)"
+    except (ValueError, OSError) as error:
+        why = f"cannot be read: {error}"
+    return f"{found[0]}: {why}: resume the run to write it again" if why else ""
 
 
 def read_table(folder: Path, table: str) -> pa.Table:
@@ -181,18 +193,19 @@ def read_table(folder: Path, table: str) -> pa.Table:
         table: its name, a key of ``TABLES``.
 
     Raises:
-        RunFolderError: no such folder, a file that cannot be read, or one of another
-            version.
+        RunFolderError: no such folder, a file that is damaged or cannot be read, or
+            one of another version.
     """
     if not folder.is_dir():
         raise RunFolderError(f"{folder}: no such folder")
-    finished = sorted((folder / FINISHED).glob(f"*/*/{table}.parquet"))
-    if not finished:
+    path = finished_path(folder, table)
+    if path is None:
         return pa.Table.from_batches(batches_by_island(folder, table), TABLES[table])
     try:
-        return completed(ParquetFile(finished[0]).read(), TABLES[table])
+        with ParquetFile(path, page_checksum_verification=True) as file:
+            return completed(file.read(), TABLES[table])
     except (ValueError, OSError) as error:
-        raise RunFolderError(f"{finished[0]}: cannot be read: {error}") from None
+        raise RunFolderError(f"{path}: cannot be read: {error}") from None
 
 
 def campaign(root: Path, table: str) -> pa.dataset.Dataset:
@@ -206,9 +219,16 @@ def campaign(root: Path, table: str) -> pa.dataset.Dataset:
         A dataset with the table's columns, ``experiment`` and ``run``.
 
     Raises:
-        RunFolderError: no finished run.
+        RunFolderError: no finished run, or a damaged file.
     """
     files = sorted(root.glob(f"**/{FINISHED}/*/*/{table}.parquet"))
     if not files:
         raise RunFolderError(f"{root}: no finished run in this folder or below")
-    return pa.dataset.dataset([str(file) for file in files], partitioning="hive")
+    for file in files:
+        finished_path(file.parents[3], table)
+    options = ParquetFragmentScanOptions(page_checksum_verification=True)
+    return pa.dataset.dataset(
+        [str(file) for file in files],
+        format=ParquetFileFormat(default_fragment_scan_options=options),
+        partitioning="hive",
+    )

@@ -1,8 +1,15 @@
 """Protobuf bytes of requests to advance arena shards, and of their answers."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from schema.errors import MalformedMessage
+from schema.limits import (
+    ADVANCE_BYTES,
+    ADVANCE_REQUEST_BYTES,
+    LIVE_BYTES,
+    LONGEST_REASON,
+    printable,
+)
 from schema.robot.ids import BirthId
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import Advance, Changes
@@ -13,7 +20,9 @@ from schema.wire.arena_messages import (
     changes_to_message,
     checked_digest,
 )
-from schema.wire.messages import birth_from_message, birth_to_message, finite, parsed
+from schema.wire.codec import read_wall_s
+from schema.wire.messages import birth_from_message, birth_to_message
+from schema.wire.parsing import parsed
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +157,7 @@ def decode_advance_request(data: bytes) -> AdvanceRequest:
             rules, a digest of wrong length, an end before the start, a number that
             is not finite.
     """
-    return _request(parsed(data, pb.AdvanceRequest()))
+    return _request(parsed(data, pb.AdvanceRequest(), ADVANCE_REQUEST_BYTES))
 
 
 def encode_advance_answer(answer: AdvanceAnswer) -> bytes:
@@ -166,14 +175,18 @@ def encode_advance_answer(answer: AdvanceAnswer) -> bytes:
     return message.SerializeToString(deterministic=True)
 
 
-def decode_advance_answer(data: bytes) -> AdvanceAnswer:
-    """Return the answer of some bytes.
+def decode_advance_answer(data: bytes, most: int = ADVANCE_BYTES) -> AdvanceAnswer:
+    """Return the answer of some bytes; reasons are cut.
+
+    Args:
+        data: the bytes.
+        most: number of bytes that it may have.
 
     Raises:
-        MalformedMessage: not an answer's bytes, no result, a digest of wrong length,
-            a number that is not finite.
+        MalformedMessage: not an answer's bytes, too many of them, no result, a digest
+            of wrong length, a number that is not finite, a negative duration.
     """
-    return _answer(parsed(data, pb.AdvanceAnswer()))
+    return _answer(parsed(data, pb.AdvanceAnswer(), most))
 
 
 def encode_live(live: Live) -> bytes:
@@ -189,7 +202,7 @@ def decode_live(data: bytes) -> Live:
     Raises:
         MalformedMessage: other bytes, or an advance that breaks its rules.
     """
-    return _live(parsed(data, pb.Live()))
+    return _live(parsed(data, pb.Live(), LIVE_BYTES))
 
 
 def _live(message: pb.Live) -> Live:
@@ -233,12 +246,18 @@ def _answer(message: pb.AdvanceAnswer) -> AdvanceAnswer:
     result = message.WhichOneof("result")
     if result is None or (result == "needs_state" and not message.needs_state):
         raise MalformedMessage("answer: must hold an advance or need a state")
+    advance: Advance | None = None
+    if result == "advance":
+        advance = advance_from_message(message.advance)
+        fallen = tuple(
+            replace(one, reason=printable(one.reason, LONGEST_REASON))
+            for one in advance.casualties
+        )
+        advance = replace(advance, casualties=fallen)
     return AdvanceAnswer(
         epoch=message.epoch,
         number=message.number,
-        wall_s=finite(message.wall_s, "answer.wall_s"),
-        advance=(
-            advance_from_message(message.advance) if result == "advance" else None
-        ),
+        wall_s=read_wall_s(message),
+        advance=advance,
         snapshot=message.snapshot,
     )

@@ -4,6 +4,7 @@
 """
 
 from schema.errors import MalformedMessage
+from schema.limits import LONGEST_REASON, printable
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import (
     Advance,
@@ -94,7 +95,7 @@ def advance_to_message(advance: Advance) -> pb.Advance:
         message.casualties.add(
             birth=birth_to_message(fallen.birth),
             step=fallen.step,
-            reason=fallen.reason,
+            reason=printable(fallen.reason, LONGEST_REASON),
             place=vector_to_message(fallen.place),
         )
     for touch in advance.touches:

@@ -6,10 +6,21 @@ part types are checked by ``schema.robot.robot.check_robot``.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 
 from schema.errors import MalformedMessage
 from schema.experiment.identity import NO_IDENTITY, Identity
+from schema.limits import (
+    ADVANCE_REQUEST_BYTES,
+    ANSWER_BYTES,
+    LONGEST_REASON,
+    LONGEST_WALL_S,
+    MOST_PARTS,
+    PAIR_BYTES,
+    REQUEST_BYTES,
+    ROBOT_BYTES,
+    printable,
+)
 from schema.robot.genome import Genome
 from schema.robot.results import Evaluation, Report
 from schema.robot.robot import Robot
@@ -22,11 +33,13 @@ from schema.wire.messages import (
     genome_to_message,
     identity_from_message,
     identity_to_message,
-    parsed,
     robot_from_message,
     vector_from_message,
     write_brain,
 )
+from schema.wire.parsing import parsed, require_most
+
+_MOST_PAIRS = MOST_PARTS * (MOST_PARTS - 1) // 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +109,7 @@ def decode_robot(data: bytes) -> Robot:
         MalformedMessage: not a robot's bytes, parts that are not a tree, or a brain
             that breaks its rules.
     """
-    return robot_from_message(parsed(data, pb.Robot()))
+    return robot_from_message(parsed(data, pb.Robot(), ROBOT_BYTES))
 
 
 def decode_body(data: bytes) -> Robot:
@@ -105,7 +118,7 @@ def decode_body(data: bytes) -> Robot:
     Raises:
         MalformedMessage: not a robot's bytes, or parts that are not a tree.
     """
-    return Robot(body_from_message(parsed(data, pb.Robot())))
+    return Robot(body_from_message(parsed(data, pb.Robot(), ROBOT_BYTES)))
 
 
 def encode_genome(genome: Genome) -> bytes:
@@ -121,7 +134,7 @@ def decode_genome(data: bytes) -> Genome:
         MalformedMessage: not a genome's bytes, nodes that are not a tree, an unknown
             neuron type or layer, a number that is not finite.
     """
-    return genome_from_message(parsed(data, pb.Genome()))
+    return genome_from_message(parsed(data, pb.Genome(), ROBOT_BYTES))
 
 
 def encode_request(
@@ -166,7 +179,7 @@ def decode_request(
     Raises:
         MalformedMessage: not a request's bytes, or its robot is malformed.
     """
-    message = parsed(data, pb.Request())
+    message = parsed(data, pb.Request(), REQUEST_BYTES)
     has_identity = message.HasField("identity")
     return Request(
         run=message.run,
@@ -188,66 +201,63 @@ def is_advance_request(data: bytes) -> bool:
         MalformedMessage: bytes that are no request of either kind.
     """
     # Only a request about an arena has changes, even if they are empty.
-    return parsed(data, pb.AdvanceRequest()).HasField("changes")
+    message = parsed(data, pb.AdvanceRequest(), ADVANCE_REQUEST_BYTES)
+    return message.HasField("changes")
 
 
 def encode_answer(answer: Answer) -> bytes:
-    """Return the bytes of an answer."""
+    """Return the bytes of an answer; the reason of a failure is cut."""
     message = pb.Answer(epoch=answer.epoch, number=answer.number, wall_s=answer.wall_s)
     if isinstance(answer.result, Report):
         write_report(answer.result, message.report)
     elif isinstance(answer.result, Evaluation):
         message.evaluation.CopyFrom(evaluation_to_message(answer.result))
     else:
-        message.failure = answer.result
+        message.failure = printable(answer.result, LONGEST_REASON)
     return message.SerializeToString(deterministic=True)
 
 
-def decode_answer(data: bytes) -> Answer:
-    """Return the answer of some bytes.
-
-    Raises:
-        MalformedMessage: not an answer's bytes, no result, a number that is not
-            finite.
-    """
-    message = parsed(data, pb.Answer())
-    result: Report | Evaluation | str
-    match message.WhichOneof("result"):
-        case "report":
-            result = report_from_message(message.report)
-        case "evaluation":
-            result = evaluation_from_message(message.evaluation)
-        case "failure":
-            result = message.failure
-        case _:
-            raise MalformedMessage("answer: has no result")
-    wall_s = finite(message.wall_s, "answer.wall_s")
-    return Answer(message.epoch, message.number, wall_s, result)
-
-
-def decode_answer_to(
-    data: bytes, *, epoch: int, number: int, unfit: type[Report | Evaluation]
-) -> Answer:
-    """Return the answer of some bytes to a certain request.
+def decode_answer(data: bytes, pairs: int = _MOST_PAIRS) -> Answer:
+    """Return the answer of some bytes; the reason of a failure is cut.
 
     Args:
         data: the bytes.
-        epoch: of the request.
-        number: of the request.
-        unfit: type of result that this kind of request cannot have.
+        pairs: number of intersections that a report may have.
 
     Raises:
-        MalformedMessage: not an answer; the answer to another request or kind of it.
+        MalformedMessage: not an answer's bytes, too many of them, no result, a number
+            that is not finite, a negative duration.
     """
-    answer = decode_answer(data)
-    if (answer.epoch, answer.number) != (epoch, number):
+    message = parsed(data, pb.Answer(), ANSWER_BYTES + pairs * PAIR_BYTES)
+    result: Report | Evaluation | str
+    match message.WhichOneof("result"):
+        case "report":
+            require_most(len(message.report.intersections), pairs, "intersections")
+            result = report_from_message(message.report)
+            if result.reason:
+                reason = printable(result.reason, LONGEST_REASON)
+                result = replace(result, reason=reason)
+        case "evaluation":
+            result = evaluation_from_message(message.evaluation)
+        case "failure":
+            result = printable(message.failure, LONGEST_REASON)
+        case _:
+            raise MalformedMessage("answer: has no result")
+    return Answer(message.epoch, message.number, read_wall_s(message), result)
+
+
+def read_wall_s(message: pb.Answer | pb.AdvanceAnswer) -> float:
+    """Return the duration of an answer [s].
+
+    Raises:
+        MalformedMessage: it is negative, too long or not a number.
+    """
+    wall_s = message.wall_s
+    if not 0.0 <= wall_s <= LONGEST_WALL_S:
         raise MalformedMessage(
-            f"answer must be to (epoch, job) {(epoch, number)}, "
-            f"got {(answer.epoch, answer.number)}"
+            f"answer.wall_s: must be in [0, {LONGEST_WALL_S:g}], got {wall_s}"
         )
-    if isinstance(answer.result, unfit):
-        raise MalformedMessage(f"the answer is of type {unfit.__name__}")
-    return answer
+    return wall_s
 
 
 def write_report(report: Report, message: pb.Report) -> None:

@@ -5,12 +5,10 @@
 
 import math
 from collections.abc import Sequence
-from typing import TypeVar
-
-from google.protobuf.message import DecodeError, Message
 
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.identity import Identity, Origin
+from schema.limits import MOST_CONNECTIONS, MOST_NEURONS, MOST_PARTS
 from schema.parts import Vector
 from schema.robot.brain import (
     NEURON_TYPES,
@@ -32,8 +30,7 @@ from schema.robot.genome import (
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot, check_tree
 from schema.wire import revolve_pb2 as pb
-
-M = TypeVar("M", bound=Message)
+from schema.wire.parsing import require_most
 
 _LAYER_CODES: dict[Layer, pb.Layer] = {
     "input": pb.LAYER_INPUT,
@@ -41,20 +38,6 @@ _LAYER_CODES: dict[Layer, pb.Layer] = {
     "hidden": pb.LAYER_HIDDEN,
 }
 _LAYERS: dict[int, Layer] = {int(code): name for name, code in _LAYER_CODES.items()}
-
-
-def parsed(data: bytes, message: M) -> M:
-    """Return a message with the content of some bytes.
-
-    Raises:
-        MalformedMessage: not the bytes of such a message.
-    """
-    try:
-        message.ParseFromString(data)
-    except DecodeError as error:
-        name = message.DESCRIPTOR.name
-        raise MalformedMessage(f"not the bytes of a {name}: {error}") from None
-    return message
 
 
 def robot_to_message(robot: Robot) -> pb.Robot:
@@ -88,8 +71,9 @@ def body_from_message(message: pb.Robot) -> tuple[Part, ...]:
     """Return the body of a message; its brain is not read.
 
     Raises:
-        MalformedMessage: parts that are not a tree.
+        MalformedMessage: parts that are not a tree, or too many.
     """
+    require_most(len(message.parts), MOST_PARTS, "Robot.parts")
     parts = tuple(map(_part_from_message, message.parts))
     _require_tree(parts, "Robot")
     return parts
@@ -115,8 +99,11 @@ def read_brain(message: pb.Robot | pb.BrainChange, part_count: int) -> Brain:
     """Return the brain of a message that has neurons and connections.
 
     Raises:
-        MalformedMessage: a brain that breaks its rules, or an unknown layer.
+        MalformedMessage: a brain that breaks its rules or is too large, or an unknown
+            layer.
     """
+    require_most(len(message.neurons), MOST_NEURONS, "neurons")
+    require_most(len(message.connections), MOST_CONNECTIONS, "connections")
     brain = Brain(
         neurons=tuple(
             Neuron(_layer(item.layer), item.kind, item.part, tuple(item.parameters[:]))
@@ -171,9 +158,15 @@ def genome_from_message(message: pb.Genome) -> Genome:
     """Return the genome of a message.
 
     Raises:
-        MalformedMessage: nodes that are not a tree, an unknown neuron type or layer, a
-            number that is not finite.
+        MalformedMessage: nodes that are not a tree, too many nodes, neurons or
+            connections, an unknown neuron type or layer, a number that is not finite.
     """
+    nodes = message.nodes
+    require_most(len(nodes), MOST_PARTS, "Genome.nodes")
+    neurons = sum(len(node.outputs) + len(node.hidden) for node in nodes)
+    require_most(neurons, MOST_NEURONS, "neurons")
+    edges = sum(len(node.connections) for node in nodes)
+    require_most(edges, MOST_CONNECTIONS, "connections")
     parts = tuple(_part_from_message(item.part) for item in message.nodes)
     _require_tree(parts, "Genome")
     return assemble(parts, lambda index: _genes(message.nodes[index]))

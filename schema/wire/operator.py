@@ -4,7 +4,14 @@ from typing import Annotated
 
 from msgspec import Meta
 from msgspec.msgpack import Decoder, encode
+from msgspec.structs import replace
 
+from schema.limits import (
+    LONGEST_NAME,
+    OPERATOR_REPLY_BYTES,
+    OPERATOR_REQUEST_BYTES,
+    printable_lines,
+)
 from schema.robot.ids import BirthId, IslandNumber
 from schema.wire.codec import decode_robot
 from schema.wire.packing import Finite, Message, unpack
@@ -84,10 +91,10 @@ class OperatorRequest(Message, frozen=True):
         run: last part of the run folder's path, which selects one of several runs.
     """
 
-    request_id: Annotated[str, Meta(min_length=1)]
+    request_id: Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
     island: IslandNumber
     action: OperatorAction
-    run: str = ""
+    run: Annotated[str, Meta(max_length=LONGEST_NAME)] = ""
 
 
 class OperatorReply(Message, frozen=True):
@@ -122,7 +129,7 @@ def decode_operator_request(data: bytes) -> OperatorRequest:
         MalformedMessage: not a request's bytes, an empty request_id, an unknown
             action, a robot that breaks its rules, a place that is not finite.
     """
-    request = unpack(_REQUEST, data)
+    request = unpack(_REQUEST, data, OPERATOR_REQUEST_BYTES)
     if isinstance(request.action, InsertRobot | SetBrain):
         decode_robot(request.action.robot)
     return request
@@ -134,9 +141,11 @@ def encode_operator_reply(reply: OperatorReply) -> bytes:
 
 
 def decode_operator_reply(data: bytes) -> OperatorReply:
-    """Return the reply of some bytes.
+    """Return the reply of some bytes; its text is safe to print.
 
     Raises:
-        MalformedMessage: not a reply's bytes, or a number that is not finite.
+        MalformedMessage: not a reply's bytes, too many of them, or a number that is
+            not finite.
     """
-    return unpack(_REPLY, data)
+    reply = unpack(_REPLY, data, OPERATOR_REPLY_BYTES)
+    return replace(reply, text=printable_lines(reply.text))

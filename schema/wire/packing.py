@@ -30,12 +30,21 @@ def fingerprint(data: bytes) -> bytes:
     return blake2b(data, digest_size=8).digest()
 
 
-def unpack(decoder: Decoder[T], data: bytes) -> T:
+def unpack(decoder: Decoder[T], data: bytes, most: int) -> T:
     """Return the message of some bytes.
 
+    Args:
+        decoder: of the type of message.
+        data: the bytes.
+        most: number of bytes that such a message may have.
+
     Raises:
-        MalformedMessage: not the bytes of such a message.
+        MalformedMessage: not the bytes of such a message, or too many.
     """
+    if len(data) > most:
+        raise MalformedMessage(
+            f"message: must be <= {most} bytes, got {len(data)}", "too large"
+        )
     try:
         return decoder.decode(data)
     except ValueError as error:  # of msgspec, or text that is not UTF-8

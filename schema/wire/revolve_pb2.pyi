@@ -225,20 +225,26 @@ class Death(_message.Message):
     def __init__(self, agent: _Optional[str] = ..., run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., cause: _Optional[str] = ..., request: _Optional[bytes] = ...) -> None: ...
 
 class AgentInfo(_message.Message):
-    __slots__ = ("agent", "kind", "slots", "platform", "version", "deaths")
+    __slots__ = ("agent", "kind", "slots", "platform", "version", "deaths", "shards", "cores", "quiet_s")
     AGENT_FIELD_NUMBER: _ClassVar[int]
     KIND_FIELD_NUMBER: _ClassVar[int]
     SLOTS_FIELD_NUMBER: _ClassVar[int]
     PLATFORM_FIELD_NUMBER: _ClassVar[int]
     VERSION_FIELD_NUMBER: _ClassVar[int]
     DEATHS_FIELD_NUMBER: _ClassVar[int]
+    SHARDS_FIELD_NUMBER: _ClassVar[int]
+    CORES_FIELD_NUMBER: _ClassVar[int]
+    QUIET_S_FIELD_NUMBER: _ClassVar[int]
     agent: str
     kind: str
     slots: int
     platform: str
     version: str
     deaths: _containers.RepeatedCompositeFieldContainer[Death]
-    def __init__(self, agent: _Optional[str] = ..., kind: _Optional[str] = ..., slots: _Optional[int] = ..., platform: _Optional[str] = ..., version: _Optional[str] = ..., deaths: _Optional[_Iterable[_Union[Death, _Mapping]]] = ...) -> None: ...
+    shards: int
+    cores: int
+    quiet_s: float
+    def __init__(self, agent: _Optional[str] = ..., kind: _Optional[str] = ..., slots: _Optional[int] = ..., platform: _Optional[str] = ..., version: _Optional[str] = ..., deaths: _Optional[_Iterable[_Union[Death, _Mapping]]] = ..., shards: _Optional[int] = ..., cores: _Optional[int] = ..., quiet_s: _Optional[float] = ...) -> None: ...
 
 class Provenance(_message.Message):
     __slots__ = ("agent", "platform", "wall_s")

@@ -13,6 +13,7 @@ from typing import Any
 from msgspec.msgpack import Decoder, encode
 
 from schema.experiment.section import Count
+from schema.limits import UPDATE_BYTES
 from schema.robot.ids import BirthId, IslandNumber
 from schema.robot.robot import Part, Robot
 from schema.wire.codec import decode_body, encode_body
@@ -152,7 +153,7 @@ def decode_update(data: bytes) -> Update:
         MalformedMessage: not an update's bytes, a body that is not a tree of parts,
             a number that is not finite.
     """
-    update = unpack(_UPDATE, data)
+    update = unpack(_UPDATE, data, UPDATE_BYTES)
     for birth in update.births:
         if birth.body is not None:
             decode_body(birth.body)

@@ -56,7 +56,7 @@ class TimedNetwork:
     def __init__(self, network: Network) -> None:
         self.busy_s = 0.0
         self.send = network.send
-        self.cancel = network.cancel
+        self.cancel, self.ask = network.cancel, network.ask
         self._network = network
 
     def receive(

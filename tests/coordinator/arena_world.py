@@ -1,7 +1,7 @@
 """World without physics: fitness is a function, and robots only have a place."""
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -41,6 +41,7 @@ CROWDED = Report(
 )  # fmt: skip
 PROVENANCE = Provenance("worker-1", "x86", 0.5)
 DT = 0.005
+POSE_STEPS = 40
 MATURE = 3000
 """Steps of 15 s: 3 s of warm-up and a window of 12 s."""
 
@@ -129,13 +130,16 @@ class World:
         return Judgement(birth, age * DT, 0.0, fitness / 5, fitness, is_mature, place)
 
 
-def poses(births: list[BirthId], time_s: float) -> bytes:
-    """Return a pose for each robot as columns."""
+def poses(
+    births: list[BirthId], *times_s: float, joints: Mapping[BirthId, int] | None = None
+) -> bytes:
+    """Return a pose for each time and robot as columns; one joint by default."""
     schema = POSES.remove(0)
     rows = [
         {"island": one.island, "birth": one.number, "sim_time_s": time_s}
         | dict.fromkeys(("x", "y", "z", "qx", "qy", "qz"), 0.0)
-        | {"qw": 1.0, "angles": [0.5]}
+        | {"qw": 1.0, "angles": [0.5] * (joints[one] if joints else 1)}
+        for time_s in times_s
         for one in births
     ]
     sink = pa.BufferOutputStream()

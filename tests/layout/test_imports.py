@@ -82,6 +82,8 @@ def test_contracts_hold(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(ROOT)
+    # Its configuration would disable all loggers of this process for later tests.
+    monkeypatch.setattr("importlinter.cli._configure_logging", lambda _verbose: None)
     status = lint_imports(config_filename="pyproject.toml", no_cache=True)
     assert status == EXIT_STATUS_SUCCESS, capsys.readouterr().out
 

@@ -1,8 +1,11 @@
 """Program: a worker with correct answers that sends them twice or too late.
 
-Arguments: the address of a hub, and ``twice`` or ``late``. A late worker removes its
-liveliness token while it has a job, answers after the coordinator counts it as lost,
-and joins again. Ends on SIGTERM and prints its behaviour and the number of answers.
+Arguments: the address of a hub, and ``twice``, ``late`` or ``silent``. A late worker
+removes its liveliness token while it has a job, answers after the coordinator counts it
+as lost, and joins again. A silent worker makes some advances of an arena and holds the
+answer to the next one back until that job is cancelled; then it sends the answer, and
+serves as before. Ends on SIGTERM and prints its behaviour and the number of answers; of
+a silent worker, the number of those that it held back.
 """
 
 import signal
@@ -20,12 +23,16 @@ from schema.agent.topics import Member, unique_name
 from schema.wire import revolve_pb2 as pb
 
 GONE_S = 0.3
+GOOD_ANSWERS = 3
+"""Answers of a silent worker before it falls silent."""
 
 
 def main(address: str, behaviour: str) -> None:
     """Serve until SIGTERM."""
     prepare_process()
-    from worker.serve.jobs import answer  # noqa: PLC0415 - imports numpy
+    from worker.serve.jobs import Jobs  # noqa: PLC0415 - imports numpy
+
+    answer = Jobs().answer
 
     stop = threading.Event()
     signal.signal(signal.SIGTERM, lambda *_: stop.set())
@@ -38,19 +45,26 @@ def main(address: str, behaviour: str) -> None:
         slots=1,
         platform=platform_tag(),
         version=agent.version,
+        shards=8,
+        cores=1,
     ).SerializeToString()
     inbox: SimpleQueue[zenoh.Query] = SimpleQueue()
-    count = 0
+    count = held_back = 0
+    is_cancelled = threading.Event()
 
     def reply_info(query: zenoh.Query) -> None:
         with query:
             query.reply(member.info, info)
+
+    def note_cancelled(_: zenoh.Sample) -> None:
+        is_cancelled.set()
 
     with zenoh.open(session_config(client_config(address), member)) as session:
         on_job = zenoh.handlers.Callback(inbox.put, indirect=False)
         on_info = zenoh.handlers.Callback(reply_info)
         _jobs = session.declare_queryable(member.jobs, on_job, complete=True)
         _info = session.declare_queryable(member.info, on_info, complete=True)
+        _cancelled = session.declare_subscriber(member.cancelled, note_cancelled)
         token = session.liveliness().declare_token(member.alive)
         while not stop.is_set():
             try:
@@ -65,13 +79,18 @@ def main(address: str, behaviour: str) -> None:
                     token.undeclare()  # type: ignore[no-untyped-call]
                     # Meanwhile the job is sent to another worker.
                     stop.wait(GONE_S)
+                if behaviour == "silent" and count == GOOD_ANSWERS + 1:
+                    while not (is_cancelled.wait(0.1) or stop.is_set()):
+                        pass
+                    held_back += is_cancelled.is_set()
                 query.reply(member.jobs, data)
                 if behaviour == "twice":
                     query.reply(member.jobs, data)
             if behaviour == "late":
                 stop.wait(GONE_S)
                 token = session.liveliness().declare_token(member.alive)
-    sys.stdout.write(f"{behaviour} {count}\n")
+    number = held_back if behaviour == "silent" else count
+    sys.stdout.write(f"{behaviour} {number}\n")
 
 
 if __name__ == "__main__":

@@ -22,7 +22,8 @@ from coordinator.storage.compare import compare
 from coordinator.storage.folder import EPOCH
 from coordinator.storage.journal import NAME, Journal
 from schema.tables.columns import TABLES
-from schema.tables.files import read_table, segments_of
+from schema.tables.files import read_table
+from schema.tables.segments import segments_of
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
 

@@ -55,6 +55,10 @@ HARMS = {
     "segfault": ("os.kill(os.getpid(), signal.SIGSEGV)", "SIGSEGV"),
     "exit": ("os._exit(3)", "exit with status 3"),
     "hang": ("while True: pass", "use of too much CPU time"),
+    "wait": (
+        "import threading; threading.Event().wait()",
+        "waiting too long without use of CPU time",
+    ),
 }
 QUARANTINED = "quarantined: ended its own process 3 times, by "
 
@@ -83,7 +87,8 @@ def test_robot_that_crashes_three_processes_is_quarantined(
 ) -> None:
     harm, cause = HARMS[kind]
     write_plug_in(workspace, harm)
-    output = workspace.run("run", *WORDS, "--workers", "2", "--out", "run")
+    words = (*WORDS, "--wait-limit", "3") if kind == "wait" else WORDS
+    output = workspace.run("run", *words, "--workers", "2", "--out", "run")
     failed = reasons(workspace.folder / "run")
     assert 1 <= len(failed) <= 3
     assert set(failed.values()) == {f"{QUARANTINED}{cause}"}
@@ -91,6 +96,19 @@ def test_robot_that_crashes_three_processes_is_quarantined(
     assert births.num_rows == 16
     for birth in failed:
         assert f"birth {birth} of island 0: {QUARANTINED}{cause}" in output
+
+
+@pytest.mark.slow
+def test_a_job_that_waits_for_ever_ends_alike_with_one_worker(
+    workspace: Workspace,
+) -> None:
+    write_plug_in(workspace, HARMS["wait"][0])
+    words = (*WORDS, "--wait-limit", "3")
+    for workers in ("1", "3"):
+        workspace.run("run", *words, "--workers", workers, "--out", workers)
+    folder = workspace.folder
+    assert set(reasons(folder / "1").values()) == {f"{QUARANTINED}{HARMS['wait'][1]}"}
+    assert compare(folder / "1", folder / "3") == []
 
 
 def test_external_kills_do_not_lead_to_quarantine(

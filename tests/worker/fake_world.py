@@ -8,9 +8,10 @@ import json
 from typing import Self
 
 from schema.experiment.settings import ArenaSettings
+from schema.parts import BUILT_IN
 from schema.robot.ids import BirthId
 from schema.wire.arena import Advance, Casualty, Changes, Judgement
-from tests.coordinator.arena_world import DT, MATURE, poses
+from tests.coordinator.arena_world import DT, MATURE, POSE_STEPS, poses
 
 
 class FakeWorld:
@@ -25,6 +26,7 @@ class FakeWorld:
         type(self).made += 1
         self.step = 0
         self.born: dict[BirthId, int] = {}
+        self.joints: dict[BirthId, int] = {}
         self.past = "begun"
         self.is_closed = False
 
@@ -32,7 +34,9 @@ class FakeWorld:
     def restore(cls, settings: ArenaSettings, data: bytes, threads: int = 1) -> Self:
         world = cls(settings, threads)
         world.step, born, world.past = json.loads(data)
-        world.born = {BirthId(*name): step for *name, step in born}
+        for island, number, step, joints in born:
+            world.born[BirthId(island, number)] = step
+            world.joints[BirthId(island, number)] = joints
         return world
 
     @property
@@ -44,11 +48,16 @@ class FakeWorld:
             del self.born[birth]
         for each in changes.insertions:
             self.born[each.birth] = self.step
+            self.joints[each.birth] = sum(
+                BUILT_IN[part.kind].shape(part.parameters).joint is not None
+                for part in each.robot.parts
+            )
         self._record(repr((changes.removals, [i.place for i in changes.insertions])))
 
     def advance(self, until: int) -> Advance:
         assert until > self.step
         assert not self.is_closed
+        samples = range(self.step // POSE_STEPS + 1, until // POSE_STEPS + 1)
         self.step = until
         self._record(str(until))
         lost = [one for one in sorted(self.born) if self._chance(one) < 0.01]
@@ -61,11 +70,15 @@ class FakeWorld:
             judgements=tuple(map(self._judgement, living)),
             casualties=tuple(Casualty(o, until, "fell", (0.0, 0.0, 0.1)) for o in lost),
             touches=(),
-            poses=poses(living, until * DT),
+            poses=poses(
+                living,
+                *(one * POSE_STEPS * DT for one in samples),
+                joints=self.joints,
+            ),
         )
 
     def snapshot(self) -> bytes:
-        born = [(*name, step) for name, step in sorted(self.born.items())]
+        born = [(*b, step, self.joints[b]) for b, step in sorted(self.born.items())]
         return json.dumps([self.step, born, self.past]).encode()
 
     def digest(self) -> bytes:
@@ -85,7 +98,8 @@ class FakeWorld:
         age = self.step - self.born[birth]
         fitness = self._chance(birth)
         place = (fitness, -fitness, 0.02)
-        return Judgement(birth, age * DT, 0.0, fitness, fitness, age >= MATURE, place)
+        is_mature = age >= MATURE
+        return Judgement(birth, age * DT, fitness, fitness, fitness, is_mature, place)
 
 
 class OddWorld(FakeWorld):

@@ -24,15 +24,22 @@ class Jobs:
     """Evaluations and arena shards of one worker process."""
 
     def __init__(
-        self, *, threads: int = 1, publish: Callable[[Live], None] = lambda _: None
+        self,
+        *,
+        most_shards: int = 16,
+        threads: int = 1,
+        publish: Callable[[Live], None] = lambda _: None,
     ) -> None:
         """Initialise without shards.
 
         Args:
+            most_shards: arena shards to keep.
             threads: that step clusters of an arena; results do not depend on it.
             publish: called with each advance, for live viewers.
         """
-        self._shards = Shards(World, threads=threads, publish=publish)
+        self._shards = Shards(
+            World, most_held=most_shards, threads=threads, publish=publish
+        )
 
     def answer(self, request: bytes) -> bytes:
         """Return the encoded answer to an encoded request of either kind.

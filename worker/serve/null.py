@@ -8,6 +8,7 @@ import time
 from schema.agent.network import Agent
 from schema.agent.service import serve_as_process
 from schema.agent.supervision import ProcessSlot
+from schema.experiment.settings import read_evaluation_settings
 from schema.robot.results import Evaluation
 from schema.wire import revolve_pb2 as pb
 from schema.wire.codec import Answer, encode_answer
@@ -22,7 +23,9 @@ def answer(request: bytes) -> bytes:
     The robot is not decoded, as decoding is part of an evaluation.
     """
     job = pb.Request.FromString(request)
-    nothing = Evaluation(0.0, 0.0, 0.0, 0.0)
+    clock = read_evaluation_settings(job.settings).simulation
+    steps = job.steps or clock.warmup_steps + clock.window_steps
+    nothing = Evaluation(0.0, 0.0, 0.0, steps * clock.timestep_s)
     return encode_answer(Answer(job.epoch, job.number, 0.0, nothing))
 
 

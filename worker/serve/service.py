@@ -22,5 +22,5 @@ def process(agent: Agent, slot: ProcessSlot) -> None:
         if outlet.has_listeners(key):
             outlet.put(key, encode_live(live))
 
-    jobs = Jobs(threads=agent.threads, publish=publish)
+    jobs = Jobs(most_shards=own.shards, threads=own.threads, publish=publish)
     serve_as_process(jobs.answer, own, slot, outlet)

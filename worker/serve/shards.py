@@ -29,9 +29,6 @@ from schema.wire.arena_codec import (
 )
 from worker.arena.births import possible
 
-MOST_HELD = 16
-"""Shards that one process keeps; the least recently used is dropped first."""
-
 Key = tuple[str, int]
 """Name of a shard: its run and its number."""
 
@@ -86,6 +83,7 @@ class Shards:
         self,
         world: type[World],
         *,
+        most_held: int = 16,
         threads: int = 1,
         publish: Callable[[Live], None] = lambda _: None,
     ) -> None:
@@ -93,10 +91,12 @@ class Shards:
 
         Args:
             world: class of the arenas.
+            most_held: shards to keep; the least recently used is dropped first.
             threads: that step clusters of an arena; results do not depend on it.
             publish: called with each advance, for live viewers.
         """
         self._world = world
+        self._most_held = most_held
         self._threads = threads
         self._publish = publish
         self._held: OrderedDict[Key, _Held] = OrderedDict()
@@ -151,7 +151,7 @@ class Shards:
 
     def _keep(self, key: Key, held: _Held) -> None:
         self._held[key] = held
-        if len(self._held) > MOST_HELD:
+        if len(self._held) > self._most_held:
             self._held.popitem(last=False)[1].world.close()
 
     def _rebuilt(self, job: AdvanceRequest, rebuild: Rebuild) -> World:

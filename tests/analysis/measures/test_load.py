@@ -13,7 +13,8 @@ import pytest
 from analysis.measures.load import Run, read_runs, read_tables
 from analysis.measures.study import MeasuredRun, measure_run, measure_runs
 from schema.errors import RunFolderError
-from schema.tables.files import parquet_path, segment_path
+from schema.tables.files import parquet_path
+from schema.tables.segments import segment_path
 from tests.analysis.tables import births, population, table
 
 A, B, C = ((0, number) for number in range(3))

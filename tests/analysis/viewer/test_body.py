@@ -6,13 +6,17 @@ import mujoco
 import numpy as np
 import pytest
 
-from analysis.viewer.body import box_model, neutral_pose, place
+from analysis.viewer.body import box_model, neutral_pose, place, place_rows
+from schema.errors import MalformedMessage
 from schema.experiment.document import Simulation
 from schema.mjcf.model import robot_spec
 from schema.parts import BUILT_IN
 from schema.robot.brain import Brain
+from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
+from schema.tables.columns import read_columns
+from tests.coordinator.arena_world import poses
 
 GREY = (0.2, 0.4, 0.6)
 ROBOT = Robot(
@@ -123,3 +127,18 @@ def test_a_standing_robot_touches_the_ground() -> None:
     assert corners[:, 2].min() == pytest.approx(0.0, abs=1e-6)
     core = int(np.argmax(drawn.half_sizes.prod(axis=1)))
     assert centres[0, core] == pytest.approx((2.0, -1.0, built.height), abs=1e-6)
+
+
+def test_poses_of_another_body_are_refused() -> None:
+    """Angles of another number made NumPy fail, or shifted all of a robot's."""
+    kinds = [Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5))]
+    kinds += [Part("ActiveHinge", 0, slot, 0, 0, (0.5, 0.5, 0.5)) for slot in (0, 1)]
+    model = box_model(Robot(tuple(kinds)), BUILT_IN, is_plain=True)
+    births = [BirthId(0, 0), BirthId(0, 1)]
+    for joints in ((1, 1), (1, 3), (2, 1)):
+        rows = dict(zip(births, joints, strict=True))
+        columns = read_columns("poses", poses(births, 0.2, joints=rows))
+        with pytest.raises(MalformedMessage, match="must have 2 angles each"):
+            place_rows(model, columns)
+    two = read_columns("poses", poses(births, 0.2, joints=dict.fromkeys(births, 2)))
+    assert place_rows(model, two)[0].shape[0] == 2

@@ -5,16 +5,20 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pyarrow as pa
 import pytest
 from msgspec.structs import replace
 
 from analysis.viewer.live import Ended, LiveMessage
 from analysis.viewer.output import Output
 from analysis.viewer.watch import LiveView, watch
-from schema.errors import NetworkError
+from schema.errors import MalformedMessage, NetworkError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId
+from schema.wire.arena import Advance
+from schema.wire.arena_codec import Live
 from schema.wire.updates import Birth, Update
+from tests.coordinator.arena_world import poses
 
 
 def news(sequence: int, *births: tuple[int, int]) -> Update:
@@ -97,3 +101,34 @@ def test_births_count_once_on_every_island() -> None:
     view = LiveView(ignored, "a/run")
     view.tell([WHOLE, news(2, (1, 0), (0, 2)), news(2, (1, 0), (0, 2)), news(3)])
     assert view.births == 4
+
+
+def test_poses_that_fit_no_robot_are_dropped() -> None:
+    """They are published best effort, by any worker."""
+    moved: list[int] = []
+
+    class Fussy:
+        """Show that refuses the poses of three robots."""
+
+        def move(self, arena: int, poses: pa.Table, *, has_all: bool) -> None:
+            assert has_all
+            if poses.num_rows == 3:
+                raise MalformedMessage("poses: must have 2 angles each")
+            moved.append(arena)
+
+    show: Any = Fussy()
+    view = LiveView(show, "a/run")
+
+    def live(shard: int, columns: bytes) -> Live:
+        advance = Advance(1, bytes(32), (), (), (), columns)
+        return Live("a/run", shard, advance)
+
+    births = [BirthId(0, number) for number in range(3)]
+    view.tell(
+        [
+            live(1, poses(births, 0.2)),
+            live(2, b"\xff" * 200),
+            live(3, poses(births[:2], 0.2)),
+        ]
+    )
+    assert moved == [3]

@@ -7,9 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.dispatch.dispatch import MAX_DEATHS, MAX_ERRORS, VETS_AT_HAND, Dispatch
+from coordinator.dispatch.deadlines import FIRST_S, PATIENCE
+from coordinator.dispatch.dispatch import (
+    LEAST_S,
+    MAX_DEATHS,
+    MAX_ERRORS,
+    VETS_AT_HAND,
+    Dispatch,
+)
 from coordinator.dispatch.events import (
     AgentKind,
+    Ask,
     Assign,
     Cancel,
     Client,
@@ -21,6 +29,8 @@ from coordinator.dispatch.events import (
     JobKind,
     Joined,
     Left,
+    Overdue,
+    Progressed,
     Requested,
     Returned,
     Ticked,
@@ -28,11 +38,10 @@ from coordinator.dispatch.events import (
 )
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.dispatch.pool import (
-    LEAST_S,
     LONGEST_REST_S,
     MOST_AHEAD,
-    PATIENCE,
     PAUSE_S,
+    REPLY_S,
     REST_S,
 )
 from schema.errors import UnexpectedEvent
@@ -369,6 +378,77 @@ def test_no_agent_gets_a_copy_of_a_job_that_it_has_or_failed_at() -> None:
     assert given_out(dispatch.handle(Ticked(199.0))) == []
 
 
+def test_first_job_of_all_is_duplicated_though_no_duration_is_known() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0), worker("b"))
+    assert dispatch.handle(Ticked(FIRST_S)) == []
+    assert given_out(dispatch.handle(Ticked(FIRST_S + 0.3))) == [(0, "b")]
+
+
+def silent(dispatch: Dispatch, now_s: float) -> list[DispatchCommand]:
+    """Let agents be asked from a time on, and not answer; return what follows."""
+    asked = dispatch.handle(Ticked(now_s))
+    assert {type(command) for command in asked} <= {Ask}
+    return dispatch.handle(Ticked(now_s + REPLY_S + 0.3))
+
+
+def test_further_copies_need_silent_agents_and_twice_the_time() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0), worker("b"))
+    dispatch.handle(Ticked(FIRST_S + 1.0))
+    dispatch.handle(worker("c"))
+    dispatch.handle(worker("d"))
+    at_s = FIRST_S + 1.0 + 2 * FIRST_S
+    assert dispatch.handle(Ticked(at_s - 1.0)) == []
+    assert dispatch.handle(Ticked(at_s)) == [Ask("a"), Ask("b")]
+    # The second one works: the third has no cause to help.
+    dispatch.handle(Progressed("b"))
+    assert dispatch.handle(Ticked(at_s + REPLY_S + 1.0)) == []
+    assert silent(dispatch, at_s + 2 * FIRST_S + 1.0) == [
+        Overdue("a", at_s + 2 * FIRST_S + REPLY_S + 1.3, "c"),
+        Overdue("b", 4 * FIRST_S + REPLY_S + 1.3, "c"),
+        Assign(job(0), "c"),
+    ]
+    # The third copy has four times as long.
+    at_s += 2 * FIRST_S + REPLY_S + 1.3
+    assert dispatch.handle(Ticked(at_s + 4 * FIRST_S - 1.0)) == []
+    assert given_out(silent(dispatch, at_s + 4 * FIRST_S)) == [(0, "d")]
+
+
+def test_user_is_told_once_of_a_silent_agent_without_a_substitute() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0, 1))
+    assert dispatch.handle(Ticked(FIRST_S)) == []
+    waited_s = 2 * FIRST_S + REPLY_S + 0.3
+    assert silent(dispatch, 2 * FIRST_S) == [Overdue("a", waited_s)]
+    for more in range(1, 9):
+        assert given_out(silent(dispatch, (2 + more) * FIRST_S)) == []
+        assert not any(
+            isinstance(command, Overdue)
+            for command in silent(dispatch, (2.5 + more) * FIRST_S)
+        )
+    # It was only slow; if it falls silent again, the user is told again.
+    dispatch.handle(ok(0, "a"))
+    assert [type(each) for each in silent(dispatch, 9000.0)] == [Overdue]
+
+
+def test_an_agent_that_works_is_never_called_silent() -> None:
+    dispatch = told(Ticked(0.0), worker("a"), *requests(0))
+    for minute in range(1, 100):
+        commands = dispatch.handle(Ticked(FIRST_S * minute + 1.0))
+        assert {type(command) for command in commands} <= {Ask}
+        if commands:
+            dispatch.handle(Progressed("a"))
+
+
+def test_late_answers_are_counted() -> None:
+    dispatch = late()
+    dispatch.handle(Ticked(9.0))
+    dispatch.handle(ok(1, "b"))
+    assert dispatch._faults.total("late") == 0
+    dispatch.handle(ok(1, "a"))
+    assert dispatch._faults.total("late") == 1
+    dispatch.handle(ok(1, "a"))
+    assert dispatch._faults.total("late") == 2
+
+
 def test_job_that_crashed_three_processes_is_given_up() -> None:
     dispatch = told(worker("a"), worker("b"), *requests(0))
     for number, name in enumerate(("a", "b")):
@@ -461,6 +541,9 @@ class World:
 
     def tell(self, event: DispatchEvent) -> None:
         for command in self.dispatch.handle(event):
+            if isinstance(command, Ask | Overdue):
+                assert command.agent in self.agents
+                continue
             number, agent = command.job.number, command.agent
             if isinstance(command, Deliver):
                 assert number not in {*self.delivered, *self.withdrawn}
@@ -471,7 +554,8 @@ class World:
                 assert number in self.held[agent]
                 continue
             assert number not in {*self.delivered, *self.withdrawn}
-            assert sum(number in held for held in self.held.values()) < 2
+            copies = sum(number in held for held in self.held.values())
+            assert copies < 2 or self.now_s > FIRST_S
             assert number not in self.held[agent]
             kind: AgentKind = "analyzer" if command.job.kind == "vet" else "worker"
             assert self.agents[agent].kind == kind
@@ -555,6 +639,10 @@ class World:
     def lose(self) -> None:
         self.give_back("lost")
 
+    def report(self) -> None:
+        """An agent reports progress; it may have left."""
+        self.tell(Progressed(self.random.choice([*sorted(self.agents), "nobody"])))
+
     def die(self) -> None:
         """An agent dies of a job that may be long done."""
         if self.jobs:
@@ -563,7 +651,7 @@ class World:
             self.tell(died(number, self.killed[number][-1]))
 
     def tick(self) -> None:
-        self.now_s += self.random.choice((0.1, 0.3, 3.0))
+        self.now_s += self.random.choice((0.1, 0.3, 3.0, 30.0))
         self.tell(Ticked(self.now_s))
 
     def repeat(self) -> None:
@@ -592,6 +680,7 @@ ACTIONS = ["request"] * 3 + [
     "fail",
     "lose",
     "die",
+    "report",
     "tick",
     "tick",
     "repeat",

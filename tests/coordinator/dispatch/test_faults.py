@@ -1,7 +1,7 @@
 """Counts of faults: by kind and peer, limited, in printable lines."""
 
 from coordinator.dispatch.faults import OTHERS, FaultCount, PeerFaults
-from schema.limits import MOST_PEERS, MOST_REASON, MOST_SHOWN
+from schema.limits import LONGEST_REASON, MOST_PEERS, MOST_SHOWN
 
 
 def test_faults_are_counted_by_kind_and_peer_and_told_once() -> None:
@@ -16,7 +16,11 @@ def test_faults_are_counted_by_kind_and_peer_and_told_once() -> None:
     )
     assert (faults.total("late"), faults.total("refused")) == (3, 0)
     lines = faults.lines()
-    assert [line.partition(":")[0] for line in lines] == ["a", "a", "b"]
+    assert [line.split(": ")[:2] for line in lines] == [
+        ["late", "a"],
+        ["malformed", "a"],
+        ["late", "b"],
+    ]
     assert "(job 7)" in lines[0]
     faults.note("late", "a")
     assert faults.lines() == []
@@ -39,6 +43,6 @@ def test_names_and_details_are_cut_and_printable() -> None:
     (counted,) = faults.counts
     (line,) = faults.lines()
     assert len(counted.peer) == MOST_SHOWN
-    assert len(line) < MOST_SHOWN + MOST_REASON + 100
+    assert len(line) < MOST_SHOWN + LONGEST_REASON + 100
     assert counted.peer.isprintable()
     assert line.isprintable()

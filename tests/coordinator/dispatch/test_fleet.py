@@ -4,6 +4,7 @@ from typing import Literal
 
 import pytest
 
+from coordinator.dispatch.deadlines import FIRST_S
 from coordinator.dispatch.events import (
     AssignShard,
     Client,
@@ -20,6 +21,7 @@ from coordinator.dispatch.events import (
     Ticked,
 )
 from coordinator.dispatch.fleet import Fleet
+from coordinator.dispatch.pool import REPLY_S
 from schema.errors import MalformedMessage
 from schema.wire.packing import fingerprint
 
@@ -44,6 +46,7 @@ class Agents:
     def __init__(self) -> None:
         self.sent: list[tuple[int, str, bytes]] = []
         self.cancelled: list[tuple[str, bytes]] = []
+        self.asked: list[str] = []
         self.pauses_s: list[float] = []
         self.news: list[DispatchEvent] = [
             Joined("one", "worker", 1, "p"),
@@ -55,6 +58,9 @@ class Agents:
 
     def cancel(self, agent: str, payload: bytes, /) -> None:
         self.cancelled.append((agent, payload))
+
+    def ask(self, agent: str, /) -> None:
+        self.asked.append(agent)
 
     def receive(
         self, _timeout_s: float, pause_s: float = 0.0, /
@@ -221,18 +227,32 @@ def test_arenas_of_all_runs_share_the_workers(fleet: Fleet, agents: Agents) -> N
     assert fleet.open == 1
 
 
-def test_an_unfit_answer_to_an_advance_is_the_workers_error(
-    fleet: Fleet, agents: Agents
+@pytest.mark.parametrize("is_answer", [True, False])
+def test_errors_of_several_workers_stop_an_arena_and_unfit_answers_do_not(
+    fleet: Fleet, agents: Agents, *, is_answer: bool
 ) -> None:
     shard = new_shard(fleet)
     fleet.advance(shard)
+    tried = []
     for now_s in range(1, 4):
         number, agent, _ = agents.sent[-1]
-        agents.news = [Returned(number, agent, "ok", b"bad")]
+        tried.append(agent)
+        agents.news = [
+            Returned(number, agent, "ok", b"bad")
+            if is_answer
+            else Returned(number, agent, "error", reason="no such plug-in")
+        ]
         ends = fleet.listen(0.0, float(10 * now_s))
-        assert fleet.malformed == now_s
+        assert fleet.malformed == (now_s if is_answer else 0)
         fleet.tell(Ticked(10 * now_s + 5.0))
-    assert ends == {ARENA: [ShardFailed(shard, agent, "bad bytes")]}
+    assert set(tried) == {"one", "two"}
+    if not is_answer:
+        assert ends == {ARENA: [ShardFailed(shard, agent, "no such plug-in")]}
+        return
+    assert ends == {}
+    number, agent, _ = agents.sent[-1]
+    agents.news = [Returned(number, agent, "ok", b"answer")]
+    assert fleet.listen(0.0, 50.0) == {ARENA: [ShardDone(shard, agent, b"answer")]}
 
 
 def test_a_worker_without_the_state_is_given_it(fleet: Fleet, agents: Agents) -> None:
@@ -303,3 +323,46 @@ def test_fleet_pauses_while_all_workers_have_spare_jobs(
     fleet.advance(new_shard(fleet))
     fleet.listen(0.2, 0.05)
     assert agents.pauses_s[-1] == 0.0  # an arena waits for each answer
+
+
+def test_a_silent_workers_advance_moves_and_its_late_answer_is_dropped(
+    agents: Agents,
+) -> None:
+    lines: list[str] = []
+    fleet = Fleet(agents, warn=lines.append)
+    fleet.listen(0.0, 0.0)
+    fleet.advance(new_shard(fleet))
+    ((number, agent, payload),) = agents.sent
+    assert agent == "one"
+    fleet.tell(Ticked(FIRST_S))
+    assert agents.asked == ["one"]
+    fleet.tell(Ticked(FIRST_S + REPLY_S))
+    assert agents.cancelled == [("one", payload)]
+    assert lines == [
+        "one has not answered for 65 s and reports no progress: two takes its job"
+    ]
+    (moved, other, payload) = agents.sent[1]
+    assert (other, payload) == ("two", b"whole True")
+    fleet.tell(Returned(number, "one", "ok", b"bad"))
+    assert (fleet.late, fleet.malformed, fleet.open) == (1, 0, 1)
+    agents.news = [Returned(moved, "two", "ok", b"x")]
+    assert fleet.listen(0.0, 100.0) == {ARENA: [ShardDone(0, "two", b"x")]}
+
+
+def test_jobs_and_advances_share_one_account_of_load(
+    fleet: Fleet, agents: Agents
+) -> None:
+    fleet.advance(new_shard(fleet))
+    assert [agent for _, agent, _ in agents.sent] == ["one"]
+    for _ in range(3):
+        request(fleet)
+    # The advance counts as a job of the first: the second gets more.
+    assert [agent for _, agent, _ in agents.sent[1:]] == ["two", "two", "one"]
+    # A worker with many arenas has a job at hand nevertheless.
+    for _ in range(6):
+        fleet.advance(new_shard(fleet))
+    fleet.tell(Returned(agents.sent[3][0], "one", "ok", b""))
+    before = len(agents.sent)
+    for _ in range(2):
+        request(fleet)
+    assert "one" in {agent for _, agent, _ in agents.sent[before:]}

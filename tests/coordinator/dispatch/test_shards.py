@@ -1,31 +1,85 @@
 """Assignment of shards to workers, event by event."""
 
+from collections import Counter
 from itertools import count
 
 import pytest
 
+from coordinator.dispatch.deadlines import FIRST_S, PATIENCE
+from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
+    Ask,
     AssignShard,
+    CancelShard,
+    Crowded,
     Joined,
     Killed,
     Left,
+    Overdue,
+    Progressed,
+    Released,
+    Returned,
+    ShardCommand,
     ShardDone,
+    ShardEvent,
     ShardFailed,
     ShardRequested,
     ShardReturned,
     ShardSeen,
     Ticked,
 )
-from coordinator.dispatch.shards import DRIFT_S, MAX_ERRORS, ShardDispatch
+from coordinator.dispatch.pool import REPLY_S
+from coordinator.dispatch.shards import DRIFT_S, LEAST_S, MAX_ERRORS, ShardDispatch
 from schema.errors import UnexpectedEvent
 
 
 def joined(name: str, platform: str = "p", kind: str = "worker") -> Joined:
-    return Joined(name, kind, 1, platform)  # type: ignore[arg-type]
+    return Joined(name, kind, 1, platform, shards=16)  # type: ignore[arg-type]
 
 
-def fleet(*names: str) -> ShardDispatch:
-    dispatch = ShardDispatch(count(1))
+class Fleet:
+    """Both dispatchers, connected as in ``coordinator.dispatch.fleet``."""
+
+    def __init__(self, *, allows_drift: bool = False) -> None:
+        self.jobs = Dispatch()
+        self.shards = ShardDispatch(
+            count(1), self.jobs.workers, allows_drift=allows_drift
+        )
+        self.agents: dict[int, str] = {}
+
+    def handle(self, event: ShardEvent | Progressed) -> list[ShardCommand]:
+        if isinstance(event, Joined | Left | Ticked | Progressed):
+            assert self.jobs.handle(event) == []
+        commands: list[ShardCommand] = []
+        if not isinstance(event, Progressed):
+            commands = self.shards.handle(event)
+        if isinstance(event, ShardReturned) and event.number in self.agents:
+            outcome = "ok" if event.outcome == "done" else "error"
+            agent = self.agents.pop(event.number)
+            self.jobs.handle(Returned(event.number, agent, outcome))  # type: ignore[arg-type]
+        for command in commands:
+            if isinstance(command, AssignShard):
+                self.agents[command.number] = command.agent
+        return commands
+
+    @property
+    def waiting(self) -> dict[int, str]:
+        return self.shards.waiting
+
+    @property
+    def wake_s(self) -> float | None:
+        times = (self.jobs.wake_s, self.shards.wake_s)
+        return min((each for each in times if each is not None), default=None)
+
+    def holder(self, shard: int) -> str:
+        return self.shards.holder(shard)
+
+    def shard_that_lost(self, number: int) -> int | None:
+        return self.shards.shard_that_lost(number)
+
+
+def fleet(*names: str) -> Fleet:
+    dispatch = Fleet()
     for name in names:
         assert dispatch.handle(joined(name)) == []
     return dispatch
@@ -89,21 +143,29 @@ def test_worker_without_the_state_is_given_it() -> None:
         AssignShard(3, 0, "a", "p", is_whole=True)
     ]
     # Asking again is an error.
-    assert dispatch.handle(ShardReturned(3, "stateless")) == []
-    assert dispatch.wake_s is not None
-    hands = dispatch.handle(Ticked(dispatch.wake_s))
-    assert hands == [AssignShard(4, 0, "b", "p", is_whole=True)]
+    assert dispatch.handle(ShardReturned(3, "stateless")) == [
+        AssignShard(4, 0, "b", "p", is_whole=True)
+    ]
 
 
 @pytest.mark.parametrize("outcome", ["error", "lost"])
-def test_failed_advance_goes_to_another_worker_after_a_backoff(outcome: str) -> None:
+def test_failed_advance_goes_to_another_worker(outcome: str) -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(Ticked(10.0))
     dispatch.handle(ShardRequested(0))
-    assert dispatch.handle(ShardReturned(1, outcome, "why")) == []  # type: ignore[arg-type]
+    assert dispatch.handle(ShardReturned(1, outcome, "why")) == [  # type: ignore[arg-type]
+        AssignShard(2, 0, "b", "p", is_whole=True)
+    ]
+
+
+def test_only_worker_gets_the_failed_advance_again_after_its_backoff() -> None:
+    dispatch = fleet("a")
+    dispatch.handle(Ticked(10.0))
+    dispatch.handle(ShardRequested(0))
+    assert dispatch.handle(ShardReturned(1, "lost")) == []
     assert dispatch.handle(Ticked(10.01)) == []
     assert dispatch.handle(Ticked(10.05)) == [
-        AssignShard(2, 0, "b", "p", is_whole=True)
+        AssignShard(2, 0, "a", "p", is_whole=True)
     ]
 
 
@@ -135,23 +197,21 @@ def test_errors_of_several_workers_end_an_advance_and_losses_do_not() -> None:
     dispatch = fleet("a", "b")
     dispatch.handle(ShardRequested(0))
     now_s, number = 0.0, 1
-    for _ in range(10):
-        assert dispatch.handle(ShardReturned(number, "lost")) == []
+    for outcome in ["lost"] * 10 + ["error"] * (MAX_ERRORS - 1):
+        hands = dispatch.handle(ShardReturned(number, outcome, "no"))  # type: ignore[arg-type]
         now_s += 10.0
-        assert len(dispatch.handle(Ticked(now_s))) == 1
+        hands += dispatch.handle(Ticked(now_s))
+        (hand,) = hands
+        assert isinstance(hand, AssignShard)
         number += 1
-    for _ in range(MAX_ERRORS - 1):
-        assert dispatch.handle(ShardReturned(number, "error", "no")) == []
-        now_s += 10.0
-        (hand,) = dispatch.handle(Ticked(now_s))
-        number += 1
-    assert isinstance(hand, AssignShard)
+        assert hand.number == number
+    agent = dispatch.holder(0)
     given_up = dispatch.handle(ShardReturned(number, "error", "no"))
-    assert given_up == [ShardFailed(0, hand.agent, "no")]
+    assert given_up == [ShardFailed(0, agent, "no")]
 
 
 def test_only_a_worker_of_an_equal_platform_continues_a_shard() -> None:
-    dispatch = ShardDispatch(count(1))
+    dispatch = Fleet()
     dispatch.handle(joined("a", "arm"))
     dispatch.handle(joined("b", "x86"))
     dispatch.handle(ShardSeen(0, "x86"))
@@ -166,7 +226,7 @@ def test_only_a_worker_of_an_equal_platform_continues_a_shard() -> None:
 
 
 def test_first_advance_decides_the_platform() -> None:
-    dispatch = ShardDispatch(count(1))
+    dispatch = Fleet()
     dispatch.handle(joined("a", "arm"))
     dispatch.handle(ShardRequested(0))
     dispatch.handle(ShardReturned(1, "done"))
@@ -183,9 +243,9 @@ def test_second_request_for_a_shard_raises() -> None:
         dispatch.handle(ShardRequested(0))
 
 
-def drifting(*, allows_drift: bool) -> ShardDispatch:
+def drifting(*, allows_drift: bool) -> Fleet:
     """Return a shard dispatcher whose shard ran on a platform that has left."""
-    dispatch = ShardDispatch(count(1), allows_drift=allows_drift)
+    dispatch = Fleet(allows_drift=allows_drift)
     dispatch.handle(ShardSeen(0, "theirs"))
     dispatch.handle(joined("b", "ours"))
     dispatch.handle(joined("a", "ours"))
@@ -210,7 +270,7 @@ def test_shard_drifts_to_another_platform_after_a_while_if_allowed() -> None:
 
 
 def test_shard_that_may_drift_waits_for_a_worker_and_not_for_a_time() -> None:
-    dispatch = ShardDispatch(count(1), allows_drift=True)
+    dispatch = Fleet(allows_drift=True)
     dispatch.handle(ShardSeen(0, "theirs"))
     dispatch.handle(ShardRequested(0))
     dispatch.handle(Ticked(100.0))
@@ -241,12 +301,229 @@ def test_shard_does_not_drift_unless_allowed() -> None:
 
 def test_advances_are_counted_while_they_wait_and_while_a_worker_has_them() -> None:
     dispatch = fleet()
+    shards = dispatch.shards
     dispatch.handle(ShardRequested(0))
     dispatch.handle(ShardRequested(1))
-    assert (dispatch.unassigned, dispatch.assigned) == (2, 0)
+    assert (shards.unassigned, shards.assigned) == (2, 0)
     dispatch.handle(joined("a"))
-    assert (dispatch.unassigned, dispatch.assigned) == (0, 2)
+    assert (shards.unassigned, shards.assigned) == (0, 2)
     dispatch.handle(ShardReturned(1, "done"))
-    assert (dispatch.unassigned, dispatch.assigned) == (0, 1)
+    assert (shards.unassigned, shards.assigned) == (0, 1)
     dispatch.handle(Left("a"))
-    assert (dispatch.unassigned, dispatch.assigned) == (1, 0)
+    assert (shards.unassigned, shards.assigned) == (1, 0)
+
+
+def advance(dispatch: Fleet, shard: int, start_s: float, lasts_s: float) -> None:
+    """Make one advance of a shard."""
+    dispatch.handle(Ticked(start_s))
+    (hand,) = dispatch.handle(ShardRequested(shard))
+    assert isinstance(hand, AssignShard)
+    dispatch.handle(Ticked(start_s + lasts_s))
+    (done, *_) = dispatch.handle(ShardReturned(hand.number, "done"))
+    assert isinstance(done, ShardDone)
+
+
+def test_silent_worker_loses_its_advance_to_an_idle_one() -> None:
+    dispatch = fleet("a", "b")
+    dispatch.handle(ShardRequested(0))
+    assert dispatch.handle(Ticked(FIRST_S - 1.0)) == []
+    assert dispatch.handle(Ticked(FIRST_S)) == [Ask("a")]
+    assert dispatch.handle(Ticked(FIRST_S + REPLY_S - 1.0)) == []
+    assert dispatch.handle(Ticked(FIRST_S + REPLY_S)) == [
+        Overdue("a", FIRST_S + REPLY_S, "b"),
+        CancelShard(1, 0, "a"),
+        AssignShard(2, 0, "b", "p", is_whole=True),
+    ]
+    # The late answer changes nothing, and the next advance stays where it is.
+    assert dispatch.handle(ShardReturned(1, "done")) == []
+    assert dispatch.handle(ShardReturned(2, "done")) == [ShardDone(0, "b")]
+    assert dispatch.handle(ShardRequested(0)) == [
+        AssignShard(3, 0, "b", "p", is_whole=False)
+    ]
+
+
+def test_deadline_follows_the_duration_of_earlier_advances() -> None:
+    for lasts_s, limit_s in ((0.1, LEAST_S), (20.0, PATIENCE * 20.0)):
+        dispatch = fleet("a", "b")
+        # The first one, from nothing, does not count.
+        advance(dispatch, 0, 0.0, 50.0)
+        advance(dispatch, 0, 100.0, lasts_s)
+        dispatch.handle(Ticked(200.0))
+        dispatch.handle(ShardRequested(0))
+        assert dispatch.handle(Ticked(199.0 + limit_s)) == []
+        assert dispatch.handle(Ticked(200.0 + limit_s)) == [Ask("a")]
+
+
+def test_worker_that_reports_progress_keeps_its_advance() -> None:
+    dispatch = fleet("a", "b")
+    dispatch.handle(ShardRequested(0))
+    now_s, asked = 0.0, 0
+    while now_s < 100 * FIRST_S:
+        now_s += 1.0
+        commands = dispatch.handle(Ticked(now_s))
+        assert commands in ([], [Ask("a")])
+        if commands:
+            asked += 1
+            dispatch.handle(Progressed("a"))
+    # One question for each deadline.
+    assert asked == pytest.approx(100, abs=2)
+    assert dispatch.holder(0) == "a"
+
+
+def test_slow_advance_on_several_silent_workers_ends() -> None:
+    """The deadline doubles, so that one of them finishes the advance."""
+    dispatch = fleet("a", "b")
+    dispatch.handle(ShardRequested(0))
+    now_s, lasts_s, assigned_s, moves = 0.0, 1000.0, 0.0, 0
+    hand = AssignShard(1, 0, "a", "p", is_whole=True)
+    stale: list[AssignShard] = []
+    while now_s - assigned_s < lasts_s:
+        assert now_s < 10 * lasts_s
+        now_s += 1.0
+        for command in dispatch.handle(Ticked(now_s)):
+            if isinstance(command, AssignShard):
+                stale.append(hand)
+                hand, assigned_s, moves = command, now_s, moves + 1
+        # An agent finishes what it has begun, in vain.
+        for old in [each for each in stale if now_s > assigned_s + lasts_s / 20]:
+            stale.remove(old)
+            assert dispatch.handle(ShardReturned(old.number, "done")) == []
+    assert moves == 5
+    assert dispatch.handle(ShardReturned(hand.number, "done")) == [
+        ShardDone(0, hand.agent)
+    ]
+
+
+def test_silent_worker_keeps_its_advance_while_no_other_is_idle() -> None:
+    dispatch = fleet("a", "b")
+    for shard in (0, 1):
+        dispatch.handle(ShardSeen(shard, "p"))
+        dispatch.handle(ShardRequested(shard))
+    dispatch.handle(joined("c", "another"))
+    dispatch.handle(joined("d", kind="analyzer"))
+    dispatch.handle(Ticked(FIRST_S))
+    assert dispatch.handle(Ticked(FIRST_S + REPLY_S)) == [
+        Overdue("a", FIRST_S + REPLY_S),
+        Overdue("b", FIRST_S + REPLY_S),
+    ]
+    told = [
+        command
+        for minute in range(2, 50)
+        for command in dispatch.handle(Ticked(minute * FIRST_S))
+    ]
+    assert {type(command) for command in told} == {Ask}
+    assert [dispatch.holder(0), dispatch.holder(1)] == ["a", "b"]
+
+
+def test_single_worker_never_loses_its_advance() -> None:
+    dispatch = fleet("a")
+    dispatch.handle(ShardRequested(0))
+    commands = [
+        command
+        for second in range(5000)
+        for command in dispatch.handle(Ticked(float(second)))
+    ]
+    assert [each for each in commands if not isinstance(each, Ask)] == [
+        Overdue("a", FIRST_S + REPLY_S)
+    ]
+    assert dispatch.handle(ShardReturned(1, "done")) == [ShardDone(0, "a")]
+
+
+def test_all_advances_of_a_silent_worker_move_at_once() -> None:
+    dispatch = fleet("a", "b")
+    for shard in range(4):
+        dispatch.handle(ShardRequested(shard))
+    for number in (2, 4):
+        dispatch.handle(ShardReturned(number, "done"))
+    dispatch.handle(Ticked(FIRST_S))
+    dispatch.handle(Ticked(FIRST_S + REPLY_S))
+    assert [dispatch.holder(shard) for shard in range(4)] == ["b"] * 4
+    # A new shard avoids the silent worker until it gives a sign of life.
+    (hand,) = dispatch.handle(ShardRequested(4))
+    assert isinstance(hand, AssignShard)
+    assert hand.agent == "b"
+    dispatch.handle(Progressed("a"))
+    (hand,) = dispatch.handle(ShardRequested(5))
+    assert isinstance(hand, AssignShard)
+    assert hand.agent == "a"
+
+
+def spread(dispatch: Fleet, shards: int) -> Counter[str]:
+    """Return how many shards each worker holds."""
+    return Counter(dispatch.holder(shard) for shard in range(shards))
+
+
+def test_full_worker_gets_a_shard_only_if_all_are_full() -> None:
+    dispatch = Fleet()
+    dispatch.handle(Joined("a", "worker", 1, "p", shards=2))
+    dispatch.handle(Joined("b", "worker", 1, "p", shards=5))
+    for shard in range(7):
+        assert len(dispatch.handle(ShardRequested(shard))) == 1
+    assert spread(dispatch, 7) == {"a": 2, "b": 5}
+    (told, hand) = dispatch.handle(ShardRequested(7))
+    assert told == Crowded(8, 7)
+    assert isinstance(hand, AssignShard)
+    assert len(dispatch.handle(ShardRequested(8))) == 1
+
+
+def test_shards_spread_by_cores() -> None:
+    dispatch = Fleet()
+    dispatch.handle(Joined("a", "worker", 1, "p", shards=16, cores=1))
+    dispatch.handle(Joined("b", "worker", 1, "p", shards=16, cores=3))
+    for shard in range(12):
+        dispatch.handle(ShardRequested(shard))
+    assert spread(dispatch, 12) == {"a": 3, "b": 9}
+
+
+def test_forty_shards_on_two_workers_are_never_rebuilt() -> None:
+    dispatch = Fleet()
+    for name in ("a", "b"):
+        dispatch.handle(Joined(name, "worker", 1, "p", shards=20))
+    hands = [dispatch.handle(ShardRequested(shard))[0] for shard in range(40)]
+    for _ in range(10):
+        following = []
+        for hand in hands:
+            assert isinstance(hand, AssignShard)
+            dispatch.handle(ShardReturned(hand.number, "done"))
+            following += dispatch.handle(ShardRequested(hand.shard))
+        hands = following
+    assert spread(dispatch, 40) == {"a": 20, "b": 20}
+    assert dispatch.shards.rebuilt == 0
+    dispatch.handle(Left("a"))
+    assert dispatch.shards.rebuilt == 20
+
+
+def test_worker_that_joins_late_takes_over_its_share() -> None:
+    dispatch = fleet("a")
+    (first, *_) = [dispatch.handle(ShardRequested(shard))[0] for shard in range(5)]
+    dispatch.handle(ShardRequested(5))
+    assert isinstance(first, AssignShard)
+    dispatch.handle(ShardReturned(first.number, "done"))
+    commands = dispatch.handle(joined("b"))
+    # Those that wait in the queue of the other; none of them has a state yet.
+    assert [
+        command.shard for command in commands if isinstance(command, CancelShard)
+    ] == [5, 4, 3]
+    assert spread(dispatch, 6) == {"a": 3, "b": 3}
+    assert dispatch.shards.rebuilt == 0
+
+
+def test_shard_with_a_state_moves_after_its_present_advance() -> None:
+    dispatch = fleet("a")
+    for shard in (0, 1):
+        advance(dispatch, shard, shard, 0.5)
+    (hand,) = dispatch.handle(ShardRequested(1))
+    assert dispatch.handle(joined("b")) == []
+    assert isinstance(hand, AssignShard)
+    assert dispatch.handle(ShardReturned(hand.number, "done")) == [ShardDone(1, "a")]
+    (hand,) = dispatch.handle(ShardRequested(1))
+    assert hand == AssignShard(4, 1, "b", "p", is_whole=True)
+    assert dispatch.shards.rebuilt == 1
+
+
+def test_released_shard_is_forgotten() -> None:
+    dispatch = fleet("a", "b")
+    dispatch.handle(ShardRequested(0))
+    assert dispatch.handle(Released(0)) == []
+    assert dispatch.handle(ShardReturned(1, "done")) == []
+    assert dispatch.handle(Ticked(100 * FIRST_S)) == []

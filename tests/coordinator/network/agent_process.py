@@ -2,7 +2,7 @@
 
 Arguments: the agent's role, name and hub, and its behaviour. ``good`` answers;
 ``stuck`` prints a line and never answers; ``slow`` prints a line and answers when told
-to; ``old`` has another version.
+to; ``busy`` computes for ever; ``old`` has another version.
 """
 
 import sys
@@ -24,13 +24,15 @@ def answer(request: bytes) -> bytes:
         raise MalformedMessage("settings: bad")
     if asked.settings == b"bug":
         raise ZeroDivisionError("a plug-in's own")
-    if BEHAVIOUR in {"stuck", "slow"}:
+    if BEHAVIOUR in {"stuck", "slow", "busy"}:
         sys.stdout.write("begun\n")
         sys.stdout.flush()
     if BEHAVIOUR == "slow":
         sys.stdin.readline()
     if BEHAVIOUR == "stuck":
         threading.Event().wait()
+    while BEHAVIOUR == "busy":
+        pass
     evaluation = pb.Evaluation(fitness=float(asked.number))
     return pb.Answer(
         epoch=asked.epoch, number=asked.number, evaluation=evaluation

@@ -4,12 +4,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.dispatch.events import Died, Joined, Left
+from coordinator.dispatch.events import Died, Joined, Left, Progressed
 from coordinator.dispatch.faults import PeerFaults
 from coordinator.network.membership import Membership
 from schema.agent.topics import Member
 from schema.errors import MalformedMessage
-from schema.limits import MOST_MEMBERS, MOST_PEERS
+from schema.limits import (
+    LONGEST_QUIET_S,
+    MOST_CORES,
+    MOST_MEMBERS,
+    MOST_PEERS,
+    MOST_SHARDS,
+    MOST_SLOTS,
+)
 from schema.wire import revolve_pb2 as pb
 
 WORKER = Member("f", "worker", "host-0.w")
@@ -21,12 +28,21 @@ def info(
     kind: str = "worker",
     slots: int = 2,
     version: str = "1",
+    *,
     platform: str = "p",
+    shards: int = 3,
+    cores: int = 4,
+    quiet_s: float | None = None,
 ) -> bytes:
     message = pb.AgentInfo(
-        agent=agent, kind=kind, slots=slots, platform=platform, version=version
-    )
+        agent=agent, kind=kind, slots=slots, platform=platform, version=version,
+        shards=shards, cores=cores, quiet_s=quiet_s,
+    )  # fmt: skip
     return message.SerializeToString()
+
+
+def joined(name: str) -> Joined:
+    return Joined(name, "worker", 2, "p", 3, 4)
 
 
 @pytest.fixture
@@ -43,7 +59,7 @@ def membership(faults: PeerFaults) -> Membership:
 
 def test_agent_joins_with_its_info_and_leaves(membership: Membership) -> None:
     assert membership.is_stranger(WORKER)
-    assert membership.introduce(WORKER, info()) == [Joined(NAME, "worker", 2, "p")]
+    assert membership.introduce(WORKER, info()) == [joined(NAME)]
     assert not membership.is_stranger(WORKER)
     assert membership.appear(WORKER.alive) is None
     assert membership.vanish(WORKER.alive) == Left(NAME)
@@ -100,16 +116,13 @@ def test_each_death_is_reported_once_and_before_the_successor_joins(
     for member in (second, third):
         membership.appear(member.alive)
     cause = "SIG\x1b[31m" + "x" * 999
-    joined = Joined(second.name, "worker", 2, "p")
     (died, after) = membership.introduce(second, with_death(second, NAME, cause))
     assert isinstance(died, Died)
     assert (died.run, died.epoch, died.number, died.agent) == ("r", 3, 7, NAME)
     assert len(died.cause) == 100
     assert died.cause.isprintable()
-    assert after == joined
-    assert membership.introduce(third, with_death(third, NAME)) == [
-        Joined(third.name, "worker", 2, "p")
-    ]
+    assert after == joined(second.name)
+    assert membership.introduce(third, with_death(third, NAME)) == [joined(third.name)]
 
 
 @pytest.mark.parametrize("state", ["unknown", "alive", "of another slot"])
@@ -125,7 +138,7 @@ def test_a_death_that_did_not_happen_is_dropped(
         liar = successor(WORKER, "x")
     membership.appear(liar.alive)
     events = membership.introduce(liar, with_death(liar, NAME))
-    assert events == [Joined(liar.name, "worker", 2, "p")]
+    assert events == [joined(liar.name)]
     # An earlier coordinator may have known an unknown one.
     assert faults.total("death") == (state != "unknown")
 
@@ -149,7 +162,7 @@ def test_a_forged_token_that_came_first_does_not_keep_the_worker_out(
     membership = Membership("1", faults)
     membership.appear(Member("f", "analyzer", NAME).alive)
     assert membership.appear(WORKER.alive) == WORKER
-    assert membership.introduce(WORKER, info()) == [Joined(NAME, "worker", 2, "p")]
+    assert membership.introduce(WORKER, info()) == [joined(NAME)]
 
 
 def test_agents_that_do_not_answer_make_room_for_others(
@@ -166,7 +179,7 @@ def test_agents_that_do_not_answer_make_room_for_others(
     late = Member("f", "worker", "host-0.late")
     assert membership.appear(late.alive) == late
     data = info(agent=late.name)
-    assert membership.introduce(late, data) == [Joined(late.name, "worker", 2, "p")]
+    assert membership.introduce(late, data) == [joined(late.name)]
     assert membership.member(NAME) == WORKER
 
 
@@ -178,7 +191,7 @@ def test_an_agent_that_stops_answering_leaves_and_may_join_again(
     assert membership.note_silence(WORKER) == Left(NAME)
     assert membership.note_silence(WORKER) is None
     assert membership.silences(WORKER) == 2
-    assert membership.introduce(WORKER, info()) == [Joined(NAME, "worker", 2, "p")]
+    assert membership.introduce(WORKER, info()) == [joined(NAME)]
     assert membership.silences(WORKER) == 0
 
 
@@ -190,6 +203,11 @@ def test_an_agent_that_stops_answering_leaves_and_may_join_again(
         info(agent="x"),
         info(kind="analyzer"),
         info(slots=0),
+        info(slots=MOST_SLOTS + 1),
+        info(shards=0),
+        info(shards=MOST_SHARDS + 1),
+        info(cores=0),
+        info(cores=MOST_CORES + 1),
         info(slots=2**32 - 1),
         info(platform="p" * 1000),
         info(platform="\x1b[2J"),
@@ -222,3 +240,28 @@ def test_other_keys_are_malformed(membership: Membership, key: str) -> None:
     for take in (membership.appear, membership.vanish):
         with pytest.raises(MalformedMessage):
             take(key)
+
+
+@pytest.mark.parametrize(
+    ("quiet_s", "works"),
+    [
+        (0.0, True),
+        (LONGEST_QUIET_S, True),
+        (LONGEST_QUIET_S + 0.1, False),
+        (None, False),
+        (-1.0, False),
+        (float("nan"), False),
+    ],
+)
+def test_agent_reports_progress_if_its_job_used_cpu_lately(
+    membership: Membership, quiet_s: float | None, works: object
+) -> None:
+    data = info(quiet_s=quiet_s)
+    assert membership.progress(WORKER, data) is None
+    membership.introduce(WORKER, info())
+    expected = Progressed(NAME) if works else None
+    assert membership.progress(WORKER, data) == expected
+    with pytest.raises(MalformedMessage):
+        membership.progress(WORKER, info(agent="x", quiet_s=0.0))
+    membership.vanish(WORKER.alive)
+    assert membership.progress(WORKER, data) is None

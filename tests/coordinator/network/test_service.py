@@ -15,12 +15,15 @@ import zenoh
 
 from coordinator.dispatch.dispatch import Dispatch
 from coordinator.dispatch.events import (
+    Ask,
     Assign,
     Deliver,
     DispatchEvent,
     Job,
     Joined,
     Left,
+    Overdue,
+    Progressed,
     Requested,
     Returned,
     Ticked,
@@ -30,6 +33,7 @@ from schema.agent.network import client_config
 from schema.agent.service import session_config
 from schema.agent.topics import Member
 from schema.errors import NetworkError
+from schema.limits import LONGEST_QUIET_S
 from schema.wire import revolve_pb2 as pb
 from schema.wire.codec import Answer, decode_answer
 
@@ -101,6 +105,8 @@ class Driver:
 
     def tell(self, event: DispatchEvent) -> None:
         for command in self.dispatch.handle(event):
+            if isinstance(command, Ask | Overdue):
+                continue
             job = command.job
             if isinstance(command, Assign):
                 self.network.send(job.number, command.agent, job.payload)
@@ -154,6 +160,34 @@ def test_jobs_of_a_killed_worker_are_done_by_another(network: Network) -> None:
         with agent(network, "b"):
             driver.run(lambda: not driver.dispatch.pending)
     assert driver.delivered == {0: "b", 1: "b", 2: "b"}
+
+
+def test_only_a_job_that_computes_reports_progress(network: Network) -> None:
+    with agent(network, "busy", "busy") as busy, agent(network, "stuck", "stuck") as it:
+        until(network, has(2))
+        config = zenoh.Config.from_json5(client_config(network.address))
+        with zenoh.open(config) as session:
+
+            def quiet_s(name: str) -> float:
+                (reply,) = session.get(Member("default", "worker", name).info)
+                assert reply.ok is not None
+                info = pb.AgentInfo.FromString(reply.ok.payload.to_bytes())
+                return info.quiet_s if info.HasField("quiet_s") else -1.0
+
+            assert quiet_s("busy") == quiet_s("stuck") == -1.0
+            for process, name in ((busy, "busy"), (it, "stuck")):
+                network.send(0, name, request(0))
+                assert line_of(process) == "begun\n"
+            end_s = time.monotonic() + PATIENCE_S
+            while quiet_s("stuck") <= LONGEST_QUIET_S:
+                assert time.monotonic() < end_s
+            assert 0.0 <= quiet_s("busy") <= LONGEST_QUIET_S
+        network.ask("stuck")
+        network.ask("nobody")
+        network.ask("busy")
+        assert until(network, has(1)) == [Progressed("busy")]
+        assert network.receive(0.5) == []
+        assert network.malformed == 0
 
 
 def test_a_worker_told_to_end_finishes_its_job_and_drops_the_next(

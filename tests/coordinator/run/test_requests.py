@@ -7,19 +7,12 @@ from msgspec.structs import replace
 
 from coordinator.dispatch.events import (
     AgentKind,
-    Client,
-    Deliver,
     Died,
-    DispatchEvent,
     Joined,
     Left,
     Returned,
-    Ticked,
 )
-from coordinator.dispatch.fleet import Fleet
 from coordinator.islands.events import (
-    Answered,
-    Audited,
     Evaluate,
     Evaluated,
     EvaluationFailed,
@@ -27,14 +20,13 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
-from coordinator.run.requests import QUARANTINED, REMEMBERED, Requests
-from coordinator.run.run_context import RunContext
+from coordinator.run.requests import QUARANTINED, REMEMBERED
 from schema.errors import JobRefused
-from schema.experiment.identity import NO_IDENTITY, Identity, Origin
-from schema.robot.brain import Brain, Connection, Neuron
+from schema.experiment.identity import NO_IDENTITY, Identity
+from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
-from schema.robot.results import Evaluation, Provenance, Report
-from schema.robot.robot import Part, Robot
+from schema.robot.results import Provenance
+from schema.robot.robot import Robot
 from schema.wire import revolve_pb2 as pb
 from schema.wire.codec import (
     Answer,
@@ -45,67 +37,15 @@ from schema.wire.codec import (
     encode_robot,
 )
 from schema.wire.packing import fingerprint
-
-EPOCH = 3
-CLIENT = Client("run", EPOCH)
-ORIGIN = Origin(seed=5, run=2)
-BIRTH = BirthId(0, 7)
-ROBOT = Robot(
-    (Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),),
-    Brain(
-        (
-            *(Neuron("input", "Input", 0) for _ in range(6)),
-            Neuron("hidden", "Simple", 0, (0.25, 0.5)),
-        ),
-        (Connection(0, 6, 0.75),),
-    ),
+from tests.coordinator.sent_requests import (
+    BIRTH,
+    EPOCH,
+    JUDGED,
+    ORIGIN,
+    ROBOT,
+    VIABLE,
+    SentRequests,
 )
-JUDGED = Evaluation(0.25, 0.0, 0.05, 12.0)
-VIABLE = Report(True, "", (), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.1, 1)
-
-
-class SentRequests:
-    """Requests whose jobs are recorded, with two workers and an analyzer."""
-
-    def __init__(self, evaluation: bytes = b"evaluation", audit: float = 0.0) -> None:
-        self.sent: list[tuple[int, str, bytes]] = []
-        self.cancelled: list[tuple[int, str]] = []
-        self.fleet = Fleet(self)
-        context = RunContext(CLIENT, ORIGIN, b"vetting", {0: evaluation, 2: evaluation})
-        self.requests = Requests(context, self.fleet, audit)
-        for name in ("one", "two"):
-            self.tell(Joined(name, "worker", 1, f"platform-{name}"))
-        self.tell(Joined("judge", "analyzer", 1, "platform"))
-        self.tell(Ticked(0.0))
-
-    def send(self, number: int, agent: str, payload: bytes) -> None:
-        self.sent.append((number, agent, payload))
-
-    def cancel(self, agent: str, payload: bytes) -> None:
-        asked = decode_request(payload, decode_body)
-        self.cancelled.append((asked.number, agent))
-
-    def receive(
-        self, _timeout_s: float, _pause_s: float = 0.0, /
-    ) -> list[DispatchEvent]:
-        return []
-
-    def tell(self, event: DispatchEvent) -> list[Answered | Audited]:
-        """Pass an event to the fleet; return the island's events that follow."""
-        self.fleet.tell(event)
-        ends = self.fleet.listen(0.0, 0.0).get(CLIENT, ())
-        found = []
-        for end in ends:
-            assert isinstance(end, Deliver)
-            found += self.requests.events(end)
-        return found
-
-    def reply(self, result: Evaluation | Report | str, **changes: int) -> Returned:
-        """Return the answer to the newest job."""
-        number, agent, _ = self.sent[-1]
-        fields = {"epoch": EPOCH, "number": number, **changes}
-        data = encode_answer(Answer(**fields, wall_s=0.5, result=result))
-        return Returned(number, agent, "ok", data)
 
 
 @pytest.fixture

@@ -52,7 +52,7 @@ class Worker:
             raise Killed
         context = decode_request(request)
         number = crc32(encode_robot(context.robot))
-        fitness = Evaluation(number / 2**32, 0.1, 0.2, 12.0)
+        fitness = Evaluation(number / 2**32, 0.2, 0.1, 12.0)
         result = "diverged" if number % 9 == 0 else fitness
         return encode_answer(Answer(context.epoch, context.number, 0.0, result))
 

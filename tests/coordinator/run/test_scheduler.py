@@ -214,6 +214,9 @@ class Silent:
     def cancel(self, agent: str, payload: bytes, /) -> None:
         """Continue in any case."""
 
+    def ask(self, _agent: str, /) -> None:
+        """Report no progress."""
+
     def receive(
         self, _timeout_s: float, _pause_s: float = 0.0, /
     ) -> list[DispatchEvent]:

@@ -13,12 +13,8 @@ from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import BUFFERED, Recorder
 from schema.errors import RunFolderError
 from schema.tables.columns import POPULATION, TABLES
-from schema.tables.files import (
-    parquet_path,
-    read_table,
-    segment_path,
-    segments_of,
-)
+from schema.tables.files import parquet_path, read_table
+from schema.tables.segments import segment_path, segments_of
 
 DETAILS = RunDetails("a/b c", 2, 1, "{}")
 Make = Callable[..., list[Record]]

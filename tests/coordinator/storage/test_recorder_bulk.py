@@ -11,7 +11,8 @@ from coordinator.storage.recorder import Recorder
 from schema.errors import MalformedMessage, RunFolderError
 from schema.robot.ids import BirthId
 from schema.tables.columns import POSES, TABLES, read_columns
-from schema.tables.files import read_table, segment_path, segments_of
+from schema.tables.files import read_table
+from schema.tables.segments import segment_path, segments_of
 from tests.coordinator.arena_world import poses
 
 DETAILS = RunDetails("scenario3", 0, 1, "{}")

@@ -1,18 +1,22 @@
 """Every request gets one reply; an invalid request gets the reason."""
 
+import os
+import signal
 from collections.abc import Callable
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from schema.agent.job_watch import JobWatch
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.request_handler import MOST_SOURCES, FairQueue, Reply, Server
-from schema.agent.supervision import Death, ProcessSlot, Task
+from schema.agent.supervision import CurrentJob, Death, ProcessSlot, Task
 from schema.errors import InvalidRobot, UnknownPlugin
 from schema.experiment.plugin_source import check_plugins, plugins_of
-from schema.limits import MOST_EPOCH
+from schema.limits import LONGEST_REASON, MOST_EPOCH
 from schema.wire import revolve_pb2 as pb
+from schema.wire.packing import fingerprint
 
 
 def request(number: int = 1, epoch: int = 1, plugins: str = "") -> bytes:
@@ -51,9 +55,9 @@ def test_the_coordinator_that_replaced_another_is_not_fenced() -> None:
 @pytest.mark.parametrize(
     ("data", "story"),
     [
-        (request(epoch=MOST_EPOCH + 1), "epoch must be at most"),
-        (request(epoch=2**64 - 1), "epoch must be at most"),
-        (pb.Request(run="r" * 10_000).SerializeToString(), "at most 5000 characters"),
+        (request(epoch=MOST_EPOCH + 1), "Request.epoch: must be <= 4294967296"),
+        (request(epoch=2**64 - 1), "Request.epoch: must be <= 4294967296"),
+        (pb.Request(run="r" * 10_000).SerializeToString(), "must be <= 5000, got"),
     ],
 )
 def test_what_is_beyond_a_limit_is_malformed_and_not_remembered(
@@ -128,6 +132,23 @@ def test_error_is_the_reason_of_the_reply(error: Exception, reason: str) -> None
     assert made.counts.refused == 1
 
 
+@pytest.mark.parametrize("error", [InvalidRobot, UnknownPlugin, ValueError])
+def test_reasons_are_short_printable_lines(error: type[Exception]) -> None:
+    """They quote the request, which may be long or meant for a terminal."""
+    quoted = error("\x1b[2J\n" + "x" * 10_000_000)
+    reason = server(raising(quoted)).reply(request()).reason
+    assert len(reason) == LONGEST_REASON
+    assert reason.isprintable()
+
+
+def test_long_names_of_runs_are_refused_and_not_kept() -> None:
+    made = server()
+    data = pb.Request(run="x" * 5001, number=7).SerializeToString()
+    made.cancel(data)
+    assert "characters of Request.run" in made.reply(data).reason
+    assert (made.counts.malformed, made._cancelled, made._epochs) == (2, {}, {})
+
+
 def test_agent_without_a_plugin_is_unfit() -> None:
     reply = server().reply(request(plugins="nowhere_to_be_found=abc"))
     assert reply.reason == f"{UNFIT}has no plug-in 'nowhere_to_be_found'"
@@ -149,6 +170,61 @@ def test_agent_info_holds_the_deaths() -> None:
     (told,) = info.deaths
     assert (told.agent, told.run, told.epoch, told.number) == ("v", "r", 3, 7)
     assert (told.cause, told.request) == ("SIGSEGV", b"12345678")
+
+
+@pytest.mark.parametrize(
+    ("is_cancelled", "waited_s", "signals"),
+    [
+        (False, 60, []),
+        (False, 61, [signal.SIGVTALRM]),
+        (True, 10, []),
+        # Another process may have done the job: it is not to blame.
+        (True, 11, [signal.SIGKILL]),
+    ],
+)
+def test_job_that_waits_too_long_loses_its_process(
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    is_cancelled: bool,
+    waited_s: int,
+    signals: list[int],
+) -> None:
+    sent: list[int] = []
+    monkeypatch.setattr(os, "kill", lambda _, number: sent.append(number))
+    now_s = 0.0
+    slot = ProcessSlot(0, CurrentJob())
+    noted: list[Task | None] = []
+
+    def compute(_: bytes) -> bytes:
+        nonlocal now_s
+        if is_cancelled:
+            made.cancel(request(1))
+        for _second in range(waited_s):
+            assert sent == []
+            now_s += 1.0
+            made.look()
+        assert slot.note is not None
+        noted.append(slot.note.read())
+        told = pb.AgentInfo.FromString(made.info)
+        assert told.quiet_s == waited_s
+        return b"answer"
+
+    agent = Agent(
+        "worker", "w", "tcp/h:1", threads=3, shards=9, wait_limit_s=60.0, version="1"
+    )
+    watch = JobWatch(lambda: 0.0, lambda: now_s)
+    made = Server(compute, agent, slot, watch=watch)
+    made.reply(request(1))
+    assert sent == signals
+    is_blamed = sent != [signal.SIGKILL]
+    doing = Task("w", "r", 1, 1, fingerprint(request(1)))
+    assert noted == [doing if is_blamed else None]
+    now_s += 1000.0
+    made.look()
+    assert sent == signals
+    told = pb.AgentInfo.FromString(made.info)
+    assert not told.HasField("quiet_s")
+    assert (told.shards, told.cores) == (9, 3)
 
 
 def test_plugins_are_identified_by_their_source(

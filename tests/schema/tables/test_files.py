@@ -1,6 +1,8 @@
 """Reading of tables that were written before they got their newest columns."""
 
+import json
 from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 
 import pyarrow as pa
@@ -9,7 +11,8 @@ import pytest
 
 from schema.errors import RunFolderError
 from schema.tables.columns import EVALUATIONS, TABLES
-from schema.tables.files import parquet_path, read_table, segment_path
+from schema.tables.files import campaign, parquet_path, read_table
+from schema.tables.segments import segment_path
 
 ROW = {
     "record": 0,
@@ -80,4 +83,42 @@ def test_rows_without_a_required_column_are_refused(tmp_path: Path) -> None:
 def test_file_without_a_required_column_is_refused(tmp_path: Path) -> None:
     write_parquet(tmp_path, without("status"))
     with pytest.raises(RunFolderError, match="cannot be read"):
+        read_table(tmp_path, "evaluations")
+
+
+def sealed(folder: Path) -> Path:
+    """Write a finished table with its digest; return its path."""
+    write_parquet(folder, without())
+    path = parquet_path(folder, "old", 0, "evaluations")
+    digest = sha256(path.read_bytes()).hexdigest()
+    entries = {"name": "old", "checksums": True, "digests": {"evaluations": digest}}
+    (folder / "run.json").write_text(json.dumps(entries))
+    return path
+
+
+@pytest.mark.parametrize("read", [read_table, campaign])
+def test_every_flipped_byte_of_a_finished_table_is_named(
+    tmp_path: Path, read: Callable[[Path, str], object]
+) -> None:
+    path = sealed(tmp_path)
+    data = path.read_bytes()
+    read(tmp_path, "evaluations")
+    for byte in range(0, len(data), 97):
+        path.write_bytes(
+            data[:byte] + bytes([data[byte] ^ 1 << byte % 8]) + data[byte + 1 :]
+        )
+        with pytest.raises(RunFolderError, match=r"evaluations\.parquet: damaged"):
+            read(tmp_path, "evaluations")
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", None])
+def test_lost_and_empty_finished_tables_are_named(
+    tmp_path: Path, content: bytes | None
+) -> None:
+    path = sealed(tmp_path)
+    if content is None:
+        path.unlink()
+    else:
+        path.write_bytes(content)
+    with pytest.raises(RunFolderError, match="resume the run to write it again"):
         read_table(tmp_path, "evaluations")

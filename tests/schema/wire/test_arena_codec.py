@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
 from schema.errors import MalformedMessage
+from schema.limits import LONGEST_REASON, printable
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire import revolve_pb2 as pb
@@ -37,6 +38,7 @@ U64 = st.integers(0, 2**64 - 1)
 U32 = st.integers(0, 2**32 - 1)
 NUMBER = st.floats(allow_nan=False, allow_infinity=False)
 PLACE = st.tuples(NUMBER, NUMBER, NUMBER)
+REASON = st.text().map(lambda text: printable(text, LONGEST_REASON))
 BIRTHS = st.builds(BirthId, U32, U64)
 DIGEST = st.binary(min_size=32, max_size=32)
 SNAPSHOT = st.binary(max_size=40)
@@ -54,12 +56,12 @@ ADVANCES = st.builds(
     step=U64,
     digest=DIGEST,
     judgements=some(JUDGEMENTS),
-    casualties=some(st.builds(Casualty, BIRTHS, U64, st.text(), PLACE)),
+    casualties=some(st.builds(Casualty, BIRTHS, U64, REASON, PLACE)),
     touches=some(st.builds(Touch, BIRTHS, BIRTHS, NUMBER)),
     poses=SNAPSHOT,
 )
 ANSWERS = st.builds(
-    AdvanceAnswer, U64, U64, NUMBER, st.none() | ADVANCES, snapshot=SNAPSHOT
+    AdvanceAnswer, U64, U64, st.floats(0, 1e9), st.none() | ADVANCES, snapshot=SNAPSHOT
 )
 ZERO = BirthId(0, 0)
 JUDGEMENT = Judgement(ZERO, 15.0, 0.1, 0.0, 0.1, is_mature=True, place=(0.0, 0.0, 0.02))

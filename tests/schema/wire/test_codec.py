@@ -12,6 +12,7 @@ from hypothesis.strategies import DataObject, SearchStrategy
 
 from schema.errors import MalformedMessage
 from schema.experiment.identity import NO_IDENTITY, Identity, Origin
+from schema.limits import LONGEST_REASON, printable
 from schema.parts import BUILT_IN
 from schema.robot.genome import Genome, Node, develop
 from schema.robot.ids import BirthId
@@ -55,12 +56,21 @@ NUMBER = st.floats(allow_nan=False, allow_infinity=False)
 VECTOR = st.tuples(NUMBER, NUMBER, NUMBER)
 EVALUATIONS = st.builds(Evaluation, NUMBER, NUMBER, NUMBER, NUMBER)
 PAIRS = st.lists(st.tuples(U32, U32), max_size=4).map(tuple)
+REASON = st.text(max_size=2000).map(lambda text: printable(text, LONGEST_REASON))
 REPORTS = st.builds(
-    Report, st.just(value=False), st.text(), PAIRS, VECTOR, VECTOR, NUMBER, U32
+    Report,
+    st.just(value=False),
+    REASON,
+    PAIRS,
+    VECTOR,
+    VECTOR,
+    NUMBER,
+    U32,
 ) | st.builds(
     Report, st.just(value=True), st.just(""), PAIRS, VECTOR, VECTOR, NUMBER, U32
 )
-ANSWERS = st.builds(Answer, U64, U64, NUMBER, REPORTS | EVALUATIONS | st.text())
+WALL = st.floats(0, 1e9)
+ANSWERS = st.builds(Answer, U64, U64, WALL, REPORTS | EVALUATIONS | REASON)
 REPORT = Report(
     is_viable=True,
     reason="",

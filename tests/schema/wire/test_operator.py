@@ -69,6 +69,12 @@ def test_decoding_inverts_encoding_of_replies(reply: OperatorReply) -> None:
     assert decode_operator_reply(encode_operator_reply(reply)) == reply
 
 
+def test_text_of_a_reply_cannot_control_a_terminal() -> None:
+    reply = OperatorReply("birth  rank\n\x1b[2J    1\x9b\u202e")
+    text = decode_operator_reply(encode_operator_reply(reply)).text
+    assert text == "birth  rank\n?[2J    1??"
+
+
 def test_time_left_counts_what_is_still_to_be_born() -> None:
     done = RunStatus("c", "c", 0, "finished", 0.0, (IslandStatus(9, 50, 0.1, 3),))
     half = RunStatus("d", "d", 0, "running", 2.0, (IslandStatus(30, 50, 0.1, 3),))

@@ -1,6 +1,7 @@
 """Arena shards of a worker, in a world without physics."""
 
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
@@ -25,8 +26,10 @@ from schema.wire.arena_codec import (
     encode_live,
 )
 from tests.worker.fake_world import FakeWorld, OddWorld
-from worker.serve.shards import MOST_HELD, Shards
+from worker.serve.shards import Shards as AnyShards
 
+MOST_HELD = 3
+Shards = partial(AnyShards, most_held=MOST_HELD)
 SETTINGS = arena_settings(read_experiment("scenario3"), Origin())
 EMPTY = Rebuild(b"", ())
 CORE = develop(Node("Core", -1, 0, (0.5, 0.5, 0.5)), BUILT_IN)
@@ -64,7 +67,7 @@ class JobClient:
 
     def ask(
         self,
-        shards: Shards,
+        shards: AnyShards,
         steps: int = 100,
         changes: Changes | None = None,
         rebuild: Rebuild | None = None,
@@ -87,7 +90,7 @@ class JobClient:
         return Rebuild(self.snapshot, tuple(self.history))
 
 
-def lived(shards: Shards) -> JobClient:
+def lived(shards: AnyShards) -> JobClient:
     """Return a client whose shard has had two advances with two robots."""
     requester = JobClient()
     requester.ask(shards, 100, insertion(0), EMPTY)
@@ -96,7 +99,7 @@ def lived(shards: Shards) -> JobClient:
 
 
 def following(
-    requester: JobClient, shards: Shards, rebuild: Rebuild | None
+    requester: JobClient, shards: AnyShards, rebuild: Rebuild | None
 ) -> Advance | None:
     request = requester.request(50, insertion(2), rebuild)
     return decode_advance_answer(shards.answer(request)).advance

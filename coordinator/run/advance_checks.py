@@ -1,0 +1,238 @@
+"""Checks of advances against their requests and the state of their arenas.
+
+An advance that passes names exactly the robots that live, and its times, ages and
+counts are those that follow from the request; so no state machine raises for it.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from itertools import pairwise
+
+from coordinator.run.answer_checks import check_velocities, impossible
+from schema.experiment.document import Experiment
+from schema.limits import (
+    ANGLE_BYTES,
+    COLUMNS_BYTES,
+    GREATEST_COORDINATE,
+    JUDGEMENT_BYTES,
+    POSE_BYTES,
+    SNAPSHOT_BYTES,
+    SNAPSHOT_ROBOT_BYTES,
+    SNAPSHOT_SAMPLE_BYTES,
+    TOUCH_BYTES,
+)
+from schema.parts import BodySpace, Vector
+from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
+from schema.wire.arena import Advance, Casualty, Judgement, Touch
+from schema.wire.arena_codec import AdvanceAnswer
+
+_SHOWN = 3
+"""Robots that a message names."""
+_ROUNDING_S = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Inserted:
+    """A living robot of an arena: its step of insertion, and its number of joints.
+
+    The number is None if its body is not known, as after a snapshot.
+    """
+
+    step: int
+    joints: int | None
+
+
+def inserted(robot: Robot, space: BodySpace, step: int) -> Inserted:
+    """Return what advances are checked against for a robot inserted at a step."""
+    shapes = (space[part.kind].shape(part.parameters) for part in robot.parts)
+    return Inserted(step, sum(shape.joint is not None for shape in shapes))
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedAdvance:
+    """What a correct answer to a request to advance an arena has.
+
+    Attributes:
+        from_step, until: of the request.
+        born: robots that live after the requested changes.
+        experiment: of the island.
+        wants_snapshot: the answer must hold the state at the end.
+    """
+
+    from_step: int
+    until: int
+    born: Mapping[BirthId, Inserted]
+    experiment: Experiment
+    wants_snapshot: bool
+
+    @property
+    def samples(self) -> range:
+        """Steps at which poses are recorded."""
+        interval = self.experiment.simulation.pose_steps
+        first = self.from_step // interval + 1
+        return range(first * interval, self.until + 1, interval)
+
+    @property
+    def has_touches(self) -> bool:
+        """The arena records which robots touch."""
+        arena = self.experiment.arena
+        return arena is not None and arena.record_touches
+
+    @property
+    def most_rows(self) -> int:
+        """Number of poses if all robots live to the end."""
+        return len(self.samples) * len(self.born)
+
+    @property
+    def most_pose_bytes(self) -> int:
+        """Length of columns with as many poses."""
+        most = self.experiment.space.max_parts
+        joints = sum(
+            most if one.joints is None else one.joints for one in self.born.values()
+        )
+        a_sample = len(self.born) * POSE_BYTES + joints * ANGLE_BYTES
+        return COLUMNS_BYTES + len(self.samples) * a_sample
+
+    @property
+    def most_bytes(self) -> int:
+        """Length of an answer."""
+        robots, simulation = len(self.born), self.experiment.simulation
+        window = simulation.window_steps // simulation.pose_steps + 2
+        robot_bytes = SNAPSHOT_ROBOT_BYTES + window * SNAPSHOT_SAMPLE_BYTES
+        return (
+            self.most_pose_bytes
+            + robots * JUDGEMENT_BYTES
+            + self.has_touches * robots**2 * TOUCH_BYTES
+            + self.wants_snapshot * (SNAPSHOT_BYTES + robots * robot_bytes)
+        )
+
+
+def check_snapshot(answer: AdvanceAnswer, expected: ExpectedAdvance) -> None:
+    """Raise unless an answer has a snapshot of its state, if one was wanted.
+
+    Raises:
+        MalformedMessage: none, one that was not wanted, or one of another state.
+    """
+    if bool(answer.snapshot) != expected.wants_snapshot:
+        raise impossible(
+            "advance: a snapshot was wanted, got none"
+            if expected.wants_snapshot
+            else "advance: no snapshot was wanted, got one"
+        )
+    advance = answer.advance
+    assert advance is not None
+    if answer.snapshot and sha256(answer.snapshot).digest() != advance.digest:
+        raise impossible("advance: the snapshot must have the digest of the state")
+
+
+def check_advance(advance: Advance, expected: ExpectedAdvance) -> None:
+    """Raise unless an advance is a result of its request; poses are not checked.
+
+    Raises:
+        MalformedMessage: another step; unknown, missing or repeated robots; numbers
+            that do not follow from the request.
+    """
+    if advance.step != expected.until:
+        raise impossible(
+            f"advance: must reach step {expected.until}, got {advance.step}"
+        )
+    _check_robots(advance, expected.born)
+    for one in advance.judgements:
+        _check_judgement(one, expected)
+    last = expected.from_step
+    for fallen in advance.casualties:
+        if not last <= fallen.step <= expected.until:
+            raise impossible(
+                f"casualty {names([fallen.birth])}: step must be in "
+                f"{last}..{expected.until}, got {fallen.step}"
+            )
+        last = fallen.step
+        _check_place(fallen)
+    _check_touches(advance.touches, expected)
+
+
+def _check_robots(advance: Advance, born: Mapping[BirthId, Inserted]) -> None:
+    """Raise unless exactly the living robots are reported, each once."""
+    judged = [one.birth for one in advance.judgements]
+    if any(a >= b for a, b in pairwise(judged)):
+        raise impossible("advance: judgements must ascend by birth")
+    reported = {*judged, *(one.birth for one in advance.casualties)}
+    problems = []
+    if unknown := reported - born.keys():
+        problems.append(f"unknown {names(unknown)}")
+    if missing := born.keys() - reported:
+        problems.append(f"missing {names(missing)}")
+    if len(reported) < len(advance.judgements) + len(advance.casualties):
+        problems.append("a robot is reported twice")
+    if problems:
+        raise impossible(
+            "advance: must report each living robot once: " + ", ".join(problems)
+        )
+
+
+def _check_judgement(one: Judgement, expected: ExpectedAdvance) -> None:
+    name, born = names([one.birth]), expected.born[one.birth].step
+    simulation = expected.experiment.simulation
+    age_s = (expected.until - born) * simulation.timestep_s
+    if one.age_s != age_s:
+        raise impossible(f"robot {name}: age must be {age_s} s, got {one.age_s} s")
+    is_mature = _window(born, expected) > (
+        simulation.window_steps // simulation.pose_steps
+    )
+    if one.is_mature != is_mature:
+        raise impossible(f"robot {name}: is_mature must be {is_mature}")
+    check_velocities(one.path_velocity, one.straight_velocity)
+    _check_place(one)
+
+
+def _window(born: int, expected: ExpectedAdvance) -> int:
+    """Return how many samples a robot's window has been given.
+
+    The first one is taken at birth if there is no warm-up.
+    """
+    simulation = expected.experiment.simulation
+    interval, warmup = simulation.pose_steps, simulation.warmup_steps
+    before = (born + warmup - 1) // interval if warmup else born // interval
+    return expected.until // interval - before + (not warmup)
+
+
+def _check_place(one: Judgement | Casualty) -> None:
+    place: Vector = one.place
+    if max(map(abs, place)) > GREATEST_COORDINATE:
+        raise impossible(
+            f"robot {names([one.birth])}: coordinates must be within "
+            f"{GREATEST_COORDINATE:g} m, got {place}"
+        )
+
+
+def _check_touches(touches: Sequence[Touch], expected: ExpectedAdvance) -> None:
+    if touches and not expected.has_touches:
+        raise impossible("advance: touches are not recorded, got some")
+    arena, simulation = expected.experiment.arena, expected.experiment.simulation
+    assert arena is not None
+    steps = expected.until - expected.from_step + arena.proximity_steps
+    longest_s = steps * simulation.timestep_s + _ROUNDING_S
+    for touch in touches:
+        pair = (touch.first, touch.second)
+        if touch.first == touch.second or not expected.born.keys() >= set(pair):
+            raise impossible(
+                f"touch: must be of two robots that live here, got {names(pair)}"
+            )
+        if not 0.0 < touch.duration_s <= longest_s:
+            raise impossible(
+                f"touch of {names(pair)}: must take up to {longest_s:g} s, "
+                f"got {touch.duration_s} s"
+            )
+    pairs = [(touch.first, touch.second) for touch in touches]
+    if any(a >= b for a, b in pairwise(pairs)):
+        raise impossible("advance: touches must ascend by pair")
+
+
+def names(births: Iterable[BirthId]) -> str:
+    """Return the first of some births as text, and how many more there are."""
+    ordered = sorted(births)
+    shown = ", ".join(f"{one.island}/{one.number}" for one in ordered[:_SHOWN])
+    more = len(ordered) - _SHOWN
+    return f"{shown} and {more} more" if more > 0 else shown

@@ -1,0 +1,145 @@
+"""Checksums of tables: of segments in a file beside each, of Parquet in run.json.
+
+A segment ``births-000.arrows`` has the file ``births-000.sums`` beside it: ``MAGIC``,
+then one record per Arrow message of the segment, that of the schema included. A record
+holds the end of the message in the segment, the CRC32 of the segment's bytes since the
+end before, and the CRC32 of these two fields. The record is written after its message:
+a message without a record does not count.
+"""
+
+import struct
+from collections.abc import Iterator
+from hashlib import sha256
+from pathlib import Path
+from zlib import crc32
+
+import msgspec
+import pyarrow as pa
+
+DESCRIPTION = "run.json"
+MAGIC = b"revolve sums 1\n\0"
+
+_FIELDS = struct.Struct("<QI")
+_CHECK = struct.Struct("<I")
+_RECORD = _FIELDS.size + _CHECK.size
+_PIECE = 1 << 20
+
+
+class Damaged(Exception):  # noqa: N818 - reads as what it says
+    """A file whose bytes are not those that were written.
+
+    Attributes:
+        byte: start of the bytes that cannot be trusted.
+    """
+
+    def __init__(self, path: Path, byte: int, what: str) -> None:
+        """Describe the damage of a file."""
+        super().__init__(f"{path}: damaged at byte {byte}: {what}")
+        self.byte = byte
+
+
+class Seal(msgspec.Struct, frozen=True):
+    """The part of ``run.json`` that concerns tables.
+
+    Attributes:
+        checksums: all segments have checksums.
+        digests: SHA-256 of each finished table in hexadecimal, by name of the table.
+    """
+
+    checksums: bool = False
+    digests: dict[str, str] = {}
+
+
+def read_seal(folder: Path) -> Seal:
+    """Return what ``run.json`` says about a run's tables.
+
+    Runs of earlier versions have neither checksums nor digests. The same is returned
+    if the file cannot be read: then only checksums that are found are checked.
+    """
+    try:
+        return msgspec.json.decode((folder / DESCRIPTION).read_bytes(), type=Seal)
+    except (OSError, msgspec.MsgspecError):
+        return Seal()
+
+
+def sums_path(segment: Path) -> Path:
+    """Return the path of the checksums of a segment."""
+    return segment.with_suffix(".sums")
+
+
+def sums_size(messages: int) -> int:
+    """Return the length of the checksums of so many messages [bytes]."""
+    return len(MAGIC) + messages * _RECORD
+
+
+def sums_record(end: int, message: bytes | memoryview) -> bytes:
+    """Return the record of a message that ends at a byte of its segment."""
+    fields = _FIELDS.pack(end, crc32(message))
+    return fields + _CHECK.pack(crc32(fields))
+
+
+def sound_messages(segment: Path, sums: bytes) -> Iterator[tuple[int, pa.Buffer]]:
+    """Yield end and bytes of each message of a segment, up to the first damage.
+
+    Bytes behind the last record are a cut write: they are no damage.
+
+    Args:
+        segment: the file.
+        sums: content of the file with its checksums, read before the segment is.
+
+    Raises:
+        Damaged: after the last sound message.
+        OSError: the disk fails.
+    """
+    start = 0
+    for end, check in _records(segment, sums):
+        if not start:
+            file = _opened(segment)
+        if end <= start:
+            raise Damaged(sums_path(segment), 0, "its records are not in order")
+        message = file.read_buffer(end - start)
+        if message.size < end - start:
+            raise Damaged(segment, start + message.size, f"must have {end} bytes")
+        if crc32(message) != check:
+            raise Damaged(segment, start, f"wrong checksum of bytes {start} to {end}")
+        yield end, message
+        start = end
+
+
+def _opened(segment: Path) -> pa.OSFile:
+    try:
+        return pa.OSFile(str(segment))
+    except FileNotFoundError:
+        raise Damaged(segment, 0, "the file is missing") from None
+
+
+def _records(segment: Path, sums: bytes) -> Iterator[tuple[int, int]]:
+    """Yield end and CRC32 of each message; an incomplete last record is a cut write.
+
+    Raises:
+        Damaged: after the last sound record.
+    """
+    path = sums_path(segment)
+    if not sums.startswith(MAGIC):
+        # Both files are made before anything is written to them.
+        if segment.exists() and not segment.stat().st_size and not sums:
+            return
+        raise Damaged(path, 0, "no checksums of this version of Revolve")
+    for at in range(len(MAGIC), len(sums) - _RECORD + 1, _RECORD):
+        fields = sums[at : at + _FIELDS.size]
+        if _CHECK.unpack_from(sums, at + _FIELDS.size) != (crc32(fields),):
+            raise Damaged(path, at, "wrong checksum of a record")
+        yield _FIELDS.unpack(fields)
+
+
+def digest_of(path: Path) -> str:
+    """Return the SHA-256 of a file in hexadecimal.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    digest = sha256()
+    with path.open("rb") as file:
+        while piece := file.read(_PIECE):
+            digest.update(piece)
+    return digest.hexdigest()

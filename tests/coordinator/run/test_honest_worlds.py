@@ -1,0 +1,120 @@
+"""Advances of real arenas pass every check."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from coordinator.evolution.generation import generate
+from coordinator.run.advance_checks import (
+    ExpectedAdvance,
+    Inserted,
+    check_advance,
+    check_snapshot,
+    inserted,
+)
+from coordinator.run.pose_checks import read_poses
+from schema.experiment.document import Experiment, body_space
+from schema.experiment.identity import Origin
+from schema.experiment.settings import arena_settings, read_arena_settings
+from schema.robot.genome import develop
+from schema.robot.ids import BirthId
+from schema.wire.arena import Advance, Changes, Insertion
+from schema.wire.arena_codec import (
+    AdvanceAnswer,
+    decode_advance_answer,
+    encode_advance_answer,
+)
+from tests.coordinator.arena_world import experiment
+from worker.arena.world import World
+
+TICK = 25
+
+
+def settings_of(*, arena: dict[str, Any], simulation: dict[str, Any]) -> Experiment:
+    made = experiment(9, **arena)
+    return replace(made, simulation=replace(made.simulation, **simulation))
+
+
+def advances(
+    rules: Experiment, stops: list[int]
+) -> Iterator[tuple[Advance, bytes, ExpectedAdvance]]:
+    """Advance a crowd from stop to stop; robots come and go at each."""
+    settings = read_arena_settings(arena_settings(rules, Origin()))
+    world, space = World(settings), body_space(rules.space)
+    born: dict[BirthId, Inserted] = {}
+    try:
+        for number, (begin, end) in enumerate(pairwise([0, *stops])):
+            births = [BirthId(number % 2, 3 * number + each) for each in range(3)]
+            genomes = [
+                generate(np.random.default_rng(birth.number), rules) for birth in births
+            ]
+            came = tuple(
+                Insertion(birth, develop(genome, space), (0.1 * place, 0.05 * number))
+                for place, (birth, genome) in enumerate(
+                    zip(births, genomes, strict=True)
+                )
+            )
+            gone = tuple(sorted(born)[:1]) if begin % TICK == 0 else ()
+            if begin % TICK:
+                came = ()
+            world.apply(Changes(gone, came))
+            born = {birth: at for birth, at in born.items() if birth not in gone}
+            born |= {each.birth: inserted(each.robot, space, begin) for each in came}
+            advance, snapshot = world.advance(end), world.snapshot()
+            yield advance, snapshot, ExpectedAdvance(begin, end, born, rules, True)
+            born = {one.birth: born[one.birth] for one in advance.judgements}
+    finally:
+        world.close()
+
+
+def check(advance: Advance, snapshot: bytes, expected: ExpectedAdvance) -> int:
+    """Fail if a check refuses an advance; return the number of its poses."""
+    sent = encode_advance_answer(AdvanceAnswer(1, 2, 0.5, advance, snapshot))
+    assert len(sent) < expected.most_bytes / 2
+    answer = decode_advance_answer(sent, expected.most_bytes)
+    assert answer.advance is not None
+    check_snapshot(answer, expected)
+    check_advance(answer.advance, expected)
+    rows = read_poses(answer.advance.poses, answer.advance, expected)
+    return int(rows.num_rows)
+
+
+CASES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "thesis": ({}, {}),
+    "touches": ({"record_touches": True}, {}),
+    "no warm-up": ({}, {"warmup_steps": 0, "window_steps": 400}),
+    "odd clocks": (
+        {"record_touches": True, "proximity_steps": 7},
+        {"warmup_steps": 130, "window_steps": 330, "pose_steps": 33},
+    ),
+    "rare poses": ({}, {"pose_steps": 700, "window_steps": 700, "warmup_steps": 0}),
+}
+
+
+@pytest.mark.parametrize(("arena", "simulation"), CASES.values(), ids=CASES)
+def test_honest_advances_are_taken(
+    arena: dict[str, Any], simulation: dict[str, Any]
+) -> None:
+    rules = settings_of(arena=arena, simulation=simulation)
+    poses = matures = touches = 0
+    for advance, snapshot, expected in advances(rules, [25, 200, 333, 500, 1000, 1400]):
+        poses += check(advance, snapshot, expected)
+        matures += sum(one.is_mature for one in advance.judgements)
+        touches += len(advance.touches)
+    assert poses > 0
+    assert (matures > 0) == (rules.simulation.window_steps < 1000)
+    assert (touches > 0) == bool(arena.get("record_touches"))
+
+
+def test_robots_that_diverge_are_taken() -> None:
+    """They fall faster than any robot may move."""
+    rules = settings_of(arena={"drop_m": 40.0}, simulation={})
+    casualties = 0
+    for advance, snapshot, expected in advances(rules, [200, 400, 700, 900]):
+        check(advance, snapshot, expected)
+        casualties += len(advance.casualties)
+    assert casualties > 0

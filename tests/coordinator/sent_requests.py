@@ -1,0 +1,105 @@
+"""Requests about single robots, whose jobs are recorded."""
+
+from coordinator.dispatch.events import (
+    Client,
+    Deliver,
+    DispatchEvent,
+    Joined,
+    Returned,
+    Ticked,
+)
+from coordinator.dispatch.fleet import Fleet
+from coordinator.islands.events import Answered, Audited
+from coordinator.run.requests import Requests
+from coordinator.run.run_context import RunContext
+from schema.experiment.document import Experiment
+from schema.experiment.identity import Origin
+from schema.parts import BUILT_IN
+from schema.robot.brain import Brain, Connection, Neuron
+from schema.robot.ids import BirthId
+from schema.robot.results import Evaluation, Report
+from schema.robot.robot import Part, Robot
+from schema.wire.codec import Answer, decode_body, decode_request, encode_answer
+
+EPOCH = 3
+CLIENT = Client("run", EPOCH)
+ORIGIN = Origin(seed=5, run=2)
+BIRTH = BirthId(0, 7)
+ROBOT = Robot(
+    (
+        Part("Core", -1, -1, -1, 0, (0.5, 0.5, 0.5)),
+        Part("ActiveHinge", 0, 0, 0, 0, (0.5, 0.5, 0.5)),
+    ),
+    Brain(
+        (
+            *(Neuron("input", "Input", 0) for _ in range(6)),
+            Neuron("output", "Simple", 1, (0.25, 0.5)),
+            Neuron("hidden", "Simple", 0, (0.25, 0.5)),
+        ),
+        (Connection(0, 6, 0.75),),
+    ),
+)
+JUDGED = Evaluation(0.25, 0.06, 0.05, 12.0)
+VIABLE = Report(True, "", (), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0), 0.1, 1)
+
+
+class SentRequests:
+    """Requests whose jobs are recorded, with two workers and an analyzer."""
+
+    def __init__(self, evaluation: bytes = b"evaluation", audit: float = 0.0) -> None:
+        self.sent: list[tuple[int, str, bytes]] = []
+        self.cancelled: list[tuple[int, str]] = []
+        self.fleet = Fleet(self)
+        self.now_s = 0.0
+        experiment = Experiment(name="requests")
+        context = RunContext(
+            CLIENT,
+            ORIGIN,
+            b"vetting",
+            {0: evaluation, 2: evaluation},
+            {},
+            {0: experiment, 2: experiment},
+            BUILT_IN,
+        )
+        self.requests = Requests(context, self.fleet, audit)
+        for name in ("one", "two"):
+            self.tell(Joined(name, "worker", 1, f"platform-{name}"))
+        self.tell(Joined("judge", "analyzer", 1, "platform"))
+        self.tell(Ticked(0.0))
+
+    def send(self, number: int, agent: str, payload: bytes) -> None:
+        self.sent.append((number, agent, payload))
+
+    def cancel(self, agent: str, payload: bytes) -> None:
+        asked = decode_request(payload, decode_body)
+        self.cancelled.append((asked.number, agent))
+
+    def ask(self, agent: str) -> None:
+        raise AssertionError(agent)
+
+    def receive(
+        self, _timeout_s: float, _pause_s: float = 0.0, /
+    ) -> list[DispatchEvent]:
+        return []
+
+    def tell(self, event: DispatchEvent) -> list[Answered | Audited]:
+        """Pass an event to the fleet; return the island's events that follow."""
+        self.fleet.tell(event)
+        ends = self.fleet.listen(0.0, self.now_s).get(CLIENT, ())
+        found = []
+        for end in ends:
+            assert isinstance(end, Deliver)
+            found += self.requests.events(end)
+        return found
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass."""
+        self.now_s += seconds
+        self.tell(Ticked(self.now_s))
+
+    def reply(self, result: Evaluation | Report | str, **changes: int) -> Returned:
+        """Return the answer to the newest job."""
+        number, agent, _ = self.sent[-1]
+        fields = {"epoch": EPOCH, "number": number, **changes}
+        data = encode_answer(Answer(**fields, wall_s=0.5, result=result))
+        return Returned(number, agent, "ok", data)

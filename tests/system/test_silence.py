@@ -1,0 +1,133 @@
+"""Workers that never answer, and arenas that share workers."""
+
+import os
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import analyzer.service
+import worker.serve.service
+from coordinator.cli.dispatch_bench import Body, real_fleet
+from coordinator.dispatch.events import AgentKind
+from coordinator.dispatch.fleet import Fleet
+from coordinator.islands.events import Advanced
+from coordinator.run.session import RunSession
+from coordinator.storage.compare import compare
+from coordinator.storage.folder import RunDetails, RunFolder
+from coordinator.storage.journal import Journal
+from schema.experiment.file import experiment_text, read_experiment
+from schema.wire.arena_codec import decode_advance_request
+from schema.wire.codec import is_advance_request
+
+pytestmark = [
+    pytest.mark.system,
+    pytest.mark.timeout(300),
+    pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
+]
+
+Workspace = Any
+Fleets = Callable[..., Any]
+ROOT = Path(__file__).parents[2]
+MISBEHAVING_AGENT = Path(__file__).with_name("misbehaving_agent.py")
+
+
+def advances(folder: Path) -> list[Advanced]:
+    with Journal.open(folder) as journal:
+        return [each for each in journal.replay() if isinstance(each, Advanced)]
+
+
+def test_arena_of_a_silent_worker_continues_on_an_idle_one(
+    small_arena_workspace: Workspace, small_arena_run: Path, fleet_of: Fleets
+) -> None:
+    fleet = fleet_of(small_arena_workspace, "hamlet.toml", "--seed", "4", "--quiet")
+    command = [sys.executable, str(MISBEHAVING_AGENT), fleet.address, "silent"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, text=True
+    ) as silent:
+        try:
+            fleet.join("one")
+            fleet.begin(workers=2)
+            fleet.finish()
+        finally:
+            silent.terminate()
+        assert silent.stdout is not None
+        report = silent.stdout.read().split()
+    # It sent its late answer when the job was cancelled.
+    assert report == ["silent", "1"]
+    assert compare(small_arena_run, fleet.folder) == []
+    agents = [each.provenance.agent[:3] for each in advances(fleet.folder)]
+    first = agents.index("one")
+    assert first >= 3
+    assert agents == ["odd"] * first + ["one"] * (len(agents) - first)
+    said = fleet.coordinator.stderr.read()
+    assert said.count("has not answered for") == 1
+    assert "takes its job" in said
+
+
+FORTY = """
+name = "forty"
+births = 6
+[selection]
+population = 5
+[simulation]
+warmup_steps = 200
+window_steps = 400
+[arena]
+birth_interval_s = 4.0
+cull_interval_s = 8.0
+sample_interval_s = 4.0
+snapshot_interval_s = 100.0
+[[islands]]
+count = 40
+"""
+
+
+class Counting:
+    """Agents of a fleet; counts the advances that rebuild a state."""
+
+    def __init__(self, fleet: Fleet) -> None:
+        self.rebuilt = 0
+        self._agents = fleet._agents
+        fleet._agents = self
+
+    def send(self, number: int, agent: str, payload: bytes) -> None:
+        if is_advance_request(payload):
+            request = decode_advance_request(payload)
+            self.rebuilt += request.rebuild is not None and request.from_step > 0
+        self._agents.send(number, agent, payload)
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - of the real one
+        return getattr(self._agents, name)
+
+
+def test_forty_arenas_on_two_workers_are_never_rebuilt(tmp_path: Path) -> None:
+    (tmp_path / "forty.toml").write_text(FORTY)
+    experiment = read_experiment(str(tmp_path / "forty.toml"))
+    details = RunDetails(experiment.name, 0, 1, experiment_text(experiment))
+    bodies: dict[AgentKind, tuple[Body, int]] = {
+        "worker": (worker.serve.service.process, 2),
+        "analyzer": (analyzer.service.process, 1),
+    }
+    with real_fleet(bodies) as fleet:
+        agents = Counting(fleet)
+        run = RunSession(RunFolder(tmp_path / "run", details), fleet)
+        run.start()
+        while not run.loop.is_finished:
+            now_s = time.monotonic()
+            ends = fleet.listen(0.1, now_s)
+            run.loop.act(now_s, ends.get(run.loop.client, ()))
+        run.close()
+    made = advances(tmp_path / "run")
+    assert len(made) >= 3 * 40
+    assert agents.rebuilt == 0
+    arenas = Counter(
+        agent for _, agent in {(e.island, e.provenance.agent) for e in made}
+    )
+    assert sorted(arenas.values()) == [20, 20]
