@@ -103,7 +103,7 @@ def _run(words: list[str]) -> int:
         room = import_module(COMMANDS[words[0]][0])
         return int(room.main(words))
     except error_type as error:
-        print(f"revolve: {error}", file=sys.stderr)
+        import_module("schema.agent.log").tell_error(f"revolve: {error}")
         return 2
     finally:
         if words[1:] in (["-h"], ["--help"]):

@@ -23,7 +23,7 @@ from coordinator.storage.hints import stopped
 from schema.agent.address import HUB, listen_address
 from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.command import access_of, connect_of, tls_of
-from schema.agent.service import tell_user
+from schema.agent.log import start_log, tell_user
 from schema.agent.supervisor import cores
 from schema.errors import NetworkError
 from schema.experiment.check import check_experiment
@@ -53,6 +53,7 @@ def main(arguments: list[str]) -> int:
         return _compare(options)
     if command == "bench dispatch":
         return _bench(options)
+    start_log("coordinator", as_json=options.log_json)
     if command == "resume":
         folder = Path(options.folder)
         deployment = _deployment(options, _experiments_of(folder))

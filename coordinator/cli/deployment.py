@@ -14,9 +14,9 @@ from coordinator.run.live_server import open_viewer
 from coordinator.storage.disk import replace_text
 from schema.agent.access import Certificate
 from schema.agent.address import ADDRESS
+from schema.agent.log import tell_user
 from schema.agent.network import Agent, Tls
 from schema.agent.platform_tag import platform_tag
-from schema.agent.service import tell_user
 from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, ProcessSlot
 from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name

@@ -4,7 +4,7 @@ import argparse
 
 from coordinator.storage.campaign import shipped_campaigns
 from schema.agent.address import FORMS
-from schema.agent.command import add_access, add_job_limits, add_network_flags
+from schema.agent.command import add_access, add_job_limits, add_log, add_network_flags
 from schema.experiment.file import shipped_experiments
 from schema.flags import Flags, add_count, positive_number, share, whole_number
 
@@ -162,6 +162,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         "one of its own; this is recorded and changes the results",
     )
     flags.add_argument("--quiet", action="store_true", help="show no progress")
+    add_log(flags)
     flags.add_argument(
         "--metrics",
         metavar="ADDRESS",

@@ -17,7 +17,7 @@ from coordinator.run.live_server import LiveServer
 from coordinator.run.operators import answer_operator
 from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
-from schema.agent.service import tell_user
+from schema.agent.log import tell_user, warn_user
 from schema.agent.supervisor import stop_on_signals
 from schema.errors import RevolveError
 from schema.wire.status import RunStatus, Status
@@ -124,7 +124,7 @@ def _open_metrics(
 def _tell_faults(scheduler: RunScheduler) -> None:
     """Tell the user what peers have begun to send that is not used."""
     for line in scheduler.fleet.faults.lines():
-        tell_user(line)
+        warn_user(line)
 
 
 class _Server:

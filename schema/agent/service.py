@@ -7,7 +7,6 @@ counted; they never end the loop.
 
 import json
 import os
-import sys
 import threading
 import time
 from collections.abc import Callable
@@ -19,6 +18,7 @@ import zenoh
 
 from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.job_watch import LOOK_S
+from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.network import Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.request_handler import FairQueue, ReplyCounts, Server
@@ -66,12 +66,6 @@ def session_config(text: str, member: Member) -> zenoh.Config:
     return config
 
 
-def tell_user(line: str) -> None:
-    """Write a line to standard error."""
-    sys.stderr.write(f"{line}\n")
-    sys.stderr.flush()
-
-
 class Outlet:
     """Publisher of messages for viewers: best effort, never blocks."""
 
@@ -116,6 +110,7 @@ def serve(
     stop: threading.Event,
     say: Callable[[str], None] = tell_user,
     *,
+    warn: Callable[[str], None] | None = None,
     outlet: Outlet | None = None,
     slot: ProcessSlot = UNSUPERVISED,
 ) -> ReplyCounts:
@@ -129,7 +124,8 @@ def serve(
             is bad.
         agent: this agent, and the address of its hub.
         stop: ends the loop; checked between jobs.
-        say: called with a line when the hub is gone and when it is back.
+        say: called with a line when the hub is back.
+        warn: called with a line when the hub is gone; None: ``say``.
         outlet: publishes through this agent's session while there is one.
         slot: this process's slot in a pool, if it has one.
 
@@ -141,7 +137,7 @@ def serve(
     me = Member(agent.fleet, agent.role, agent.name)
     config = session_config(client_config(agent.connect, agent.tls), me)
     server = Server(answer, agent, slot)
-    hub = _Hub(agent.connect, say)
+    hub = _Hub(agent.connect, say, warn or say)
     log_engine()
     session = _open(config, hub, stop)
     if session is not None:
@@ -187,10 +183,13 @@ def serve_as_process(
     stop = stop_on_signals()
     stop_with_parent(stop)
     own = agent if agent.version else own_agent(agent, slot.index)
-    say = tell_user if slot.index == 0 else _keep_quiet
-    counts = serve(answer, own, stop, say, outlet=outlet, slot=slot)
+    start_log(own.name)
+    say, warn = (
+        (tell_user, warn_user) if slot.index == 0 else (_keep_quiet, _keep_quiet)
+    )
+    counts = serve(answer, own, stop, say, warn=warn, outlet=outlet, slot=slot)
     if counts.refused:
-        tell_user(
+        warn_user(
             f"{own.name} refused {counts.refused} requests, "
             f"{counts.malformed} of them malformed"
         )
@@ -292,6 +291,7 @@ class _Hub:
 
     address: str
     say: Callable[[str], None]
+    warn: Callable[[str], None]
     is_there: bool = True
     said_s: float = 0.0
 
@@ -301,7 +301,7 @@ class _Hub:
         if is_there and not self.is_there:
             self.say(f"connected to {self.address}")
         if not is_there and (self.is_there or now_s - self.said_s >= _SAY_S):
-            self.say(
+            self.warn(
                 f"no coordinator at {self.address}; retrying; press Ctrl-C to stop"
             )
             self.said_s = now_s
