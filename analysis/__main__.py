@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from schema.errors import RevolveError
-from schema.flags import Flags, whole_number
+from schema.experiment.plugin_access import allow
+from schema.flags import Flags, add_plugins, whole_number
 
 
 class MissingExtra(RevolveError):  # noqa: N818 - names what is missing
@@ -50,6 +51,7 @@ def main(arguments: list[str]) -> int:
     if arguments[0] == "view":
         return _view(arguments)
     options = _flags().parse_args(arguments[1:])
+    allow(options.plugins)
     with _extra("analysis needs", "analysis"):
         from analysis.analyze_command import analyze
     return analyze(options, arguments, _simulation)
@@ -86,6 +88,7 @@ def _flags() -> Flags:
         metavar="N",
         help="number of runs measured in parallel (default: number of cores)",
     )
+    add_plugins(flags)
     return flags
 
 

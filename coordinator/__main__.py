@@ -31,9 +31,11 @@ from schema.experiment.document import (
     Experiment,
     island_count,
     island_experiment,
+    references,
     with_births,
 )
 from schema.experiment.file import experiment_from_text
+from schema.experiment.plugin_access import allow, allow_references
 from schema.experiment.settings import fitness_function
 
 
@@ -54,6 +56,7 @@ def main(arguments: list[str]) -> int:
     if command == "bench dispatch":
         return _bench(options)
     start_log("coordinator", as_json=options.log_json)
+    allow(options.plugins)
     if command == "resume":
         folder = Path(options.folder)
         deployment = _deployment(options, _experiments_of(folder))
@@ -102,8 +105,12 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
 def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
     """Return the experiments of a run or campaign folder."""
     if is_campaign(folder):
-        return read_campaign(folder).experiments
-    return (experiment_from_text(read_details(folder).document),)
+        experiments = read_campaign(folder).experiments
+    else:
+        experiments = (experiment_from_text(read_details(folder).document),)
+    for experiment in experiments:
+        allow_references(references(experiment))
+    return experiments
 
 
 def _deployment(

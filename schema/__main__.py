@@ -7,7 +7,8 @@ from pathlib import Path
 from schema.errors import RevolveError
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
-from schema.flags import Flags
+from schema.experiment.plugin_access import allow
+from schema.flags import Flags, add_plugins
 from schema.formats.files import read_robot, settings_of, write_robot
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot.brain import neuron_names
@@ -28,6 +29,7 @@ def main(argv: list[str] | None = None) -> int:
     """
     words = ["robot", *sys.argv[1:]] if argv is None else argv
     options = _parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
+    allow(options.plugins)
     experiment = read_experiment(options.experiment) if options.experiment else None
     space = body_space(experiment.space) if experiment else BUILT_IN
     robot = read_robot(options.file, space)
@@ -65,6 +67,7 @@ def _parser() -> argparse.ArgumentParser:
             help="use the part types and the world of this experiment (default: all "
             "built-in part types and the default world)",
         )
+        add_plugins(command)
     return parser
 
 

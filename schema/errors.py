@@ -6,7 +6,7 @@ The class of an exception names the source of the fault, which decides its handl
 from difflib import get_close_matches
 from typing import Any, Literal
 
-from schema.limits import LONGEST_REASON, printable
+from schema.limits import LONGEST_REASON, MOST_SHOWN, printable
 
 
 class RevolveError(Exception):
@@ -91,7 +91,23 @@ def one_line(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
+def shown(value: object) -> str:
+    """Return a value for a message: as in Python, cut if it is long."""
+    try:
+        text = repr(value)
+    except ValueError:
+        # Python writes no integer of more than 4300 digits.
+        return f"a {type(value).__name__} that is too long to show"
+    return cut(text)
+
+
+def cut(text: str) -> str:
+    """Return a text for a message, cut if it is long."""
+    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
+
+
 def nearest(word: Any, words: Any) -> str:  # noqa: ANN401 - any iterable of str
     """Return ``; did you mean 'x'?`` for the nearest word, or an empty text."""
-    found = get_close_matches(str(word), list(words), n=1, cutoff=0.5)
+    # The search takes quadratic time.
+    found = get_close_matches(str(word)[:MOST_SHOWN], list(words), n=1, cutoff=0.5)
     return f"; did you mean {found[0]!r}?" if found else ""

@@ -60,6 +60,19 @@ def add_count(
     )
 
 
+def add_plugins(flags: argparse.ArgumentParser) -> None:
+    """Add the flag for modules that may be imported (``plugin_access.allow``)."""
+    flags.add_argument(
+        "--plugins",
+        action="append",
+        default=[],
+        metavar="MODULE|FILE",
+        help="allow a module, or a .py file, with part types and fitness functions; "
+        "may be repeated (default: only built-in modules, installed entry points "
+        "'revolve.plugins', and what an experiment given as .toml names)",
+    )
+
+
 def number(text: str) -> float:
     """Return a flag's value as a finite number."""
     return _number(text, "a finite number", lambda _value: True)

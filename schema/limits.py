@@ -1,4 +1,4 @@
-"""Limits of everything that comes from another process.
+"""Limits of everything that comes from another process or from another's file.
 
 Every decoder uses these. The length of a message is checked before it is parsed, the
 number of its submessages before they are made, and texts are cut. What a request or
@@ -99,6 +99,43 @@ MOST_CORES = 4096
 """Arenas that an agent keeps, and cores that it uses for one."""
 LONGEST_QUIET_S = 5.0
 """A job that used CPU time within this time makes progress [s]."""
+
+# Documents: robot files, experiments, sceneries; measured before they are parsed
+
+MOST_TEXT_BYTES = 1_000_000
+"""Size of a robot file, an experiment or scenery."""
+MOST_MJCF_BYTES = 6_000_000
+"""Size of a robot file in MJCF, which may hold rough ground as text."""
+MOST_SETTINGS_BYTES = 4_000_000
+"""Size of the settings in a request: they hold the scenery of an island as JSON."""
+MOST_NODES = 100_000
+"""Values in a YAML document, elements in an XML one."""
+MOST_XML_ATTRIBUTES = 200_000
+"""Attributes in an XML document."""
+MOST_DEPTH = 400
+"""Levels of nesting in YAML and XML."""
+MOST_BRACKETS = 20_000
+"""Opening square brackets, of tables and lists, in TOML."""
+MOST_DIGITS = 1000
+"""Digits of a number in TOML."""
+MOST_KEY_PARTS = 16
+"""Parts of a dotted key in TOML; ``tomllib`` takes quadratic memory for them."""
+MOST_ISLANDS = 10_000
+"""Islands of an experiment."""
+MOST_ISLAND_TABLES = 1000
+"""Tables ``[[islands]]`` of an experiment."""
+MOST_OTHERS = 100
+"""Elements of MJCF that belong to no part, of a kind: default classes, lights."""
+MOST_SCENERY_DEPTH = 100
+"""Levels of nesting in scenery; MuJoCo takes quadratic time for them."""
+MOST_LINE = 1000
+"""Characters of a line in RoboGen's text."""
+MOST_COUNT = 2**63 - 1
+"""Greatest whole number in an experiment."""
+MOST_GEOMS = 10_000
+"""Geoms of scenery, replicated ones included."""
+MOST_PLUGIN_CHARACTERS = 10_000
+"""Length of the list of plug-ins and digests in a request."""
 
 # Numbers
 

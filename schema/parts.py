@@ -159,13 +159,10 @@ class PartType:
 
     def __post_init__(self) -> None:
         """Derive the attributes that each birth uses."""
-        derived = {
-            "parameters": self.own_parameters + COLOURS,
-            "inputs": sum(sensor.inputs for sensor in self.sensors),
-            "outputs": 0 if self.motor is None else 1,
-        }
-        for name, value in derived.items():
-            object.__setattr__(self, name, value)
+        inputs = sum(sensor.inputs for sensor in self.sensors)
+        object.__setattr__(self, "parameters", self.own_parameters + COLOURS)
+        object.__setattr__(self, "inputs", inputs)
+        object.__setattr__(self, "outputs", 0 if self.motor is None else 1)
 
 
 BodySpace = Mapping[str, PartType]

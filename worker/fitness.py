@@ -5,7 +5,7 @@ experiment's fitness section and returns a finite number, higher is better.
 """
 
 import math
-from typing import Protocol
+from collections.abc import Callable
 
 import numpy as np
 
@@ -14,13 +14,8 @@ from schema.experiment.document import Fitness
 from schema.experiment.settings import fitness_function
 from schema.robot.results import Floats, Track
 
-
-class FitnessFunction(Protocol):
-    """Signature of the function that ``fitness.function`` names."""
-
-    def __call__(self, track: Track, fitness: Fitness) -> float:
-        """Return the fitness of a track; finite, always maximised."""
-        ...
+FitnessFunction = Callable[[Track, Fitness], float]
+"""Function that ``fitness.function`` names: fitness of a track; finite, maximised."""
 
 
 def fitness_of(track: Track, fitness: Fitness) -> float:
@@ -105,7 +100,7 @@ def check_fitness(function: FitnessFunction, fitness: Fitness) -> None:
         ExperimentError: it returns no number, a number that is not finite, different
             numbers for one track, or writes to the track.
     """
-    for name, positions in _simple_tracks():
+    for name, positions in _simple_tracks().items():
         track = Track(0.2, positions.copy())
         values = [function(track, fitness) for _ in range(2)]
         for value in values:
@@ -131,17 +126,12 @@ def check_fitness(function: FitnessFunction, fitness: Fitness) -> None:
             )
 
 
-def _simple_tracks() -> list[tuple[str, Floats]]:
-    along = np.linspace(0.0, 0.6, 61)
+def _simple_tracks() -> dict[str, Floats]:
+    along, zero = np.linspace(0.0, 0.6, 61), np.zeros(61)
     turn = np.linspace(0.0, 2.0 * np.pi, 61)
-    still = np.zeros((61, 3))
-    straight, circle, two = still.copy(), still.copy(), still[:2].copy()
-    straight[:, 0] = along
-    circle[:, 0], circle[:, 1] = np.cos(turn), np.sin(turn)
-    two[1] = (0.01, 0.02, 0.03)
-    return [
-        ("still", still),
-        ("straight", straight),
-        ("circular", circle),
-        ("two-sample", two),
-    ]
+    return {
+        "still": np.zeros((61, 3)),
+        "straight": np.stack([along, zero, zero], axis=1),
+        "circular": np.stack([np.cos(turn), np.sin(turn), zero], axis=1),
+        "two-sample": np.array([(0.0, 0.0, 0.0), (0.01, 0.02, 0.03)]),
+    }

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
+from schema.experiment.plugin_access import allow
 from schema.experiment.settings import EvaluationSettings
-from schema.flags import Flags
+from schema.flags import Flags, add_plugins
 from schema.formats.files import MJCF_ENDING, read_robot, settings_of
 from schema.formats.mjcf import read_mjcf
 from schema.robot.robot import Robot
@@ -31,6 +32,7 @@ def main(arguments: list[str]) -> int:
             its environment.
     """
     options = _parser().parse_args(arguments[1:])
+    allow(options.plugins)
     robot, settings = _read(options.file, options.experiment)
     found = evaluate(robot, settings)
     for name, value, unit in (
@@ -65,6 +67,7 @@ def _parser() -> argparse.ArgumentParser:
         help="experiment whose settings to use (default: those in an MJCF file, or "
         "those of the thesis's off-line experiments)",
     )
+    add_plugins(parser)
     return parser
 
 

@@ -29,21 +29,17 @@ def progression(populations: pa.Table) -> pa.Table:
     pieces = []
     for measure in POPULATION:
         known = populations.filter(populations[measure].is_valid())
-        by_run = _whole_runs(
-            known.group_by([*keys, "folder"]).aggregate(
-                [(measure, "mean"), (measure, "count")]
-            ),
-            f"{measure}_count",
-        )
+        runs = known.group_by([*keys, "folder"])
+        means = runs.aggregate([(measure, "mean"), (measure, "count")])
+        by_run = _whole_runs(means, f"{measure}_count")
+        kinds = ("mean", "stddev", "min", "max", "count")
         totals = by_run.group_by(keys).aggregate(
-            [
-                (f"{measure}_mean", kind)
-                for kind in ("mean", "stddev", "min", "max", "count")
-            ]
+            [(f"{measure}_mean", k) for k in kinds]
         )
-        named = totals.rename_columns(
-            [*keys, "mean", "sd", "least", "greatest", "runs"]
-        ).sort_by([(key, "ascending") for key in keys])
+        names = [*keys, "mean", "sd", "least", "greatest", "runs"]
+        named = totals.rename_columns(names).sort_by(
+            [(key, "ascending") for key in keys]
+        )
         measures = pa.repeat(pa.scalar(measure), named.num_rows)
         pieces.append(named.append_column("measure", measures))
     table = pa.concat_tables(pieces)

@@ -57,13 +57,8 @@ class DrawnFigure:
 
 
 def _spread(number: str, title: str, panels: Panels) -> Figure:
-    return Figure(
-        number,
-        title,
-        _SPREAD,
-        ("outcomes", "robots"),
-        partial(over_runs, panels=panels),
-    )
+    draw = partial(over_runs, panels=panels)
+    return Figure(number, title, _SPREAD, ("outcomes", "robots"), draw)
 
 
 def _course(number: str, title: str, measure: str, text: str) -> Figure:

@@ -17,7 +17,7 @@ from analysis.figures.style import PICTURE_ENDING, in_order, label, save
 from analysis.measures.load import LeftOut, Run
 from analysis.render.picture import Simulate
 from schema.errors import RevolveError
-from schema.experiment.file import experiment_from_text
+from schema.experiment.file import own_experiment
 from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
 from schema.tables.files import read_table
@@ -142,7 +142,7 @@ def _robot_pictures(
             pictures[name] = robot_picture(
                 best[name],
                 read_table(run.folder, "births"),
-                experiment_from_text(run.document),
+                own_experiment(run.document),
                 simulation,
                 origin=Origin(seed=run.seed, run=run.number),
                 has_family=name not in _BASELINES,

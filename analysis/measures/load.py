@@ -16,7 +16,8 @@ from pyarrow.parquet import read_schema
 
 from schema.errors import RunFolderError
 from schema.tables.columns import TABLES, VERSION
-from schema.tables.files import FINISHED, finished_path, has_rows, read_table
+from schema.tables.files import finished_path, has_rows, read_table
+from schema.tables.segments import FINISHED
 
 TABLE = "table "
 """Prefix of the name of a table that was left out."""

@@ -18,7 +18,8 @@ from analysis.render.picture import (
 )
 from schema.experiment.document import Simulation, body_space
 from schema.experiment.file import read_experiment
-from schema.flags import Flags, whole_number
+from schema.experiment.plugin_access import allow
+from schema.flags import Flags, add_plugins, whole_number
 from schema.formats.files import read_robot, settings_of
 from schema.robot.results import Floats
 
@@ -44,6 +45,7 @@ def main(arguments: list[str], simulate: Simulate) -> int:
         ExperimentError: no such experiment, or it does not support a sensor.
     """
     options = _parser().parse_args(arguments[1:])
+    allow(options.plugins)
     out: Path = options.out
     is_film = out.suffix.lower() == FILM_ENDING
     if not is_film and out.suffix.lower() != PICTURE_ENDING:
@@ -134,4 +136,5 @@ def _parser() -> argparse.ArgumentParser:
         metavar="NAME|FILE.toml",
         help="experiment that defines part types, simulation and environment",
     )
+    add_plugins(parser)
     return parser

@@ -1,6 +1,6 @@
 """Box models of robots, and the places of their boxes in recorded poses.
 
-The tree of segments is rebuilt from the body as in ``schema.mjcf``, without MuJoCo: at
+The tree of segments is rebuilt from the body as in ``schema.mjcf``, without a model: at
 the neutral pose all frames are parallel to the core's, and a joint turns everything
 beyond it. Boxes of one segment share an attitude if they differ by right angles only,
 because equal numbers take less room in a recording.
@@ -15,6 +15,7 @@ import pyarrow as pa
 import pyarrow.compute
 
 from schema.errors import MalformedMessage
+from schema.mjcf.model import quaternion
 from schema.parts import BodySpace, Box
 from schema.robot.frames import place_parts, shapes_of
 from schema.robot.results import Floats
@@ -204,7 +205,9 @@ class _Builder:
             colours=np.round(255.0 * np.array(colours)).astype(np.uint8),
             segments=np.array(segments, dtype=np.intp),
             centres=np.array(centres),
-            attitudes=np.array([quaternion(each) for _, each in self.attitudes]),
+            attitudes=np.array(
+                [np.roll(quaternion(each), -1) for _, each in self.attitudes]
+            ),
             attitude_of=np.array(attitude_of, dtype=np.intp),
             carried_by=np.array([owner for owner, _ in self.attitudes], dtype=np.intp),
             parents=tuple(self.parents),
@@ -228,24 +231,6 @@ def _plain(boxes: Iterable[Box]) -> list[Box]:
                 Box("all", tuple(size), tuple(middle), 0.0, segment, chosen[0].rotation)
             )
     return found
-
-
-def quaternion(matrix: Floats) -> Floats:
-    """Return the unit quaternion x, y, z, w of a rotation matrix.
-
-    Source: Bar-Itzhack 2000, New method for extracting the quaternion from a
-    rotation matrix: the greatest eigenvector of a symmetric matrix.
-    """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix.tolist()
-    symmetric = [
-        [xx - yy - zz, yx + xy, zx + xz, zy - yz],
-        [yx + xy, yy - xx - zz, zy + yz, xz - zx],
-        [zx + xz, zy + yz, zz - xx - yy, yx - xy],
-        [zy - yz, xz - zx, yx - xy, xx + yy + zz],
-    ]
-    _, vectors = np.linalg.eigh(np.array(symmetric))
-    greatest: Floats = vectors[:, -1]
-    return greatest
 
 
 def product(first: Floats, second: Floats) -> Floats:

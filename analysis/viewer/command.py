@@ -32,8 +32,9 @@ from analysis.viewer.watch import watch
 from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
 from schema.agent.log import tell_user
 from schema.agent.supervisor import stop_on_signals
-from schema.experiment.file import experiment_from_text
-from schema.flags import Flags, number
+from schema.experiment.file import own_experiment
+from schema.experiment.plugin_access import allow
+from schema.flags import Flags, add_plugins, number
 from schema.robot.ids import BirthId
 from schema.wire.codec import decode_body
 
@@ -57,6 +58,7 @@ def main(arguments: list[str], simulators: Simulators) -> int:
         ViewerError: the viewer cannot be opened, or the flags conflict.
     """
     options = _flags().parse_args(arguments[1:])
+    allow(options.plugins)
     output = Output.of(options.save, options.serve)
     if options.run is not None and options.connect is not None:
         raise ViewerError("give either a run folder or --connect ADDRESS")
@@ -79,7 +81,7 @@ def _replay(
     """Record a run from its tables, and keep serving the recording."""
     folder: Path = options.run
     run = shown_run(folder)
-    scene = scene_of(experiment_from_text(run.document))
+    scene = scene_of(own_experiment(run.document))
     news = read_news(run)
     born = {one.birth for one in news.births}
     _check(options, born, is_online=bool(scene.arenas))
@@ -227,4 +229,5 @@ def _flags() -> Flags:
         "--until", type=number, metavar="S", help="replay poses up to this time [s]"
     )
     add_network_flags(flags)
+    add_plugins(flags)
     return flags

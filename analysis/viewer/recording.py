@@ -101,7 +101,7 @@ class Recording:
             if len(walls):
                 boxes = rr.Boxes3D(
                     centers=walls[:, :3],
-                    quaternions=walls[:, 3:7],
+                    quaternions=walls[:, [4, 5, 6, 3]],
                     half_sizes=walls[:, 7:],
                     colors=_WALL,
                 )
@@ -164,7 +164,8 @@ class Recording:
             attitudes: (T, B, 4) attitudes of the boxes x, y, z, w.
         """
         rows, count, _ = centres.shape
-        index = [rr.TimeColumn(SIMULATED, duration=_nanoseconds(times_s))]
+        durations = np.round(times_s * 1e9).astype("timedelta64[ns]")
+        index = [rr.TimeColumn(SIMULATED, duration=durations)]
         if births is not None:
             index.append(rr.TimeColumn(BIRTHS, sequence=births))
         columns = rr.Boxes3D.columns(
@@ -248,7 +249,3 @@ class Recording:
             self._stream.set_time(SIMULATED, duration=time)
         if when.births is not None:
             self._stream.set_time(BIRTHS, sequence=when.births)
-
-
-def _nanoseconds(times_s: npt.NDArray[np.float64]) -> npt.NDArray[np.timedelta64]:
-    return np.round(times_s * 1e9).astype("timedelta64[ns]")

@@ -10,7 +10,8 @@ import pyarrow.compute as pc
 from analysis.measures.load import Run, read_run
 from schema.errors import RunFolderError
 from schema.robot.ids import BirthId
-from schema.tables.files import FINISHED, campaign, read_table
+from schema.tables.files import campaign, read_table
+from schema.tables.segments import parquet_files
 from schema.wire.updates import (
     Update,
     read_birth,
@@ -119,6 +120,6 @@ def _within(folder: Path, start_s: float, end_s: float) -> pa.Table:
     """Return the poses of a span, reading no more than needed."""
     time = pc.field("sim_time_s")
     is_in = (time >= start_s) & (time <= end_s)
-    if (folder / FINISHED).is_dir():
+    if parquet_files(folder, "poses"):
         return campaign(folder, "poses").to_table(filter=is_in)
     return read_table(folder, "poses").filter(is_in)

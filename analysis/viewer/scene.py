@@ -2,16 +2,16 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import cos, pi, sin, tan
 
 import numpy as np
 
-from analysis.viewer.body import Float32s
 from analysis.viewer.ground import Surface, surfaces
-from schema.experiment.document import Arena, Experiment, body_space, island_count
+from schema.experiment.document import Experiment, body_space, island_count
 from schema.experiment.document import island_experiment as of_island
+from schema.mjcf.world import ring_wall
 from schema.parts import BodySpace
 from schema.robot.ids import BirthId
+from schema.robot.results import Floats
 
 _MARGIN = 1.3
 _GALLERY_M = 2.0
@@ -26,7 +26,7 @@ class Scene:
         arenas: islands on which robots live together, in simulated time.
         extent_m: half width of the largest arena or population grid [m].
         space: the part types.
-        walls: walls of each island, (W, 10): centre [m], attitude x, y, z, w, and
+        walls: walls of each island, (W, 10): centre [m], attitude w, x, y, z, and
             half sizes [m].
         surfaces: surfaces above the plane of each island.
     """
@@ -35,7 +35,7 @@ class Scene:
     arenas: frozenset[int]
     extent_m: float
     space: BodySpace
-    walls: tuple[Float32s, ...]
+    walls: tuple[Floats, ...]
     surfaces: tuple[tuple[Surface, ...], ...]
 
     def below(self, births: Iterable[BirthId]) -> tuple[Surface, ...]:
@@ -70,22 +70,6 @@ def scene_of(experiment: Experiment) -> Scene:
         frozenset(each for each in islands if arenas[each] is not None),
         max(reaches),
         body_space(experiment.space),
-        tuple(map(_ring_wall, arenas)),
+        tuple(ring_wall(arena) if arena else np.zeros((0, 10)) for arena in arenas),
         tuple(surfaces(each.environment, each.simulation) for each in settings),
     )
-
-
-def _ring_wall(arena: Arena | None) -> Float32s:
-    """Return the walls of an arena, as ``schema.mjcf.world`` builds them."""
-    if arena is None or not arena.wall_diameter_m:
-        return np.zeros((0, 10), np.float32)
-    half, height = 0.5 * arena.wall_thickness_m, 0.5 * arena.wall_height_m
-    centre = 0.5 * arena.wall_diameter_m + half
-    length = (centre + half) * tan(pi / arena.wall_segments)
-    walls = []
-    for index in range(arena.wall_segments):
-        angle = 2.0 * pi * index / arena.wall_segments
-        place = (centre * cos(angle), centre * sin(angle), height)
-        attitude = (0.0, 0.0, sin(0.5 * angle), cos(0.5 * angle))
-        walls.append((*place, *attitude, half, length, height))
-    return np.array(walls, np.float32)

@@ -87,14 +87,15 @@ class Show:
 
     def tell(self, news: Update) -> None:
         """Record everything new in a message."""
-        for each in _in_order(news):
-            match each:
-                case Birth():
-                    self._born(each)
-                case Level():
-                    self._level(each)
-                case Death():
-                    self._departed(each)
+        came: list[Birth | Level] = [*news.births, *news.levels]
+        for each in sorted(came, key=lambda one: one.births):
+            if isinstance(each, Birth):
+                self._born(each)
+            else:
+                self._level(each)
+        # A birth at the time of a death comes before the death.
+        for gone in sorted(news.deaths, key=lambda gone: gone.births):
+            self._departed(gone)
         for migrant in news.migrants:
             self._migrated(migrant)
         self._lineage.draw()
@@ -223,16 +224,6 @@ class Show:
 def _coarse(numbers: Float32s, grains: float) -> Float32s:
     """Return numbers rounded to ``1 / grains``, which take less room in a file."""
     return (np.round(numbers * grains) / grains).astype(np.float32)
-
-
-def _in_order(news: Update) -> list[Birth | Level | Death]:
-    """Return births and populations by births on their island, then deaths.
-
-    A birth at the time of a death comes before the death.
-    """
-    came: list[Birth | Level] = [*news.births, *news.levels]
-    came.sort(key=lambda one: one.births)
-    return [*came, *sorted(news.deaths, key=lambda gone: gone.births)]
 
 
 def _process_pool(workers: tuple[WorkerInfo, ...]) -> str:

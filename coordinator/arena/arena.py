@@ -253,12 +253,10 @@ class Arena:
     def _advance(self) -> AdvanceShard:
         clock, step = self.clock, self.step
         until = clock.next_decision(step, is_founding=bool(self._founders))
+        changes = self._living.take_changes()
+        is_saved = clock.is_snapshot_due(step, until)
         self._awaited = AdvanceShard(
-            self._number,
-            self._advances,
-            until,
-            self._living.take_changes(),
-            clock.is_snapshot_due(step, until),
+            self._number, self._advances, until, changes, is_saved
         )
         return self._awaited
 
@@ -269,13 +267,9 @@ class Arena:
         place = place or self._living.random_place(birth, Purpose.PLACE)
         self._living.insert(individual, candidate.robot, place)
         self.births += 1
-        moment = self._moment
+        now_s = self.clock.seconds(self.step)
         born = birth_record(
-            candidate,
-            individual,
-            self._space,
-            sim_time_s=moment.sim_time_s,
-            place=place,
+            candidate, individual, self._space, sim_time_s=now_s, place=place
         )
         fitness = [(one.birth, one.known_fitness) for one in self._living]
         return [born, *population_records(self._number, self.births, fitness)]

@@ -95,13 +95,9 @@ class VettingQueue:
         """Return the vetting of the first candidate from an attempt on, if any."""
         birth = BirthId(self._island, number)
         is_founder = number < self._next
+        parents, end = ((), inf) if is_founder else (self._mature, self._end)
         candidate = self._breeder.candidate(
-            birth,
-            attempt,
-            () if is_founder else self._mature,
-            couple,
-            why,
-            end=inf if is_founder else self._end,
+            birth, attempt, parents, couple, why, end=end
         )
         if candidate is None:
             self._failed = self._end

@@ -20,6 +20,7 @@ from schema.agent.platform_tag import platform_tag
 from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, ProcessSlot
 from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name
+from schema.experiment.plugin_access import allowed
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +110,7 @@ def connected_agents(
                 tls=deployment.tls, threads=deployment.threads,
                 cpu_limit_s=deployment.cpu_limit_s,
                 wait_limit_s=deployment.wait_limit_s, processes=size,
+                plugins=allowed(),
             )  # fmt: skip
             pool = ProcessPool(deployment.bodies[kind], (agent,), size=size)
             pools.append(stack.enter_context(pool))

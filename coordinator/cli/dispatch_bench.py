@@ -88,12 +88,9 @@ class Stream:
         self.done = 0
         self._fleet = fleet
         self._settings = evaluation_settings(experiment)
-        self._robots = [
-            encode_robot(
-                develop(generate(np.random.default_rng(seed), experiment), space)
-            )
-            for seed in range(_ROBOTS)
-        ]
+        rngs = map(np.random.default_rng, range(_ROBOTS))
+        robots = (develop(generate(rng, experiment), space) for rng in rngs)
+        self._robots = list(map(encode_robot, robots))
         for _ in range(in_flight):
             self._ask()
 

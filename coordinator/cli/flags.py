@@ -6,7 +6,14 @@ from coordinator.storage.campaign import shipped_campaigns
 from schema.agent.address import FORMS
 from schema.agent.command import add_access, add_job_limits, add_log, add_network_flags
 from schema.experiment.file import shipped_experiments
-from schema.flags import Flags, add_count, positive_number, share, whole_number
+from schema.flags import (
+    Flags,
+    add_count,
+    add_plugins,
+    positive_number,
+    share,
+    whole_number,
+)
 
 _COMMANDS = {
     "run": (
@@ -140,6 +147,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         "--view", action="store_true", help="open a viewer, as revolve view does"
     )
     add_job_limits(flags)
+    add_plugins(flags)
     flags.add_argument(
         "--audit",
         type=share,

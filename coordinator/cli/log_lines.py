@@ -155,18 +155,16 @@ def _robots(event: Advanced, selection: Selection) -> list[Fields]:
     robots: tuple[Judgement | Casualty, ...] = advance.judgements + advance.casualties
     progress = {"advance": event.number, "step": advance.step}
     return [
-        {
-            **_head(event, event.island, one.birth),
-            **progress,
-            **(
-                {"verdict": "diverged", "reason": one.reason}
-                if isinstance(one, Casualty)
-                else {"fitness": one.fitness, "age_s": one.age_s}
-            ),
-        }
+        {**_head(event, event.island, one.birth), **progress, **_state(one)}
         for one in robots
         if selection.has(event.island, one.birth)
     ]
+
+
+def _state(robot: Judgement | Casualty) -> Fields:
+    if isinstance(robot, Casualty):
+        return {"verdict": "diverged", "reason": robot.reason}
+    return {"fitness": robot.fitness, "age_s": robot.age_s}
 
 
 def _order(order: Order) -> str:

@@ -21,8 +21,7 @@ from schema.agent.log import tell_user
 from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.flags import Flags
 from schema.limits import printable
-from schema.tables.files import FINISHED
-from schema.tables.segments import SEGMENTS
+from schema.tables.segments import FINISHED, SEGMENTS
 from schema.wire.operator import (
     GetStatus,
     OperatorReply,

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from schema.agent.platform_tag import our_version, wire_version
+from schema.experiment.plugin_access import GROUP
 
 _LIBRARIES = {
     "MuJoCo": "mujoco-core",
@@ -17,7 +18,6 @@ _LIBRARIES = {
     "NumPy": "numpy",
     "Protobuf": "protobuf",
 }
-_PLUGINS = "revolve.plugins"
 # In a process of its own: a broken driver may end it.
 _RENDER = """
 from analysis.render.picture import choose_engine
@@ -102,7 +102,7 @@ def plugin_modules() -> dict[str, bool]:
 
     None is imported, not even a parent package.
     """
-    points = metadata.entry_points(group=_PLUGINS)
+    points = metadata.entry_points(group=GROUP)
     return {
         point.module: find_spec(point.module.partition(".")[0]) is not None
         for point in points

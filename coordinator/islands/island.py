@@ -224,10 +224,8 @@ class Island:
         individual = candidate.individual(self._generation, fitness_of(outcome))
         self._brood.append(individual)
         self.births += 1
-        return [
-            birth_record(candidate, individual, self._space),
-            evaluation_record(outcome),
-        ]
+        born = birth_record(candidate, individual, self._space)
+        return [born, evaluation_record(outcome)]
 
     def _close_brood(self) -> list[IslandCommand]:
         """Select the survivors, and end the epoch of migration if it is due."""

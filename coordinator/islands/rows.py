@@ -89,18 +89,11 @@ def population_records(
     island: int, births: int, fitness: Iterable[tuple[BirthId, float | None]]
 ) -> list[Record]:
     """Return the population rows of the living, each with its fitness if known."""
-    return [
-        Record(
-            "population",
-            {
-                "island": island,
-                "births": births,
-                **named(birth, island),
-                "fitness": value,
-            },
-        )
-        for birth, value in fitness
-    ]
+    now = {"island": island, "births": births}
+    rows = (
+        {**now, **named(birth, island), "fitness": value} for birth, value in fitness
+    )
+    return [Record("population", row) for row in rows]
 
 
 def migration_records(

@@ -26,9 +26,11 @@ def archipelago(
     edges: tuple[Edge, ...] = ()
     if experiment.migration is not None:
         edges = connections(experiment.migration, count, seed, run)
+    # Islands that differ in these evaluate robots differently.
+    worlds = [(own.arena is None, evaluation_settings(own)) for own in owns]
     islands: dict[int, Island | Arena] = {}
     for number, own in enumerate(owns):
-        links, epochs = _neighbours(number, owns, edges), None
+        links, epochs = _neighbours(number, worlds, edges), None
         if own.migration is not None and links.neighbours:
             epochs = MigrationEpochs(own, number, links, seed, run)
         machine = Island if own.arena is None else Arena
@@ -37,25 +39,18 @@ def archipelago(
 
 
 def _neighbours(
-    number: int, owns: list[Experiment], edges: tuple[Edge, ...]
+    number: int, worlds: list[tuple[bool, bytes]], edges: tuple[Edge, ...]
 ) -> Neighbours:
     """Return the neighbours of an island.
 
     Args:
         number: of the island.
-        owns: settings of all islands.
+        worlds: settings of all islands that determine their evaluations.
         edges: along which migrants travel.
     """
     sources = tuple(source for source, to in edges if to == number)
     return Neighbours(
         targets=tuple(to for source, to in edges if source == number),
         sources=sources,
-        differing=tuple(each for each in sources if _differs(owns[number], owns[each])),
+        differing=tuple(each for each in sources if worlds[each] != worlds[number]),
     )
-
-
-def _differs(own: Experiment, other: Experiment) -> bool:
-    """Return whether another island evaluates robots differently."""
-    if (own.arena is None) != (other.arena is None):
-        return True
-    return evaluation_settings(own) != evaluation_settings(other)

@@ -82,15 +82,11 @@ class CrossChecks:
 
 def describe(event: Audited) -> str:
     """Describe which workers disagree on which evaluation."""
-    outcomes = [
-        f"{each.provenance.agent} ({each.provenance.platform or 'gone'}) says "
-        + (
-            f"fitness {each.evaluation.fitness!r}"
-            if each.evaluation
-            else repr(each.reason)
-        )
-        for each in (event.first, event.second)
-    ]
+    outcomes = []
+    for each in (event.first, event.second):
+        found, source = each.evaluation, each.provenance
+        result = f"fitness {found.fitness!r}" if found else repr(each.reason)
+        outcomes.append(f"{source.agent} ({source.platform or 'gone'}) says {result}")
     birth = event.first.birth
     return (
         f"birth {birth.number} of island {birth.island}: {', '.join(outcomes)}; "

@@ -16,6 +16,7 @@ from coordinator.network.service import Network, Order
 from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
 from schema.agent.network import Tls
+from schema.experiment.plugin_access import allowed
 from schema.wire.updates import WorkerInfo, encode_update
 
 _UPDATE_S = 0.2
@@ -101,6 +102,8 @@ def open_viewer(address: str, fleet: str, tls: Tls | None) -> None:
     if tls is not None:
         words += ["--tls-ca", tls.ca, "--tls-certificate", tls.certificate]
         words += ["--tls-key", tls.key]
+    for entry in allowed():
+        words += ["--plugins", entry]
     # In its own session: a Ctrl-C that stops the run leaves the window open.
     subprocess.Popen(  # noqa: S603 - our own interpreter
         [sys.executable, "-m", "revolve", "view", *words], start_new_session=True

@@ -26,7 +26,8 @@ from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, Death, ProcessSl
 from schema.agent.supervisor import ProcessPool, stop_on_signals, stop_with_input
 from schema.agent.topics import Role, check_name
 from schema.errors import NetworkError, RevolveError
-from schema.flags import Flags, positive_number, whole_number
+from schema.experiment.plugin_access import allow, allowed
+from schema.flags import Flags, add_plugins, positive_number, whole_number
 
 _POLL_S = 0.5
 
@@ -174,6 +175,7 @@ def run_pool(
     options = flags.parse_args(arguments)
     try:
         start_log(role, as_json=options.log_json)
+        allow(options.plugins)
         connect, tls = connect_of(options), tls_of(options)
         agent = Agent(
             role,
@@ -185,6 +187,7 @@ def run_pool(
             cpu_limit_s=options.cpu_limit,
             wait_limit_s=options.wait_limit,
             processes=options.processes,
+            plugins=allowed(),
         )
         client_config(connect, tls)
     except RevolveError as error:
@@ -261,6 +264,7 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
     )
     add_job_limits(flags)
     add_log(flags)
+    add_plugins(flags)
     flags.set_defaults(threads=1)
     if role == "worker":
         flags.add_argument(

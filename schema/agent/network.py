@@ -64,6 +64,7 @@ class Agent:
         wait_limit_s: time that a job may wait without using CPU time [s].
         processes: that share the memory of this machine.
         shards: arenas whose state the process keeps.
+        plugins: modules and files that it may import, for ``plugin_access.allow``.
     """
 
     role: Role
@@ -79,6 +80,7 @@ class Agent:
     wait_limit_s: float = WAIT_LIMIT_S
     processes: int = 1
     shards: int = 1
+    plugins: tuple[str, ...] = ()
 
 
 def _is_loopback(host: str) -> bool:

@@ -10,7 +10,7 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from queue import Empty, SimpleQueue
 from typing import Any
 
@@ -19,16 +19,19 @@ import zenoh
 from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.job_watch import LOOK_S
 from schema.agent.log import start_log, tell_user, warn_user
-from schema.agent.network import Agent, client_config
+from schema.agent.network import UNFIT, Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.request_handler import FairQueue, ReplyCounts, Server
 from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
+from schema.experiment.plugin_access import allow
 
 _POLL_S = 0.2
 _RETRY_S = 0.3
 _SAY_S = 5.0
+# Different lines about refused runs that are written.
+_MOST_REFUSALS = 20
 
 UNSUPERVISED = ProcessSlot()
 """Slot of a process without a supervisor."""
@@ -180,6 +183,7 @@ def serve_as_process(
         slot: of the process; only the first one writes messages about the hub.
         outlet: as for ``serve``.
     """
+    allow(agent.plugins)
     stop = stop_on_signals()
     stop_with_parent(stop)
     own = agent if agent.version else own_agent(agent, slot.index)
@@ -255,7 +259,7 @@ def _serve_session(
             hub.seen(is_there=True)
             began_s = time.monotonic()
             with turns.take() as query:
-                _answer(query, server, me)
+                _answer(query, server, me, hub)
             turns.spent(time.monotonic() - began_s)
     _queue_all(inbox, turns)
     while turns:
@@ -275,11 +279,13 @@ def _queue_all(inbox: SimpleQueue[zenoh.Query], turns: FairQueue[zenoh.Query]) -
         return bool(turns)
 
 
-def _answer(query: zenoh.Query, server: Server, me: Member) -> None:
+def _answer(query: zenoh.Query, server: Server, me: Member, hub: "_Hub") -> None:
     """Reply with the answer, or with the reason why there is none."""
     payload = query.payload
     reply = server.reply(b"" if payload is None else payload.to_bytes())
     if reply.reason:
+        if reply.reason.startswith(UNFIT):
+            hub.refused(f"refused a run: {reply.reason.removeprefix(UNFIT)}")
         query.reply_err(reply.reason)
     else:
         query.reply(me.jobs, reply.answer)
@@ -287,13 +293,20 @@ def _answer(query: zenoh.Query, server: Server, me: Member) -> None:
 
 @dataclass(slots=True)
 class _Hub:
-    """State of the hub as the user knows it."""
+    """State of the hub, and refusals of runs, as the user knows them."""
 
     address: str
     say: Callable[[str], None]
     warn: Callable[[str], None]
     is_there: bool = True
     said_s: float = 0.0
+    refusals: set[str] = field(default_factory=set)
+
+    def refused(self, line: str) -> None:
+        """Write a line about a refused run, once, and not without end."""
+        if line not in self.refusals and len(self.refusals) < _MOST_REFUSALS:
+            self.refusals.add(line)
+            self.warn(line)
 
     def seen(self, *, is_there: bool) -> None:
         """Write changes, and every few seconds that the hub is still missing."""

@@ -15,7 +15,7 @@ from msgspec import Meta, structs
 from schema.errors import ExperimentError
 from schema.experiment.environment import FLAT, Environment
 from schema.experiment.migration import Migration
-from schema.experiment.plugin import load
+from schema.experiment.plugin import load_instance
 from schema.experiment.section import (
     AtLeastOne,
     Count,
@@ -395,19 +395,24 @@ def with_births(experiment: Experiment, births: int) -> Experiment:
     return structs.replace(experiment, births=births, islands=islands)
 
 
+def references(experiment: Experiment) -> list[str]:
+    """Return the ``module:attribute`` of all plug-ins that a document names."""
+    own = [each.fitness for each in experiment.islands if each.fitness is not None]
+    functions = [fitness.function for fitness in (experiment.fitness, *own)]
+    return [*experiment.space.part_types, *functions]
+
+
 @lru_cache(maxsize=64)
 def body_space(space: Space) -> BodySpace:
     """Return the part types of a document by name, in its order.
 
     Raises:
-        UnknownPlugin: no such module or attribute.
+        UnknownPlugin: no such module or attribute, or a module that is not allowed.
         ExperimentError: not a part type, two of one name, or not exactly one core.
     """
     types: dict[str, PartType] = {}
     for path in space.part_types:
-        kind = load(path, "space.part_types")
-        if not isinstance(kind, PartType):
-            raise ExperimentError(f"space.part_types: {path!r} is not a PartType")
+        kind = load_instance(path, "space.part_types", PartType)
         if kind.name in types:
             raise ExperimentError(
                 f"space.part_types: two part types are named {kind.name!r}"

@@ -79,16 +79,18 @@ def ground_problems(environment: Environment) -> Iterator[str]:
     if not environment.roughness_m:
         return
     extent_m, patch_m = environment.extent_m, environment.patch_m
+    # First: the ratio may be too large for an integer.
+    if 2 * extent_m / patch_m >= MOST_PATCHES + 1:
+        yield (
+            "environment.patch_m: must be >= 2 environment.extent_m / "
+            f"{MOST_PATCHES} = {2 * extent_m / MOST_PATCHES:g}, got {patch_m:g}"
+        )
+        return
     whole = environment.patches
     if not whole or not isclose(whole * patch_m, extent_m, rel_tol=1e-9):
         yield (
             "environment.extent_m: must be a whole multiple of environment.patch_m = "
             f"{patch_m:g}, got {extent_m:g}"
-        )
-    if 2 * whole > MOST_PATCHES:
-        yield (
-            "environment.patch_m: must be >= 2 environment.extent_m / "
-            f"{MOST_PATCHES} = {2 * extent_m / MOST_PATCHES:g}, got {patch_m:g}"
         )
 
 

@@ -1,5 +1,6 @@
 """Reading and writing of experiments: TOML of users, JSON of the runs table."""
 
+import re
 import tomllib
 from collections.abc import Collection
 from importlib import resources
@@ -10,10 +11,25 @@ from typing import Any, Literal, get_args, get_origin
 import msgspec
 from msgspec import Struct
 
-from schema.errors import ExperimentError, nearest
+from schema.errors import ExperimentError, cut, nearest, shown
+from schema.experiment.bounded import read_bytes
 from schema.experiment.check import check_experiment
-from schema.experiment.document import Experiment
+from schema.experiment.document import Experiment, references
 from schema.experiment.environment import is_mjcf
+from schema.experiment.plugin_access import allow_references
+from schema.limits import (
+    MOST_BRACKETS,
+    MOST_DIGITS,
+    MOST_ISLAND_TABLES,
+    MOST_ISLANDS,
+    MOST_KEY_PARTS,
+    MOST_TEXT_BYTES,
+)
+
+# ``tomllib`` stores all beginnings of a dotted key. Possessive: without backtracking.
+_KEY_PART = r"""(?:[\w-]++|"(?:[^"\\\n]++|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""
+_LONG_NUMBER = re.compile(rf"(?<!\w)[0-9][0-9A-Fa-f_xob]{{{MOST_DIGITS}}}")
+_LONG_KEY = re.compile(rf"(?<![\w-])(?:{_KEY_PART}){{{MOST_KEY_PARTS}}}")
 
 
 def read_experiment(source: str) -> Experiment:
@@ -27,7 +43,7 @@ def read_experiment(source: str) -> Experiment:
     """
     if source.endswith(".toml"):
         try:
-            text = Path(source).read_text(encoding="utf-8")
+            text = read_bytes(Path(source)).decode()
         except (OSError, UnicodeDecodeError) as error:
             raise ExperimentError(f"{source}: cannot be read: {error}") from None
         return parse_experiment(text, source)
@@ -61,29 +77,83 @@ def shipped_experiments() -> list[str]:
 
 
 def parse_experiment(text: str, where: str) -> Experiment:
-    """Return the experiment of a TOML text.
+    """Return the experiment of a TOML text of the user.
+
+    The modules that it names may be imported by this process from now on.
 
     Args:
         text: the document.
-        where: its path, for messages and for relative paths of scenery.
+        where: its path, for messages, and for relative paths of scenery and plug-ins.
 
     Raises:
         ExperimentError: not TOML; an unknown key (the nearest is named); a value of a
             wrong type or outside its range; inconsistent values.
     """
-    try:
-        document = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ExperimentError(f"{where}: not valid TOML: {error}") from None
+    document = _parse_toml(text, where)
     _refuse_unknown(document, Experiment, where, "")
+    _refuse_many_islands(document, where)
     _read_scenery(document, where)
     _complete(document)
     try:
         experiment = msgspec.convert(document, type=Experiment)
     except msgspec.ValidationError as error:
         raise ExperimentError(f"{where}: {_explain(error, document)}") from None
+    allow_references(references(experiment), Path(where).parent)
     check_experiment(experiment, where)
     return experiment
+
+
+def own_experiment(text: str) -> Experiment:
+    """Return the experiment of a run folder that the user named on the command line.
+
+    Installed modules that it names may be imported by this process from now on.
+
+    Raises:
+        ExperimentError: not a text of ``experiment_text``.
+    """
+    experiment = experiment_from_text(text)
+    allow_references(references(experiment))
+    return experiment
+
+
+def _parse_toml(text: str, where: str) -> dict[str, Any]:
+    """Return the document of a TOML text.
+
+    Raises:
+        ExperimentError: not TOML, too long, nested too deeply, or a key of too many
+            parts.
+    """
+    if len(text) > MOST_TEXT_BYTES:
+        raise ExperimentError(
+            f"{where}: must have <= {MOST_TEXT_BYTES} characters, got {len(text)}"
+        )
+    if (brackets := text.count("[")) > MOST_BRACKETS:
+        raise ExperimentError(
+            f"{where}: must have <= {MOST_BRACKETS} lists and tables, got {brackets}"
+        )
+    if _LONG_KEY.search(text):
+        raise ExperimentError(f"{where}: a key must have <= {MOST_KEY_PARTS} parts")
+    if _LONG_NUMBER.search(text):
+        raise ExperimentError(f"{where}: a number must have <= {MOST_DIGITS} digits")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ExperimentError(f"{where}: not valid TOML: nested too deeply") from None
+    except ValueError as error:
+        # Too long an integer is no TOMLDecodeError.
+        reason = str(error).partition(";")[0]
+        raise ExperimentError(f"{where}: not valid TOML: {reason}") from None
+
+
+def _refuse_many_islands(document: dict[str, Any], where: str) -> None:
+    tables = document.get("islands", ())
+    counts = [table.get("count", 1) for table in tables]
+    whole = sum(count for count in counts if isinstance(count, int))
+    if len(tables) > MOST_ISLAND_TABLES or whole > MOST_ISLANDS:
+        raise ExperimentError(
+            f"{where}: islands: must be <= {MOST_ISLANDS} islands in <= "
+            f"{MOST_ISLAND_TABLES} tables, got {shown(whole)} in {len(tables)}"
+        )
 
 
 def _read_scenery(document: dict[str, Any], where: str) -> None:
@@ -95,7 +165,7 @@ def _read_scenery(document: dict[str, Any], where: str) -> None:
             continue
         path = Path(where).parent / named
         try:
-            text = path.read_text(encoding="utf-8-sig")
+            text = read_bytes(path).decode("utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             raise ExperimentError(
                 f"{where}: environment.scenery: {named}: cannot be read: {error}"
@@ -139,7 +209,7 @@ def _refuse_unknown(
     for key, value in document.items():
         if key not in fields:
             raise ExperimentError(
-                f"{where}: {prefix}{key}: no such key{nearest(key, fields)}; "
+                f"{where}: {prefix}{cut(key)}: no such key{nearest(key, fields)}; "
                 f"allowed: {', '.join(fields)}"
             )
         for number in value if isinstance(value, list) else (value,):
@@ -188,9 +258,11 @@ def _explain(error: msgspec.ValidationError, document: dict[str, Any]) -> str:
         return message
     choices = get_args(kind) if get_origin(kind) is Literal else ()
     if not choices:
-        return f"{key}: {message}, got {value!r}"
+        return f"{key}: {message}, got {shown(value)}"
     allowed = ", ".join(map(repr, choices))
-    return f"{key}: must be one of {allowed}, got {value!r}{nearest(value, choices)}"
+    return (
+        f"{key}: must be one of {allowed}, got {shown(value)}{nearest(value, choices)}"
+    )
 
 
 def _type_of(kind: Any, key: str) -> Any:  # noqa: ANN401 - any annotation

@@ -1,34 +1,97 @@
 """Loading of plug-ins by name: ``"package.module:attribute"``.
 
-There is no registry; the process that runs the code resolves the name.
+There is no registry; the process that runs the code resolves the name. It imports only
+modules that are allowed there, and takes from them only objects of the kind that the
+caller declares.
 """
 
+import inspect
+from collections.abc import Callable
 from difflib import get_close_matches
 from functools import lru_cache
-from importlib import import_module
+from typing import Any, TypeVar
 
-from schema.errors import ExperimentError, UnknownPlugin
+from schema.errors import ExperimentError, UnknownPlugin, shown
+from schema.experiment.plugin_access import how_to_allow, import_allowed, is_allowed
+
+T = TypeVar("T")
 
 
-@lru_cache(maxsize=256)
-def load(path: str, where: str) -> object:
-    """Return the object that a dotted path names.
+def load_instance(path: str, where: str, kind: type[T]) -> T:
+    """Return the object of a type that a dotted path names.
 
     Args:
         path: ``package.module:attribute``.
         where: the key that holds it, for messages.
+        kind: of the object.
 
     Raises:
-        UnknownPlugin: not of that form, no such module, no such attribute (the
-            nearest is named).
-        ExperimentError: importing the module raises another error.
+        UnknownPlugin: not of that form, a module that is not allowed or not there, no
+            such attribute (the nearest is named).
+        ExperimentError: importing the module raises another error; an object of
+            another type.
+    """
+    found = _load(path, where)
+    if not isinstance(found, kind):
+        raise ExperimentError(f"{where}: {path!r} is not a {kind.__name__}")
+    return found
+
+
+def load_function(path: str, where: str, arguments: int) -> Callable[..., Any]:
+    """Return the function that a dotted path names.
+
+    Args:
+        path: ``package.module:attribute``.
+        where: the key that holds it, for messages.
+        arguments: number of positional arguments that it must take.
+
+    Raises:
+        UnknownPlugin: as for ``load_instance``; a function that was defined in a
+            module that is not allowed.
+        ExperimentError: as for ``load_instance``; not a function, or one that takes
+            another number of arguments.
+    """
+    found = _load(path, where)
+    if not callable(found) or isinstance(found, type):
+        raise ExperimentError(f"{where}: {path!r} is not a function")
+    # A module that imports a function of another one does not offer it.
+    home = str(getattr(found, "__module__", None))
+    if not is_allowed(home):
+        raise UnknownPlugin(
+            f"{where}: {path!r} is defined in {home}, which is not allowed: "
+            f"{how_to_allow(home)}"
+        )
+    try:
+        inspect.signature(found).bind(*range(arguments))
+    except (TypeError, ValueError) as error:
+        raise ExperimentError(
+            f"{where}: {path!r} must take {arguments} arguments: {error}"
+        ) from None
+    return found
+
+
+def _load(path: str, where: str) -> object:
+    """Return the object that a dotted path names, of any type.
+
+    The permission is checked at every call, before the cache.
     """
     module_name, colon, attribute = path.partition(":")
     words = [*module_name.split("."), attribute]
     if not (colon and all(word.isidentifier() for word in words)):
-        raise UnknownPlugin(f"{where}: must be 'module:attribute', got {path!r}")
+        raise UnknownPlugin(f"{where}: must be 'module:attribute', got {shown(path)}")
+    if not is_allowed(module_name):
+        raise UnknownPlugin(
+            f"{where}: {shown(path)}: module {shown(module_name)} is not allowed: "
+            f"{how_to_allow(module_name)}"
+        )
+    return _loaded(module_name, attribute, where)
+
+
+@lru_cache(maxsize=256)
+def _loaded(module_name: str, attribute: str, where: str) -> object:
+    path = f"{module_name}:{attribute}"
     try:
-        module = import_module(module_name)
+        module = import_allowed(module_name)
     except ImportError as error:
         raise UnknownPlugin(f"{where}: {path!r}: {error}") from None
     except Exception as error:

@@ -7,12 +7,16 @@ packages of this project are not plug-ins; their version identifies them.
 import re
 from functools import lru_cache
 from hashlib import sha256
-from importlib.util import find_spec
-from pathlib import Path
 
-from schema.errors import PluginDiffers
+from schema.errors import PluginDiffers, shown
+from schema.experiment.plugin_access import (
+    ROOMS,
+    allows_any_of,
+    how_to_allow,
+    source_of,
+)
+from schema.limits import MOST_PLUGIN_CHARACTERS
 
-_ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis")
 _PATH = re.compile(r'"([A-Za-z_]\w*)(?:\.[A-Za-z_]\w*)*:[A-Za-z_]\w*"')
 _DIGITS = 12
 
@@ -28,47 +32,57 @@ def plugins_of(settings: bytes) -> str:
         ``module=digest`` for each top-level module, by name, with a space between.
     """
     named = set(_PATH.findall(settings.decode(errors="replace")))
-    modules = sorted(named.difference(_ROOMS))
+    modules = sorted(named.difference(ROOMS))
     return " ".join(f"{name}={_digest(name)}" for name in modules)
 
 
 @lru_cache(maxsize=64)
 def check_plugins(wanted: str) -> None:
-    """Raise unless this machine has the same plug-ins.
+    """Raise unless this machine has the same plug-ins, and this process allows them.
+
+    Nothing is imported.
 
     Args:
         wanted: the result of ``plugins_of`` on the other machine.
 
     Raises:
-        PluginDiffers: one is missing, or its source differs.
+        PluginDiffers: one is missing or not allowed, or its source differs; a text
+            that is too long.
     """
+    if len(wanted) > MOST_PLUGIN_CHARACTERS:
+        raise PluginDiffers(
+            f"a list of plug-ins must have <= {MOST_PLUGIN_CHARACTERS} characters, got "
+            f"{len(wanted)}"
+        )
     for each in wanted.split():
         name, _, digest = each.partition("=")
+        if not allows_any_of(name):
+            raise PluginDiffers(
+                f"has no plug-in {shown(name)} among those that it may import: "
+                f"{how_to_allow(name)}"
+            )
         found = _digest(name)
         if not found:
-            raise PluginDiffers(f"has no plug-in {name!r}")
+            raise PluginDiffers(f"has no plug-in {shown(name)}: it is not installed")
         if found != digest:
             raise PluginDiffers(
-                f"its plug-in {name!r} differs from the coordinator's: source digest "
-                f"{found}, expected {digest}"
+                f"its plug-in {shown(name)} differs from the coordinator's: source "
+                f"digest {found}, expected {digest[:_DIGITS]}"
             )
 
 
 @lru_cache(maxsize=64)
 def _digest(module: str) -> str:
     """Return the digest of a top-level module's source; empty if not installed."""
-    try:
-        spec = find_spec(module)
-    except (ImportError, ValueError):
-        return ""
-    if spec is None:
+    sources = source_of(module)
+    if not sources:
         return ""
     hashed = sha256()
-    if spec.submodule_search_locations:
-        for folder in spec.submodule_search_locations:
-            for file in sorted(Path(folder).rglob("*.py")):
-                hashed.update(file.relative_to(folder).as_posix().encode() + b"\0")
+    for source in sources:
+        if source.is_dir():
+            for file in sorted(source.rglob("*.py")):
+                hashed.update(file.relative_to(source).as_posix().encode() + b"\0")
                 hashed.update(file.read_bytes() + b"\0")
-    elif spec.has_location and spec.origin:
-        hashed.update(Path(spec.origin).read_bytes())
+        else:
+            hashed.update(source.read_bytes())
     return hashed.hexdigest()[:_DIGITS]

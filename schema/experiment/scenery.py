@@ -12,8 +12,10 @@ from xml.etree import ElementTree as ET
 import mujoco
 import numpy as np
 
-from schema.errors import ExperimentError, one_line
+from schema.errors import ExperimentError, one_line, shown
+from schema.experiment.bounded import parse_xml
 from schema.experiment.document import Simulation
+from schema.limits import MOST_GEOMS, MOST_OTHERS, MOST_SCENERY_DEPTH
 from schema.robot.results import Floats
 
 _ALLOWED = (
@@ -111,14 +113,15 @@ def scenery_model(scenery: str, simulation: Simulation) -> mujoco.MjModel:
         simulation: default friction and contact of its geoms.
 
     Raises:
-        ExperimentError: not XML, not MJCF, no geom, an element that moves or refers
-            to another file, or a shape that is not supported.
+        ExperimentError: not XML, not MJCF, no geom or too many, an element that moves
+            or refers to another file, or a shape that is not supported.
     """
     try:
-        root = ET.fromstring(scenery)  # noqa: S314 - of the user's own document
-    except ET.ParseError as error:
-        raise _invalid(f"not valid XML: {error}") from None
+        root = parse_xml(scenery, most_depth=MOST_SCENERY_DEPTH)
+    except ValueError as error:
+        raise _invalid(str(error)) from None
     _check_elements(root)
+    _check_count(root)
     # First, so that the user's own defaults override it.
     general = ET.Element("default")
     ET.SubElement(
@@ -152,13 +155,42 @@ def _check_elements(root: ET.Element) -> None:
                 f"does not move; allowed: {', '.join(_ALLOWED)}"
             )
         for key, value in element.items():
+            if key == "user":
+                raise _invalid(f"<{element.tag} user=...> is not allowed")
             if key not in _WORDS and not all(map(_is_finite, value.split())):
-                raise _invalid(f"<{element.tag} {key}={value!r}> must be finite")
+                raise _invalid(f"<{element.tag} {key}={shown(value)}> must be finite")
         if element.get("mocap", "false") != "false":
             name = element.get("name", "")
             raise _invalid(
                 f"<body name={name!r}> must not be mocap, because scenery does not move"
             )
+
+
+def _check_count(root: ET.Element) -> None:
+    """Raise if MuJoCo would make too many bodies or geoms by replication."""
+    if sum(1 for _ in root.iter("default")) > MOST_OTHERS:
+        raise _invalid(f"must have <= {MOST_OTHERS} <default>")
+    # The elements, each with the number of its copies.
+    level, made = [(root, 1)], 0
+    while level:
+        inner = []
+        for element, copies in level:
+            if element.tag == "replicate":
+                copies *= _replicas(element)  # noqa: PLW2901 - of what is inside
+            made += copies
+            inner += [(child, copies) for child in element]
+        if made > MOST_GEOMS:
+            raise _invalid(f"must have <= {MOST_GEOMS} elements, copies included")
+        level = inner
+
+
+def _replicas(element: ET.Element) -> int:
+    count = element.get("count", "")
+    if not (count.isascii() and count.isdigit() and len(count) <= len(str(MOST_GEOMS))):
+        raise _invalid(
+            f"<replicate count={shown(count)}> must be a whole number <= {MOST_GEOMS}"
+        )
+    return int(count)
 
 
 def _is_finite(word: str) -> bool:

@@ -4,11 +4,13 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
+from schema.limits import MOST_COUNT
+
 Probability = Annotated[float, Meta(ge=0, le=1)]
 Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
-Count = Annotated[int, Meta(ge=0)]
-AtLeastOne = Annotated[int, Meta(ge=1)]
+Count = Annotated[int, Meta(ge=0, le=MOST_COUNT)]
+AtLeastOne = Annotated[int, Meta(ge=1, le=MOST_COUNT)]
 
 
 class Section(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TypeVar, cast
+from typing import TypeVar
 
 import msgspec
 from msgspec.structs import replace
@@ -16,10 +16,11 @@ from schema.experiment.document import (
     Space,
     Vetting,
 )
-from schema.experiment.environment import FLAT, Environment
+from schema.experiment.environment import FLAT, Environment, ground_problems
 from schema.experiment.identity import Origin
-from schema.experiment.plugin import load
+from schema.experiment.plugin import load_function
 from schema.experiment.section import Section
+from schema.limits import MOST_SETTINGS_BYTES
 
 T = TypeVar("T")
 
@@ -126,10 +127,20 @@ def read_evaluation_settings(settings: bytes) -> EvaluationSettings:
 
 
 def _from_json(settings: bytes, kind: type[T]) -> T:
+    """Return settings; what an experiment may not have is refused here, too."""
+    where = "settings of a request"
+    if len(settings) > MOST_SETTINGS_BYTES:
+        raise ExperimentError(
+            f"{where}: must have <= {MOST_SETTINGS_BYTES} bytes, got {len(settings)}"
+        )
     try:
-        return msgspec.json.decode(settings, type=kind)
-    except msgspec.MsgspecError as error:
-        raise ExperimentError(f"settings of a request: {error}") from None
+        found = msgspec.json.decode(settings, type=kind)
+    except (msgspec.MsgspecError, RecursionError) as error:
+        raise ExperimentError(f"{where}: {error}") from None
+    environment = getattr(found, "environment", FLAT)
+    for problem in ground_problems(environment):
+        raise ExperimentError(f"{where}: {problem}")
+    return found
 
 
 def lasting(settings: EvaluationSettings, steps: int) -> EvaluationSettings:
@@ -161,12 +172,7 @@ def fitness_function(fitness: Fitness) -> Callable[..., float]:
     """Return the fitness function that an experiment names.
 
     Raises:
-        UnknownPlugin: no such module or attribute.
-        ExperimentError: not a function.
+        UnknownPlugin: no such module or attribute, or a module that is not allowed.
+        ExperimentError: not a function of a track and a fitness section.
     """
-    function = load(fitness.function, "fitness.function")
-    if not callable(function):
-        raise ExperimentError(
-            f"fitness.function: {fitness.function!r} is not a function"
-        )
-    return cast("Callable[..., float]", function)
+    return load_function(fitness.function, "fitness.function", 2)

@@ -8,6 +8,7 @@ read. RoboGen's text (.txt) and JSON (.json) are read, not written.
 from pathlib import Path
 
 from schema.errors import InvalidRobot, MalformedMessage
+from schema.experiment.bounded import read_bytes
 from schema.experiment.document import Experiment, Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.formats.robogen_json import robot_from_robogen_json
@@ -15,8 +16,9 @@ from schema.formats.robogen_text import robot_from_robogen_text
 from schema.formats.yaml import Reader, robot_to_yaml
 from schema.formats.yaml_2016 import RevolveReader, is_of_revolve
 from schema.formats.yaml_node import compose
+from schema.limits import MOST_TEXT_BYTES
 from schema.parts import BUILT_IN, BodySpace
-from schema.robot.robot import Robot, check_robot
+from schema.robot.robot import Robot, check_number, check_robot
 from schema.wire.codec import decode_robot, encode_robot
 
 
@@ -89,27 +91,32 @@ def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
         except MalformedMessage as error:
             raise MalformedMessage(f"{path}: {error}") from None
     try:
+        check_number(robot)
         check_robot(robot, space)
     except InvalidRobot as error:
         raise InvalidRobot(f"{path}: {error}") from None
     return robot
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path, most: int = MOST_TEXT_BYTES) -> str:
     """Return the text of a file.
 
+    Args:
+        path: of the file.
+        most: greatest allowed size [bytes].
+
     Raises:
-        InvalidRobot: a file that cannot be read, or is not UTF-8.
+        InvalidRobot: a file that cannot be read, is larger, or is not UTF-8.
     """
     try:
-        return _read(path).decode()
+        return _read(path, most).decode()
     except UnicodeDecodeError as error:
         raise InvalidRobot(f"{path}: not UTF-8 text (byte {error.start})") from None
 
 
-def _read(path: Path) -> bytes:
+def _read(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
     try:
-        return path.read_bytes()
+        return read_bytes(path, most)
     except OSError as error:
         raise InvalidRobot(f"{path}: cannot be read: {error.strerror}") from None
 

@@ -8,24 +8,48 @@ hand differs from its text and is refused.
 
 import base64
 import binascii
+from collections import Counter
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import msgspec
 import mujoco
 import numpy as np
 
-from schema.errors import ExperimentError, InvalidRobot, MalformedMessage
+from schema.errors import (
+    ExperimentError,
+    InvalidRobot,
+    MalformedMessage,
+    one_line,
+    shown,
+)
+from schema.experiment.bounded import parse_xml
 from schema.experiment.document import body_space
+from schema.experiment.environment import MOST_PATCHES
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
 from schema.formats.files import read_text
+from schema.limits import MOST_MJCF_BYTES, MOST_OTHERS
 from schema.mjcf.model import solo_spec
-from schema.robot.robot import Robot, check_robot
+from schema.robot.robot import Robot, check_number, check_robot
 from schema.wire.codec import decode_robot, encode_robot
 
 ROBOT = "revolve_robot"
 SETTINGS = "revolve_settings"
 """Names of the two custom texts."""
 
+_ALLOWED = (
+    *("mujoco", "compiler", "option", "flag", "size", "default", "asset", "hfield"),
+    *("worldbody", "body", "joint", "freejoint", "inertial", "geom", "site"),
+    *("light", "camera", "actuator", "general", "custom", "text"),
+    *("statistic", "visual", "global", "quality", "headlight", "map", "scale", "rgba"),
+)
+"""Elements that are allowed: none reads another file or makes more elements."""
+_ONLY = {
+    "size": ("memory",),
+    "compiler": ("angle", "autolimits", "coordinate", "eulerseq"),
+}
+"""Attributes of elements that could make MuJoCo reserve memory or read files."""
+_SIDES = frozenset(map(str, range(1, MOST_PATCHES + 2)))
 _DIGITS = 1e-4
 """Relative difference that is greater than MJCF's rounding."""
 _LENGTH_M = 1e-6
@@ -64,26 +88,88 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
         where: its name, for messages.
 
     Raises:
-        InvalidRobot: not MJCF; no robot or settings in it; a body that differs from
-            the robot's.
+        InvalidRobot: not MJCF, or MJCF that a robot does not need; no robot or
+            settings in it; a body that differs from the robot's.
     """
     try:
-        spec = mujoco.MjSpec.from_string(text)
-        model = spec.compile()
+        root = parse_xml(text, MOST_MJCF_BYTES)
     except ValueError as error:
-        reason = " ".join(str(error).split())
-        raise InvalidRobot(f"{where}: not valid MJCF: {reason}") from None
-    held = {one.name: one.data for one in spec.texts}
+        raise InvalidRobot(f"{where}: not valid MJCF: {error}") from None
+    _check_elements(root, where)
+    held = {each.get("name", ""): each.get("data", "") for each in root.iter("text")}
     try:
         robot = decode_robot(_bytes(held, ROBOT))
         settings = read_evaluation_settings(_bytes(held, SETTINGS))
         space = body_space(settings.space)
+        check_number(robot)
         check_robot(robot, space)
-    except (MalformedMessage, ExperimentError, InvalidRobot) as error:
-        raise InvalidRobot(f"{where}: {error}") from None
-    built = solo_spec(robot, space, settings.simulation, settings.environment).compile()
+        built = solo_spec(
+            robot, space, settings.simulation, settings.environment
+        ).compile()
+    except (MalformedMessage, ExperimentError, InvalidRobot, ValueError) as error:
+        raise InvalidRobot(f"{where}: {one_line(error)}") from None
+    _check_counts(root, built, where)
+    try:
+        # The text that was checked, not the original one.
+        checked = ET.tostring(root, encoding="unicode")
+        model = mujoco.MjSpec.from_string(checked).compile()
+    except (ValueError, RecursionError) as error:
+        raise InvalidRobot(f"{where}: not valid MJCF: {one_line(error)}") from None
     _check_body(model, built, where)
     return robot, settings
+
+
+def _check_elements(root: ET.Element, where: str) -> None:
+    """Raise for elements that read other files, or that no robot needs."""
+    for element in root.iter():
+        if element.tag not in _ALLOWED:
+            raise InvalidRobot(
+                f"{where}: <{element.tag}> is not allowed in a robot's MJCF; allowed: "
+                f"{', '.join(_ALLOWED)}"
+            )
+        allowed = _ONLY.get(element.tag, element.attrib)
+        for key, value in element.items():
+            if key.startswith("file") or key == "user" or key not in allowed:
+                raise InvalidRobot(
+                    f"{where}: <{element.tag} {key}={shown(value)}> is not allowed in "
+                    "a robot's MJCF"
+                )
+            if key in ("nrow", "ncol") and value not in _SIDES:
+                raise InvalidRobot(
+                    f"{where}: <{element.tag} {key}={shown(value)}> must be a whole "
+                    f"number <= {MOST_PATCHES + 1}"
+                )
+
+
+def _check_counts(root: ET.Element, built: mujoco.MjModel, where: str) -> None:
+    """Raise if a file has not as many elements as the robot in its text."""
+    inside = Counter(
+        element.tag for world in root.iter("worldbody") for element in world.iter()
+    )
+    found = {
+        # With the root of the tree of bodies, which is no element of its own.
+        "nbody": inside["body"] + 1,
+        "ngeom": inside["geom"],
+        "njnt": inside["joint"] + inside["freejoint"],
+        "nsite": inside["site"],
+        "nu": sum(len(element) for element in root.iter("actuator")),
+        "nhfield": sum(1 for _ in root.iter("hfield")),
+    }
+    if differing := [name for name in found if found[name] != getattr(built, name)]:
+        raise _differs(differing, where)
+    others = Counter(element.tag for element in root.iter())
+    for tag in ("light", "camera", "default", "text"):
+        if others[tag] > MOST_OTHERS:
+            raise InvalidRobot(
+                f"{where}: must have <= {MOST_OTHERS} <{tag}>, got {others[tag]}"
+            )
+
+
+def _differs(names: list[str], where: str) -> InvalidRobot:
+    return InvalidRobot(
+        f"{where}: its body differs from the robot in its text "
+        f"({', '.join(names)}): edit the robot's YAML and convert it again"
+    )
 
 
 def read_mjcf(path: Path) -> tuple[Robot, EvaluationSettings]:
@@ -92,7 +178,7 @@ def read_mjcf(path: Path) -> tuple[Robot, EvaluationSettings]:
     Raises:
         InvalidRobot: as ``robot_from_mjcf``, or the file cannot be read.
     """
-    return robot_from_mjcf(read_text(path), str(path))
+    return robot_from_mjcf(read_text(path, MOST_MJCF_BYTES), str(path))
 
 
 def _bytes(held: dict[str, str], name: str) -> bytes:
@@ -120,7 +206,4 @@ def _check_body(found: mujoco.MjModel, built: mujoco.MjModel, where: str) -> Non
             )
         ]
     if differing:
-        raise InvalidRobot(
-            f"{where}: its body differs from the robot in its text "
-            f"({', '.join(differing)}): edit the robot's YAML and convert it again"
-        )
+        raise _differs(differing, where)

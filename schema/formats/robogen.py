@@ -10,11 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import pi
 
-from schema.errors import InvalidRobot
+from schema.errors import InvalidRobot, shown
 from schema.formats.robogen_frames import SQUARE, our_orientation, our_slot
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot.brain import INPUT, Brain, Connection, Layer, Neuron
-from schema.robot.robot import Part, Robot, check_robot, part_type
+from schema.robot.robot import Part, Robot, check_number, check_robot, part_type
 
 Ending = tuple[str, int]
 """RoboGen's name of a neuron: part, and number among the part's neurons."""
@@ -113,9 +113,9 @@ def checked_part(
     """
     if kind not in KINDS:
         allowed = ", ".join(KINDS)
-        raise InvalidRobot(f"{where}: type must be one of {allowed}, got {kind!r}")
+        raise InvalidRobot(f"{where}: type must be one of {allowed}, got {shown(kind)}")
     if turns not in range(4):
-        raise InvalidRobot(f"{where}: orientation must be 0..3, got {turns}")
+        raise InvalidRobot(f"{where}: orientation must be 0..3, got {shown(turns)}")
     ours = KINDS[kind]
     wanted = _BAR_NUMBERS if ours == "ParametricBarJoint" else 0
     if len(values) != wanted:
@@ -131,7 +131,7 @@ def neuron_kind(name: str, where: str) -> str:
     """
     if name.lower() not in _NEURONS:
         allowed = ", ".join(_NEURONS)
-        raise InvalidRobot(f"{where}: must be one of {allowed}, got {name!r}")
+        raise InvalidRobot(f"{where}: must be one of {allowed}, got {shown(name)}")
     return _NEURONS[name.lower()]
 
 
@@ -148,12 +148,17 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
             unknown neuron or part.
     """
     body = _Body()
-    body.add(theirs.root, (-1, -1, -1), 0, 0)
+    try:
+        body.add(theirs.root, (-1, -1, -1), 0, 0)
+    except RecursionError:
+        raise InvalidRobot(f"{where}: nested too deeply") from None
     neurons, index = _neurons(theirs, body, space)
     ends = (end for *pair, _ in theirs.weights for end in pair)
     for name, number in (*theirs.kinds, *ends):
         if (name, number) not in index:
-            raise InvalidRobot(f"{where}: no neuron {number} on part {name!r}")
+            raise InvalidRobot(
+                f"{where}: no neuron {shown(number)} on part {shown(name)}"
+            )
     connections = []
     for source, target, weight in theirs.weights:
         # RoboGen ignores connections to oscillators.
@@ -161,6 +166,7 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
             connections.append(Connection(index[source], index[target], weight))
     robot = Robot(tuple(body.parts), Brain(tuple(neurons), tuple(connections)))
     try:
+        check_number(robot)
         check_robot(robot, space)
     except InvalidRobot as error:
         raise InvalidRobot(f"{where}: {error}") from None
@@ -193,7 +199,9 @@ class _Body:
         by_slot: dict[int, tuple[int, RobogenPart]] = {}
         for slot, child in part.children.items():
             if not 0 <= slot < BUILT_IN[part.kind].arity:
-                raise InvalidRobot(f"{child.where}: {part.kind} has no slot {slot}")
+                raise InvalidRobot(
+                    f"{child.where}: {part.kind} has no slot {shown(slot)}"
+                )
             by_slot[our_slot(part.kind, slot)] = slot, child
         for parent_slot in sorted(by_slot):
             slot, child = by_slot[parent_slot]
@@ -240,8 +248,10 @@ def _neurons(
     for part, kind in enumerate(types):
         for number in range(kind.outputs):
             add("output", part, (body.names[part], number))
+    hidden: dict[str, list[Ending]] = {}
+    for end in theirs.hidden:
+        hidden.setdefault(end[0], []).append(end)
     for part, name in enumerate(body.names):
-        for end in theirs.hidden:
-            if end[0] == name:
-                add("hidden", part, end)
+        for end in hidden.get(name, ()):
+            add("hidden", part, end)
     return neurons, index

@@ -4,9 +4,10 @@ Source: RoboGen's published sources of 2018.
 """
 
 import json
+import math
 from typing import Any, NoReturn, TypeVar
 
-from schema.errors import InvalidRobot
+from schema.errors import InvalidRobot, one_line, shown
 from schema.formats.robogen import (
     Ending,
     RobogenPart,
@@ -48,7 +49,8 @@ def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
             f"{where}:{error.lineno}: not valid JSON: {error.msg}"
         ) from None
     except (ValueError, RecursionError) as error:
-        raise InvalidRobot(f"{where}: not valid JSON: {error}") from None
+        reason = one_line(error).partition(";")[0]
+        raise InvalidRobot(f"{where}: not valid JSON: {reason}") from None
     theirs = RobogenRobot(_body(document, where))
     ends: dict[str, Ending] = {}
     for at, neuron in _items(document, ("brain", "neuron"), where):
@@ -57,7 +59,9 @@ def robot_from_robogen_json(text: str, where: str, space: BodySpace) -> Robot:
         layer = _get(neuron, "layer", str, at)
         if layer not in LAYERS:
             allowed = ", ".join(LAYERS)
-            raise InvalidRobot(f"{at}.layer: must be one of {allowed}, got {layer!r}")
+            raise InvalidRobot(
+                f"{at}.layer: must be one of {allowed}, got {shown(layer)}"
+            )
         if layer == "hidden":
             theirs.hidden.append(end)
         if layer != "input":
@@ -83,7 +87,7 @@ def _body(document: object, where: str) -> RobogenPart:
     for at, entry in _items(document, ("body", "part"), where):
         name = _get(entry, "id", str, at)
         if name in parts:
-            raise InvalidRobot(f"{at}.id: duplicate part {name!r}")
+            raise InvalidRobot(f"{at}.id: duplicate part {shown(name)}")
         values = tuple(
             _get(value, "paramValue", float, inner)
             for inner, value in _items(entry, ("evolvableParam",), at)
@@ -107,7 +111,7 @@ def _body(document: object, where: str) -> RobogenPart:
             )
         if child.name in attached:
             raise InvalidRobot(
-                f"{at}.dest: {child.name!r} is already attached to a part"
+                f"{at}.dest: {shown(child.name)} is already attached to a part"
             )
         if slot in parent.children or (slot == 0 and parent is not roots[0]):
             raise InvalidRobot(f"{at}.srcSlot: slot {slot} is taken")
@@ -115,7 +119,7 @@ def _body(document: object, where: str) -> RobogenPart:
         parent.children[slot] = child
     if separate := [name for name in parts if name not in attached]:
         raise InvalidRobot(
-            f"{where}: body.part: {separate[0]!r} is not attached to any part"
+            f"{where}: body.part: {shown(separate[0])} is not attached to any part"
         )
     _check_connected(roots[0], len(parts), where)
     return roots[0]
@@ -153,18 +157,26 @@ def _get(entry: dict[str, Any], key: str, kind: type[T], at: str) -> T:
     """Return the value of a key, of a type; integers are accepted as floats."""
     value = entry.get(key)
     if kind is float and isinstance(value, int):
-        value = float(value)
+        value = _as_float(value)
     if not isinstance(value, kind) or isinstance(value, bool):
         raise InvalidRobot(
-            f"{at}.{key}: must be of type {kind.__name__}, got {value!r}"
+            f"{at}.{key}: must be of type {kind.__name__}, got {shown(value)}"
         )
     return value
+
+
+def _as_float(value: int) -> float:
+    """Return a whole number as a float, infinite if it is too large."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf
 
 
 def _known(named: dict[str, K], name: str, at: str) -> K:
     """Return the value of a name that must exist."""
     if name not in named:
-        raise InvalidRobot(f"{at}: unknown name {name!r}")
+        raise InvalidRobot(f"{at}: unknown name {shown(name)}")
     return named[name]
 
 

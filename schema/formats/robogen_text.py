@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Iterator
 
-from schema.errors import InvalidRobot
+from schema.errors import InvalidRobot, shown
 from schema.formats.robogen import (
     RobogenPart,
     RobogenRobot,
@@ -18,6 +18,7 @@ from schema.formats.robogen import (
     neuron_kind,
     our_robot,
 )
+from schema.limits import MOST_LINE
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot.robot import Robot
 
@@ -31,6 +32,8 @@ _LETTERS = {
     "T": "TouchSensor",
     "L": "LightSensor",
 }
+_DIGITS = 9
+"""Most digits of a neuron's number."""
 _PART = re.compile(r"(\t*)(\d) (\S+) (\S+) (\d)((?: \S+)*)\s*")
 
 
@@ -54,7 +57,7 @@ def robot_from_robogen_text(text: str, where: str, space: BodySpace) -> Robot:
     for line, words in next(sections, []):
         part, kind = _exactly(words, ("PART", "TYPE"), line)
         if part not in numbers:
-            raise InvalidRobot(f"{line}: no part {part!r}")
+            raise InvalidRobot(f"{line}: no part {shown(part)}")
         theirs.hidden.append((part, numbers[part]))
         # The last section overrides it.
         theirs.kinds[theirs.hidden[-1]] = (neuron_kind(kind, line), (0.0, 1.0))
@@ -76,6 +79,11 @@ def _sections(text: str, where: str) -> Iterator[list[tuple[str, list[str]]]]:
     section: list[tuple[str, list[str]]] = []
     is_body = True
     for number, line in enumerate(text.splitlines(), start=1):
+        if len(line) > MOST_LINE:
+            raise InvalidRobot(
+                f"{where}:{number}: must have <= {MOST_LINE} characters, "
+                f"got {len(line)}"
+            )
         if line.strip():
             section.append((f"{where}:{number}", [line] if is_body else line.split()))
         else:
@@ -95,7 +103,7 @@ def _body(lines: list[tuple[str, list[str]]], where: str) -> RobogenPart:
         if match is None:
             raise InvalidRobot(
                 f"{line}: must be TABS SLOT TYPE NAME ORIENTATION PARAMETERS, "
-                f"got {written!r}"
+                f"got {shown(written)}"
             )
         tabs, slot, kind, name, turns, rest = match.groups()
         kind = _LETTERS.get(kind, kind)
@@ -103,7 +111,7 @@ def _body(lines: list[tuple[str, list[str]]], where: str) -> RobogenPart:
         part = checked_part(name, kind, int(turns), values, line)
         depth = len(tabs)
         if name in names:
-            raise InvalidRobot(f"{line}: duplicate part {name!r}")
+            raise InvalidRobot(f"{line}: duplicate part {shown(name)}")
         names.add(name)
         if (depth == 0) != (not path) or depth > len(path):
             allowed = f"1..{len(path)}" if path else "0"
@@ -149,14 +157,14 @@ def _read_parameters(theirs: RobogenRobot, words: list[str], line: str) -> None:
 def _exactly(words: list[str], names: tuple[str, ...], line: str) -> list[str]:
     if len(words) != len(names):
         raise InvalidRobot(
-            f"{line}: must be {' '.join(names)}, got {' '.join(words)!r}"
+            f"{line}: must be {' '.join(names)}, got {shown(' '.join(words))}"
         )
     return words
 
 
 def _count(word: str, line: str) -> int:
-    if not word.isdecimal():
-        raise InvalidRobot(f"{line}: must be a neuron's number, got {word!r}")
+    if not (word.isdecimal() and len(word) <= _DIGITS):
+        raise InvalidRobot(f"{line}: must be a neuron's number, got {shown(word)}")
     return int(word)
 
 
@@ -166,5 +174,5 @@ def _number(word: str, line: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise InvalidRobot(f"{line}: must be a number, got {word!r}")
+        raise InvalidRobot(f"{line}: must be a number, got {shown(word)}")
     return value

@@ -31,7 +31,7 @@ from typing import Any
 
 import yaml
 
-from schema.errors import InvalidRobot
+from schema.errors import InvalidRobot, shown
 from schema.formats.yaml_node import Table
 from schema.parts import BodySpace, Parameter
 from schema.robot.brain import (
@@ -44,7 +44,7 @@ from schema.robot.brain import (
     Neuron,
     neuron_names,
 )
-from schema.robot.robot import Part, Robot, check_robot
+from schema.robot.robot import Part, Robot, check_number, check_robot
 
 VERSION = 1
 _WRITTEN: tuple[Layer, ...] = ("output", "hidden")
@@ -152,11 +152,14 @@ class Reader:
         if document.has("revolve_robot"):
             version = document.integer("revolve_robot")
             if version != VERSION:
-                document.refuse("revolve_robot", f"must be {VERSION}, got {version}")
+                document.refuse(
+                    "revolve_robot", f"must be {VERSION}, got {shown(version)}"
+                )
         self._read_part(document.table("body"), -1, -1)
         brain = document.table("brain") if document.has("brain") else None
         robot = Robot(tuple(self.parts), self.brain(brain))
         try:
+            check_number(robot)
             check_robot(robot, self.space)
         except InvalidRobot as error:
             raise InvalidRobot(f"{self._place(str(error))}: {error}") from None
@@ -176,7 +179,7 @@ class Reader:
         kind = self.space[self.kind(table)]
         name = table.text("id", f"part-{index}")
         if name in self.part_index:
-            table.refuse("id", f"duplicate part name {name!r}")
+            table.refuse("id", f"duplicate part name {shown(name)}")
         self.part_index[name] = index
         self._lines |= _lines(table, f"body.parts[{index}]")
         part = Part(
@@ -232,7 +235,7 @@ class Reader:
             self._lines |= _lines(item, f"brain.neurons[{len(names)}]")
             name = item.text("id", default)
             if name in names:
-                item.refuse("id", f"duplicate neuron name {name!r}")
+                item.refuse("id", f"duplicate neuron name {shown(name)}")
             names[name] = neuron
         return Brain(
             neurons, self.connections(table.tables("connections"), list(names))

@@ -64,8 +64,9 @@ class RevolveReader(Reader):
             return Brain((*neurons.values(), *made))
         table.refuse_others("neurons", "params", "connections")
         written, params = _tables(table, "neurons"), _tables(table, "params")
+        known = {**neurons, **outputs, **written}
         for name in params:
-            if name not in {**neurons, **outputs, **written}:
+            if name not in known:
                 table.table("params").refuse(name, "unknown neuron")
         for name, part in outputs.items():
             entry = params.get(name) or written.get(name)

@@ -1,35 +1,27 @@
 """YAML mappings with line numbers for error messages.
 
 A scalar is converted to the type that the caller requests: ``1e-5`` is read as a
-number where a number is expected, although it is a text in YAML 1.1. Aliases are
-refused, so that no document contains itself.
+number where a number is expected, although it is a text in YAML 1.1.
 """
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from itertools import islice
 from types import MappingProxyType
 from typing import NoReturn, TypeVar
 
 import yaml
 
-from schema.errors import InvalidRobot, nearest
+from schema.errors import InvalidRobot, cut, nearest, shown
+from schema.formats.yaml_compose import root_node
+from schema.limits import MOST_TEXT_BYTES
 
 T = TypeVar("T", int, float)
 
 _SLOT = re.compile("0|[1-9][0-9]{0,3}")
-
-
-class _Loader(yaml.SafeLoader):
-    """Loader that refuses aliases."""
-
-    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
-            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
-            raise yaml.composer.ComposerError(
-                None, None, "aliases are not allowed", mark
-            )
-        return super().compose_node(parent, index)
+# Most allowed words that a message lists.
+_MOST_WORDS = 40
 
 
 class Table:
@@ -137,7 +129,7 @@ class Table:
     def word(
         self,
         key: str,
-        allowed: Iterable[str],
+        allowed: Collection[str],
         also: Mapping[str, str] = MappingProxyType({}),
     ) -> str:
         """Return the text of a key, one of some words.
@@ -150,11 +142,16 @@ class Table:
         Raises:
             InvalidRobot: no such key, or another word; the message names the nearest.
         """
-        words = list(allowed)
         word = also.get(self.text(key), self.text(key))
-        if word not in words:
-            near = nearest(word, words)
-            self.refuse(key, f"must be one of {', '.join(words)}, got {word!r}{near}")
+        if word not in allowed:
+            near = nearest(word, allowed)
+            first = islice(allowed, _MOST_WORDS)
+            more = ", ..." if len(allowed) > _MOST_WORDS else ""
+            self.refuse(
+                key,
+                f"must be one of {', '.join(map(cut, first))}{more}, "
+                f"got {shown(word)}{near}",
+            )
         return word
 
     def integer(self, key: str, default: int | None = None) -> int:
@@ -182,7 +179,9 @@ class Table:
             value = parse(self.text(key))
         except ValueError:
             value = None
-        if value is None or not math.isfinite(value):
+        # Not of an integer, which may be too large for a float.
+        is_infinite = isinstance(value, float) and not math.isfinite(value)
+        if value is None or is_infinite:
             self.refuse(key, f"must be {what}, got {_shown(self._node(key))}")
         return value
 
@@ -197,7 +196,7 @@ class Table:
         return int(key)
 
     def _at(self, key: str) -> str:
-        return f"{self._path}.{key}" if self._path else key
+        return f"{self._path}.{cut(key)}" if self._path else cut(key)
 
     def _node(self, key: str) -> yaml.Node:
         if key not in self._values:
@@ -217,10 +216,14 @@ def compose(text: str, file: str) -> Table:
         file: its name, for messages.
 
     Raises:
-        InvalidRobot: not YAML, not a mapping, or nested too deeply.
+        InvalidRobot: not YAML, not a mapping, or beyond a limit (``schema.limits``).
     """
+    if len(text) > MOST_TEXT_BYTES:
+        raise InvalidRobot(
+            f"{file}: must have <= {MOST_TEXT_BYTES} characters, got {len(text)}"
+        )
     try:
-        node = yaml.compose(text, Loader=_Loader)
+        node = root_node(text)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = "" if mark is None else f":{mark.line + 1}"
@@ -228,8 +231,6 @@ def compose(text: str, file: str) -> Table:
     except yaml.YAMLError as error:
         words = " ".join(str(error).split())
         raise InvalidRobot(f"{file}: not valid YAML: {words}") from None
-    except RecursionError:
-        raise InvalidRobot(f"{file}: nested too deeply") from None
     return Table(node, "", file)
 
 

@@ -209,7 +209,7 @@ class _Builder:
         imus = {s.box for s in self.types[index].sensors if s.kind == "imu"}
         # Arrays, shared by the boxes, are faster than tuples; colours are float32.
         colour = np.array((*self.robot.parts[index].parameters[-3:], 1.0), np.float32)
-        upright = _quaternion(rotation)
+        upright = quaternion(rotation)
         ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = rotation.tolist()
         px, py, pz = self.positions[index].tolist()
         # Plain floats: faster than arrays for a few boxes per part.
@@ -222,10 +222,10 @@ class _Builder:
             )
             half = (0.5 * box.size[0], 0.5 * box.size[1], 0.5 * box.size[2])
             reach = abs(cx) * half[0] + abs(cy) * half[1] + abs(cz) * half[2]
-            quaternion, below = upright, reach
+            attitude, below = upright, reach
             if box.rotation is not IDENTITY:
                 turned = rotation @ np.asarray(box.rotation)
-                quaternion, below = _quaternion(turned), float(abs(turned[2]) @ half)
+                attitude, below = quaternion(turned), float(abs(turned[2]) @ half)
             body, origin = pair[box.segment]
             place = (
                 centre[0] - origin[0],
@@ -234,15 +234,15 @@ class _Builder:
             )
             geom = body.add_geom()
             geom.name = f"{index}/{box.name}"
-            geom.size, geom.pos, geom.quat = half, place, quaternion
+            geom.size, geom.pos, geom.quat = half, place, attitude
             geom.mass, geom.rgba = box.mass, colour
             if box.name in imus:
-                body.add_site(name=f"{index}/imu", pos=place, quat=quaternion)
+                body.add_site(name=f"{index}/imu", pos=place, quat=attitude)
             self.lowest = min(self.lowest, centre[2] - below)
 
 
-def _quaternion(rotation: Floats) -> Floats:
-    """Return the quaternion (w, x, y, z) of a rotation matrix."""
-    quaternion = np.empty(4)
-    mujoco.mju_mat2Quat(quaternion, rotation.ravel())
-    return quaternion
+def quaternion(rotation: Floats) -> Floats:
+    """Return the unit quaternion w, x, y, z of a rotation matrix, (3, 3)."""
+    found = np.empty(4)
+    mujoco.mju_mat2Quat(found, rotation.ravel())
+    return found

@@ -11,6 +11,7 @@ import numpy as np
 from schema.experiment.document import Arena, Simulation
 from schema.experiment.environment import Environment, relief
 from schema.experiment.scenery import add_scenery
+from schema.robot.results import Floats
 
 _BELOW_M = 0.1
 """Thickness of rough ground below z = 0 [m]."""
@@ -97,27 +98,32 @@ def _add_relief(spec: mujoco.MjSpec, environment: Environment) -> None:
     )
 
 
-def add_ring_wall(spec: mujoco.MjSpec, arena: Arena) -> None:
-    """Add a ring of straight walls about the origin, if the arena has one.
+def ring_wall(arena: Arena) -> Floats:
+    """Return the boxes of a ring of straight walls about the origin, if there is one.
 
-    The inner faces touch the circle of ``wall_diameter_m`` from outside; geoms are
-    ``wall{k}``. Source: the original's ring of 12 segments, 0.05 m thick, 1 m high.
+    The inner faces touch the circle of ``wall_diameter_m`` from outside. Source: the
+    original's ring of 12 segments, 0.05 m thick, 1 m high.
+
+    Returns:
+        (W, 10) centre [m], attitude w, x, y, z, and half sizes [m] of each wall.
     """
     if not arena.wall_diameter_m:
-        return
+        return np.zeros((0, 10))
     count, half = arena.wall_segments, 0.5 * arena.wall_thickness_m
-    centre = 0.5 * arena.wall_diameter_m + half
+    centre, height = 0.5 * arena.wall_diameter_m + half, 0.5 * arena.wall_height_m
     length = (centre + half) * tan(pi / count)
+    walls = []
     for index in range(count):
         angle = 2.0 * pi * index / count
-        spec.worldbody.add_geom(
-            name=f"wall{index}",
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=(half, length, 0.5 * arena.wall_height_m),
-            pos=(
-                centre * np.cos(angle),
-                centre * np.sin(angle),
-                0.5 * arena.wall_height_m,
-            ),
-            quat=(np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)),
-        )
+        place = (centre * np.cos(angle), centre * np.sin(angle), height)
+        attitude = (np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle))
+        walls.append((*place, *attitude, half, length, height))
+    return np.array(walls)
+
+
+def add_ring_wall(spec: mujoco.MjSpec, arena: Arena) -> None:
+    """Add the walls of ``ring_wall`` as geoms ``wall{k}``."""
+    box = mujoco.mjtGeom.mjGEOM_BOX
+    for index, wall in enumerate(ring_wall(arena)):
+        geom = spec.worldbody.add_geom(name=f"wall{index}", type=box)
+        geom.pos, geom.quat, geom.size = wall[:3], wall[3:7], wall[7:]

@@ -139,10 +139,9 @@ def neuron_names(brain: Brain, part_ids: list[str]) -> list[str]:
 def _connection_problem(edge: Connection, brain: Brain) -> str:
     """Return what is wrong with a connection, or nothing."""
     count = len(brain.neurons)
-    if not 0 <= edge.source < count:
-        return f".source: must be 0..{count - 1}, got {edge.source}"
-    if not 0 <= edge.target < count:
-        return f".target: must be 0..{count - 1}, got {edge.target}"
+    for name, end in (("source", edge.source), ("target", edge.target)):
+        if not 0 <= end < count:
+            return f".{name}: must be 0..{count - 1}, got {end}"
     if brain.neurons[edge.target].layer == "input":
         return f".target: must not be an input, got neuron {edge.target}"
     if not math.isfinite(edge.weight):

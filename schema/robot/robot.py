@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 from msgspec import Struct
 
-from schema.errors import InvalidRobot
+from schema.errors import InvalidRobot, shown
+from schema.limits import MOST_NEURONS, MOST_PARTS
 from schema.parts import BodySpace, PartType
 from schema.robot.brain import Brain, check_brain
 
@@ -73,7 +74,8 @@ def check_tree(parts: Sequence[Part]) -> None:
         for end in ((part.parent, part.parent_slot), (index, part.slot)):
             if end in taken:
                 raise InvalidRobot(
-                    f"body.parts[{index}]: slot {end[1]} of part {end[0]} is taken"
+                    f"body.parts[{index}]: slot {shown(end[1])} of part "
+                    f"{end[0]} is taken"
                 )
             taken.add(end)
     _check_order(parts)
@@ -91,18 +93,19 @@ def _place_problem(part: Part, index: int) -> str:
     if not 0 <= part.parent < index:
         return f".parent: must be 0..{index - 1}, got {part.parent}"
     if part.parent_slot < 0:
-        return f".parent_slot: must be >= 0, got {part.parent_slot}"
-    return f".slot: must be >= 0, got {part.slot}" if part.slot < 0 else ""
+        return f".parent_slot: must be >= 0, got {shown(part.parent_slot)}"
+    return f".slot: must be >= 0, got {shown(part.slot)}" if part.slot < 0 else ""
 
 
 def _value_problem(part: Part) -> str:
     """Return what is wrong with the numbers of a part of any type, or nothing."""
     if part.orientation not in ORIENTATIONS:
-        return f".orientation: must be one of {ORIENTATIONS}, got {part.orientation}"
+        got = shown(part.orientation)
+        return f".orientation: must be one of {ORIENTATIONS}, got {got}"
     if not all(map(math.isfinite, part.parameters)):
         return ".parameters: must be finite"
     if not 0 <= part.gene < GENES:
-        return f".gene: must be 0..2^64-1, got {part.gene}"
+        return f".gene: must be 0..2^64-1, got {shown(part.gene)}"
     return ""
 
 
@@ -124,6 +127,23 @@ def check_robot(robot: Robot, space: BodySpace) -> None:
     check_tree(robot.parts)
     check_brain(robot.brain, len(robot.parts))
     check_types(robot, space)
+
+
+def check_number(robot: Robot) -> None:
+    """Raise if a robot has more parts or neurons than one in a file may have.
+
+    Raises:
+        InvalidRobot: it has more.
+    """
+    if len(robot.parts) > MOST_PARTS:
+        raise InvalidRobot(
+            f"body: must have <= {MOST_PARTS} parts, got {len(robot.parts)}"
+        )
+    if len(robot.brain.neurons) > MOST_NEURONS:
+        raise InvalidRobot(
+            f"brain: must have <= {MOST_NEURONS} neurons, "
+            f"got {len(robot.brain.neurons)}"
+        )
 
 
 def check_types(robot: Robot, space: BodySpace) -> None:
@@ -161,7 +181,7 @@ def check_body(parts: Sequence[Part], space: BodySpace) -> None:
             if slot >= kind.arity:
                 raise InvalidRobot(
                     f"body.parts[{index}].{name}: {kind.name} has slots "
-                    f"0..{kind.arity - 1}, got {slot}"
+                    f"0..{kind.arity - 1}, got {shown(slot)}"
                 )
 
 

@@ -403,7 +403,7 @@ def sizes(robot: Robot, genome: Genome, space: BodySpace) -> dict[str, int]:
     Source: thesis section 6.3; the code of the original.
     """
     kinds = [space[part.kind] for part in robot.parts]
-    layers = [neuron.layer for neuron in robot.brain.neurons]
+    brain = robot.brain
     # Includes -1, the parent of the core.
     parents = {part.parent for part in robot.parts}
     return {
@@ -414,8 +414,8 @@ def sizes(robot: Robot, genome: Genome, space: BodySpace) -> dict[str, int]:
         ),
         "motors": sum(kind.outputs for kind in kinds),
         "extremities": len(robot.parts) + 1 - len(parents),
-        "inputs": layers.count("input"),
-        "outputs": layers.count("output"),
-        "hidden": layers.count("hidden"),
+        "inputs": brain.count("input"),
+        "outputs": brain.count("output"),
+        "hidden": brain.count("hidden"),
         "connections": sum(len(node.connections) for node, _, _ in walk(genome)),
     }

@@ -22,14 +22,14 @@ from schema.errors import RunFolderError
 from schema.tables.checksums import digest_of, read_seal
 from schema.tables.columns import TABLES, completed
 from schema.tables.segments import (
+    FINISHED,
     Batch,
     note_unchecked,
+    parquet_files,
     read_segment,
     segments_of,
     warn_once,
 )
-
-FINISHED = "tables"
 
 
 class Stored(NamedTuple):
@@ -143,8 +143,7 @@ def _chain(folder: Path, table: str) -> Iterator[tuple[Path, Batch, int | None]]
 
 def has_rows(folder: Path, table: str) -> bool:
     """Return whether a run has any file of a table."""
-    finished = (folder / FINISHED).glob(f"*/*/{table}.parquet")
-    return any(finished) or bool(segments_of(folder, table))
+    return bool(parquet_files(folder, table) or segments_of(folder, table))
 
 
 def finished_path(folder: Path, table: str) -> Path | None:
@@ -155,8 +154,7 @@ def finished_path(folder: Path, table: str) -> Path | None:
     """
     if why := damage_of(folder, table):
         raise RunFolderError(why)
-    found = sorted((folder / FINISHED).glob(f"*/*/{table}.parquet"))
-    return found[0] if found else None
+    return next(iter(parquet_files(folder, table)), None)
 
 
 def damage_of(folder: Path, table: str) -> str:
@@ -165,7 +163,7 @@ def damage_of(folder: Path, table: str) -> str:
     A file of an earlier version has no digest; it must be a Parquet file.
     """
     digest = read_seal(folder).digests.get(table)
-    found = sorted((folder / FINISHED).glob(f"*/*/{table}.parquet"))
+    found = parquet_files(folder, table)
     if not found:
         if not digest or segments_of(folder, table):
             return ""
@@ -200,7 +198,12 @@ def read_table(folder: Path, table: str) -> pa.Table:
         raise RunFolderError(f"{folder}: no such folder")
     path = finished_path(folder, table)
     if path is None:
-        return pa.Table.from_batches(batches_by_island(folder, table), TABLES[table])
+        batches = batches_by_island(folder, table)
+        rows = pa.Table.from_batches(batches, TABLES[table])
+        # A run that ends meanwhile removes its segments.
+        path = finished_path(folder, table)
+        if path is None:
+            return rows
     try:
         with ParquetFile(path, page_checksum_verification=True) as file:
             return completed(file.read(), TABLES[table])

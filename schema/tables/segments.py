@@ -19,6 +19,7 @@ from schema.tables.checksums import Damaged, read_seal, sound_messages, sums_pat
 from schema.tables.columns import TABLES, completed, is_earlier
 
 SEGMENTS = "segments"
+FINISHED = "tables"
 
 _LOG = logging.getLogger(__name__)
 _NOTED: list[Path] = []
@@ -62,6 +63,11 @@ def segments_of(folder: Path, table: str) -> list[tuple[int, Path]]:
     return [(each, segment_path(folder, table, each)) for each in sorted(numbers)]
 
 
+def parquet_files(folder: Path, table: str) -> list[Path]:
+    """Return the Parquet files of a table: one if the run is finished, or none."""
+    return sorted((folder / FINISHED).glob(f"*/*/{table}.parquet"))
+
+
 def read_segment(folder: Path, table: str, path: Path) -> Iterator[Batch]:
     """Yield the complete batches of a segment, up to the first damaged one.
 
@@ -79,10 +85,12 @@ def read_segment(folder: Path, table: str, path: Path) -> Iterator[Batch]:
         batches = _unchecked if sums is None else _checked
         yield from batches(path, TABLES[table], sums or b"")
     except Damaged as damage:
-        warn_once(
-            f"{damage}; its rows from there on are left out: to compute them again, "
-            "resume the run"
-        )
+        # At the end of a run, segments are removed as soon as there is Parquet.
+        if not parquet_files(folder, table):
+            warn_once(
+                f"{damage}; its rows from there on are left out: to compute them "
+                "again, resume the run"
+            )
     except OSError as error:
         why = error.strerror or error
         raise RunFolderError(f"{path}: cannot be read: {why}") from None

@@ -32,10 +32,13 @@ def _make(workspace: Workspace, words: tuple[str, ...], table: str) -> None:
     whole = read_table(workspace.folder / "finished", table).num_rows
     killed = workspace.start("run", *words, *FLAGS, "--out", "killed")
     folder = workspace.folder / "killed"
-    wait_until(
-        lambda: folder.is_dir() and 2 * read_table(folder, table).num_rows > whole,
-        f"half of the rows of {table}",
-    )
+
+    def is_half_done() -> bool:
+        if not folder.is_dir() or not read_table(folder, "births").num_rows:
+            return False
+        return bool(2 * read_table(folder, table).num_rows > whole)
+
+    wait_until(is_half_done, f"half of the rows of {table}")
     killed.send_signal(signal.SIGKILL)
     killed.communicate()
 

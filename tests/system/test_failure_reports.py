@@ -203,6 +203,26 @@ def test_missing_tables_are_written_again(
     assert compare(run, campaign_folder / "twice" / "seeing-0") == []
 
 
+def test_damaged_tables_of_a_campaign_are_written_again(
+    workspace: Workspace, campaign_folder: Path
+) -> None:
+    shutil.copytree(campaign_folder / "twice", workspace.folder / "twice")
+    (path,) = (workspace.folder / "twice" / "seeing-1").rglob("evaluations.parquet")
+    data = path.read_bytes()
+    path.write_bytes(data[:100] + bytes([data[100] ^ 1]) + data[101:])
+    output = workspace.run("resume", "twice", "--in-process", "--quiet")
+    assert "1 of 2 runs are already finished" in output
+    assert f"{path.name}: damaged (its SHA-256" in output
+    for name in ("seeing-0", "seeing-1"):
+        assert (
+            compare(workspace.folder / "twice" / name, campaign_folder / "twice" / name)
+            == []
+        )
+    output = workspace.run("resume", "twice", "--in-process", "--quiet")
+    assert "2 of 2 runs are already finished" in output
+    assert "damaged" not in output
+
+
 @pytest.mark.parametrize("tables", ["tables", "no tables"])
 def test_run_without_its_journal_does_not_restart(
     workspace: Workspace, campaign_folder: Path, tables: str

@@ -168,8 +168,12 @@ def test_workers_with_a_missing_or_different_plug_in_are_refused(
     nowhere.mkdir()
     fleet.join("judge", "analyzer")
     lines: list[str] = []
-    for name, folder in (("without", nowhere), ("another", elsewhere)):
-        fleet.join(name, "worker", folder=folder)
+    allows = ("--plugins", "plugged.py")
+    for name, folder, flags in (
+        ("without", nowhere, ()),
+        ("another", elsewhere, allows),
+    ):
+        fleet.join(name, "worker", *flags, folder=folder)
         lines.append("")
         while "refused" not in lines[-1]:
             lines.append(fleet.coordinator.stderr.readline())
@@ -177,7 +181,9 @@ def test_workers_with_a_missing_or_different_plug_in_are_refused(
         assert f"refused: {name}-0." in lines[-1]
     assert "has no plug-in 'plugged'" in "".join(lines)
     assert "its plug-in 'plugged' differs from the coordinator's" in lines[-1]
-    fleet.join("good")
+    log = fleet.agents["without"].stderr
+    assert "refused a run: has no plug-in 'plugged' among" in log.readline()
+    fleet.join("good", "worker", *allows)
     fleet.finish()
     assert compare(workspace.folder / "calm", fleet.folder) == []
 
@@ -211,8 +217,8 @@ def test_disagreeing_workers_are_reported_and_stop_the_run(
     module.write_text(module.read_text().replace("return value", drift))
     workspace.run("run", *WORDS, "--in-process", "--out", "calm")
     fleet = fleet_of(workspace, *WORDS, "--audit", "1")
-    fleet.join("sound")
-    fleet.join("broken", environment={"DRIFT": "1"})
+    fleet.join("sound", "worker", "--plugins", "plugged")
+    fleet.join("broken", "worker", "--plugins", "plugged", environment={"DRIFT": "1"})
     fleet.begin(workers=2)
     _, err = fleet.coordinator.communicate(timeout=60)
     assert fleet.coordinator.returncode == 2

@@ -59,9 +59,8 @@ class World:
         self._schedule = Schedule(settings)
         self._pool = Pool(threads)
         width = self.population.model_cache.width
-        self._controllers = BatchedControllers(
-            NoiseSource(clock, width, settings.origin)
-        )
+        noise = NoiseSource(clock, width, settings.origin)
+        self._controllers = BatchedControllers(noise)
         gravity = settings.environment.gravity_vector(clock.gravity)
         self._io = BatchedIO(width, clock, gravity)
         self._casualties: list[Casualty] = []

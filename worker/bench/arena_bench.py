@@ -39,16 +39,11 @@ THESIS = (-0.26, 34.78, 20.41)
 SIZES = tuple(range(5, 51, 5))
 
 RESULTS = pa.schema(
-    [
-        pa.field("benchmark", pa.string()),
-        pa.field("population", pa.int32()),
-        pa.field("repetition", pa.int32()),
-        pa.field("threads", pa.int32()),
-        pa.field("step_s", pa.float64()),
-        pa.field("simulated_s", pa.float64()),
-        pa.field("wall_s", pa.float64()),
-        pa.field("factor", pa.float64()),
-    ],
+    {
+        "benchmark": pa.string(),
+        **dict.fromkeys(("population", "repetition", "threads"), pa.int32()),
+        **dict.fromkeys(("step_s", "simulated_s", "wall_s", "factor"), pa.float64()),
+    },
     metadata={"revolve.schema": "arena-benchmark", "revolve.schema_version": "1"},
 )
 """One row per repetition; ``factor`` is simulated over wall time."""

@@ -184,14 +184,12 @@ def _fidelity(options: argparse.Namespace) -> int:
         other = _changed(experiment, options.against)
     chosen = fidelity.sample_thirds(population.fitness, options.per_third, options.seed)
     best = fidelity.winners(population.fitness)
-    found, top = (
-        fidelity.compare(
-            _shown([population.robots[index] for index in which], name),
-            experiment,
-            other,
-        )
-        for which, name in ((chosen, "robots drawn"), (best, "winners"))
-    )
+
+    def compared(which: list[int], name: str) -> Floats:
+        robots = _shown([population.robots[index] for index in which], name)
+        return fidelity.compare(robots, experiment, other)
+
+    found, top = compared(chosen, "robots drawn"), compared(best, "winners")
     spearman = fidelity.spearman(*found)
     thirds = np.split(found, fidelity.THIRDS, axis=1)
     print(

@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from schema.errors import ExperimentError, RunFolderError, SimulationDiverged
 from schema.experiment.document import Experiment, Simulation, body_space
-from schema.experiment.file import experiment_from_text
+from schema.experiment.file import own_experiment
 from schema.formats.files import settings_of
 from schema.robot.genome import develop
 from schema.robot.results import Floats
@@ -48,7 +48,7 @@ def read_population(folder: Path) -> Population:
     runs = read_table(folder, "runs")
     if not runs.num_rows:
         raise RunFolderError(f"{folder}: no run is there, or none that has begun")
-    experiment = experiment_from_text(runs["document"][0].as_py())
+    experiment = own_experiment(runs["document"][0].as_py())
     space = body_space(experiment.space)
     births = read_table(folder, "births").select(["island", "birth", "genome"])
     genomes = {

@@ -128,6 +128,5 @@ class ModelCache:
 
     def _spec(self, birth: BirthId, robot: Robot) -> mujoco.MjSpec:
         if birth not in self._specs:
-            built = robot_spec(robot, self._types, self._simulation)
-            self._specs[birth] = built.spec
+            self._specs[birth] = robot_spec(robot, self._types, self._simulation).spec
         return self._specs[birth]

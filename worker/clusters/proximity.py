@@ -96,10 +96,8 @@ class Scene:
         Returns:
             Rows of the first and of the second robots, ascending by both.
         """
-        cluster_indices, robot_rows = (
-            self._layout.cluster_indices,
-            self._layout.robot_rows,
-        )
+        cluster_indices = self._layout.cluster_indices
+        robot_rows = self._layout.robot_rows
         if not len(cluster_indices):
             return [], []
         low = self._hulls.min(axis=0) - robot_rows.hulls[3]

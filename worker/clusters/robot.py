@@ -128,6 +128,7 @@ class ArenaRobot:
         """
         age_s = (step - self.window.born) * settings.simulation.timestep_s
         x, y, z = self.view.qpos[:3].tolist()
+        place, is_mature = (x, y, z), self.window.is_mature
         path = straight = fitness = 0.0
         if self.window.has_fitness:
             track = self.window.track()
@@ -135,14 +136,8 @@ class ArenaRobot:
                 fitness = fitness_of(track, settings.fitness)
             except FitnessUndefined as error:
                 reason = f"fitness undefined: {error}"
-                return Casualty(self.birth, step, reason, (x, y, z))
+                return Casualty(self.birth, step, reason, place)
             path, straight = path_velocity(track), straight_velocity(track)
         return Judgement(
-            self.birth,
-            age_s,
-            path,
-            straight,
-            fitness,
-            is_mature=self.window.is_mature,
-            place=(x, y, z),
+            self.birth, age_s, path, straight, fitness, is_mature=is_mature, place=place
         )

@@ -118,12 +118,9 @@ class _ControlLoop:
         self._sensors = Sensors(robot, types, model, self.data, width=width.inputs)
         self._servos = Servos(robot, types, model, self.data)
         steps = simulation.warmup_steps + simulation.window_steps
-        self._controller = SoloNetwork(
-            pack(robot.brain, width),
-            width,
-            self._tick_s,
-            steps // simulation.brain_steps + 1,
-        )
+        ticks = steps // simulation.brain_steps + 1
+        network = pack(robot.brain, width)
+        self._controller = SoloNetwork(network, width, self._tick_s, ticks)
         self._sensors.write_to(self._controller.readings)
         self._noise: Noise | None = None
         if simulation.sensor_noise or simulation.actuator_noise:

@@ -94,7 +94,7 @@ def test_a_ring_wall_is_where_mujoco_has_it() -> None:
     assert len(walls) == model.ngeom == 5
     for geom, wall in enumerate(walls):
         assert wall[:3] == pytest.approx(model.geom_pos[geom], abs=1e-6)
-        assert wall[[6, 3, 4, 5]] == pytest.approx(model.geom_quat[geom], abs=1e-6)
+        assert wall[3:7] == pytest.approx(model.geom_quat[geom], abs=1e-6)
         assert wall[7:] == pytest.approx(model.geom_size[geom], abs=1e-6)
 
 

@@ -210,6 +210,25 @@ def test_errors_of_several_workers_end_an_advance_and_losses_do_not() -> None:
     assert given_up == [ShardFailed(0, agent, "no")]
 
 
+def test_any_number_of_malformed_answers_only_lets_the_shard_rest() -> None:
+    dispatch = Fleet()
+    dispatch.handle(joined("a", "x86"))
+    dispatch.handle(ShardRequested(0))
+    for number in range(1, 1300):
+        assert dispatch.handle(ShardReturned(number, "malformed", "no")) == []
+        assert len(dispatch.handle(Ticked(10.0 * number))) == 1
+
+
+def test_a_shard_that_may_not_drift_waits_for_its_platform() -> None:
+    dispatch = Fleet(allows_drift=True)
+    dispatch.handle(joined("a", "arm"))
+    dispatch.handle(ShardSeen(0, "x86", may_drift=False))
+    assert dispatch.handle(ShardRequested(0)) == []
+    for now_s in (1.0, 100.0, 1000.0):
+        assert dispatch.handle(Ticked(now_s)) == []
+    assert dispatch.waiting == {0: "x86"}
+
+
 def test_only_a_worker_of_an_equal_platform_continues_a_shard() -> None:
     dispatch = Fleet()
     dispatch.handle(joined("a", "arm"))

@@ -247,7 +247,7 @@ def test_agent_without_a_plugin_is_refused_and_leaves(network: Network) -> None:
         message = pb.Request(run="r", epoch=1, number=4, plugins="not_here=abc")
         network.send(4, "w", message.SerializeToString())
         assert until(network, has(1)) == [Left("w")]
-        assert network.refused == {"w": "has no plug-in 'not_here'"}
+        assert network.refused["w"].startswith("has no plug-in 'not_here' among")
 
 
 def test_workers_connect_to_a_new_coordinator() -> None:

@@ -12,7 +12,8 @@ from schema.agent.job_watch import JobWatch
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.request_handler import MOST_SOURCES, FairQueue, Reply, Server
 from schema.agent.supervision import CurrentJob, Death, ProcessSlot, Task
-from schema.errors import InvalidRobot, UnknownPlugin
+from schema.errors import InvalidRobot, PluginDiffers, UnknownPlugin
+from schema.experiment.plugin_access import allow
 from schema.experiment.plugin_source import check_plugins, plugins_of
 from schema.limits import LONGEST_REASON, MOST_EPOCH
 from schema.wire import revolve_pb2 as pb
@@ -151,7 +152,8 @@ def test_long_names_of_runs_are_refused_and_not_kept() -> None:
 
 def test_agent_without_a_plugin_is_unfit() -> None:
     reply = server().reply(request(plugins="nowhere_to_be_found=abc"))
-    assert reply.reason == f"{UNFIT}has no plug-in 'nowhere_to_be_found'"
+    assert reply.reason.startswith(f"{UNFIT}has no plug-in 'nowhere_to_be_found' among")
+    assert reply.reason.endswith("add --plugins nowhere_to_be_found")
 
 
 @settings(derandomize=True, deadline=None)
@@ -241,6 +243,9 @@ def test_plugins_are_identified_by_their_source(
     one, two = wanted.split()
     assert one.startswith("plugged_one=")
     assert two.startswith("plugged_two=")
+    with pytest.raises(PluginDiffers, match="has no plug-in 'plugged_two' among"):
+        check_plugins(two)
+    allow(["plugged_one", "plugged_two"])
     check_plugins(wanted)
     reply = server().reply(request(plugins=f"plugged_one=0 {two}"))
     digest = one.partition("=")[2]

@@ -1,16 +1,24 @@
 """Segments with checksums: damage is found before Arrow parses it, and named."""
 
+import json
 import logging
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from schema.tables import segments
-from schema.tables.checksums import MAGIC, sums_path, sums_record
+from schema.tables.checksums import MAGIC, digest_of, sums_path, sums_record
 from schema.tables.columns import EVALUATIONS
-from schema.tables.files import read_table, stored_rows
+from schema.tables.files import (
+    parquet_path,
+    read_table,
+    stored_batches,
+    stored_rows,
+)
 from schema.tables.segments import segment_path, segments_of
 from tests.schema.tables.test_files import ROW
 
@@ -194,3 +202,24 @@ def test_foreign_files_are_no_segments(tmp_path: Path) -> None:
     for name in ("evaluations-x.arrows", "evaluations-1.arrows.bak", "evaluations-"):
         (tmp_path / "segments" / name).touch()
     assert [number for number, _ in segments_of(tmp_path, "evaluations")] == [0]
+
+
+def test_a_run_that_ends_while_it_is_read_gives_all_rows_without_a_word(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path)
+    whole = read_table(tmp_path, "evaluations")
+    path = segment_path(tmp_path, "evaluations", 0)
+
+    def ending(folder: Path, table: str) -> Iterator[pa.RecordBatch]:
+        finished = parquet_path(folder, "any", 0, table)
+        finished.parent.mkdir(parents=True)
+        pq.write_table(whole, finished)
+        entries = {"checksums": True, "digests": {table: digest_of(finished)}}
+        (folder / "run.json").write_text(json.dumps(entries))
+        path.unlink()
+        return stored_batches(folder, table)
+
+    monkeypatch.setattr("schema.tables.files.batches_by_island", ending)
+    assert read_table(tmp_path, "evaluations").equals(whole)
+    assert caplog.messages == []

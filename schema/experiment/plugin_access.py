@@ -1,0 +1,199 @@
+"""Modules that this process may import as plug-ins.
+
+A reference ``module:attribute`` may come from the network or from another person's
+file, and an import runs the module. A process therefore imports built-in modules,
+modules of installed entry points of the group ``revolve.plugins``, and modules that
+its owner named: with ``--plugins``, or in an own experiment. A module allows the
+modules inside it, too.
+
+The list belongs to the process, as ``sys.modules`` does. The commands set it, and pass
+it to the processes that they start.
+"""
+
+import sys
+from collections.abc import Iterable
+from functools import lru_cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+
+from schema.errors import ExperimentError, UnknownPlugin, shown
+
+BUILT_IN = ("schema.parts", "schema.robogen_parts", "worker.fitness")
+ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis", "revolve")
+GROUP = "revolve.plugins"
+FLAG = "--plugins"
+
+_allowed: dict[str, Path | None] = {}
+"""Allowed modules, with the file of those that are loaded from a file."""
+
+
+def allow(entries: Iterable[str]) -> None:
+    """Allow modules; nothing is imported yet.
+
+    Args:
+        entries: names of modules, or paths of Python files.
+
+    Raises:
+        ExperimentError: no such module or file; a module of the standard library or of
+            Revolve; a file with the name of another module.
+    """
+    for entry in entries:
+        if entry.endswith(".py"):
+            file = Path(entry).resolve()
+            _check_file(file, FLAG)
+            _allowed[file.stem] = file
+        else:
+            _check_name(entry)
+            if _source(_top(entry)) is None and _top(entry) not in _allowed:
+                raise UnknownPlugin(
+                    f"{FLAG}: no module {shown(entry)} is installed; give an installed "
+                    "module or the path of a .py file"
+                )
+            _allowed.setdefault(entry, None)
+
+
+def allow_references(paths: Iterable[str], folder: Path | None = None) -> None:
+    """Allow the modules that the references of an own document name.
+
+    Args:
+        paths: ``module:attribute`` of each; other texts are ignored.
+        folder: of the document: a module that is not installed may be a file there.
+
+    Raises:
+        ExperimentError: a file in the folder has the name of another module.
+    """
+    for path in paths:
+        module = path.partition(":")[0]
+        if not _may_be_plugin(module):
+            continue
+        file = (folder / f"{module}.py").resolve() if folder else None
+        if file is not None and "." not in module and file.is_file():
+            _check_file(file, "space.part_types or fitness.function")
+            _allowed[module] = file
+        elif not is_allowed(module):
+            _allowed[module] = None
+
+
+def allowed() -> tuple[str, ...]:
+    """Return the entries with which ``allow`` gives another process the same list."""
+    return tuple(name if file is None else str(file) for name, file in _allowed.items())
+
+
+def is_allowed(module: str) -> bool:
+    """Return whether this process may import a module."""
+    if module in BUILT_IN:
+        return True
+    if not _may_be_plugin(module):
+        return False
+    return any(
+        module == name or module.startswith(f"{name}.")
+        for name in (*_allowed, *_installed_modules())
+    )
+
+
+def allows_any_of(top: str) -> bool:
+    """Return whether a top-level module, or a module inside it, is allowed."""
+    return _may_be_plugin(top) and any(
+        _top(name) == top for name in (*_allowed, *_installed_modules())
+    )
+
+
+def how_to_allow(module: str) -> str:
+    """Return which modules are allowed, and how to allow another one."""
+    if not _may_be_plugin(module):
+        return f"plug-ins are {', '.join(BUILT_IN)} and modules of users"
+    names = ", ".join(dict.fromkeys([*_allowed, *_installed_modules()])) or "none"
+    return f"allowed with {FLAG} are {names}; if you trust it, add {FLAG} {module}"
+
+
+def import_allowed(module: str) -> ModuleType:
+    """Return a module that is allowed, imported if it is not yet.
+
+    Raises:
+        ValueError: the module is not allowed.
+        Exception: any error of the module itself.
+    """
+    if not is_allowed(module):
+        raise ValueError(f"module {module} is not allowed")
+    file = _allowed.get(module)
+    if file is None or module in sys.modules:
+        return import_module(module)
+    spec = spec_from_file_location(module, file)
+    assert spec is not None
+    assert spec.loader is not None
+    made = module_from_spec(spec)
+    # Registered first, as dataclasses and pickle expect.
+    sys.modules[module] = made
+    try:
+        spec.loader.exec_module(made)
+    except BaseException:
+        del sys.modules[module]
+        raise
+    return made
+
+
+def source_of(top: str) -> list[Path]:
+    """Return the file of a top-level module, or the folders of a package.
+
+    Nothing is imported. The list is empty if there is no such module.
+    """
+    file = _allowed.get(top)
+    if file is not None:
+        return [file]
+    return _source(top) or []
+
+
+def _source(top: str) -> list[Path] | None:
+    """Return where a top-level module is installed; None if it is not."""
+    try:
+        # Of a dotted name it would import the parents.
+        spec = find_spec(top) if top.isidentifier() else None
+    except (ImportError, ValueError):
+        return None
+    if spec is None:
+        return None
+    if spec.submodule_search_locations:
+        return [Path(folder) for folder in spec.submodule_search_locations]
+    return [Path(spec.origin)] if spec.has_location and spec.origin else []
+
+
+def _check_file(file: Path, where: str) -> None:
+    """Raise unless a file can be loaded under its own name."""
+    if not file.is_file():
+        raise UnknownPlugin(f"{where}: no such file: {file}")
+    _check_name(file.stem)
+    named, found = _allowed.get(file.stem), _source(file.stem)
+    others = [named] if named else [each.resolve() for each in found or ()]
+    if file not in others and (named or found is not None):
+        other = others[0] if others else "a built-in module"
+        raise ExperimentError(
+            f"{where}: {file} has the name of another module, {other}: rename the file"
+        )
+
+
+def _check_name(module: str) -> None:
+    """Raise unless a name may be that of a plug-in."""
+    if not _may_be_plugin(module):
+        raise ExperimentError(
+            f"{FLAG}: must be a module outside the standard library and Revolve, or "
+            f"the path of a .py file, got {shown(module)}"
+        )
+
+
+def _may_be_plugin(module: str) -> bool:
+    is_name = all(word.isidentifier() for word in module.split("."))
+    reserved = (*ROOMS, *sys.stdlib_module_names)
+    return is_name and _top(module) not in reserved
+
+
+@lru_cache(maxsize=1)
+def _installed_modules() -> tuple[str, ...]:
+    """Return the modules that installed distributions offer as plug-ins."""
+    return tuple(sorted({entry.module for entry in entry_points(group=GROUP)}))
+
+
+def _top(module: str) -> str:
+    return module.partition(".")[0]

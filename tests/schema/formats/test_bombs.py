@@ -1,0 +1,303 @@
+"""Hostile robot files and experiments are refused within 100 MB and 1 s each."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from schema.errors import InvalidRobot
+from schema.formats.files import read_robot, settings_of
+from schema.formats.mjcf import robot_to_mjcf
+from schema.robot.brain import INPUT, Brain, Neuron
+from schema.robot.robot import Part, Robot
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+MOST_MB = 100.0
+MOST_S = 1.0
+
+# Reads each file in a process of its own, forked after all imports, and prints memory
+# beyond that of the start [MB], CPU time [s] and the error.
+READ_ALL = """
+import json, os, resource, sys, time
+from pathlib import Path
+import schema.formats.mjcf
+from schema.errors import RevolveError
+from schema.experiment.file import read_experiment
+from schema.formats.files import read_robot
+
+def peak_mb():
+    status = Path("/proc/self/status").read_text()
+    return int(status.partition("VmHWM:")[2].split()[0]) / 1024
+
+for word in sys.argv[1:]:
+    sys.stdout.flush()
+    if os.fork() == 0:
+        resource.setrlimit(resource.RLIMIT_CPU, (5, 5))
+        path, began_mb, began_s = Path(word), peak_mb(), time.process_time()
+        try:
+            read_experiment(word) if path.suffix == ".toml" else read_robot(path)
+            error = ""
+        except RevolveError as refusal:
+            error = str(refusal)
+        took_s = time.process_time() - began_s
+        print(json.dumps([path.name, peak_mb() - began_mb, took_s, error]))
+        sys.stdout.flush()
+        os._exit(0)
+    os.wait()
+"""
+
+GREY = (0.5, 0.5, 0.5)
+CORE = Robot(
+    (Part("Core", -1, -1, -1, 0, GREY),),
+    Brain(tuple(Neuron("input", INPUT, 0) for _ in range(6))),
+)
+NEURON = "  - {{id: n{0}, part: part-0, layer: hidden, type: Simple}}\n"
+EDGE = "  - {{source: n{0}, target: n{0}, weight: 1}}\n"
+
+
+def laughs(item: str, entity: str, join: str) -> str:
+    """Return definitions, each of which names the one before nine times."""
+    names = "abcdefghij"
+    return "".join(
+        entity.format(name, join.join([item.format(before)] * 9))
+        for before, name in pairwise(names)
+    )
+
+
+ENTITIES = (
+    '<!DOCTYPE m [<!ENTITY a "xxxxxxxxxxxxxxxxx">'
+    + laughs("&{0};", '<!ENTITY {0} "{1}">', "")
+    + "]>"
+)
+
+
+def mjcf(assets: str = "", world: str = "") -> str:
+    """Return the MJCF of a robot with more in it."""
+    text = robot_to_mjcf(CORE, settings_of(None))
+    assert "<worldbody>" in text
+    text = text.replace("<worldbody>", f"{assets}<worldbody>", 1)
+    return text.replace("</worldbody>", f"{world}</worldbody>", 1)
+
+
+def scenery(inside: str, before: str = "") -> str:
+    text = f"{before}<mujoco><worldbody>{inside}</worldbody></mujoco>"
+    return f"name = 'x'\n[environment]\nscenery = '''{text}'''"
+
+
+def chain(parts: int) -> dict[str, list[dict[str, Any]]]:
+    """Return RoboGen's body of bricks, each attached to the one before."""
+    core = {"id": "p0", "type": "CoreComponent", "orientation": 0, "root": True}
+    bricks = [
+        {"id": f"p{i}", "type": "FixedBrick", "orientation": 0} for i in range(1, parts)
+    ]
+    edges = [
+        {"src": f"p{i - 1}", "dest": f"p{i}", "srcSlot": 1, "destSlot": 0}
+        for i in range(1, parts)
+    ]
+    return {"part": [core, *bricks], "connection": edges}
+
+
+GEOM = '<geom size="1"/>'
+ALIASES = "a: &a [x]\n" + laughs("*{0}", "{0}: &{0} [{1}]\n", ",")
+BOMBS: dict[str, tuple[Callable[[], str], str]] = {
+    "laughs.yaml": (lambda: ALIASES, "aliases are not allowed"),
+    "deep.yaml": (lambda: "[" * 900_000, "<= 400 levels"),
+    "maps.yaml": (lambda: "{a: " * 200_000, "<= 400 levels"),
+    "list.yaml": (lambda: f"body: [{'1,' * 490_000}]", "<= 100000 values"),
+    "size.yaml": (lambda: "1," * 10_000_000, "<= 1000000 bytes"),
+    "scalar.yaml": (lambda: "revolve_robot: " + "x" * 900_000, "whole number"),
+    "digits.yaml": (lambda: "revolve_robot: " + "1" * 900_000, "whole number"),
+    "gene.yaml": (lambda: f"body: {{type: Core, gene: {'9' * 4000}}}", "gene: must"),
+    "float.yaml": (lambda: "body: {type: Core, params: {red: 1e999999}}", "finite"),
+    "word.yaml": (lambda: f"body: {{type: {'A' * 900_000}}}", "must be one of"),
+    "brain.yaml": (
+        lambda: (
+            "body: {type: Core}\nbrain:\n  neurons:\n"
+            + "".join(map(NEURON.format, range(5000)))
+            + "  connections:\n"
+            + "".join(map(EDGE.format, range(5000)))
+            + "  - {source: nowhere, target: n1}\n"
+        ),
+        "source: must be one of",
+    ),
+    "deep.json": (lambda: "[" * 900_000, "not valid JSON"),
+    "list.json": (
+        lambda: '{"body": {"part": [' + "[]," * 300_000 + "[]]}}",
+        "must be an object",
+    ),
+    "size.json": (lambda: "[]," * 10_000_000, "<= 1000000 bytes"),
+    "digits.json": (lambda: '{"body": ' + "9" * 900_000 + "}", "not valid JSON"),
+    "float.json": (
+        lambda: (
+            '{"body": {"part": [{"id": "a", "type": "CoreComponent", '
+            '"orientation": 0, "evolvableParam": [{"paramValue": 1'
+            + "0" * 4000
+            + "}]}]}}"
+        ),
+        "takes 0 numbers",
+    ),
+    "deep.txt": (
+        lambda: (
+            "0 E c 0\n" + "".join("\t" * i + f"0 F b{i} 0\n" for i in range(1, 1200))
+        ),
+        "<= 1000 characters",
+    ),
+    "chain.json": (lambda: json.dumps({"body": chain(2000)}), "nested too deeply"),
+    "line.txt": (lambda: "0 E c 0" + " 1" * 450_000, "<= 1000 characters"),
+    "digits.txt": (
+        lambda: "0 E c 0\n\n\nc " + "9" * 900 + " c 1 1",
+        "must be a neuron's number",
+    ),
+    "neurons.txt": (lambda: "0 E c 0\n\n" + "c simple\n" * 90_000, "10000 neurons"),
+    "entities.xml": (lambda: f"{ENTITIES}<mujoco name='&j;'/>", "document type"),
+    "deep.xml": (lambda: "<a>" * 4000 + "</a>" * 4000, "levels of nesting"),
+    "elements.xml": (lambda: mjcf(world=GEOM * 90_000), r"robot in its text \(ngeom"),
+    "sites.xml": (lambda: mjcf(world="<site/>" * 90_000), r"in its text \(nsite"),
+    "classes.xml": (
+        lambda: mjcf(f"<default>{'<default/>' * 50_000}</default>"),
+        "<= 100 <default>",
+    ),
+    "attributes.xml": (
+        lambda: f"<mujoco {' '.join(map('a{}=_'.format, range(190_000)))}/>".replace(
+            "_", "''"
+        ),
+        "has no text",
+    ),
+    "copies.xml": (
+        lambda: mjcf(world=f'<replicate count="100000000">{GEOM}</replicate>'),
+        "<replicate> is not allowed",
+    ),
+    "heights.xml": (
+        lambda: mjcf('<asset><hfield nrow="30000" ncol="30000"/></asset>'),
+        "nrow='30000'> must be a whole number <= 401",
+    ),
+    "keys.xml": (lambda: mjcf('<size nkey="1000000000"/>'), "nkey=.* is not allowed"),
+    "user.xml": (
+        lambda: mjcf(world=f'<geom user="{"1 " * 400_000}"/>'),
+        "user=.* is not allowed",
+    ),
+    "size.xml": (lambda: "<a/>" * 10_000_000, "<= 6000000 bytes"),
+    "size.toml": (lambda: "#\n" * 10_000_000, "<= 1000000 bytes"),
+    "deep.toml": (lambda: "a = " + "[" * 19_000, "nested too deeply"),
+    "tables.toml": (lambda: "[[islands]]\n" * 80_000, "<= 20000 lists and tables"),
+    "islands.toml": (
+        lambda: "name = 'x'\n" + "[[islands]]\n" * 1001,
+        "<= 10000 islands in <= 1000 tables",
+    ),
+    "count.toml": (
+        lambda: "name = 'x'\n[[islands]]\ncount = 1000000000",
+        "<= 10000 islands in <= 1000 tables",
+    ),
+    "dotted.toml": (lambda: "a." * 15_000 + "b = 1", "<= 16 parts"),
+    "quoted.toml": (lambda: "' '." * 15_000 + "b = 1", "<= 16 parts"),
+    "digits.toml": (lambda: "births = " + "9" * 900_000, "<= 1000 digits"),
+    "hex.toml": (lambda: "births = 0x" + "f" * 900_000, "<= 1000 digits"),
+    "count64.toml": (lambda: "name = 'x'\nbirths = 0x" + "f" * 900, "births: Exp"),
+    "float.toml": (
+        lambda: "name = 'x'\n[simulation]\ngravity = 1e999999",
+        "must be finite",
+    ),
+    "word.toml": (
+        lambda: f"name = 'x'\n[selection]\nparents = '{'A' * 900_000}'",
+        "must be one of",
+    ),
+    "copies.toml": (
+        lambda: scenery(f'<replicate count="9999999">{GEOM}</replicate>'),
+        "count='9999999'> must be a whole number <= 10000",
+    ),
+    "nested.toml": (
+        lambda: scenery(
+            f'<replicate count="200"><replicate count="200">{GEOM}</replicate>'
+            "</replicate>"
+        ),
+        "<= 10000 elements, copies included",
+    ),
+    "entities.toml": (lambda: scenery(GEOM, ENTITIES), "document type"),
+    "bodies.toml": (
+        lambda: scenery("<body>" * 200 + GEOM + "</body>" * 200),
+        "<= 100 levels",
+    ),
+    "ground.toml": (
+        lambda: (
+            "name = 'x'\n[environment]\nroughness_m = 1.0\n"
+            "extent_m = 1e300\npatch_m = 1e-300"
+        ),
+        "patch_m: must be >=",
+    ),
+    "user.toml": (
+        lambda: scenery(f'<geom size="1" user="{"1 " * 400_000}"/>'),
+        "user=...> is not allowed",
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def outcomes(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> dict[str, tuple[float, float, str]]:
+    """Return memory [MB], CPU time [s] and error of each bomb, by its name."""
+    folder = tmp_path_factory.mktemp("bombs")
+    for name, (text, _) in BOMBS.items():
+        (folder / name).write_text(text())
+    done = subprocess.run(
+        [sys.executable, "-c", READ_ALL, *(str(folder / name) for name in BOMBS)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    lines = [json.loads(line) for line in done.stdout.splitlines()]
+    return {name: (memory, time, error) for name, memory, time, error in lines}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(BOMBS))
+def test_bomb_is_refused_in_one_short_line_before_it_costs_much(
+    name: str, outcomes: dict[str, tuple[float, float, str]]
+) -> None:
+    assert name in outcomes, "it raised an error that is not for users"
+    memory_mb, took_s, error = outcomes[name]
+    assert re.search(BOMBS[name][1], error), error
+    assert "\n" not in error
+    assert len(error) < 1000
+    assert memory_mb < MOST_MB
+    assert took_s < MOST_S
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        '<include file="{0}"/>',
+        '<asset><mesh name="m" file="{0}"/></asset>',
+        '<asset><texture name="t" type="2d" file="{0}"/></asset>',
+        '<asset><texture name="t" type="cube" fileup="{0}"/></asset>',
+        '<asset><hfield name="h" file="{0}" size="1 1 1 1"/></asset>',
+        '<asset><model name="m" file="{0}"/></asset>',
+        '<asset><skin name="s" file="{0}"/></asset>',
+        '<deformable><skin name="s" file="{0}"/></deformable>',
+        '<compiler meshdir="{0}"/>',
+        '<extension><plugin plugin="mujoco.sdf.torus"/></extension>',
+    ],
+)
+def test_mjcf_that_reads_another_file_is_refused(inside: str, tmp_path: Path) -> None:
+    other = tmp_path / "other.xml"
+    # Opening it for reading would never return.
+    os.mkfifo(other)
+    path = tmp_path / "robot.xml"
+    path.write_text(mjcf(inside.format(other)))
+    with pytest.raises(InvalidRobot, match=r"robot\.xml: <.*> is not allowed"):
+        read_robot(path)
+
+
+def test_mjcf_of_a_robot_is_read_without_its_lights(tmp_path: Path) -> None:
+    """Elements that belong to no part may be added by hand."""
+    path = tmp_path / "robot.xml"
+    path.write_text(mjcf("<statistic extent='2'/>", "<light/><camera name='c'/>"))
+    assert read_robot(path) == CORE
