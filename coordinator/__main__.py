@@ -24,7 +24,8 @@ from coordinator.storage.hints import stopped
 from schema.agent.address import HUB, listen_address
 from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.command import access_of, check_load, connect_of, tls_of
-from schema.agent.service import HubLost, tell_user
+from schema.agent.log import start_log, tell_user
+from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
 from schema.errors import NetworkError
@@ -59,6 +60,7 @@ def main(arguments: list[str]) -> int:
         return _compare(options)
     if command == "bench dispatch":
         return _bench(options)
+    start_log("coordinator", as_json=options.log_json)
     allow(options.plugins)
     if not options.in_process and options.command != "coordinator":
         check_load(flags, "--workers", options.workers or 0, options)
@@ -175,6 +177,7 @@ def _deployment(
         give_up_after_s=options.give_up_after,
         checks=Checks(options.audit, options.on_quarantine == "pause"),
         allows_drift=options.allow_drift,
+        metrics=options.metrics,
     )
 
 

@@ -15,9 +15,9 @@ from coordinator.run.live_server import open_viewer
 from coordinator.storage.disk import replace_text
 from schema.agent.access import Certificate
 from schema.agent.address import ADDRESS
+from schema.agent.log import tell_user
 from schema.agent.network import Agent, Tls
 from schema.agent.platform_tag import platform_tag
-from schema.agent.service import tell_user
 from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, ProcessSlot
 from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name
@@ -47,6 +47,7 @@ class Deployment:
         checks: cross-checks of workers, and the reaction to quarantined robots.
         give_up_after_s: time without the hub at ``connect`` after which to stop [s].
         allows_drift: an arena may continue on another platform if its own is gone.
+        metrics: address at which to serve metrics; None: nowhere.
     """
 
     workers: int
@@ -67,6 +68,7 @@ class Deployment:
     certificates: tuple[Certificate, ...] | None = None
     allows_drift: bool = False
     give_up_after_s: float = math.inf
+    metrics: str | None = None
 
 
 @contextmanager

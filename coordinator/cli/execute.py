@@ -32,7 +32,7 @@ from coordinator.storage.folder_status import (
 )
 from coordinator.storage.hints import command, stopped
 from coordinator.storage.lock import FolderLock
-from schema.agent.service import tell_user
+from schema.agent.log import tell_error, tell_user, warn_user
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.experiment.document import Experiment
@@ -183,7 +183,7 @@ def _is_to_be_rewritten(folder: Path) -> bool:
         return True
     damages = table_damages(folder)
     for damage in damages:
-        tell_user(damage)
+        warn_user(damage)
     if damages:
         check_rewritable(folder)
         tell_user(f"{folder}: writing such tables again from the journal")
@@ -213,7 +213,7 @@ def _execute_campaign(
     def conclude_run(run: RunSession) -> None:
         conclusion = conclude(run)
         if conclusion.failures:
-            tell_user(f"{run.held.path}: {conclusion.failures}")
+            warn_user(f"{run.held.path}: {conclusion.failures}")
         if not conclusion.has_evaluated:
             failed.append(run.held.path)
 
@@ -234,4 +234,4 @@ def _execute_campaign(
 
 
 def _report(status: RunStatus, error: RevolveError) -> None:
-    tell_user(f"{status.name}-{status.run} failed: {error}")
+    tell_error(f"{status.name}-{status.run} failed: {error}")

@@ -8,6 +8,7 @@ from schema.agent.command import (
     add_access,
     add_give_up,
     add_job_limits,
+    add_log,
     add_network_flags,
     add_oversubscribe,
 )
@@ -178,6 +179,13 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         "one of its own; this is recorded and changes the results",
     )
     flags.add_argument("--quiet", action="store_true", help="show no progress")
+    add_log(flags)
+    flags.add_argument(
+        "--metrics",
+        metavar="ADDRESS",
+        help="serve metrics for Prometheus at PORT of this machine, or at HOST:PORT, "
+        "where every host that reaches it can read them (default: no metrics)",
+    )
     flags.add_argument(
         "--fsync", action="store_true", help="survive power loss, too; slower"
     )

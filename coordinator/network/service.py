@@ -21,6 +21,7 @@ from coordinator.network.info_queue import InfoQueue
 from coordinator.network.membership import Membership
 from schema.agent.access import Certificate
 from schema.agent.address import new_socket, parse_address
+from schema.agent.log import tell_user, warn_user
 from schema.agent.network import (
     ASK_TIMEOUT_S,
     CANCELLED,
@@ -34,13 +35,7 @@ from schema.agent.network import (
     hub_config,
 )
 from schema.agent.platform_tag import wire_version
-from schema.agent.service import (
-    HubWatch,
-    Outlet,
-    log_engine,
-    session_config,
-    tell_user,
-)
+from schema.agent.service import HubWatch, Outlet, log_engine, session_config
 from schema.agent.topics import Member, agents_alive, check_name
 from schema.errors import MalformedMessage, NetworkError
 from schema.limits import LONGEST_REASON, MOST_ASKED_INFOS, MOST_QUERIES, printable
@@ -168,7 +163,7 @@ class Network:
             else hub_config((*listen, self.own_address), tls, certificates)
         )
         self._is_hub = not connect
-        self._hub = HubWatch(self.address, tell_user, give_up_after_s)
+        self._hub = HubWatch(self.address, tell_user, warn_user, give_up_after_s)
         self._look_s = 0.0
         self._inbox: SimpleQueue[_News] = SimpleQueue()
         self._membership = Membership(wire_version(), self.faults)

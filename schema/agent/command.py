@@ -10,7 +10,6 @@ import math
 import os
 import re
 import socket
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -22,8 +21,9 @@ from schema.agent.address import (
     hub_of,
     parse_address,
 )
+from schema.agent.log import LOG_VARIABLE, start_log, tell_error, warn_user
 from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config
-from schema.agent.service import GAVE_UP, gave_up, tell_user
+from schema.agent.service import GAVE_UP, gave_up
 from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, Death, ProcessSlot
 from schema.agent.supervisor import (
     ProcessPool,
@@ -93,6 +93,16 @@ def add_network_flags(flags: argparse.ArgumentParser) -> None:
             default=os.environ.get(variable),
             help=f"{what}; default: ${variable}",
         )
+
+
+def add_log(flags: argparse.ArgumentParser) -> None:
+    """Add the flag for the form of log lines, for ``start_log``."""
+    flags.add_argument(
+        "--log-json",
+        action="store_true",
+        help=f"write each log line as a JSON object (default: ${LOG_VARIABLE}, else "
+        "with time and level unless standard error is a terminal)",
+    )
 
 
 def add_access(flags: argparse.ArgumentParser) -> None:
@@ -216,6 +226,7 @@ def run_pool(
     flags = _flags(role, processes)
     options = flags.parse_args(arguments)
     try:
+        start_log(role, as_json=options.log_json)
         allow(options.plugins)
         connect, tls = connect_of(options), tls_of(options)
         agent = Agent(
@@ -245,12 +256,12 @@ def run_pool(
                 process_pool.look_after()
                 process_pool.wait(_POLL_S)
                 for death in process_pool.deaths[deaths:]:
-                    sys.stderr.write(f"{tell_death(death)}\n")
+                    warn_user(tell_death(death))
                 if process_pool.restarts > restarts:
-                    sys.stderr.write(f"a {role} process ended and is restarted\n")
+                    warn_user(f"a {role} process ended and is restarted")
                 restarts, deaths = process_pool.restarts, len(process_pool.deaths)
                 if GAVE_UP in process_pool.exit_codes:
-                    tell_user(gave_up(connect, options.give_up_after))
+                    tell_error(gave_up(connect, options.give_up_after))
                     return 1
                 if len(process_pool.exit_codes) == options.processes:
                     return max(process_pool.exit_codes)
@@ -309,6 +320,7 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
         help="stop when standard input is closed, too",
     )
     add_job_limits(flags)
+    add_log(flags)
     add_plugins(flags)
     add_give_up(flags)
     add_oversubscribe(flags)

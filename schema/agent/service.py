@@ -20,6 +20,7 @@ import zenoh
 
 from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.job_watch import LOOK_S
+from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.network import UNFIT, Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.request_handler import FairQueue, ReplyCounts, Server
@@ -28,7 +29,6 @@ from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
 from schema.errors import NetworkError
 from schema.experiment.plugin_access import allow
-from schema.limits import printable_line
 
 _POLL_S = 0.2
 _RETRY_S = 0.3
@@ -73,12 +73,6 @@ def session_config(text: str, member: Member) -> zenoh.Config:
     return config
 
 
-def tell_user(line: str) -> None:
-    """Write a line to standard error; control characters become spaces."""
-    sys.stderr.write(f"{printable_line(line)}\n")
-    sys.stderr.flush()
-
-
 class HubLost(NetworkError):  # noqa: N818 - reads as what it says
     """No hub has answered for the time after which the process gives up."""
 
@@ -89,12 +83,14 @@ class HubWatch:
 
     Attributes:
         address: of the hub.
-        say: called with a line when the hub is lost and when it is back.
+        say: called with a line when the hub is back.
+        warn: called with a line when the hub is lost, or a run is refused.
         give_up_after_s: time without a hub after which ``seen`` raises [s].
     """
 
     address: str
     say: Callable[[str], None]
+    warn: Callable[[str], None]
     give_up_after_s: float = math.inf
     _lost_s: float | None = None
     _refusals: set[str] = field(default_factory=set)
@@ -103,7 +99,7 @@ class HubWatch:
         """Write a line about a refused run, once, and not without end."""
         if line not in self._refusals and len(self._refusals) < _MOST_REFUSALS:
             self._refusals.add(line)
-            self.say(line)
+            self.warn(line)
 
     def seen(self, *, is_there: bool) -> None:
         """Note whether the hub is there.
@@ -118,7 +114,7 @@ class HubWatch:
             self._lost_s = None
         elif self._lost_s is None:
             self._lost_s = now_s
-            self.say(f"no hub at {self.address}; retrying; press Ctrl-C to stop")
+            self.warn(f"no hub at {self.address}; retrying; press Ctrl-C to stop")
         elif now_s - self._lost_s >= self.give_up_after_s:
             raise HubLost(gave_up(self.address, self.give_up_after_s))
 
@@ -172,6 +168,7 @@ def serve(
     stop: threading.Event,
     say: Callable[[str], None] = tell_user,
     *,
+    warn: Callable[[str], None] | None = None,
     outlet: Outlet | None = None,
     slot: ProcessSlot = UNSUPERVISED,
 ) -> ReplyCounts:
@@ -185,7 +182,8 @@ def serve(
             is bad.
         agent: this agent, and the address of its hub.
         stop: ends the loop; checked between jobs.
-        say: called with a line when the hub is gone and when it is back.
+        say: called with a line when the hub is back.
+        warn: called with a line when the hub is gone; None: ``say``.
         outlet: publishes through this agent's session while there is one.
         slot: this process's slot in a pool, if it has one.
 
@@ -197,7 +195,7 @@ def serve(
     me = Member(agent.fleet, agent.role, agent.name)
     config = session_config(client_config(agent.connect, agent.tls), me)
     server = Server(answer, agent, slot)
-    hub = HubWatch(agent.connect, say, agent.give_up_after_s)
+    hub = HubWatch(agent.connect, say, warn or say, agent.give_up_after_s)
     log_engine()
     session = _open(config, hub, stop)
     if session is not None:
@@ -244,13 +242,16 @@ def serve_as_process(
     stop = stop_on_signals()
     stop_with_parent(stop)
     own = agent if agent.version else own_agent(agent, slot.index)
-    say = tell_user if slot.index == 0 else _keep_quiet
+    start_log(own.name)
+    say, warn = (
+        (tell_user, warn_user) if slot.index == 0 else (_keep_quiet, _keep_quiet)
+    )
     try:
-        counts = serve(answer, own, stop, say, outlet=outlet, slot=slot)
+        counts = serve(answer, own, stop, say, warn=warn, outlet=outlet, slot=slot)
     except HubLost:
         sys.exit(GAVE_UP)  # the pool's command says why
     if counts.refused:
-        tell_user(
+        warn_user(
             f"{own.name} refused {counts.refused} requests, "
             f"{counts.malformed} of them malformed"
         )
