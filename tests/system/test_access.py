@@ -14,7 +14,7 @@ from schema.agent.network import Tls, client_config
 from schema.agent.topics import Member, agents_alive, member_of
 from tests.system.fleet import make_certificate, size
 from tests.system.test_agents import free_address
-from tests.system.workspace import Workspace, wait_until
+from tests.system.workspace import Workspace, runtime_directory, wait_until
 
 pytestmark = pytest.mark.system
 
@@ -155,7 +155,10 @@ def test_strangers_do_not_connect(lab: Lab) -> None:
 def test_three_commands_of_one_user_need_no_address(
     workspace: Workspace, undisturbed: Path
 ) -> None:
-    place = {"XDG_RUNTIME_DIR": str(workspace.folder), "REVOLVE_CONNECT": ""}
+    place = {
+        "XDG_RUNTIME_DIR": runtime_directory(workspace.folder),
+        "REVOLVE_CONNECT": "",
+    }
     coordinator = workspace.start("coordinator", *RUN, environment=place)
     for role in ("analyzer", "worker"):
         workspace.start(role, "--processes", "1", environment=place)

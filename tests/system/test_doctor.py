@@ -9,7 +9,12 @@ import pytest
 
 from coordinator.cluster.kit import Cluster, Kit
 from tests.system.test_agents import free_address
-from tests.system.workspace import PATIENCE_S, Workspace, wait_until
+from tests.system.workspace import (
+    PATIENCE_S,
+    Workspace,
+    runtime_directory,
+    wait_until,
+)
 
 pytestmark = pytest.mark.system
 
@@ -37,7 +42,7 @@ def files_of(kit: Kit, name: str) -> tuple[str, ...]:
 
 
 def test_a_machine_without_a_hub(workspace: Workspace, tmp_path: Path) -> None:
-    here = {"XDG_RUNTIME_DIR": str(tmp_path)}
+    here = {"XDG_RUNTIME_DIR": runtime_directory(tmp_path)}
     code, lines = lines_of(workspace, environment=here)
     assert code == 0, lines
     assert lines["hub"].startswith("warn")

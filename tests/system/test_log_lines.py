@@ -43,4 +43,4 @@ def test_a_worker_without_a_hub_warns_with_its_name(workspace: Workspace) -> Non
     entry = json.loads(worker.stderr.readline())
     assert entry["level"] == "warning"
     assert entry["process"].startswith("w7-0")
-    assert entry["message"].startswith("no coordinator at tcp/127.0.0.1:1")
+    assert entry["message"].startswith("no hub at tcp/127.0.0.1:1")

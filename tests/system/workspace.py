@@ -1,14 +1,37 @@
 """Runs the commands of a test as a user does, in a separate folder."""
 
+import atexit
 import os
+import re
+import secrets
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 PATIENCE_S = 240.0
+
+
+def runtime_directory(folder: Path) -> str:
+    """Return a directory for the sockets of a test, by a path that is short enough.
+
+    Args:
+        folder: of the test; the sockets are removed with it.
+    """
+    (folder / "runtime").mkdir(exist_ok=True)
+    link = Path(tempfile.gettempdir()) / f"rt-{secrets.token_hex(6)}"
+    link.symlink_to(folder / "runtime")
+    atexit.register(link.unlink)
+    return str(link)
+
+
+def said(text: str) -> list[str]:
+    """Return lines of a log without their time and level."""
+    stamp = re.compile(r"^\d{4}-\d\d-\d\d \d\d:\d\d:\d\d [a-z]+: ")
+    return [stamp.sub("", line) for line in text.splitlines()]
 
 
 class Workspace:
