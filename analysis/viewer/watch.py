@@ -10,15 +10,14 @@ from analysis.progress import ProgressLine
 from analysis.viewer.blueprint import layout
 from analysis.viewer.live import Ended, LiveMessage, LiveSource
 from analysis.viewer.output import Output, Window, keep_serving
+from analysis.viewer.received import check_update, received_poses
 from analysis.viewer.recording import Recording
-from analysis.viewer.scene import scene_of
+from analysis.viewer.scene import Scene, scene_of
 from analysis.viewer.show import Show
 from schema.agent.service import tell_user
 from schema.errors import MalformedMessage, NetworkError
 from schema.experiment.file import experiment_from_text
-from schema.limits import LIVE_BYTES, MOST_LIVE_ROWS
 from schema.robot.ids import BirthId
-from schema.tables.received import received_columns
 from schema.wire.arena_codec import Live
 from schema.wire.updates import Update
 
@@ -58,7 +57,7 @@ def watch(
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         window = Window(output)
         recording.add_scene(scene)
-        view = LiveView(Show(recording, scene.space), news.run)
+        view = LiveView(Show(recording, scene.space), news.run, scene)
         view.tell([news, *rest])
         with ProgressLine() as progress:
             while not (stop.is_set() or view.has_ended or window.was_closed):
@@ -66,6 +65,8 @@ def watch(
                 if not output.has_window:  # the window shows it, next to a run's bars
                     progress.update(f"recording {name}: {view.births} births", now_s)
                 view.tell(source.receive(_POLL_S, now_s))
+        if dropped := view.dropped + source.dropped:
+            tell_user(f"dropped {dropped} messages: malformed, or not of this run")
         if view.has_ended:
             tell_user("the run has ended")
         keep_serving(output, window, recording, stop)
@@ -96,10 +97,13 @@ class LiveView:
 
     Attributes:
         has_ended: the coordinator has left the network.
+        dropped: number of messages that cannot be shown.
     """
 
-    def __init__(self, show: Show, run: str) -> None:
+    def __init__(self, show: Show, run: str, scene: Scene) -> None:
         self.has_ended = False
+        self.dropped = 0
+        self._scene = scene
         self._births: dict[int, int] = {}
         self._show = show
         self._run = run
@@ -114,6 +118,11 @@ class LiveView:
         """Record messages: births before poses of their robots."""
         news = [each for each in messages if isinstance(each, Update)]
         for one in news:
+            try:
+                check_update(one, self._scene)
+            except MalformedMessage:
+                self.dropped += 1
+                continue
             # A birth carries the number of births on its island, so that duplicates
             # count once.
             self._births |= {each.birth.island: each.births for each in one.births}
@@ -125,13 +134,9 @@ class LiveView:
         for each in messages:
             if isinstance(each, Live) and each.run == self._run:
                 try:
-                    poses = received_columns(
-                        "poses",
-                        each.advance.poses,
-                        most_bytes=LIVE_BYTES,
-                        most_rows=MOST_LIVE_ROWS,
-                    )
+                    poses = received_poses(each, self._scene)
                 except MalformedMessage:
+                    self.dropped += 1
                     continue
                 self._move(each.shard, poses, has_all=True)
             self.has_ended = self.has_ended or isinstance(each, Ended)
@@ -144,6 +149,7 @@ class LiveView:
         try:
             unknown = self._show.move(arena, poses, has_all=has_all)
         except MalformedMessage:
+            self.dropped += 1
             return
         if unknown is not None:
             self._unknown.append((arena, unknown))

@@ -26,8 +26,11 @@ from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
 from schema.experiment.plugin_access import allow
+from schema.limits import MOST_SHOWN
 
 _POLL_S = 0.2
+# Queries that are taken before a job is done.
+_MOST_QUERIES = 1000
 _RETRY_S = 0.3
 _SAY_S = 5.0
 # Different lines about refused runs that are written.
@@ -193,10 +196,11 @@ def serve_as_process(
     own = agent if agent.version else own_agent(agent, slot.index)
     say = tell_user if slot.index == 0 else _keep_quiet
     counts = serve(answer, own, stop, say, outlet=outlet, slot=slot)
-    if counts.refused:
+    if counts.refused or counts.crowd:
         tell_user(
             f"{own.name} refused {counts.refused} requests, "
-            f"{counts.malformed} of them malformed"
+            f"{counts.malformed} of them malformed; dropped {counts.crowd} beyond the "
+            "limit"
         )
 
 
@@ -253,7 +257,7 @@ def _serve_session(
         hub.seen(is_there=True)
         turns: FairQueue[zenoh.Query] = FairQueue()
         while not stop.is_set():
-            if not _queue_all(inbox, turns):
+            if not _queue_all(inbox, turns, server.counts):
                 hub.seen(is_there=bool(session.info.routers_zid()))
                 continue
             # A job arrived: the hub is there.
@@ -262,22 +266,32 @@ def _serve_session(
             with turns.take() as query:
                 _answer(query, server, me, hub)
             turns.spent(time.monotonic() - began_s)
-    _queue_all(inbox, turns)
+    _queue_all(inbox, turns, server.counts)
     while turns:
         with turns.take():
             pass  # a query that ends without a reply is lost for its coordinator
 
 
-def _queue_all(inbox: SimpleQueue[zenoh.Query], turns: FairQueue[zenoh.Query]) -> bool:
+def _queue_all(
+    inbox: SimpleQueue[zenoh.Query],
+    turns: FairQueue[zenoh.Query],
+    counts: ReplyCounts,
+) -> bool:
     """Move all queries that arrived to the queue; return whether any waits."""
     try:
-        while True:
+        # Limited: jobs are done even if queries never stop coming.
+        for _ in range(_MOST_QUERIES):
             # Wait only while there is nothing to do.
             query = inbox.get_nowait() if turns else inbox.get(timeout=_POLL_S)
-            sender = query.attachment
-            turns.put(sender.to_bytes() if sender else b"", query)
+            sender, payload = query.attachment, query.payload
+            source = sender.to_bytes()[:MOST_SHOWN] if sender else b""
+            size = len(payload) if payload else 0
+            for dropped in turns.put(source, query, size):
+                counts.crowd += 1
+                dropped.drop()  # type: ignore[no-untyped-call]
     except Empty:
-        return bool(turns)
+        pass
+    return bool(turns)
 
 
 def _answer(query: zenoh.Query, server: Server, me: Member, hub: "_Hub") -> None:

@@ -197,7 +197,7 @@ def experiment_from_text(text: str) -> Experiment:
     """
     try:
         return msgspec.json.decode(text.encode(), type=Experiment)
-    except msgspec.MsgspecError as error:
+    except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
         raise ExperimentError(f"experiment of a run: {error}") from None
 
 

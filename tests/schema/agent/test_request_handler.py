@@ -15,7 +15,7 @@ from schema.agent.supervision import CurrentJob, Death, ProcessSlot, Task
 from schema.errors import InvalidRobot, PluginDiffers, UnknownPlugin
 from schema.experiment.plugin_access import allow
 from schema.experiment.plugin_source import check_plugins, plugins_of
-from schema.limits import LONGEST_REASON, MOST_EPOCH
+from schema.limits import LONGEST_REASON, MOST_EPOCH, WAITING_JOB_BYTES
 from schema.wire import revolve_pb2 as pb
 from schema.wire.packing import fingerprint
 
@@ -320,3 +320,20 @@ def test_number_of_idle_accounts_is_limited() -> None:
         turns.put(str(number).encode(), number)
         assert turns.take() == number
     assert len(turns._accounts) <= MOST_SOURCES + 1
+
+
+def test_a_crowded_queue_drops_the_newest_of_the_greediest_source() -> None:
+    turns: FairQueue[str] = FairQueue(most_bytes=4 * WAITING_JOB_BYTES)
+    assert turns.put(b"run", "job", 100) == []
+    dropped = [turns.put(b"", f"junk {number}") for number in range(5)]
+    assert dropped == [[], [], ["junk 2"], ["junk 3"], ["junk 4"]]
+    assert len(turns) == 3
+    assert sorted(turns.take() for _ in range(3)) == ["job", "junk 0", "junk 1"]
+    assert not turns
+
+
+def test_a_queue_takes_one_item_of_any_size() -> None:
+    turns: FairQueue[str] = FairQueue(most_bytes=10)
+    assert turns.put(b"run", "large", 1000) == []
+    assert turns.put(b"other", "x", 1) == ["large"]
+    assert turns.take() == "x"
