@@ -221,6 +221,10 @@ class LiveSource:
             self._ask()
         return messages
 
+    def forget(self) -> None:
+        """Wait for another run than the one that was received first."""
+        self._sequel = Sequel()
+
     def _drop(self, error: MalformedMessage) -> None:
         with self._lock:
             self.dropped += 1

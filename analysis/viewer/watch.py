@@ -15,8 +15,9 @@ from analysis.viewer.recording import Recording
 from analysis.viewer.scene import Scene, scene_of
 from analysis.viewer.show import Show
 from schema.agent.service import tell_user
-from schema.errors import MalformedMessage, NetworkError
+from schema.errors import MalformedMessage, NetworkError, RevolveError
 from schema.experiment.file import experiment_from_text
+from schema.limits import printable
 from schema.robot.ids import BirthId
 from schema.wire.arena_codec import Live
 from schema.wire.updates import Update
@@ -46,19 +47,20 @@ def watch(
         NetworkError: no coordinator sends a run.
         ViewerError: the window cannot be opened.
     """
-    news, rest = _first(source, stop)
-    if news is None:
+    scene, messages = _first(source, stop)
+    if scene is None:
         if output.file is not None:
             tell_user(f"stopped before a run was received; {output.file} not written")
         return
-    scene = scene_of(experiment_from_text(news.document))
+    news = messages[0]
+    assert isinstance(news, Update)
     name = f"{news.experiment}-{news.run.rpartition('/')[2]}"
     blueprint = layout(scene, follow=follow)
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         window = Window(output)
         recording.add_scene(scene)
         view = LiveView(Show(recording, scene.space), news.run, scene)
-        view.tell([news, *rest])
+        view.tell(messages)
         with ProgressLine() as progress:
             while not (stop.is_set() or view.has_ended or window.was_closed):
                 now_s = time.monotonic()
@@ -74,8 +76,8 @@ def watch(
 
 def _first(
     source: LiveSource, stop: threading.Event
-) -> tuple[Update | None, list[LiveMessage]]:
-    """Wait for the complete state of a run; return it and the messages after it."""
+) -> tuple[Scene | None, list[LiveMessage]]:
+    """Wait for a run; return its scene, its complete state and later messages."""
     since_s = time.monotonic()
     has_reported = False
     while not stop.is_set():
@@ -83,7 +85,13 @@ def _first(
         messages = source.receive(_POLL_S, now_s)
         for index, each in enumerate(messages):
             if isinstance(each, Update) and each.is_whole:
-                return each, messages[index + 1 :]
+                try:
+                    scene = scene_of(experiment_from_text(each.document))
+                except RevolveError as error:
+                    tell_user(f"{printable(each.run)}: cannot be shown: {error}")
+                    source.forget()
+                    break
+                return scene, messages[index:]
         if now_s > since_s + _PATIENCE_S:
             raise NetworkError("the coordinator does not send a run")
         if now_s > since_s + _SILENT_S and not has_reported:

@@ -49,6 +49,9 @@ class Source:
         self._stop = stop
         self.dropped = 0
 
+    def forget(self) -> None:
+        pass
+
     def receive(self, *_: float) -> list[LiveMessage]:
         if not self._messages:
             self._stop.set()
@@ -191,3 +194,14 @@ def test_poses_that_cannot_be_shown_are_dropped(column: str, value: float) -> No
     scene = scene_of(read_experiment("scenario3"))
     with pytest.raises(MalformedMessage):
         received_poses(Live("a/run", 0, advance), scene)
+
+
+@pytest.mark.parametrize("document", ["{}", "\x00", "[" * 100_000])
+def test_a_run_that_cannot_be_shown_is_passed_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], document: str
+) -> None:
+    forged = replace(WHOLE, run="forged", document=document)
+    seen(tmp_path / "run.rrd", forged, WHOLE, Ended())
+    lines = capsys.readouterr().err.splitlines()
+    assert "forged: cannot be shown" in lines[0]
+    assert "recording e-run: 2 births" in lines
