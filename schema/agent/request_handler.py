@@ -141,6 +141,7 @@ class ReplyCounts:
         refused: jobs with a reason, malformed requests included.
         malformed: requests that do not decode.
         skipped: cancelled jobs.
+        cancels: cancellations that do not decode.
         crowd: requests that were dropped because too many waited.
     """
 
@@ -148,6 +149,7 @@ class ReplyCounts:
     refused: int = 0
     malformed: int = 0
     skipped: int = 0
+    cancels: int = 0
     crowd: int = 0
 
 
@@ -221,7 +223,7 @@ class Server:
         try:
             task = self._task(_parsed(data), data)
         except MalformedMessage:
-            self.counts.malformed += 1
+            self.counts.cancels += 1
             return
         _remember(task, None, self._cancelled)
 

@@ -196,11 +196,15 @@ def serve_as_process(
     own = agent if agent.version else own_agent(agent, slot.index)
     say = tell_user if slot.index == 0 else _keep_quiet
     counts = serve(answer, own, stop, say, outlet=outlet, slot=slot)
-    if counts.refused or counts.crowd:
+    if counts.refused:
         tell_user(
             f"{own.name} refused {counts.refused} requests, "
-            f"{counts.malformed} of them malformed; dropped {counts.crowd} beyond the "
-            "limit"
+            f"{counts.malformed} of them malformed"
+        )
+    if counts.crowd or counts.cancels:
+        tell_user(
+            f"{own.name} dropped {counts.crowd} requests beyond the limit and "
+            f"{counts.cancels} malformed cancellations"
         )
 
 
