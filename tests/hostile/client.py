@@ -16,6 +16,7 @@ import threading
 from collections import Counter, defaultdict, deque
 from collections.abc import Callable
 from contextlib import ExitStack
+from pathlib import Path
 
 import zenoh
 
@@ -349,6 +350,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--messages", type=int, required=True)
     parser.add_argument("--connect", required=True, metavar="ADDRESS")
+    parser.add_argument(
+        "--progress", type=Path, help="file to create when half is sent"
+    )
     chosen = parser.parse_args()
     stop = stop_on_signals()
     with ExitStack() as stack:
@@ -360,6 +364,9 @@ def main() -> None:
                 break  # the run is over
             number += 1
             client.send()
+            is_half = 2 * sum(client.sent.values()) >= chosen.messages
+            if is_half and chosen.progress is not None:
+                chosen.progress.touch()
         sent, came = dict(client.sent), dict(client.came)
     json.dump({"sent": sent, "came": came}, sys.stdout, sort_keys=True)
 

@@ -68,9 +68,11 @@ class Workspace:
             sys.stdout.write(f"{process.args!r}: {process.returncode}\n{out}{err}\n")
 
 
-def wait_until(condition: Callable[[], bool], what: str) -> None:
+def wait_until(
+    condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S
+) -> None:
     """Wait until a condition holds; fail the test after a timeout."""
-    deadline = time.monotonic() + PATIENCE_S
+    deadline = time.monotonic() + patience_s
     while not condition():
         assert time.monotonic() < deadline, f"never happened: {what}"
         time.sleep(0.005)  # polling interval
