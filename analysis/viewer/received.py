@@ -36,19 +36,21 @@ def check_update(news: Update, scene: Scene) -> None:
             time beyond the limit, a text that is too long.
     """
     islands = [each.birth.island for each in news.births]
-    islands += [each.island for each in (*news.deaths, *news.levels)]
+    islands += [gone.island for gone in news.deaths]
+    islands += [level.island for level in news.levels]
     for one in news.migrants:
         islands += [one.island, one.to]
     if unknown := set(islands) - set(scene.islands):
         raise MalformedMessage(f"update: the run has no island {min(unknown)}")
-    for time_s in (
-        each.sim_time_s for each in (*news.births, *news.deaths, *news.migrants)
-    ):
+    times = [each.sim_time_s for each in news.births]
+    times += [gone.sim_time_s for gone in news.deaths]
+    times += [one.sim_time_s for one in news.migrants]
+    for time_s in times:
         if time_s is not None and not 0.0 <= time_s <= _LATEST_S:
             raise MalformedMessage(
                 f"update: times must be in [0, {_LATEST_S:g}] s, got {time_s}"
             )
-    texts = [each.reason for each in news.deaths]
+    texts = [gone.reason for gone in news.deaths]
     texts += [text for man in news.workers for text in (man.name, man.platform)]
     if any(len(text) > LONGEST_REASON for text in texts):
         raise MalformedMessage(

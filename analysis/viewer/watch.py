@@ -14,7 +14,7 @@ from analysis.viewer.received import check_update, received_poses
 from analysis.viewer.recording import Recording
 from analysis.viewer.scene import Scene, scene_of
 from analysis.viewer.show import Show
-from schema.agent.service import tell_user
+from schema.agent.log import tell_user
 from schema.errors import MalformedMessage, NetworkError, RevolveError
 from schema.experiment.file import experiment_from_text
 from schema.limits import printable

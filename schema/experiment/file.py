@@ -197,7 +197,8 @@ def experiment_from_text(text: str) -> Experiment:
     """
     try:
         return msgspec.json.decode(text.encode(), type=Experiment)
-    except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
+    # A UnicodeError is a ValueError: an escape may be half a character.
+    except (ValueError, RecursionError) as error:
         raise ExperimentError(f"experiment of a run: {error}") from None
 
 

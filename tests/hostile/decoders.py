@@ -41,7 +41,7 @@ from schema.errors import (
     RevolveError,
     RunFolderError,
 )
-from schema.experiment.document import body_space
+from schema.experiment.document import Experiment, body_space
 from schema.experiment.file import (
     experiment_from_text,
     experiment_text,
@@ -63,10 +63,10 @@ from schema.formats.robogen_json import robot_from_robogen_json
 from schema.formats.robogen_text import robot_from_robogen_text
 from schema.formats.yaml import robot_to_yaml
 from schema.limits import LIVE_BYTES, MOST_LIVE_ROWS
-from schema.parts import BUILT_IN
+from schema.parts import BUILT_IN, BodySpace
 from schema.robot.inverse_development import genome_of
 from schema.robot.results import Provenance
-from schema.robot.robot import check_types
+from schema.robot.robot import Robot, check_types
 from schema.tables.received import received_columns
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import Advance, Changes, Insertion
@@ -187,7 +187,7 @@ def _request(settings: bytes, robot: bytes) -> bytes:
     )
 
 
-def _requests(rules: object, snapshot: bytes) -> Iterator[Target]:
+def _requests(rules: Experiment, snapshot: bytes) -> Iterator[Target]:
     settings = arena_settings(rules, Origin())
     changes = Changes((BIRTH,), (Insertion(BIRTH, ROBOT, (0.0, 0.0)),))
     past = PastAdvance(changes, 200, bytes(32))
@@ -372,17 +372,24 @@ def _journal(made: list[tuple[Advance, bytes, ExpectedAdvance]]) -> Iterator[Tar
     yield Target("decode_record", record, entries, (RunFolderError,))
 
 
-def _files(rules: object) -> Iterator[Target]:
+def _read_text(read: Callable[[str, str, BodySpace], Robot], data: bytes) -> Robot:
+    return read(data.decode("latin-1"), "file", BUILT_IN)
+
+
+def _files(rules: Experiment) -> Iterator[Target]:
     yaml = robot_to_yaml(ROBOT, BUILT_IN).encode()
-    readers = (robot_from_yaml, robot_from_robogen_text, robot_from_robogen_json)
+    readers: tuple[Callable[[str, str, BodySpace], Robot], ...] = (
+        robot_from_yaml,
+        robot_from_robogen_text,
+        robot_from_robogen_json,
+    )
     for read in readers:
-        yield Target(
-            read.__name__,
-            lambda data, read=read: read(data.decode("latin-1"), "file", BUILT_IN),
-            (yaml,) if read is robot_from_yaml else (b"0 CoreComponent 0\n", b"{}"),
-            (InvalidRobot, MalformedMessage),
-            share=1,
+        samples = (
+            (yaml,) if read is robot_from_yaml else (b"0 CoreComponent 0\n", b"{}")
         )
+        errors = (InvalidRobot, MalformedMessage)
+        decode = partial(_read_text, read)
+        yield Target(read.__name__, decode, samples, errors, share=1)
     yield Target(
         "parse_experiment",
         lambda data: parse_experiment(data.decode("latin-1"), "file"),
