@@ -31,6 +31,8 @@ PAIR_BYTES = 16
 """An intersection in a report."""
 ADVANCE_BYTES = 256 * MIB
 """An answer about an arena, of any arena."""
+INFO_BYTES = 128 * KIB
+"""An agent's description of itself, with its predecessors' deaths."""
 LIVE_BYTES = 64 * MIB
 """A message to viewers about an arena."""
 UPDATE_BYTES = 64 * MIB
@@ -88,6 +90,12 @@ MOST_ASKED_INFOS = 1000
 """Open queries of a coordinator for properties of agents."""
 MOST_QUERIES = 1000
 """Queries of operators, and of viewers, that wait for a coordinator's reply."""
+MOST_QUERY_BYTES = 64 * MIB
+"""Bytes of such queries, together."""
+MOST_WAITING_BYTES = 512 * MIB
+"""Bytes of jobs that wait for an agent, together."""
+WAITING_JOB_BYTES = 64 * KIB
+"""What each of them counts in addition, so that their number has a limit, too."""
 MOST_SLOTS = 1024
 """Jobs that an agent does at a time."""
 MOST_PLATFORM = 300

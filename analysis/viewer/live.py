@@ -8,6 +8,7 @@ import threading
 from collections import deque
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from typing import Self
 
 import zenoh
@@ -24,11 +25,17 @@ from schema.agent.topics import (
     poses_of_all,
 )
 from schema.errors import MalformedMessage, NetworkError
+from schema.limits import LIVE_BYTES, MIB, UPDATE_BYTES
 from schema.wire.arena_codec import Live, decode_live
 from schema.wire.updates import Update, decode_update
 
 _MOST = 2000
 """Most messages in the queue."""
+_MOST_BYTES = 256 * MIB
+"""Most bytes of messages in the queue."""
+_MOST_TOKENS = 10_000
+_MOST_COORDINATORS = 100
+"""Coordinators that are asked for the complete state."""
 _ASK_AGAIN_S = 3.0
 
 
@@ -69,11 +76,21 @@ class Ended:
 LiveMessage = Update | Live | Ended
 
 
+@dataclass(frozen=True, slots=True)
+class _Message:
+    """Bytes that arrived; ``asked`` is the key of the token of who sent them."""
+
+    key: str
+    data: bytes
+    asked: str = ""
+
+
 class LiveSource:
     """A viewer's connection to the network; a context manager.
 
     Attributes:
-        malformed: number of messages that could not be decoded and were dropped.
+        dropped: number of messages that were malformed, of another process than the
+            coordinator, or too many.
     """
 
     def __init__(self, connect: str, fleet: str, tls: Tls | None) -> None:
@@ -87,13 +104,18 @@ class LiveSource:
         Raises:
             NetworkError: the name or the address is invalid.
         """
-        self.malformed = 0
+        self.dropped = 0
         self._fleet = check_name(fleet, "fleet")
         self._connect = connect
         self._config = client_config(connect, tls)
-        self._waiting: deque[zenoh.Sample | zenoh.Reply] = deque(maxlen=_MOST)
+        self._waiting: deque[_Message] = deque()
+        self._waiting_bytes = 0
+        self._tokens: deque[zenoh.Sample] = deque(maxlen=_MOST_TOKENS)
+        self._lock = threading.Lock()
         self._has_news = threading.Event()
         self._coordinators: dict[str, Member] = {}
+        self._watched = ""
+        self._has_told = False
         self._sequel = Sequel()
         self._asked_s = -_ASK_AGAIN_S
 
@@ -110,13 +132,14 @@ class LiveSource:
                 self._session = opened.enter_context(zenoh.open(config))
             except zenoh.ZError:
                 raise NetworkError(f"no coordinator at {self._connect}") from None
-            put = zenoh.handlers.Callback(self._put, indirect=False)
+            put = zenoh.handlers.Callback(self._take, indirect=False)
+            token = zenoh.handlers.Callback(self._take_token, indirect=False)
             tokens = agents_alive(self._fleet, "coordinator")
             self._declared = [
                 self._session.declare_subscriber(poses_of_all(self._fleet), put),
                 self._session.declare_subscriber(news_of_all(self._fleet), put),
                 self._session.liveliness().declare_subscriber(
-                    tokens, put, history=True
+                    tokens, token, history=True
                 ),
             ]
             self._opened = opened.pop_all()
@@ -125,9 +148,44 @@ class LiveSource:
     def __exit__(self, *_: object) -> None:
         self._opened.close()
 
-    def _put(self, message: zenoh.Sample | zenoh.Reply) -> None:
-        self._waiting.append(message)
+    def _take(self, sample: zenoh.Sample) -> None:
+        self._put(str(sample.key_expr), sample.payload)
+
+    def _take_token(self, sample: zenoh.Sample) -> None:
+        self._tokens.append(sample)
         self._has_news.set()
+
+    def _take_reply(self, member: Member, reply: zenoh.Reply) -> None:
+        """Take the complete state of a run, if its coordinator itself sent it."""
+        if reply.ok is None:
+            return
+        replier = reply.replier_id
+        if replier is None or str(replier.zid) != member.session:
+            with self._lock:
+                self.dropped += 1
+            return
+        self._put(member.state, reply.ok.payload, asked=member.alive)
+
+    def _put(self, key: str, payload: zenoh.ZBytes, asked: str = "") -> None:
+        with self._lock:
+            if len(payload) > max(UPDATE_BYTES, LIVE_BYTES):
+                self.dropped += 1
+                return
+            message = _Message(key, payload.to_bytes(), asked)
+            self._waiting.append(message)
+            self._waiting_bytes += len(message.data)
+            while len(self._waiting) > _MOST or self._waiting_bytes > _MOST_BYTES:
+                self._waiting_bytes -= len(self._waiting.popleft().data)
+                self.dropped += 1
+        self._has_news.set()
+
+    def _next(self) -> _Message | None:
+        with self._lock:
+            if not self._waiting:
+                return None
+            message = self._waiting.popleft()
+            self._waiting_bytes -= len(message.data)
+            return message
 
     def receive(self, timeout_s: float, now_s: float) -> list[LiveMessage]:
         """Return the messages received, in order; request lost ones again.
@@ -139,51 +197,78 @@ class LiveSource:
         self._has_news.wait(timeout_s)
         self._has_news.clear()
         messages: list[LiveMessage] = []
-        while self._waiting:
+        # Limited: the viewer must go on even if messages never stop coming.
+        for _ in range(_MOST):
+            waiting = self._next()
+            if waiting is None:
+                break
             try:
-                each = self._understood(self._waiting.popleft())
+                each = self._understood(waiting)
             except MalformedMessage as error:
-                self.malformed += 1
-                if self.malformed == 1:
-                    tell_user(f"dropped a malformed message: {error}")
+                self._drop(error)
                 continue
             if each is not None:
                 messages.append(each)
+        while self._tokens:
+            try:
+                ended = self._token(self._tokens.popleft())
+            except MalformedMessage as error:
+                self._drop(error)
+                continue
+            if ended is not None:
+                messages.append(ended)
         if self._sequel.is_behind and now_s - self._asked_s >= _ASK_AGAIN_S:
             self._asked_s = now_s
             self._ask()
         return messages
 
-    def _understood(self, message: zenoh.Sample | zenoh.Reply) -> LiveMessage | None:
-        if isinstance(message, zenoh.Reply):
-            if message.ok is None:
-                return None
-            return self._news(message.ok.payload.to_bytes())
-        key = str(message.key_expr)
-        if key.endswith("/alive"):
-            return self._token(key, message.kind == zenoh.SampleKind.PUT)
-        data = message.payload.to_bytes()
-        return self._news(data) if key.endswith("/events") else decode_live(data)
+    def forget(self) -> None:
+        """Wait for another run than the one that was received first."""
+        self._sequel = Sequel()
 
-    def _news(self, data: bytes) -> Update | None:
-        news = decode_update(data)
-        return news if self._sequel.take(news) else None
+    def _drop(self, error: MalformedMessage) -> None:
+        with self._lock:
+            self.dropped += 1
+        if not self._has_told:
+            self._has_told = True
+            tell_user(f"dropped a malformed message: {error}; more are only counted")
 
-    def _token(self, key: str, is_there: bool) -> Ended | None:  # noqa: FBT001 - a word
-        if is_there:
-            self._coordinators[key] = member_of(key)
-            self._asked_s = -_ASK_AGAIN_S
-            self._sequel.is_behind = True
+    def _understood(self, message: _Message) -> LiveMessage | None:
+        if not message.key.endswith(("/events", "/state")):
+            return decode_live(message.data)
+        news = decode_update(message.data)
+        if news.is_whole and not message.asked:
+            raise MalformedMessage("update: nobody was asked for a complete state")
+        if not self._sequel.take(news):
             return None
-        self._coordinators.pop(key, None)
-        return None if self._coordinators else Ended()
+        if news.is_whole:
+            self._watched = message.asked
+        return news
+
+    def _token(self, sample: zenoh.Sample) -> Ended | None:
+        key = str(sample.key_expr)
+        if sample.kind != zenoh.SampleKind.PUT:
+            self._coordinators.pop(key, None)
+            is_over = key == self._watched or not self._coordinators
+            return Ended() if is_over else None
+        member = member_of(key)
+        if len(self._coordinators) >= _MOST_COORDINATORS:
+            raise MalformedMessage(f"more than {_MOST_COORDINATORS} coordinators")
+        self._coordinators[key] = member
+        self._asked_s = -_ASK_AGAIN_S
+        self._sequel.is_behind = True
+        return None
 
     def _ask(self) -> None:
         """Request the complete state from all coordinators, without waiting."""
         for member in self._coordinators.values():
             self._session.get(
                 member.state,
-                zenoh.handlers.Callback(self._put, indirect=False),
+                zenoh.handlers.Callback(
+                    partial(self._take_reply, member), indirect=False
+                ),
                 timeout=ASK_TIMEOUT_S,
+                # No other process can keep the request from the coordinator.
+                target=zenoh.QueryTarget.ALL,
                 consolidation=zenoh.ConsolidationMode.NONE,
             )

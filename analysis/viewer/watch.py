@@ -10,15 +10,15 @@ from analysis.progress import ProgressLine
 from analysis.viewer.blueprint import layout
 from analysis.viewer.live import Ended, LiveMessage, LiveSource
 from analysis.viewer.output import Output, Window, keep_serving
+from analysis.viewer.received import check_update, received_poses
 from analysis.viewer.recording import Recording
-from analysis.viewer.scene import scene_of
+from analysis.viewer.scene import Scene, scene_of
 from analysis.viewer.show import Show
 from schema.agent.log import tell_user
-from schema.errors import MalformedMessage, NetworkError
+from schema.errors import MalformedMessage, NetworkError, RevolveError
 from schema.experiment.file import experiment_from_text
-from schema.limits import LIVE_BYTES, MOST_LIVE_ROWS
+from schema.limits import printable
 from schema.robot.ids import BirthId
-from schema.tables.received import received_columns
 from schema.wire.arena_codec import Live
 from schema.wire.updates import Update
 
@@ -47,25 +47,28 @@ def watch(
         NetworkError: no coordinator sends a run.
         ViewerError: the window cannot be opened.
     """
-    news, rest = _first(source, stop)
-    if news is None:
+    scene, messages = _first(source, stop)
+    if scene is None:
         if output.file is not None:
             tell_user(f"stopped before a run was received; {output.file} not written")
         return
-    scene = scene_of(experiment_from_text(news.document))
+    news = messages[0]
+    assert isinstance(news, Update)
     name = f"{news.experiment}-{news.run.rpartition('/')[2]}"
     blueprint = layout(scene, follow=follow)
     with Recording(name, blueprint, file=output.file, serve=output.serve) as recording:
         window = Window(output)
         recording.add_scene(scene)
-        view = LiveView(Show(recording, scene.space), news.run)
-        view.tell([news, *rest])
+        view = LiveView(Show(recording, scene.space), news.run, scene)
+        view.tell(messages)
         with ProgressLine() as progress:
             while not (stop.is_set() or view.has_ended or window.was_closed):
                 now_s = time.monotonic()
                 if not output.has_window:  # the window shows it, next to a run's bars
                     progress.update(f"recording {name}: {view.births} births", now_s)
                 view.tell(source.receive(_POLL_S, now_s))
+        if dropped := view.dropped + source.dropped:
+            tell_user(f"dropped {dropped} messages: malformed, or not of this run")
         if view.has_ended:
             tell_user("the run has ended")
         keep_serving(output, window, recording, stop)
@@ -73,8 +76,8 @@ def watch(
 
 def _first(
     source: LiveSource, stop: threading.Event
-) -> tuple[Update | None, list[LiveMessage]]:
-    """Wait for the complete state of a run; return it and the messages after it."""
+) -> tuple[Scene | None, list[LiveMessage]]:
+    """Wait for a run; return its scene, its complete state and later messages."""
     since_s = time.monotonic()
     has_reported = False
     while not stop.is_set():
@@ -82,7 +85,13 @@ def _first(
         messages = source.receive(_POLL_S, now_s)
         for index, each in enumerate(messages):
             if isinstance(each, Update) and each.is_whole:
-                return each, messages[index + 1 :]
+                try:
+                    scene = scene_of(experiment_from_text(each.document))
+                except RevolveError as error:
+                    tell_user(f"{printable(each.run)}: cannot be shown: {error}")
+                    source.forget()
+                    break
+                return scene, messages[index:]
         if now_s > since_s + _PATIENCE_S:
             raise NetworkError("the coordinator does not send a run")
         if now_s > since_s + _SILENT_S and not has_reported:
@@ -96,10 +105,13 @@ class LiveView:
 
     Attributes:
         has_ended: the coordinator has left the network.
+        dropped: number of messages that cannot be shown.
     """
 
-    def __init__(self, show: Show, run: str) -> None:
+    def __init__(self, show: Show, run: str, scene: Scene) -> None:
         self.has_ended = False
+        self.dropped = 0
+        self._scene = scene
         self._births: dict[int, int] = {}
         self._show = show
         self._run = run
@@ -114,6 +126,11 @@ class LiveView:
         """Record messages: births before poses of their robots."""
         news = [each for each in messages if isinstance(each, Update)]
         for one in news:
+            try:
+                check_update(one, self._scene)
+            except MalformedMessage:
+                self.dropped += 1
+                continue
             # A birth carries the number of births on its island, so that duplicates
             # count once.
             self._births |= {each.birth.island: each.births for each in one.births}
@@ -125,13 +142,9 @@ class LiveView:
         for each in messages:
             if isinstance(each, Live) and each.run == self._run:
                 try:
-                    poses = received_columns(
-                        "poses",
-                        each.advance.poses,
-                        most_bytes=LIVE_BYTES,
-                        most_rows=MOST_LIVE_ROWS,
-                    )
+                    poses = received_poses(each, self._scene)
                 except MalformedMessage:
+                    self.dropped += 1
                     continue
                 self._move(each.shard, poses, has_all=True)
             self.has_ended = self.has_ended or isinstance(each, Ended)
@@ -144,6 +157,7 @@ class LiveView:
         try:
             unknown = self._show.move(arena, poses, has_all=has_all)
         except MalformedMessage:
+            self.dropped += 1
             return
         if unknown is not None:
             self._unknown.append((arena, unknown))

@@ -105,7 +105,7 @@ class Kit:
             raise RevolveError(
                 f"{folder}: no kit is there ({STATE} is missing)"
             ) from None
-        except (OSError, msgspec.MsgspecError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise RevolveError(f"{file}: cannot be read: {error}") from None
         return cls(folder, cluster, clock)
 

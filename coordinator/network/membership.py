@@ -5,13 +5,12 @@ reaches the hub can declare tokens, so their number is limited, and a token says
 that the agent of its own key, role included, is to be asked.
 """
 
-from google.protobuf.message import DecodeError
-
 from coordinator.dispatch.events import AgentKind, Died, Joined, Left, Progressed
 from coordinator.dispatch.faults import PeerFaults
 from schema.agent.topics import Member, member_of, slot_of
 from schema.errors import MalformedMessage
 from schema.limits import (
+    INFO_BYTES,
     LONGEST_QUIET_S,
     MOST_CORES,
     MOST_DEATHS,
@@ -22,6 +21,7 @@ from schema.limits import (
     printable,
 )
 from schema.wire import revolve_pb2 as pb
+from schema.wire.parsing import parsed
 
 _CAUSE_LENGTH = 100
 
@@ -221,10 +221,7 @@ def _parsed(member: Member, data: bytes) -> pb.AgentInfo:
     Raises:
         MalformedMessage: see ``Membership.introduce``.
     """
-    try:
-        info = pb.AgentInfo.FromString(data)
-    except DecodeError as error:
-        raise MalformedMessage(f"not the bytes of an AgentInfo: {error}") from None
+    info = parsed(data, pb.AgentInfo(), INFO_BYTES)
     role, agent = member.role, member.name
     if (info.agent, info.kind) != (agent, role) or not 1 <= info.slots <= MOST_SLOTS:
         says = f"{printable(info.kind)} {printable(info.agent)!r}"

@@ -38,7 +38,14 @@ from schema.agent.platform_tag import wire_version
 from schema.agent.service import HubWatch, Outlet, log_engine, session_config
 from schema.agent.topics import Member, agents_alive, check_name
 from schema.errors import MalformedMessage, NetworkError
-from schema.limits import LONGEST_REASON, MOST_ASKED_INFOS, MOST_QUERIES, printable
+from schema.limits import (
+    LONGEST_REASON,
+    MOST_ASKED_INFOS,
+    MOST_QUERIES,
+    MOST_QUERY_BYTES,
+    OPERATOR_REQUEST_BYTES,
+    printable,
+)
 
 _KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 _NOW = zenoh.ConsolidationMode.NONE
@@ -97,7 +104,15 @@ class _Stray:
     number: int
 
 
-_News = _Asked | _Stray | zenoh.Sample | zenoh.Query
+@dataclass(frozen=True, slots=True)
+class _Queried:
+    """A query to one of the coordinator's own keys."""
+
+    query: zenoh.Query
+    key: str
+
+
+_News = _Asked | _Stray | _Queried | zenoh.Sample
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +185,7 @@ class Network:
         self._info_queue = InfoQueue()
         self._asked_infos: set[Member] = set()
         self._orders: list[Order] = []
+        self._order_bytes = 0
         self._onlookers: list[Order] = []
         self._outlet = Outlet()
 
@@ -216,14 +232,18 @@ class Network:
             )
             for kind in _KINDS
         ]
-        self._operators = self._session.declare_queryable(
-            self._me.command, put, complete=True
-        )
-        self._viewers = self._session.declare_queryable(
-            self._me.state, put, complete=True
-        )
+        self._queryables = [
+            self._session.declare_queryable(key, self._enqueue(key), complete=True)
+            for key in (self._me.command, self._me.state)
+        ]
         self._outlet.lead_to(self._session)
         self._token = self._session.liveliness().declare_token(self._me.alive)
+
+    def _enqueue(self, key: str) -> "zenoh.handlers.Callback[zenoh.Query]":
+        """Return a callback for the queries of a key; they may have wildcards."""
+        return zenoh.handlers.Callback(
+            lambda query: self._inbox.put(_Queried(query, key)), indirect=False
+        )
 
     def _free_address(self) -> str:
         """Return the address with the port that the hub has chosen."""
@@ -312,6 +332,7 @@ class Network:
     def orders(self) -> list[Order]:
         """Return the operators' queries since the last call; ``receive`` takes them."""
         orders, self._orders = self._orders, []
+        self._order_bytes = 0
         return orders
 
     def onlookers(self) -> list[Order]:
@@ -330,8 +351,8 @@ class Network:
 
     def _understand(self, news: _News) -> Sequence[DispatchEvent]:
         """Return the dispatch events of a message, if any."""
-        if isinstance(news, zenoh.Query):
-            self._queried(news)
+        if isinstance(news, _Queried):
+            self._queried(news.query, news.key)
             return []
         if isinstance(news, _Stray):
             about = "properties" if news.number < 0 else f"job {news.number}"
@@ -348,18 +369,24 @@ class Network:
             self.faults.note("malformed", peer, str(error))
             return []
 
-    def _queried(self, query: zenoh.Query) -> None:
+    def _queried(self, query: zenoh.Query, key: str) -> None:
         """Keep a query of an operator or a viewer until it is asked for."""
-        is_onlooker = str(query.key_expr) == self._me.state
+        is_onlooker = key == self._me.state
         asked = self._onlookers if is_onlooker else self._orders
-        if len(asked) >= MOST_QUERIES:
-            peers = "viewers" if is_onlooker else "operators"
-            self.faults.note("crowd", peers, f"{MOST_QUERIES} queries wait")
-            query.drop()  # type: ignore[no-untyped-call]
+        peers = "viewers" if is_onlooker else "operators"
+        payload = query.payload
+        size = 0 if payload is None else len(payload)
+        if size > OPERATOR_REQUEST_BYTES:
+            self.faults.note("malformed", peers, f"{size} bytes")
+        elif len(asked) >= MOST_QUERIES or self._order_bytes + size > MOST_QUERY_BYTES:
+            self.faults.note("crowd", peers, f"{len(asked)} queries wait")
+        else:
+            # Viewers say nothing.
+            data = b"" if payload is None or is_onlooker else payload.to_bytes()
+            self._order_bytes += len(data)
+            asked.append(Order(data, query, key))
             return
-        data = b"" if query.payload is None else query.payload.to_bytes()
-        key = self._me.state if is_onlooker else self._me.command
-        asked.append(Order(data, query, key))
+        query.drop()  # type: ignore[no-untyped-call]
 
     def _token_changed(self, sample: zenoh.Sample) -> list[DispatchEvent]:
         key = str(sample.key_expr)

@@ -112,7 +112,9 @@ def _check_numbers(rows: pa.Table) -> None:
         raise impossible("poses: birth_island must be null")
     columns = [rows[name].to_numpy() for name in ("x", "y", "z")]
     attitude = np.stack([rows[f"q{axis}"].to_numpy() for axis in "wxyz"])
-    lengths = np.sqrt((attitude.astype(np.float64) ** 2).sum(axis=0))
+    # A signalling NaN warns when it is converted.
+    with np.errstate(invalid="ignore"):
+        lengths = np.sqrt((attitude.astype(np.float64) ** 2).sum(axis=0))
     angles = pyarrow.compute.list_flatten(rows["angles"]).to_numpy()
     if not all(np.isfinite(each).all() for each in (*columns, lengths, angles)):
         raise impossible("poses: must be finite")

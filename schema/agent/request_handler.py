@@ -25,6 +25,8 @@ from schema.limits import (
     LONGEST_REASON,
     MOST_EPOCH,
     MOST_RUN_NAME,
+    MOST_WAITING_BYTES,
+    WAITING_JOB_BYTES,
     printable,
 )
 from schema.wire import revolve_pb2 as pb
@@ -49,12 +51,17 @@ class FairQueue(Generic[T]):
     Each source has an account of the time that it was served. The waiting source with
     the least time is next; its own items come in order of arrival. A source that comes
     back continues at the level of the others: it cannot save up unused time.
+    Beyond a limit the newest items of the source with the most bytes are dropped.
     Source: start-time fair queueing (Goyal, Vin and Cheng 1996), with served time for
     packet lengths.
     """
 
-    def __init__(self) -> None:
-        self._waiting: dict[bytes, deque[T]] = {}
+    def __init__(self, most_bytes: int = MOST_WAITING_BYTES) -> None:
+        self._most_bytes = most_bytes
+        # Of all that waits, and by source; each item counts its overhead.
+        self._bytes = 0
+        self._bytes_of: dict[bytes, int] = {}
+        self._waiting: dict[bytes, deque[tuple[T, int]]] = {}
         self._accounts: dict[bytes, float] = {}
         self._served = b""
         self._level_s = 0.0
@@ -63,13 +70,38 @@ class FairQueue(Generic[T]):
         """Return the number of waiting items."""
         return sum(map(len, self._waiting.values()))
 
-    def put(self, source: bytes, item: T) -> None:
-        """Add an item."""
+    def put(self, source: bytes, item: T, size: int = 0) -> list[T]:
+        """Add an item; return those that are dropped.
+
+        Args:
+            source: of the item.
+            item: that waits from now on, or is dropped.
+            size: of the item [bytes].
+        """
         if source not in self._waiting:
             account_s = max(self._accounts.pop(source, 0.0), self._level_s)
             self._accounts[source] = account_s
             self._waiting[source] = deque()
-        self._waiting[source].append(item)
+        cost = size + WAITING_JOB_BYTES
+        self._waiting[source].append((item, cost))
+        self._count(source, cost)
+        dropped: list[T] = []
+        # One item may be larger than the limit.
+        while self._bytes > self._most_bytes and (
+            len(self._waiting) > 1 or len(self._waiting[source]) > 1
+        ):
+            crowd = max(self._bytes_of, key=self._bytes_of.__getitem__)
+            last, cost = self._waiting[crowd].pop()
+            self._count(crowd, -cost)
+            dropped.append(last)
+        return dropped
+
+    def _count(self, source: bytes, cost: int) -> None:
+        """Add the bytes of an item; forget a source without items."""
+        self._bytes += cost
+        self._bytes_of[source] = self._bytes_of.get(source, 0) + cost
+        if not self._waiting[source]:
+            del self._waiting[source], self._bytes_of[source]
 
     def take(self) -> T:
         """Remove and return the next item.
@@ -82,9 +114,9 @@ class FairQueue(Generic[T]):
         source = min(self._waiting, key=self._accounts.__getitem__)
         self._served, self._level_s = source, self._accounts[source]
         queue = self._waiting[source]
-        item = queue.popleft()
+        item, cost = queue.popleft()
+        self._count(source, -cost)
         if not queue:
-            del self._waiting[source]
             self._forget()
         return item
 
@@ -109,12 +141,16 @@ class ReplyCounts:
         refused: jobs with a reason, malformed requests included.
         malformed: requests that do not decode.
         skipped: cancelled jobs.
+        cancels: cancellations that do not decode.
+        crowd: requests that were dropped because too many waited.
     """
 
     answered: int = 0
     refused: int = 0
     malformed: int = 0
     skipped: int = 0
+    cancels: int = 0
+    crowd: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +223,7 @@ class Server:
         try:
             task = self._task(_parsed(data), data)
         except MalformedMessage:
-            self.counts.malformed += 1
+            self.counts.cancels += 1
             return
         _remember(task, None, self._cancelled)
 

@@ -29,8 +29,11 @@ from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
 from schema.errors import NetworkError
 from schema.experiment.plugin_access import allow
+from schema.limits import MOST_SHOWN
 
 _POLL_S = 0.2
+# Queries that are taken before a job is done.
+_MOST_QUERIES = 1000
 _RETRY_S = 0.3
 # Different lines about refused runs that are written.
 _MOST_REFUSALS = 20
@@ -255,6 +258,11 @@ def serve_as_process(
             f"{own.name} refused {counts.refused} requests, "
             f"{counts.malformed} of them malformed"
         )
+    if counts.crowd or counts.cancels:
+        tell_user(
+            f"{own.name} dropped {counts.crowd} requests beyond the limit and "
+            f"{counts.cancels} malformed cancellations"
+        )
 
 
 def _keep_quiet(_line: str) -> None:
@@ -310,7 +318,7 @@ def _serve_session(
         hub.seen(is_there=True)
         turns: FairQueue[zenoh.Query] = FairQueue()
         while not stop.is_set():
-            if not _queue_all(inbox, turns):
+            if not _queue_all(inbox, turns, server.counts):
                 hub.seen(is_there=bool(session.info.routers_zid()))
                 continue
             # A job arrived: the hub is there.
@@ -319,22 +327,32 @@ def _serve_session(
             with turns.take() as query:
                 _answer(query, server, me, hub)
             turns.spent(time.monotonic() - began_s)
-    _queue_all(inbox, turns)
+    _queue_all(inbox, turns, server.counts)
     while turns:
         with turns.take():
             pass  # a query that ends without a reply is lost for its coordinator
 
 
-def _queue_all(inbox: SimpleQueue[zenoh.Query], turns: FairQueue[zenoh.Query]) -> bool:
+def _queue_all(
+    inbox: SimpleQueue[zenoh.Query],
+    turns: FairQueue[zenoh.Query],
+    counts: ReplyCounts,
+) -> bool:
     """Move all queries that arrived to the queue; return whether any waits."""
     try:
-        while True:
+        # Limited: jobs are done even if queries never stop coming.
+        for _ in range(_MOST_QUERIES):
             # Wait only while there is nothing to do.
             query = inbox.get_nowait() if turns else inbox.get(timeout=_POLL_S)
-            sender = query.attachment
-            turns.put(sender.to_bytes() if sender else b"", query)
+            sender, payload = query.attachment, query.payload
+            source = sender.to_bytes()[:MOST_SHOWN] if sender else b""
+            size = len(payload) if payload else 0
+            for dropped in turns.put(source, query, size):
+                counts.crowd += 1
+                dropped.drop()  # type: ignore[no-untyped-call]
     except Empty:
-        return bool(turns)
+        pass
+    return bool(turns)
 
 
 def _answer(query: zenoh.Query, server: Server, me: Member, hub: "HubWatch") -> None:

@@ -198,7 +198,7 @@ def experiment_from_text(text: str) -> Experiment:
     try:
         return msgspec.json.decode(text.encode(), type=Experiment)
     # A UnicodeError is a ValueError: an escape may be half a character.
-    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise ExperimentError(f"experiment of a run: {error}") from None
 
 

@@ -135,7 +135,7 @@ def _from_json(settings: bytes, kind: type[T]) -> T:
         )
     try:
         found = msgspec.json.decode(settings, type=kind)
-    except (msgspec.MsgspecError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
         raise ExperimentError(f"{where}: {error}") from None
     environment = getattr(found, "environment", FLAT)
     for problem in ground_problems(environment):

@@ -47,7 +47,7 @@ def unpack(decoder: Decoder[T], data: bytes, most: int) -> T:
         )
     try:
         return decoder.decode(data)
-    except ValueError as error:  # of msgspec, or text that is not UTF-8
+    except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
         raise MalformedMessage(
             f"damaged, or of another version of Revolve Islands: {error}"
         ) from None

@@ -106,7 +106,7 @@ def test_viewer_of_an_arena_of_thirty_uses_at_most_a_fifth_of_a_core(
     file = tmp_path / "watched.rrd"
     scene = scene_of(Experiment(name="watched", arena=Arena()))
     with Recording("watched", layout(scene), file=file) as recording:
-        view = LiveView(Show(recording, scene.space), "run")
+        view = LiveView(Show(recording, scene.space), "run", scene)
         view.tell([update])
         began = time.process_time()
         for data in messages:

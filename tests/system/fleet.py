@@ -64,8 +64,13 @@ class Fleet:
         wait_until(lambda: agent_processes(process.pid) != [], f"{name} starts")
         return agent_processes(process.pid)[0]
 
-    def begin(self, workers: int) -> None:
-        """Start an analyzer once this many workers are connected; births begin."""
+    def begin(self, workers: int, *, has_analyzer: bool = True) -> None:
+        """Start an analyzer once this many workers are connected; births begin.
+
+        Args:
+            workers: to wait for.
+            has_analyzer: start it; otherwise only wait.
+        """
         config = zenoh.Config.from_json5(client_config(self.address))
         with zenoh.open(config) as session:
             key = agents_alive("default", "worker")
@@ -73,7 +78,8 @@ class Fleet:
                 lambda: len(list(session.liveliness().get(key))) >= workers,
                 "all workers are there",
             )
-        self.join("judge", "analyzer")
+        if has_analyzer:
+            self.join("judge", "analyzer")
 
     def kill(self, name: str) -> None:
         """Kill an agent and the parent process that would restart it."""

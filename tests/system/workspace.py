@@ -47,6 +47,7 @@ class Workspace:
         folder: Path | None = None,
         environment: dict[str, str] | None = None,
         inside: str = "",
+        module: str = "revolve",
     ) -> subprocess.Popen[str]:
         """Start ``revolve`` with arguments and return immediately.
 
@@ -55,10 +56,11 @@ class Workspace:
             folder: working directory; default: the workspace's folder.
             environment: additional environment variables.
             inside: network namespace; default: that of the test.
+            module: program to start in place of ``revolve``.
         """
         prefix = ("ip", "netns", "exec", inside) if inside else ()
         process = subprocess.Popen(
-            [*prefix, sys.executable, "-m", "revolve", *words],
+            [*prefix, sys.executable, "-m", module, *words],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -89,9 +91,11 @@ class Workspace:
             sys.stdout.write(f"{process.args!r}: {process.returncode}\n{out}{err}\n")
 
 
-def wait_until(condition: Callable[[], bool], what: str) -> None:
+def wait_until(
+    condition: Callable[[], bool], what: str, patience_s: float = PATIENCE_S
+) -> None:
     """Wait until a condition holds; fail the test after a timeout."""
-    deadline = time.monotonic() + PATIENCE_S
+    deadline = time.monotonic() + patience_s
     while not condition():
         assert time.monotonic() < deadline, f"never happened: {what}"
         time.sleep(0.005)  # polling interval

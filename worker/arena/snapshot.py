@@ -13,11 +13,13 @@ import msgspec
 import numpy as np
 from msgspec import Struct
 
-from schema.errors import MalformedMessage
+from schema.errors import InvalidRobot, MalformedMessage
+from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
 from schema.parts import Vector
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
+from schema.robot.robot import Robot, check_types
 from schema.wire.arena import Casualty
 from schema.wire.codec import decode_robot
 from worker.clusters.population import ArenaPopulation
@@ -103,12 +105,12 @@ def read_snapshot(
         The arena's step, and the casualties not yet reported.
 
     Raises:
-        MalformedMessage: not a snapshot's bytes, another format, or of an arena with
-            other settings.
+        MalformedMessage: not a snapshot's bytes, another format, of an arena with
+            other settings, or a robot that breaks their rules.
     """
     try:
         state = msgspec.msgpack.decode(data, type=_ArenaState)
-    except msgspec.MsgspecError as error:
+    except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
         raise MalformedMessage(f"snapshot: {error}") from None
     if state.format != FORMAT:
         raise MalformedMessage(f"snapshot: format must be {FORMAT}, got {state.format}")
@@ -149,7 +151,7 @@ def _robot_state(robot: ArenaRobot) -> _RobotState:
 
 def _restored(state: _RobotState, population: ArenaPopulation) -> ArenaRobot:
     cache = population.model_cache
-    body = cache.body(state.birth, decode_robot(state.robot))
+    body = cache.body(state.birth, _robot(state.robot, cache.settings))
     window = Window(cache.settings.simulation, state.born)
     for x, y, z in _unpack(state.window, -1, 3).tolist():
         window.positions.append((x, y, z))
@@ -164,6 +166,20 @@ def _restored(state: _RobotState, population: ArenaPopulation) -> ArenaRobot:
     ]
     robot.states = _unpack(state.states, *robot.states.shape)
     robot.brain_start = state.brain_start
+    return robot
+
+
+def _robot(data: bytes, settings: ArenaSettings) -> Robot:
+    """Return the robot of some bytes, from which its model can be built.
+
+    Raises:
+        MalformedMessage: no robot, or one that breaks the rules of the settings.
+    """
+    robot = decode_robot(data)
+    try:
+        check_types(robot, body_space(settings.space))
+    except InvalidRobot as error:
+        raise MalformedMessage(f"snapshot: {error}") from None
     return robot
 
 

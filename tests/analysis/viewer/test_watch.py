@@ -11,13 +11,17 @@ from msgspec.structs import replace
 
 from analysis.viewer.live import Ended, LiveMessage
 from analysis.viewer.output import Output
+from analysis.viewer.received import received_poses
+from analysis.viewer.scene import scene_of
 from analysis.viewer.watch import LiveView, watch
 from schema.errors import MalformedMessage, NetworkError
 from schema.experiment.file import experiment_text, read_experiment
 from schema.robot.ids import BirthId
+from schema.robot.robot import Part, Robot
 from schema.wire.arena import Advance
 from schema.wire.arena_codec import Live
-from schema.wire.updates import Birth, Update
+from schema.wire.codec import encode_body
+from schema.wire.updates import Birth, Death, Migrant, Update, WorkerInfo
 from tests.coordinator.arena_world import poses
 
 
@@ -43,6 +47,10 @@ class Source:
     def __init__(self, stop: threading.Event, *messages: LiveMessage) -> None:
         self._messages = list(messages)
         self._stop = stop
+        self.dropped = 0
+
+    def forget(self) -> None:
+        pass
 
     def receive(self, *_: float) -> list[LiveMessage]:
         if not self._messages:
@@ -98,7 +106,7 @@ def test_waiting_for_a_run_is_reported_once(
 
 def test_births_count_once_on_every_island() -> None:
     ignored: Any = type("Show", (), {"tell": lambda *_: None})()
-    view = LiveView(ignored, "a/run")
+    view = LiveView(ignored, "a/run", scene_of(read_experiment("archipelago-ring")))
     view.tell([WHOLE, news(2, (1, 0), (0, 2)), news(2, (1, 0), (0, 2)), news(3)])
     assert view.births == 4
 
@@ -117,7 +125,7 @@ def test_poses_that_fit_no_robot_are_dropped() -> None:
             moved.append(arena)
 
     show: Any = Fussy()
-    view = LiveView(show, "a/run")
+    view = LiveView(show, "a/run", scene_of(read_experiment("archipelago-arenas")))
 
     def live(shard: int, columns: bytes) -> Live:
         advance = Advance(1, bytes(32), (), (), (), columns)
@@ -132,3 +140,68 @@ def test_poses_that_fit_no_robot_are_dropped() -> None:
         ]
     )
     assert moved == [3]
+    assert view.dropped == 2
+
+
+BAD_BODY = encode_body(Robot((Part("Hinoe", -1, -1, -1, 0, ()),)))
+FORGED: dict[str, Update] = {
+    "unknown part": replace(
+        news(3), births=(Birth(BirthId(0, 9), (), 1, 1, None, BAD_BODY),)
+    ),
+    "time beyond 64 bits": replace(
+        news(3), births=(Birth(BirthId(0, 9), (), 1, 1, 1e308, None),)
+    ),
+    "death before the start": replace(
+        news(3), deaths=(Death(0, BirthId(0, 1), 1, -1e300, "culled"),)
+    ),
+    "unknown island": news(3, (4_000_000_000, 0)),
+    "migrant to nowhere": replace(
+        news(3), migrants=(Migrant(BirthId(0, 1), 0, 99, 1, 1, None),)
+    ),
+    "long text": replace(
+        news(3), workers=(WorkerInfo("w" * 1_000_000, "platform", ()),)
+    ),
+}
+
+
+@pytest.mark.parametrize("forged", FORGED.values(), ids=FORGED)
+def test_a_forged_update_is_counted_and_changes_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], forged: Update
+) -> None:
+    seen(tmp_path / "run.rrd", WHOLE, forged, news(4, (0, 2)), Ended())
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[1:3] == [
+        "dropped 1 messages: malformed, or not of this run",
+        "the run has ended",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [("sim_time_s", float("nan")), ("sim_time_s", 1e300), ("x", float("inf")),
+     ("qw", float("nan"))],
+)  # fmt: skip
+def test_poses_that_cannot_be_shown_are_dropped(column: str, value: float) -> None:
+    columns = poses([BirthId(0, 0)], 0.2)
+    rows = pa.ipc.open_stream(columns).read_all()
+    place = rows.schema.get_field_index(column)
+    field = rows.schema.field(column)
+    forged = pa.array([value] * rows.num_rows, field.type)
+    sink = pa.BufferOutputStream()
+    with pa.ipc.new_stream(sink, rows.schema) as writer:
+        writer.write_table(rows.set_column(place, field, forged))
+    advance = Advance(1, bytes(32), (), (), (), bytes(sink.getvalue()))
+    scene = scene_of(read_experiment("scenario3"))
+    with pytest.raises(MalformedMessage):
+        received_poses(Live("a/run", 0, advance), scene)
+
+
+@pytest.mark.parametrize("document", ["{}", "\x00", "[" * 100_000])
+def test_a_run_that_cannot_be_shown_is_passed_over(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], document: str
+) -> None:
+    forged = replace(WHOLE, run="forged", document=document)
+    seen(tmp_path / "run.rrd", forged, WHOLE, Ended())
+    lines = capsys.readouterr().err.splitlines()
+    assert "forged: cannot be shown" in lines[0]
+    assert "recording e-run: 2 births" in lines

@@ -10,6 +10,7 @@ from coordinator.network.membership import Membership
 from schema.agent.topics import Member
 from schema.errors import MalformedMessage
 from schema.limits import (
+    INFO_BYTES,
     LONGEST_QUIET_S,
     MOST_CORES,
     MOST_MEMBERS,
@@ -209,6 +210,7 @@ def test_an_agent_that_stops_answering_leaves_and_may_join_again(
         info(cores=0),
         info(cores=MOST_CORES + 1),
         info(slots=2**32 - 1),
+        info() + b"\x0a\x00" * INFO_BYTES,
         info(platform="p" * 1000),
         info(platform="\x1b[2J"),
         pb.AgentInfo(

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -28,12 +29,12 @@ from coordinator.dispatch.events import (
     Returned,
     Ticked,
 )
-from coordinator.network.service import Network
+from coordinator.network.service import Network, Order
 from schema.agent.network import client_config
 from schema.agent.service import session_config
 from schema.agent.topics import Member
 from schema.errors import NetworkError
-from schema.limits import LONGEST_QUIET_S
+from schema.limits import LONGEST_QUIET_S, OPERATOR_REQUEST_BYTES
 from schema.wire import revolve_pb2 as pb
 from schema.wire.codec import Answer, decode_answer
 
@@ -367,3 +368,35 @@ def test_two_coordinators_share_a_hub_and_its_workers(network: Network) -> None:
             (returned,) = until(coordinator, has(1))
             assert isinstance(returned, Returned)
             assert returned.outcome == "ok"
+
+
+@pytest.mark.parametrize("end", ["stat$*", "*", "comman$*", "c$*"])
+def test_a_query_with_a_wildcard_gets_a_reply_of_each_key(
+    network: Network, end: str
+) -> None:
+    """The reply to such a query must not be on another key: that is an error."""
+    member = Member("default", "coordinator", "c")
+    config = zenoh.Config.from_json5(client_config(network.address))
+    key = member.command.replace("/command", f"/{end}")
+    pattern = key.replace("$", "")
+    keys = {each for each in (member.command, member.state) if fnmatch(each, pattern)}
+    with zenoh.open(config) as session:
+        replies = session.get(key, consolidation=zenoh.ConsolidationMode.NONE)
+        asked: list[Order] = []
+        while len(asked) < len(keys):
+            network.receive(0.1)
+            asked += network.orders() + network.onlookers()
+        for order in asked:
+            order.reply(b"yes")
+        found = {str(reply.ok.key_expr) for reply in replies if reply.ok}
+    assert found == keys
+
+
+def test_a_query_of_hostile_length_is_counted_and_dropped(network: Network) -> None:
+    member = Member("default", "coordinator", "c")
+    config = zenoh.Config.from_json5(client_config(network.address))
+    with zenoh.open(config) as session:
+        replies = session.get(member.command, payload=bytes(OPERATOR_REQUEST_BYTES + 1))
+        until(network, lambda _: network.malformed > 0)
+        assert list(replies) == []
+    assert network.orders() == []

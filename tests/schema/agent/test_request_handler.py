@@ -15,7 +15,7 @@ from schema.agent.supervision import CurrentJob, Death, ProcessSlot, Task
 from schema.errors import InvalidRobot, PluginDiffers, UnknownPlugin
 from schema.experiment.plugin_access import allow
 from schema.experiment.plugin_source import check_plugins, plugins_of
-from schema.limits import LONGEST_REASON, MOST_EPOCH
+from schema.limits import LONGEST_REASON, MOST_EPOCH, WAITING_JOB_BYTES
 from schema.wire import revolve_pb2 as pb
 from schema.wire.packing import fingerprint
 
@@ -67,7 +67,7 @@ def test_what_is_beyond_a_limit_is_malformed_and_not_remembered(
     made = server()
     assert story in made.reply(data).reason
     made.cancel(data)
-    assert made.counts.malformed == 2
+    assert (made.counts.malformed, made.counts.cancels) == (1, 1)
     assert made.reply(request(epoch=1)) == Reply(b"answer")
 
 
@@ -95,7 +95,7 @@ def test_cancelled_job_is_skipped_once() -> None:
     assert made.reply(request(6)) == Reply(b"answer")
     assert made.reply(request(7)).reason == "the job was cancelled"
     assert made.reply(request(7)) == Reply(b"answer")
-    assert (made.counts.skipped, made.counts.malformed) == (1, 1)
+    assert (made.counts.skipped, made.counts.cancels) == (1, 1)
 
 
 def test_a_cancellation_needs_the_request_of_the_job() -> None:
@@ -147,7 +147,8 @@ def test_long_names_of_runs_are_refused_and_not_kept() -> None:
     data = pb.Request(run="x" * 5001, number=7).SerializeToString()
     made.cancel(data)
     assert "characters of Request.run" in made.reply(data).reason
-    assert (made.counts.malformed, made._cancelled, made._epochs) == (2, {}, {})
+    assert (made.counts.malformed, made.counts.cancels) == (1, 1)
+    assert (made._cancelled, made._epochs) == ({}, {})
 
 
 def test_agent_without_a_plugin_is_unfit() -> None:
@@ -320,3 +321,20 @@ def test_number_of_idle_accounts_is_limited() -> None:
         turns.put(str(number).encode(), number)
         assert turns.take() == number
     assert len(turns._accounts) <= MOST_SOURCES + 1
+
+
+def test_a_crowded_queue_drops_the_newest_of_the_greediest_source() -> None:
+    turns: FairQueue[str] = FairQueue(most_bytes=4 * WAITING_JOB_BYTES)
+    assert turns.put(b"run", "job", 100) == []
+    dropped = [turns.put(b"", f"junk {number}") for number in range(5)]
+    assert dropped == [[], [], ["junk 2"], ["junk 3"], ["junk 4"]]
+    assert len(turns) == 3
+    assert sorted(turns.take() for _ in range(3)) == ["job", "junk 0", "junk 1"]
+    assert not turns
+
+
+def test_a_queue_takes_one_item_of_any_size() -> None:
+    turns: FairQueue[str] = FairQueue(most_bytes=10)
+    assert turns.put(b"run", "large", 1000) == []
+    assert turns.put(b"other", "x", 1) == ["large"]
+    assert turns.take() == "x"

@@ -139,3 +139,15 @@ def test_messages_with_one_other_byte_decode_or_are_malformed(
     data[index % len(data)] = value
     with suppress(MalformedMessage):
         decode_operator_reply(bytes(data))
+
+
+@pytest.mark.parametrize("nest", [b"\x91", b"\x81\xa1a"])
+def test_nested_lists_are_malformed(nest: bytes) -> None:
+    """The decoder skips what it does not know, to any depth that it can."""
+    whole = encode_operator_request(OperatorRequest("id", 0, GetStatus()))
+    nested = bytes([whole[0] + 1]) + b"\xa1x" + nest * 100_000 + b"\xc0" + whole[1:]
+    for data in (nested, nest * 100_000 + b"\xc0"):
+        with pytest.raises(MalformedMessage):
+            decode_operator_request(data)
+        with pytest.raises(MalformedMessage):
+            decode_operator_reply(data)

@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from hashlib import sha256
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -108,3 +109,18 @@ def test_other_bytes_are_rejected_as_snapshot(turtle: Robot) -> None:
     for _ in range(50):
         with pytest.raises(MalformedMessage):
             World.restore(SETTINGS, rng.bytes(int(rng.integers(200))))
+
+
+def test_a_snapshot_with_a_robot_of_unknown_parts_is_refused(turtle: Robot) -> None:
+    world = populated(SETTINGS, [Insertion(BirthId(0, 0), turtle, (0.0, 0.0))])
+    forged = world.snapshot().replace(b"Hinge", b"Hings")
+    with pytest.raises(MalformedMessage, match="Hings"):
+        World.restore(SETTINGS, forged)
+
+
+def test_a_snapshot_with_text_that_is_not_utf_8_is_refused() -> None:
+    fallen = [((0, 1), 2, "reason", (0.0, 0.0, 0.0))]
+    state = [2, bytes(32), 3, [], [], fallen]
+    data = msgspec.msgpack.encode(state).replace(b"reason", b"reas\xff\xff")
+    with pytest.raises(MalformedMessage):
+        World.restore(SETTINGS, data)

@@ -108,3 +108,10 @@ def test_settings_of_the_wrong_type_are_refused() -> None:
     message.settings = msgspec.json.encode({"space": "x" * 100_000})
     reply = server(analyzer.report.answer).reply(message.SerializeToString())
     assert "settings of a request" in reply.reason
+
+
+def test_settings_that_are_not_utf_8_are_refused() -> None:
+    message = pb.Request.FromString(VETTING)
+    message.settings = b'{"space": "\xff"}'
+    reply = server(analyzer.report.answer).reply(message.SerializeToString())
+    assert "settings of a request" in reply.reason

@@ -1,0 +1,98 @@
+"""Checks of live messages before they are shown: any process can publish them."""
+
+import numpy as np
+import pyarrow as pa
+
+from analysis.viewer.scene import Scene
+from schema.errors import InvalidRobot, MalformedMessage
+from schema.limits import (
+    GREATEST_COORDINATE,
+    LIVE_BYTES,
+    LONGEST_REASON,
+    LONGEST_WALL_S,
+    MOST_LIVE_ROWS,
+)
+from schema.parts import BodySpace
+from schema.robot.robot import check_body
+from schema.tables.received import received_columns
+from schema.wire.arena_codec import Live
+from schema.wire.codec import decode_body
+from schema.wire.updates import Update
+
+_LATEST_S = LONGEST_WALL_S
+"""Simulated time; the recording has 64 bits of nanoseconds [s]."""
+_PLACES = ("x", "y", "z")
+
+
+def check_update(news: Update, scene: Scene) -> None:
+    """Raise unless all that a message holds can be shown.
+
+    Args:
+        news: the message, decoded.
+        scene: of the run.
+
+    Raises:
+        MalformedMessage: an unknown island, a body that breaks the rules of the run, a
+            time beyond the limit, a text that is too long.
+    """
+    islands = [each.birth.island for each in news.births]
+    islands += [gone.island for gone in news.deaths]
+    islands += [level.island for level in news.levels]
+    for one in news.migrants:
+        islands += [one.island, one.to]
+    if unknown := set(islands) - set(scene.islands):
+        raise MalformedMessage(f"update: the run has no island {min(unknown)}")
+    times = [each.sim_time_s for each in news.births]
+    times += [gone.sim_time_s for gone in news.deaths]
+    times += [one.sim_time_s for one in news.migrants]
+    for time_s in times:
+        if time_s is not None and not 0.0 <= time_s <= _LATEST_S:
+            raise MalformedMessage(
+                f"update: times must be in [0, {_LATEST_S:g}] s, got {time_s}"
+            )
+    texts = [gone.reason for gone in news.deaths]
+    texts += [text for man in news.workers for text in (man.name, man.platform)]
+    if any(len(text) > LONGEST_REASON for text in texts):
+        raise MalformedMessage(
+            f"update: texts must have <= {LONGEST_REASON} characters"
+        )
+    for each in news.births:
+        if each.body is not None:
+            _check_body(each.body, scene.space)
+
+
+def _check_body(body: bytes, space: BodySpace) -> None:
+    try:
+        check_body(decode_body(body).parts, space)
+    except InvalidRobot as error:
+        raise MalformedMessage(f"update: {error}") from None
+
+
+def received_poses(live: Live, scene: Scene) -> pa.Table:
+    """Return the poses of a message.
+
+    Raises:
+        MalformedMessage: no columns of poses; of no arena; times or numbers that are
+            not finite, beyond their limits, or times that descend.
+    """
+    if live.shard not in scene.arenas:
+        raise MalformedMessage(f"poses: the run has no arena {live.shard}")
+    poses = received_columns(
+        "poses",
+        live.advance.poses,
+        most_bytes=LIVE_BYTES,
+        most_rows=MOST_LIVE_ROWS,
+    )
+    times = poses["sim_time_s"].to_numpy()
+    if not ((times >= 0.0) & (times <= _LATEST_S)).all() or (np.diff(times) < 0).any():
+        raise MalformedMessage(
+            f"poses: times must ascend from 0 to {_LATEST_S:g} s at most"
+        )
+    for name in _PLACES:
+        if not (np.abs(poses[name].to_numpy()) <= GREATEST_COORDINATE).all():
+            raise MalformedMessage(f"poses: {name} must be a finite position")
+    turns = [poses[f"q{axis}"].to_numpy() for axis in "wxyz"]
+    turns.append(poses["angles"].combine_chunks().flatten().to_numpy())
+    if not all(np.isfinite(each).all() for each in turns):
+        raise MalformedMessage("poses: attitudes and angles must be finite")
+    return poses

@@ -1,0 +1,375 @@
+"""Program: a peer that speaks our messages and misbehaves in every role, from a seed.
+
+It hears the jobs, the news and the poses of a run through a session of its own, and
+sends random and mutated messages, and valid ones of the wrong role, run, epoch or
+number, on every key of every role. It joins as worker, analyzer and coordinator that
+answer late, twice, wrongly or never. It gives no valid order, and no answer that a
+correct agent could give: without TLS, nothing stops those (docs/security.md).
+
+Prints JSON: how many messages it sent of each kind, and what came back.
+"""
+
+import argparse
+import json
+import sys
+import threading
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+
+import zenoh
+
+from schema.agent.network import CANCELLED, FENCED, UNFIT, client_config
+from schema.agent.platform_tag import wire_version
+from schema.agent.service import session_config
+from schema.agent.supervisor import stop_on_signals
+from schema.agent.topics import Member, Role, agents_alive, member_of
+from schema.errors import MalformedMessage
+from schema.limits import MOST_EPOCH
+from schema.robot.ids import BirthId
+from schema.wire import revolve_pb2 as pb
+from schema.wire.operator import (
+    GetStatus,
+    ListRobots,
+    OperatorRequest,
+    PauseArena,
+    RemoveRobot,
+    encode_operator_request,
+)
+from schema.wire.updates import encode_update
+from tests.hostile.decoders import update
+from tests.hostile.mutation import Mutator
+
+_NOW = zenoh.ConsolidationMode.NONE
+_OPEN = 200
+"""Most queries that wait for replies at a time."""
+_KEPT = 30
+"""Messages of each kind that are kept to be mutated."""
+_LIARS = 2
+"""Agents of each role that join."""
+_NOBODY = "no-such-run-of-anybody"
+_ROLES: tuple[Role, ...] = ("worker", "analyzer", "coordinator")
+_FAR = 10**12
+"""Number of a job that no run reaches."""
+
+
+class HostileClient:
+    """Sends hostile messages through sessions at a hub."""
+
+    def __init__(self, seed: int, address: str, stack: ExitStack) -> None:
+        self.sent: Counter[str] = Counter()
+        self.came: Counter[str] = Counter()
+        self._mutator = Mutator(seed)
+        # The threads of the network draw from a sequence of their own.
+        self._replier = Mutator(seed + 1)
+        self._lock = threading.Lock()
+        self._stack = stack
+        self._address = address
+        self._free = threading.Semaphore(_OPEN)
+        self._heard: defaultdict[str, deque[bytes]] = defaultdict(
+            lambda: deque(_samples(), maxlen=_KEPT)
+        )
+        self._held: deque[zenoh.Query] = deque(maxlen=_KEPT)
+        self._kept: list[object] = []
+        self._session = self._open(client_config(address))
+        self._liars: list[Member] = []
+        self._members: list[Member] = []
+        self._listen()
+
+    def _open(self, config: str, member: Member | None = None) -> zenoh.Session:
+        made = (
+            session_config(config, member)
+            if member
+            else zenoh.Config.from_json5(config)
+        )
+        return self._stack.enter_context(zenoh.open(made))
+
+    def _listen(self) -> None:
+        """Hear all that is sent; reply to what is asked."""
+        for key in ("events", "arena/*/pose", "cancelled"):
+            heard = zenoh.handlers.Callback(self._hear)
+            self._kept.append(
+                self._session.declare_subscriber(f"revolve/**/{key}", heard)
+            )
+        for end in ("jobs", "info", "command", "state"):
+            asked = zenoh.handlers.Callback(self._answer_for_another)
+            self._kept.append(
+                self._session.declare_queryable(
+                    f"revolve/**/{end}", asked, complete=True
+                )
+            )
+
+    def join(self) -> None:
+        """Join as agents and as a coordinator."""
+        for role in _ROLES:
+            for number in range(_LIARS):
+                liar = Member("default", role, f"liar-{role}-{number}.{number:08}")
+                session = self._open(client_config(self._address), liar)
+                for key in (liar.jobs, liar.info, liar.command, liar.state):
+                    lie = zenoh.handlers.Callback(self._lie_as(liar))
+                    self._kept.append(
+                        session.declare_queryable(key, lie, complete=True)
+                    )
+                token = session.liveliness().declare_token(liar.alive)
+                self._kept.append(token)
+                self._liars.append(liar)
+
+    def look(self) -> int:
+        """Look for the processes of the fleet; return how many there are."""
+        found = []
+        for role in _ROLES:
+            for each in self._session.liveliness().get(agents_alive("default", role)):
+                if each.ok:
+                    try:
+                        found.append(member_of(str(each.ok.key_expr)))
+                    except MalformedMessage:
+                        continue
+        self._members = sorted(set(found) - set(self._liars), key=lambda m: m.alive)
+        return len(self._members)
+
+    def send(self) -> None:
+        """Send one hostile message."""
+        draw = self._mutator.random
+        actions: tuple[Callable[[Member], None], ...] = (
+            self._job,
+            self._job,
+            self._job,
+            self._cancel,
+            self._ask,
+            self._order,
+            self._order,
+            self._news,
+            self._news,
+            self._poses,
+            self._token,
+            self._anything,
+        )
+        member = draw.choice([*self._members, *self._members, *self._liars])
+        draw.choice(actions)(member)
+
+    # --- what it hears ----------------------------------------------------------
+
+    def _hear(self, sample: zenoh.Sample) -> None:
+        kind = str(sample.key_expr).rpartition("/")[2]
+        if len(sample.payload) < 100_000:
+            self._heard[kind].append(sample.payload.to_bytes())
+
+    def _answer_for_another(self, query: zenoh.Query) -> None:
+        """Reply in the name of the process that was asked, or never."""
+        key = str(query.key_expr)
+        kind = key.rpartition("/")[2]
+        with self._lock:
+            if query.payload is not None and kind == "jobs" and "liar" not in key:
+                role = "analysis" if "/an/" in key else "evaluation"
+                self._heard[role].append(query.payload.to_bytes())
+            self._reply(query, kind, "foreign")
+
+    def _lie_as(self, liar: Member) -> Callable[[zenoh.Query], None]:
+        """Return a function that replies as an agent that joined."""
+
+        def lie(query: zenoh.Query) -> None:
+            kind = str(query.key_expr).rpartition("/")[2]
+            with self._lock:
+                if kind == "info" and self._replier.random.random() < 0.5:
+                    with query:
+                        query.reply(liar.info, _info(liar))
+                    self.sent["valid info"] += 1
+                else:
+                    self._reply(query, kind, "liar")
+
+        return lie
+
+    def _reply(self, query: zenoh.Query, kind: str, who: str) -> None:
+        draw = self._replier.random
+        choice = draw.randrange(6)
+        if choice == 0:
+            self._held.append(query)  # never answered, or when others are held
+            return
+        with query:
+            key = query.key_expr
+            # An error of an agent that joined counts: several stop a run.
+            if choice == 1 and who == "foreign":
+                reason = (FENCED, UNFIT, CANCELLED, "\x1b[2J", "")[draw.randrange(5)]
+                query.reply_err(reason.encode() + draw.randbytes(draw.randrange(20)))
+                self.sent[f"{who} error to {kind}"] += 1
+                return
+            times = 2 if choice == 2 else 1
+            for _ in range(times):
+                query.reply(key, self._replier.message(_answers(kind)))
+                self.sent[f"{who} reply to {kind}"] += 1
+
+    # --- what it sends ----------------------------------------------------------
+
+    def _message(self, kind: str) -> bytes:
+        samples = list(self._heard[kind]) or _samples()
+        return self._mutator.message(samples)
+
+    def _get(self, key: str, data: bytes, kind: str, sender: bytes = b"") -> None:
+        self._free.acquire()
+        self.sent[kind] += 1
+
+        def take(reply: zenoh.Reply) -> None:
+            self.came["answer" if reply.ok is not None else "refusal"] += 1
+
+        self._session.get(
+            key,
+            zenoh.handlers.Callback(take, self._free.release, indirect=False),
+            payload=data,
+            attachment=sender,
+            target=zenoh.QueryTarget.ALL,
+            consolidation=_NOW,
+            timeout=2.0,
+        )
+
+    def _put(self, key: str, data: bytes, kind: str) -> None:
+        self.sent[kind] += 1
+        self._session.put(key, data, congestion_control=zenoh.CongestionControl.BLOCK)
+
+    def _job(self, member: Member) -> None:
+        """Send a job: mutated, of another role, or of another run and epoch."""
+        draw = self._mutator.random
+        kind = draw.choice(("evaluation", "analysis"))
+        data = self._message(kind)
+        if draw.random() < 0.2:
+            data = self._renamed(draw.choice(list(self._heard[kind]) or _samples()))
+        sender = draw.choice((b"", b"x", draw.randbytes(8)))
+        self._get(member.jobs, data, f"job to {member.role}", sender)
+
+    def _renamed(self, data: bytes) -> bytes:
+        """Return a request of another coordinator, without what takes time to do."""
+        draw = self._mutator.random
+        try:
+            request = pb.Request.FromString(data)
+        except Exception:  # noqa: BLE001 - a sample that is no request
+            return data
+        request.run = draw.choice((request.run, "", "x", "y" * 6000))
+        request.epoch = draw.choice((0, 1, 2, MOST_EPOCH, MOST_EPOCH + 1, 2**64 - 1))
+        request.number = draw.choice((request.number, _FAR))
+        request.settings = draw.choice((b"", b"{}", request.settings[:-1]))
+        request.plugins = draw.choice(("", "os:system=0", "x" * 20_000))
+        return request.SerializeToString()
+
+    def _cancel(self, member: Member) -> None:
+        """Cancel a job that was heard, or none."""
+        draw = self._mutator.random
+        known = list(self._heard["evaluation"]) + list(self._heard["analysis"])
+        valid = draw.random() < 0.2 and known
+        data = draw.choice(known) if valid else self._message("cancelled")
+        self._put(member.cancelled, data, "cancellation")
+
+    def _ask(self, member: Member) -> None:
+        key = self._mutator.random.choice((member.info, member.state))
+        self._get(key, self._message("info"), f"query of {key.rpartition('/')[2]}")
+
+    def _order(self, member: Member) -> None:
+        self._get(member.command, self._mutator.message(_ORDERS), "order")
+
+    def _news(self, member: Member) -> None:
+        draw = self._mutator.random
+        forged = encode_update(update())
+        data = forged if draw.random() < 0.1 else self._message("events")
+        self._put(member.events, data, "news")
+
+    def _poses(self, member: Member) -> None:
+        shard = self._mutator.random.choice((0, 0, 0, 1, 2**32))
+        self._put(member.poses(shard), self._message("pose"), "poses")
+
+    def _token(self, member: Member) -> None:
+        """Declare a token of another role, of a process that is there, or of none."""
+        draw = self._mutator.random
+        key = draw.choice(
+            (
+                member.alive,
+                member.alive.replace("/w/", "/an/"),
+                member.alive.replace("/an/", "/w/"),
+                f"revolve/default/w/{draw.randbytes(4).hex()}/alive",
+                f"revolve/default/co/{draw.randbytes(4).hex()}/alive",
+                "revolve/default/w/" + "x" * 200 + "/alive",
+            )
+        )
+        self.sent["token"] += 1
+        token = self._session.liveliness().declare_token(key)
+        token.undeclare()  # type: ignore[no-untyped-call]
+
+    def _anything(self, member: Member) -> None:
+        """Put or get any bytes on any key of a process, wildcards included."""
+        draw = self._mutator.random
+        prefix = member.alive.removesuffix("/alive")
+        end = draw.choice(("*", "jobs", "info", "alive", "state", "command", "x/y"))
+        key = f"{prefix}/{end}"
+        data = self._mutator.message(_samples())
+        if draw.random() < 0.5:
+            self._put(key, data, "put anywhere")
+        else:
+            self._get(key, data, "query anywhere")
+
+
+def _info(liar: Member) -> bytes:
+    """Return a valid description; its predecessors died of the jobs of others."""
+    info = pb.AgentInfo(
+        agent=liar.name,
+        kind=liar.role,
+        slots=1,
+        platform="liar",
+        version=wire_version(),
+        shards=1,
+        cores=1,
+        quiet_s=0.1,
+    )
+    info.deaths.add(agent="w", run="run", epoch=1, number=1, cause="SIGSEGV")
+    return info.SerializeToString()
+
+
+def _samples() -> list[bytes]:
+    return [pb.Request(run="run", epoch=1, number=_FAR).SerializeToString()]
+
+
+def _answers(kind: str) -> list[bytes]:
+    """Return answers to no job, descriptions of nobody, or replies to nobody."""
+    if kind == "info":
+        return [_info(Member("default", "worker", "nobody"))]
+    if kind in ("command", "state"):
+        return [encode_update(update())]
+    evaluation = pb.Evaluation(fitness=99.0, simulated_s=1.0)
+    judged = pb.Answer(epoch=MOST_EPOCH, number=_FAR, evaluation=evaluation)
+    failed = pb.Answer(epoch=MOST_EPOCH, number=_FAR, failure="diverged")
+    lost = pb.AdvanceAnswer(epoch=MOST_EPOCH, number=_FAR, needs_state=True)
+    return [each.SerializeToString() for each in (judged, failed, lost)]
+
+
+_ORDERS = [
+    encode_operator_request(OperatorRequest("id", 0, action, _NOBODY))
+    for action in (ListRobots(), GetStatus(), PauseArena(), RemoveRobot(BirthId(0, 1)))
+]
+
+
+def main() -> None:
+    """Read the arguments; send until all is sent or a signal comes."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seed", type=int, required=True)
+    parser.add_argument("--messages", type=int, required=True)
+    parser.add_argument("--connect", required=True, metavar="ADDRESS")
+    parser.add_argument(
+        "--progress", type=Path, help="file to create when half is sent"
+    )
+    chosen = parser.parse_args()
+    stop = stop_on_signals()
+    with ExitStack() as stack:
+        client = HostileClient(chosen.seed, chosen.connect, stack)
+        client.join()
+        number = 0
+        while not stop.is_set() and sum(client.sent.values()) < chosen.messages:
+            if number % 500 == 0 and client.look() == 0:
+                break  # the run is over
+            number += 1
+            client.send()
+            is_half = 2 * sum(client.sent.values()) >= chosen.messages
+            if is_half and chosen.progress is not None:
+                chosen.progress.touch()
+        sent, came = dict(client.sent), dict(client.came)
+    json.dump({"sent": sent, "came": came}, sys.stdout, sort_keys=True)
+
+
+if __name__ == "__main__":
+    main()

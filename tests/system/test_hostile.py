@@ -1,0 +1,176 @@
+"""A run beside a hostile peer equals an undisturbed one, at little cost in memory."""
+
+import json
+import re
+import sys
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coordinator.storage.compare import compare
+from tests.hostile.decode import peak_mb
+from tests.system.fleet import agent_processes
+from tests.system.workspace import PATIENCE_S, wait_until
+
+pytestmark = [
+    pytest.mark.system,
+    pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
+]
+
+Workspace = Any
+FleetOf = Callable[..., Any]
+MOST_GROWTH_MB = 100.0
+ROLES = ("coordinator", "w1", "w2", "judge", "viewer")
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A run that has ended.
+
+    Attributes:
+        folder: of the run.
+        peaks_mb: peak memory of each process [MB].
+        told: standard error of each process.
+        hostile: what the hostile client sent and got, if there was one.
+    """
+
+    folder: Path
+    peaks_mb: dict[str, float]
+    told: dict[str, str]
+    hostile: dict[str, dict[str, int]]
+
+
+def note_peaks(fleet: Any, viewer: Any, peaks_mb: dict[str, float]) -> None:  # noqa: ANN401
+    """Note the peak memory of all processes that there are."""
+    pids = {"coordinator": [fleet.coordinator.pid], "viewer": [viewer.pid]}
+    for name, process in fleet.agents.items():
+        pids[name] = agent_processes(process.pid)
+    for name, each in pids.items():
+        for pid in each:
+            try:
+                peak = peak_mb(pid)
+            except OSError:
+                continue  # it has just ended
+            peaks_mb[name] = max(peaks_mb.get(name, 0.0), peak)
+
+
+def outcome(
+    workspace: Workspace, fleet_of: FleetOf, words: tuple[str, ...], messages: int
+) -> Outcome:
+    """Run with two workers, an analyzer and a viewer, and a hostile client if wanted.
+
+    Args:
+        workspace: of the test.
+        fleet_of: makes a fleet.
+        words: of the run.
+        messages: that the hostile client sends; 0 for none.
+    """
+    fleet = fleet_of(workspace, *words)
+    flags = ("--cpu-limit", "2")
+    fleet.join("w1", "worker", *flags)
+    fleet.join("w2", "worker", *flags)
+    fleet.begin(2, has_analyzer=False)
+    recording = f"{messages}.rrd"
+    viewer = workspace.start("view", "--connect", fleet.address, "--save", recording)
+    processes = {"coordinator": fleet.coordinator, "viewer": viewer, **fleet.agents}
+    told: dict[str, Future[tuple[str, str]]] = {}
+    peaks_mb: dict[str, float] = {}
+    half = workspace.folder / "half"
+    with ThreadPoolExecutor(len(processes) + 2) as pool:
+        if messages:
+            processes["client"] = workspace.start(
+                *("--seed", "3", "--messages", str(messages)),
+                *("--connect", fleet.address, "--progress", str(half)),
+                module="tests.hostile.client",
+            )
+        # Their output is read all the time: a full pipe would stop them.
+        for name, process in processes.items():
+            told[name] = pool.submit(process.communicate)
+        if messages:
+            # Without an analyzer but the false ones, the run goes on for as long.
+            wait_until(half.exists, "half of the messages are sent", patience_s=3000.0)
+        fleet.join("judge", "analyzer")
+        processes["judge"] = fleet.agents["judge"]
+        told["judge"] = pool.submit(fleet.agents["judge"].communicate)
+        while not told["coordinator"].done():
+            note_peaks(fleet, viewer, peaks_mb)
+            wait([told["coordinator"]], 0.5)
+        told["viewer"].result(PATIENCE_S)
+        if messages:
+            told["client"].result(PATIENCE_S)
+        for agent in fleet.agents.values():
+            agent.terminate()
+    texts = {name: each.result() for name, each in told.items()}
+    codes = {name: process.returncode for name, process in processes.items()}
+    assert set(codes.values()) == {0}, (codes, texts)
+    folder = fleet.folder.rename(workspace.folder / f"run-{messages}")
+    sent = texts["client"][0] if messages else "{}"
+    errors = {name: text for name, (_, text) in texts.items()}
+    return Outcome(folder, peaks_mb, errors, json.loads(sent))
+
+
+def check(calm: Outcome, hostile: Outcome, messages: int) -> None:
+    assert compare(calm.folder, hostile.folder) == []
+    for name, text in hostile.told.items():
+        assert "Traceback" not in text, f"{name}: {text}"
+        # Zenoh colours its own lines.
+        own = [line for line in text.splitlines() if not line.startswith("\x1b[2m")]
+        assert not any("\x1b" in line for line in own), name
+    sent = hostile.hostile["sent"]
+    growth = {
+        name: round(hostile.peaks_mb[name] - calm.peaks_mb[name], 1) for name in ROLES
+    }
+    report = {
+        "sent": sent,
+        "came": hostile.hostile["came"],
+        "growth_mb": growth,
+        "told": {name: lines_about_drops(text) for name, text in hostile.told.items()},
+    }
+    sys.stdout.write(f"{json.dumps(report, indent=1)}\n")
+    assert sum(sent.values()) >= messages // 2
+    assert max(growth[name] for name in ROLES[:-1]) <= MOST_GROWTH_MB
+    assert dropped(hostile.told["coordinator"], "malformed") > 0
+    for name in ("w1", "w2", "judge"):
+        assert re.search(r"refused \d+ requests", hostile.told[name]), name
+    assert re.search(r"dropped \d+ messages", hostile.told["viewer"])
+
+
+def lines_about_drops(text: str) -> list[str]:
+    words = ("not used: ", "refused ", "dropped ")
+    return [line for line in text.splitlines() if any(word in line for word in words)]
+
+
+def dropped(text: str, kind: str) -> int:
+    """Return how many messages of a kind the coordinator has dropped."""
+    found = re.search(rf"not used: (\d+) {kind}", text)
+    return int(found[1]) if found else 0
+
+
+CASES = {
+    "off-line": ("scenario1", "--seed", "5", "--quiet", "--births", "60"),
+    "arena": ("hamlet.toml", "--seed", "4", "--quiet"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("words", CASES.values(), ids=CASES)
+def test_2000_hostile_messages_change_nothing(
+    small_arena_workspace: Workspace, fleet_of: FleetOf, words: tuple[str, ...]
+) -> None:
+    calm = outcome(small_arena_workspace, fleet_of, words, 0)
+    check(calm, outcome(small_arena_workspace, fleet_of, words, 2000), 2000)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("words", CASES.values(), ids=CASES)
+def test_50_000_hostile_messages_change_nothing(
+    small_arena_workspace: Workspace, fleet_of: FleetOf, words: tuple[str, ...]
+) -> None:
+    calm = outcome(small_arena_workspace, fleet_of, words, 0)
+    check(calm, outcome(small_arena_workspace, fleet_of, words, 50_000), 50_000)
