@@ -12,10 +12,10 @@ from typing import Self
 
 import zenoh
 
+from analysis.viewer.presence import Presence
 from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
 from schema.agent.service import log_engine, tell_user
 from schema.agent.topics import (
-    Member,
     agents_alive,
     check_name,
     member_of,
@@ -62,7 +62,7 @@ class Sequel:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """Event: the coordinator has left the network."""
+    """Event: the coordinator of the run has left the network."""
 
 
 LiveMessage = Update | Live | Ended
@@ -92,7 +92,8 @@ class LiveSource:
         self._config = client_config(connect, tls)
         self._waiting: deque[zenoh.Sample | zenoh.Reply] = deque(maxlen=_MOST)
         self._has_news = threading.Event()
-        self._coordinators: dict[str, Member] = {}
+        self._presence = Presence()
+        self._has_told_end = False
         self._sequel = Sequel()
         self._asked_s = -_ASK_AGAIN_S
 
@@ -131,6 +132,8 @@ class LiveSource:
     def receive(self, timeout_s: float, now_s: float) -> list[LiveMessage]:
         """Return the messages received, in order; request lost ones again.
 
+        Say when the hub is gone and when it is back.
+
         Args:
             timeout_s: time to wait for a message [s].
             now_s: time of a monotonic clock [s].
@@ -148,38 +151,56 @@ class LiveSource:
                 continue
             if each is not None:
                 messages.append(each)
+        self._look(now_s)
+        if self._presence.has_ended and not self._has_told_end:
+            self._has_told_end = True
+            messages.append(Ended())
         if self._sequel.is_behind and now_s - self._asked_s >= _ASK_AGAIN_S:
             self._asked_s = now_s
             self._ask()
         return messages
 
+    def _look(self, now_s: float) -> None:
+        """Note whether the hub is there; after its return the state is requested."""
+        was_there = self._presence.is_hub_there
+        hubs = frozenset(map(str, self._session.info.routers_zid()))
+        self._presence.look(hubs, now_s)
+        if self._presence.is_hub_there and not was_there:
+            tell_user(f"connected to {self._connect}")
+            self._sequel.is_behind = True
+        elif was_there and not hubs and not self._presence.has_ended:
+            tell_user(f"no hub at {self._connect}; retrying; press Ctrl-C to stop")
+
     def _understood(self, message: zenoh.Sample | zenoh.Reply) -> LiveMessage | None:
         if isinstance(message, zenoh.Reply):
             if message.ok is None:
                 return None
-            return self._news(message.ok.payload.to_bytes())
+            return self._news(str(message.ok.key_expr), message.ok.payload.to_bytes())
         key = str(message.key_expr)
         if key.endswith("/alive"):
-            return self._token(key, message.kind == zenoh.SampleKind.PUT)
+            self._token(key, is_there=message.kind == zenoh.SampleKind.PUT)
+            return None
         data = message.payload.to_bytes()
-        return self._news(data) if key.endswith("/events") else decode_live(data)
+        return self._news(key, data) if key.endswith("/events") else decode_live(data)
 
-    def _news(self, data: bytes) -> Update | None:
+    def _news(self, key: str, data: bytes) -> Update | None:
         news = decode_update(data)
-        return news if self._sequel.take(news) else None
+        if not self._sequel.take(news):
+            return None
+        self._presence.watch(f"{key.rpartition('/')[0]}/alive")
+        return news
 
-    def _token(self, key: str, is_there: bool) -> Ended | None:  # noqa: FBT001 - a word
+    def _token(self, key: str, *, is_there: bool) -> None:
         if is_there:
-            self._coordinators[key] = member_of(key)
+            self._presence.coordinators[key] = member_of(key)
             self._asked_s = -_ASK_AGAIN_S
             self._sequel.is_behind = True
-            return None
-        self._coordinators.pop(key, None)
-        return None if self._coordinators else Ended()
+        else:
+            self._presence.coordinators.pop(key, None)
 
     def _ask(self) -> None:
         """Request the complete state from all coordinators, without waiting."""
-        for member in self._coordinators.values():
+        for member in self._presence.coordinators.values():
             self._session.get(
                 member.state,
                 zenoh.handlers.Callback(self._put, indirect=False),

@@ -95,7 +95,7 @@ class LiveView:
     """Records the messages of one run; poses wait until their robot is known.
 
     Attributes:
-        has_ended: the coordinator has left the network.
+        has_ended: the coordinator of the run has left the network.
     """
 
     def __init__(self, show: Show, run: str) -> None:
