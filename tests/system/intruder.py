@@ -1,8 +1,8 @@
 """Program: a process of a lab that uses the keys of others, until SIGTERM.
 
-Arguments: the address of a hub; files (PEM) of authority, certificate and key, or "" for
-none; and the names of the coordinator and of a worker. It tries to act as both, gives
-them orders, reads what others get, and counts what it got. Writes a JSON object
+Arguments: the address of a hub; files (PEM) of authority, certificate and key, or ""
+for none; and the names of the coordinator and of a worker. It tries to act as both,
+gives them orders, reads what others get, and counts what it got. Writes a JSON object
 at its end; without a connection, "refused" and the reason.
 """
 
@@ -78,7 +78,7 @@ def intrude(session: zenoh.Session, chief: Member, other: Member) -> Counter[str
         ):
             session.get(
                 key,
-                count("replies"),
+                count(f"reply of {key.rpartition('/')[2]}"),
                 payload=data,
                 timeout=1.0,
                 consolidation=zenoh.ConsolidationMode.NONE,

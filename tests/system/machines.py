@@ -124,11 +124,12 @@ class Network:
 
     Attributes:
         machines: by their names.
+        workspace: starts their processes.
     """
 
     def __init__(self, workspace: Workspace, names: tuple[str, ...]) -> None:
         self.machines: dict[str, Machine] = {}
-        self._workspace = workspace
+        self.workspace = workspace
         self._names = names
         self._switch = f"revolve-{os.getpid()}-switch"
         self._opened = ExitStack()
@@ -168,7 +169,7 @@ class Network:
         machine, number = self.machines[name], list(self._names).index(name) + 1
         ip(f"-n {machine.space} link del wire")
         # The kernel's own "tc netem" is not in every kernel.
-        cable = self._workspace.start_command(
+        cable = self.workspace.start_command(
             sys.executable,
             str(Path(__file__).with_name("slow_cable.py")),
             *(self._switch, f"p{number}", machine.space, "wire"),
@@ -193,9 +194,9 @@ class Network:
         ip(f"-n {self._switch} link set p{number} master lan up")
         ip(f"-n {space} addr add {_NET}.{number}/24 dev wire")
         ip(f"-n {space} link set wire up")
-        home = self._workspace.folder / name
+        home = self.workspace.folder / name
         (home / ".runtime").mkdir(parents=True, mode=0o700)
-        return Machine(name, space, home, self._workspace)
+        return Machine(name, space, home, self.workspace)
 
     @staticmethod
     def _space(opened: ExitStack, name: str) -> None:
