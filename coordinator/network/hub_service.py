@@ -4,8 +4,9 @@ import threading
 
 import zenoh
 
+from schema.agent.log import tell_user
 from schema.agent.network import cannot_listen
-from schema.agent.service import log_engine, tell_user
+from schema.agent.service import log_engine
 
 
 def serve_hub(config: str, addresses: tuple[str, ...], stop: threading.Event) -> None:

@@ -36,8 +36,18 @@ def config_of(address: str, ca: str, certificate: str, key: str) -> zenoh.Config
     return zenoh.Config.from_json5(json.dumps(config))
 
 
-def intrude(session: zenoh.Session, chief: Member, other: Member) -> Counter[str]:
-    """Use the keys of a coordinator and a worker until SIGTERM."""
+def intrude(
+    session: zenoh.Session, ears: zenoh.Session, chief: Member, other: Member
+) -> Counter[str]:
+    """Use the keys of a coordinator and a worker until SIGTERM.
+
+    Args:
+        session: gives orders and declares tokens.
+        ears: declares queryables and subscribers; a session of its own, since each
+            session gets what it sends itself.
+        chief: the coordinator.
+        other: the worker.
+    """
     got: Counter[str] = Counter()
 
     def count(kind: str) -> zenoh.handlers.Callback:
@@ -57,10 +67,10 @@ def intrude(session: zenoh.Session, chief: Member, other: Member) -> Counter[str
     order = encode_operator_request(OperatorRequest("1", 0, GetStatus()))
     claim = pb.Request(run="any", epoch=_EPOCH, number=1).SerializeToString()
     held = [
-        session.declare_subscriber("revolve/**", count("news")),
-        session.liveliness().declare_subscriber("revolve/*/w/*/alive", count("tokens")),
+        ears.declare_subscriber("revolve/**", count("news")),
+        ears.liveliness().declare_subscriber("revolve/*/w/*/alive", count("tokens")),
         *(
-            session.declare_queryable(key, zenoh.handlers.Callback(serve))
+            ears.declare_queryable(key, zenoh.handlers.Callback(serve))
             for key in ("revolve/*/*/*/jobs", other.jobs, chief.command, chief.state)
         ),
         *map(session.liveliness().declare_token, forged),
@@ -93,13 +103,15 @@ def main(arguments: list[str]) -> None:
     address, ca, certificate, key, chief, other = arguments
     zenoh.init_log_from_env_or("error")
     try:
-        session = zenoh.open(config_of(address, ca, certificate, key))
+        config = config_of(address, ca, certificate, key)
+        session, ears = zenoh.open(config), zenoh.open(config)
     except zenoh.ZError as error:
         print(f"refused: {error}")  # noqa: T201 - the test reads it
         return
-    with session:
+    with session, ears:
         got = intrude(
             session,
+            ears,
             Member("default", "coordinator", chief),
             Member("default", "worker", other),
         )

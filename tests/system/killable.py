@@ -23,8 +23,8 @@ prepare_process()
 import analyzer.service  # noqa: E402, F401 - before the first fork
 import worker.serve.service  # noqa: E402, F401
 from coordinator.__main__ import main  # noqa: E402
-from coordinator.storage.folder import DETAILS  # noqa: E402
 from coordinator.storage.journal import NAME  # noqa: E402
+from schema.tables.description import DETAILS  # noqa: E402
 
 FLAGS = ["--in-process", "--threads", "1", "--quiet"]
 
