@@ -13,9 +13,9 @@ from typing import Self
 import zenoh
 
 from analysis.viewer.presence import Presence
-from schema.agent.log import tell_user
+from schema.agent.log import tell_user, warn_user
 from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
-from schema.agent.service import log_engine
+from schema.agent.service import HubWatch, log_engine
 from schema.agent.topics import (
     agents_alive,
     check_name,
@@ -94,6 +94,7 @@ class LiveSource:
         self._waiting: deque[zenoh.Sample | zenoh.Reply] = deque(maxlen=_MOST)
         self._has_news = threading.Event()
         self._presence = Presence()
+        self._hub = HubWatch(connect, tell_user, warn_user)
         self._has_told_end = False
         self._sequel = Sequel()
         self._asked_s = -_ASK_AGAIN_S
@@ -166,11 +167,9 @@ class LiveSource:
         was_there = self._presence.is_hub_there
         hubs = frozenset(map(str, self._session.info.routers_zid()))
         self._presence.look(hubs, now_s)
-        if self._presence.is_hub_there and not was_there:
-            tell_user(f"connected to {self._connect}")
-            self._sequel.is_behind = True
-        elif was_there and not hubs and not self._presence.has_ended:
-            tell_user(f"no hub at {self._connect}; retrying; press Ctrl-C to stop")
+        if not self._presence.has_ended:
+            self._hub.seen(is_there=bool(hubs))
+        self._sequel.is_behind = self._sequel.is_behind or bool(hubs and not was_there)
 
     def _understood(self, message: zenoh.Sample | zenoh.Reply) -> LiveMessage | None:
         if isinstance(message, zenoh.Reply):
