@@ -21,6 +21,8 @@ from schema.wire.operator import GetStatus, OperatorRequest, encode_operator_req
 
 _EPOCH = 2**31
 _EACH_S = 1.0
+_LATE = b"Timeout"
+"""What the engine itself replies after the timeout."""
 
 
 def config_of(address: str, ca: str, certificate: str, key: str) -> zenoh.Config:
@@ -55,9 +57,10 @@ def intrude(
 
     def replies(kind: str) -> zenoh.handlers.Callback:
         def take(reply: zenoh.Reply) -> None:
-            # Without a replier it is the engine's own, after the timeout.
-            if reply.replier_id is not None:
+            if reply.ok is not None:
                 got.update([kind])
+            elif reply.err is not None and reply.err.payload.to_bytes() != _LATE:
+                got.update([f"error {kind}"])
 
         return zenoh.handlers.Callback(take, indirect=False)
 
