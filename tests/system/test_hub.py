@@ -3,10 +3,13 @@
 from pathlib import Path
 
 import pytest
+import zenoh
 
 from coordinator.storage.compare import compare
+from schema.agent.network import Tls, client_config
 from tests.system.fleet import size
 from tests.system.machines import Running
+from tests.system.test_agents import free_address
 from tests.system.test_view import check_curves
 from tests.system.workspace import Workspace, wait_until
 
@@ -96,3 +99,23 @@ def test_coordinators_and_the_hub_come_and_go(
     check_curves(site.folder / "arena.rrd", small_arena_run)
     for process in (viewer, *workers):
         assert told_of_hub(process) == (2, 2), process.text
+
+
+def test_printed_configuration_opens_a_hub(workspace: Workspace) -> None:
+    kit = workspace.folder / "lab"
+    workspace.run("cluster", "init", str(kit), "--hub", "127.0.0.1", "--workers", "a")
+    address = free_address().replace("tcp/", "tls/")
+    member = kit / "members" / "hub"
+    config = workspace.run(
+        *("hub", "--listen", address, "--access", str(member / "access.json")),
+        *("--tls-ca", str(member / "ca.pem"), "--tls-key", str(member / "key.pem")),
+        *("--tls-certificate", str(member / "certificate.pem"), "--print-config"),
+    )
+    own = kit / "members" / "a"
+    files = (str(own / name) for name in ("ca.pem", "certificate.pem", "key.pem"))
+    client = zenoh.Config.from_json5(client_config(address, Tls(*files)))
+    with (
+        zenoh.open(zenoh.Config.from_json5(config)) as hub,
+        zenoh.open(client) as session,
+    ):
+        assert list(session.info.routers_zid()) == [hub.info.zid()]
