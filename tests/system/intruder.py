@@ -52,10 +52,10 @@ def intrude(
     """
     got: Counter[str] = Counter()
 
-    def count(kind: str) -> zenoh.handlers.Callback:
+    def count(kind: str) -> "zenoh.handlers.Callback[zenoh.Sample]":
         return zenoh.handlers.Callback(lambda _: got.update([kind]), indirect=False)
 
-    def replies(kind: str) -> zenoh.handlers.Callback:
+    def replies(kind: str) -> "zenoh.handlers.Callback[zenoh.Reply]":
         def take(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
                 got.update([kind])

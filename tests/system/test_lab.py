@@ -91,7 +91,7 @@ def test_commands_of_the_page(network: Network, lab: Path, undisturbed: Path) ->
 
 
 def intrude(
-    machine: Machine, files: tuple[str, ...], victims: tuple[str, str]
+    machine: Machine, files: tuple[str, ...], victims: tuple[str, ...]
 ) -> Running:
     """Start an intruder that shows certificate files or none: see intruder.py."""
     program = str(Path(__file__).with_name("intruder.py"))
