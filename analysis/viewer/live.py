@@ -13,9 +13,10 @@ from typing import Self
 
 import zenoh
 
-from schema.agent.log import tell_user
+from analysis.viewer.presence import Presence
+from schema.agent.log import tell_user, warn_user
 from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
-from schema.agent.service import log_engine
+from schema.agent.service import HubWatch, log_engine
 from schema.agent.topics import (
     Member,
     agents_alive,
@@ -70,7 +71,7 @@ class Sequel:
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """Event: the coordinator has left the network."""
+    """Event: the coordinator of the run has left the network."""
 
 
 LiveMessage = Update | Live | Ended
@@ -113,9 +114,10 @@ class LiveSource:
         self._tokens: deque[zenoh.Sample] = deque(maxlen=_MOST_TOKENS)
         self._lock = threading.Lock()
         self._has_news = threading.Event()
-        self._coordinators: dict[str, Member] = {}
-        self._watched = ""
+        self._presence = Presence()
+        self._hub = HubWatch(connect, tell_user, warn_user)
         self._has_told = False
+        self._has_told_end = False
         self._sequel = Sequel()
         self._asked_s = -_ASK_AGAIN_S
 
@@ -190,6 +192,8 @@ class LiveSource:
     def receive(self, timeout_s: float, now_s: float) -> list[LiveMessage]:
         """Return the messages received, in order; request lost ones again.
 
+        Say when the hub is gone and when it is back.
+
         Args:
             timeout_s: time to wait for a message [s].
             now_s: time of a monotonic clock [s].
@@ -211,12 +215,13 @@ class LiveSource:
                 messages.append(each)
         while self._tokens:
             try:
-                ended = self._token(self._tokens.popleft())
+                self._token(self._tokens.popleft())
             except MalformedMessage as error:
                 self._drop(error)
-                continue
-            if ended is not None:
-                messages.append(ended)
+        self._look(now_s)
+        if self._presence.has_ended and not self._has_told_end:
+            self._has_told_end = True
+            messages.append(Ended())
         if self._sequel.is_behind and now_s - self._asked_s >= _ASK_AGAIN_S:
             self._asked_s = now_s
             self._ask()
@@ -233,6 +238,15 @@ class LiveSource:
             self._has_told = True
             tell_user(f"dropped a malformed message: {error}; more are only counted")
 
+    def _look(self, now_s: float) -> None:
+        """Note whether the hub is there; after its return the state is requested."""
+        was_there = self._presence.is_hub_there
+        hubs = frozenset(map(str, self._session.info.routers_zid()))
+        self._presence.look(hubs, now_s)
+        if not self._presence.has_ended:
+            self._hub.seen(is_there=bool(hubs))
+        self._sequel.is_behind = self._sequel.is_behind or bool(hubs and not was_there)
+
     def _understood(self, message: _Message) -> LiveMessage | None:
         if not message.key.endswith(("/events", "/state")):
             return decode_live(message.data)
@@ -242,26 +256,24 @@ class LiveSource:
         if not self._sequel.take(news):
             return None
         if news.is_whole:
-            self._watched = message.asked
+            self._presence.watch(message.asked)
         return news
 
-    def _token(self, sample: zenoh.Sample) -> Ended | None:
-        key = str(sample.key_expr)
+    def _token(self, sample: zenoh.Sample) -> None:
+        key, coordinators = str(sample.key_expr), self._presence.coordinators
         if sample.kind != zenoh.SampleKind.PUT:
-            self._coordinators.pop(key, None)
-            is_over = key == self._watched or not self._coordinators
-            return Ended() if is_over else None
+            coordinators.pop(key, None)
+            return
         member = member_of(key)
-        if len(self._coordinators) >= _MOST_COORDINATORS:
+        if len(coordinators) >= _MOST_COORDINATORS:
             raise MalformedMessage(f"more than {_MOST_COORDINATORS} coordinators")
-        self._coordinators[key] = member
+        coordinators[key] = member
         self._asked_s = -_ASK_AGAIN_S
         self._sequel.is_behind = True
-        return None
 
     def _ask(self) -> None:
         """Request the complete state from all coordinators, without waiting."""
-        for member in self._coordinators.values():
+        for member in self._presence.coordinators.values():
             self._session.get(
                 member.state,
                 zenoh.handlers.Callback(

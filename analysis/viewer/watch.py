@@ -104,7 +104,7 @@ class LiveView:
     """Records the messages of one run; poses wait until their robot is known.
 
     Attributes:
-        has_ended: the coordinator has left the network.
+        has_ended: the coordinator of the run has left the network.
         dropped: number of messages that cannot be shown.
     """
 

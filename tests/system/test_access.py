@@ -4,11 +4,13 @@ import json
 import subprocess
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 import zenoh
 
+from coordinator.cluster.kit import Cluster, Kit
 from coordinator.storage.compare import compare
 from schema.agent.network import Tls, client_config
 from schema.agent.topics import Member, agents_alive, member_of
@@ -179,3 +181,47 @@ def test_name_of_an_agent_is_that_of_its_certificate(lab: Lab) -> None:
     assert process.wait(60) == 2
     assert process.stderr is not None
     assert "--name: must be 'good', the name of " in process.stderr.read()
+
+
+def test_hub_closes_links_when_their_certificate_expires(workspace: Workspace) -> None:
+    """One certificate has expired when the hub starts, one expires while connected."""
+    folder = workspace.folder / "lab"
+    start = datetime.now(UTC)
+    clock = [start]
+    kit = Kit.new(folder, Cluster("127.0.0.1", 7447, 1), lambda: clock[0])
+    kit.add("good", "worker")
+    for name, left_s in (("late", -5.0), ("brief", 20.0)):
+        clock[0] = start - timedelta(days=1) + timedelta(seconds=left_s)
+        kit.add(name, "worker")
+    files = {
+        name: Tls(
+            *(
+                str(folder / "members" / name / file)
+                for file in ("ca.pem", "certificate.pem", "key.pem")
+            )
+        )
+        for name in ("hub", "good", "late", "brief")
+    }
+    address = free_address().replace("tcp/", "tls/")
+    tls = files["hub"]
+    hub = workspace.start(
+        *("hub", "--listen", address, "--access", str(folder / "access.json")),
+        *("--tls-ca", tls.ca, "--tls-certificate", tls.certificate),
+        *("--tls-key", tls.key),
+    )
+    assert hub.stderr is not None
+    assert "listening on tls/" in hub.stderr.readline()
+
+    def opened(name: str) -> zenoh.Session:
+        config = client_config(address, files[name])
+        return zenoh.open(zenoh.Config.from_json5(config))
+
+    with pytest.raises(zenoh.ZError):
+        opened("late")
+    with opened("brief") as brief, opened("good") as good:
+        assert list(brief.info.routers_zid())
+        wait_until(lambda: not list(brief.info.routers_zid()), "the link is closed")
+        assert datetime.now(UTC) >= start + timedelta(seconds=19)
+        assert list(good.info.routers_zid())
+        with pytest.raises(zenoh.ZError):
+            opened("brief")

@@ -10,7 +10,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
+from typing import IO
 
 PATIENCE_S = 240.0
 
@@ -39,7 +41,7 @@ class Workspace:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._started: list[subprocess.Popen[str]] = []
+        self._started: list[tuple[subprocess.Popen[str], Path | None]] = []
 
     def start(
         self,
@@ -48,6 +50,7 @@ class Workspace:
         environment: dict[str, str] | None = None,
         inside: str = "",
         module: str = "revolve",
+        log: Path | None = None,
     ) -> subprocess.Popen[str]:
         """Start ``revolve`` with arguments and return immediately.
 
@@ -57,12 +60,46 @@ class Workspace:
             environment: additional environment variables.
             inside: network namespace; default: that of the test.
             module: program to start in place of ``revolve``.
+            log: file that gets all output; default: pipes.
         """
         prefix = ("ip", "netns", "exec", inside) if inside else ()
-        process = subprocess.Popen(
-            [*prefix, sys.executable, "-m", module, *words],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+        command = (*prefix, sys.executable, "-m", module, *words)
+        return self.start_command(
+            *command, folder=folder, environment=environment, log=log
+        )
+
+    def start_command(
+        self,
+        *words: str,
+        folder: Path | None = None,
+        environment: dict[str, str] | None = None,
+        log: Path | None = None,
+    ) -> subprocess.Popen[str]:
+        """Start any command, otherwise like ``start``.
+
+        Args:
+            words: command and arguments.
+            folder: as for ``start``.
+            environment: as for ``start``.
+            log: file that gets all output; default: pipes.
+        """
+        with ExitStack() as opened:
+            file = opened.enter_context(log.open("w")) if log else subprocess.PIPE
+            process = self._popen(words, file, folder, environment)
+        self._started.append((process, log))
+        return process
+
+    def _popen(
+        self,
+        words: tuple[str, ...],
+        output: IO[str] | int,
+        folder: Path | None,
+        environment: dict[str, str] | None,
+    ) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            words,
+            stdout=output,
+            stderr=output,
             text=True,
             cwd=folder or self.folder,
             env={
@@ -71,8 +108,6 @@ class Workspace:
                 **(environment or {}),
             },
         )
-        self._started.append(process)
-        return process
 
     def run(self, *words: str, code: int = 0) -> str:
         """Run ``revolve`` to its end; return standard output and standard error."""
@@ -83,11 +118,13 @@ class Workspace:
 
     def clear(self) -> None:
         """Kill remaining processes and write all output to the test report."""
-        for process in self._started:
+        for process, log in self._started:
             if process.poll() is None:
                 process.send_signal(signal.SIGCONT)
                 process.kill()
             out, err = process.communicate()
+            if log is not None:
+                out, err = log.read_text("utf-8", "replace"), ""
             sys.stdout.write(f"{process.args!r}: {process.returncode}\n{out}{err}\n")
 
 

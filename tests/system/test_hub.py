@@ -1,0 +1,121 @@
+"""A hub of its own: coordinators come and go, and the hub itself does."""
+
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from coordinator.storage.compare import compare
+from schema.agent.network import Tls, client_config
+from tests.system.fleet import size
+from tests.system.machines import Running
+from tests.system.test_agents import free_address
+from tests.system.test_view import check_curves
+from tests.system.workspace import Workspace, wait_until
+
+pytestmark = [pytest.mark.system, pytest.mark.slow, pytest.mark.timeout(300)]
+
+PLAIN = ("coordinator", "scenario1", "--seed", "5", "--births", "60", "--quiet")
+ARENA = ("coordinator", "hamlet.toml", "--seed", "4", "--quiet")
+
+
+class Site:
+    """A machine with a hub, two kinds of runs, and processes that connect to it."""
+
+    def __init__(self, workspace: Workspace, arena: str) -> None:
+        self.folder = workspace.folder
+        (self.folder / "hamlet.toml").write_text(arena)
+        self._workspace = workspace
+        self._started = 0
+        self.hub = self.start("hub")
+        self.hub.wait_for("listening on")
+
+    def start(self, *words: str) -> Running:
+        self._started += 1
+        log = self.folder / f"{self._started}-{words[0]}.log"
+        place = {"XDG_RUNTIME_DIR": str(self.folder), "REVOLVE_CONNECT": ""}
+        return Running(self._workspace.start(*words, environment=place, log=log), log)
+
+    def restart_hub(self) -> None:
+        self.hub.process.kill()
+        self.hub.process.wait()
+        self.hub = self.start("hub")
+        self.hub.wait_for("listening on")
+
+    def wait_for(self, run: str, share: float, reference: Path) -> None:
+        """Wait until a run's journal has a share of the size of a reference."""
+        least = share * (reference / "journal.bin").stat().st_size
+        wait_until(lambda: size(self.folder / run) > least, f"{run} goes on")
+
+
+@pytest.fixture
+def site(workspace: Workspace, small_arena_document: str) -> Site:
+    return Site(workspace, small_arena_document)
+
+
+def told_of_hub(process: Running) -> tuple[int, int]:
+    """Return how many times a process told that the hub was gone, and back."""
+    return process.text.count("; retrying"), process.text.count("connected to")
+
+
+def test_viewer_and_run_go_on_after_the_hub_is_killed(
+    site: Site, undisturbed: Path
+) -> None:
+    site.start("analyzer")
+    worker = site.start("worker", "--processes", "1")
+    coordinator = site.start(*PLAIN, "--out", "first", "--connect", "hub")
+    viewer = site.start("view", "--save", "first.rrd")
+    viewer.wait_for("recording ")
+    site.wait_for("first", 0.3, undisturbed)
+    site.restart_hub()
+    coordinator.end()
+    assert "the run has ended" in viewer.end()
+    assert compare(site.folder / "first", undisturbed) == []
+    check_curves(site.folder / "first.rrd", undisturbed)
+    assert told_of_hub(viewer) == told_of_hub(worker) == (1, 1)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(600)
+def test_coordinators_and_the_hub_come_and_go(
+    site: Site, undisturbed: Path, small_arena_run: Path
+) -> None:
+    site.start("analyzer")
+    workers = [site.start("worker", "--processes", "1") for _ in range(3)]
+    # Slow, so that it outlasts the others.
+    arena = site.start(*ARENA, "--speed", "0.5", "--out", "arena", "--connect", "hub")
+    viewer = site.start("view", "--save", "arena.rrd")
+    viewer.wait_for("recording ")
+    for name in ("first", "second"):
+        plain = site.start(*PLAIN, "--out", name, "--connect", "hub")
+        site.wait_for(name, 0.3, undisturbed)
+        assert arena.process.poll() is None
+        site.restart_hub()
+        plain.end()
+        assert compare(site.folder / name, undisturbed) == []
+    arena.end()
+    assert "the run has ended" in viewer.end()
+    assert compare(site.folder / "arena", small_arena_run) == []
+    check_curves(site.folder / "arena.rrd", small_arena_run)
+    for process in (viewer, *workers):
+        assert told_of_hub(process) == (2, 2), process.text
+
+
+def test_printed_configuration_opens_a_hub(workspace: Workspace) -> None:
+    kit = workspace.folder / "lab"
+    workspace.run("cluster", "init", str(kit), "--hub", "127.0.0.1", "--workers", "a")
+    address = free_address().replace("tcp/", "tls/")
+    member = kit / "members" / "hub"
+    config = workspace.run(
+        *("hub", "--listen", address, "--access", str(member / "access.json")),
+        *("--tls-ca", str(member / "ca.pem"), "--tls-key", str(member / "key.pem")),
+        *("--tls-certificate", str(member / "certificate.pem"), "--print-config"),
+    )
+    own = kit / "members" / "a"
+    files = (str(own / name) for name in ("ca.pem", "certificate.pem", "key.pem"))
+    client = zenoh.Config.from_json5(client_config(address, Tls(*files)))
+    with (
+        zenoh.open(zenoh.Config.from_json5(config)) as hub,
+        zenoh.open(client) as session,
+    ):
+        assert list(session.info.routers_zid()) == [hub.info.zid()]
