@@ -1,0 +1,334 @@
+"""Program that kills the processes of runs until it has killed enough of them.
+
+Arguments: ``instants`` or ``fleet``, numbers of coordinator and of worker kills, a
+seed, and experiment documents, which take turns. A seed draws every kill. The first run
+of each document is undisturbed; each other one is resumed after every kill of its
+coordinator, and compared with the first when it is finished. Prints one line of JSON:
+kills by kind, kills per run, and the differences.
+
+``instants``: coordinators without a network, killed at an instant of ``instants.py`` or
+after some CPU time. Before most kills in the recovery of poses the segment is cut, as a
+power loss does.
+
+``fleet``: coordinators at a hub, with an analyzer and three worker processes that their
+pool restarts. All kills are at sizes of the journal or times after the last kill. Some
+coordinators find cut poses when they resume.
+"""
+
+import json
+import os
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from tests.system import warm  # first: it prepares the process
+from tests.system.instants import JOURNAL, RECOVERY, Instants
+
+from coordinator.storage.folder import DETAILS, STATE  # isort: skip
+from coordinator.storage.journal import NAME  # isort: skip
+from schema.tables.segments import segments_of  # isort: skip
+
+FLAGS = ["--in-process", "--threads", "1", "--quiet"]
+WHILE_RUNNING = 10
+"""Kills of a run, at most, before those at its end."""
+AT_THE_END = 5
+PROCESSES = 3
+BY_TIME = "by CPU time"
+MOST_RESTORED = 16
+LONGEST_WAIT_S = 0.3
+
+
+@dataclass
+class Reference:
+    """The undisturbed run of a document.
+
+    Attributes:
+        document: file.
+        folder: of the run.
+        cpu_s: CPU time of the run [s].
+        running: number of the instants of each kind up to the end of the journal.
+        ending: number of those behind it.
+    """
+
+    document: str
+    folder: Path
+    cpu_s: float = 0.0
+    running: Counter[str] = field(default_factory=Counter)
+    ending: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def size(self) -> int:
+        """Size of the journal [bytes]."""
+        return size(self.folder)
+
+    @property
+    def has_poses(self) -> bool:
+        return any(kind.startswith("write poses") for kind in self.running)
+
+
+@dataclass
+class Tally:
+    """Results of the program."""
+
+    kills: Counter[str] = field(default_factory=Counter)
+    per_run: list[int] = field(default_factory=list)
+    differences: list[str] = field(default_factory=list)
+
+
+def size(folder: Path) -> int:
+    """Return the size of a run's journal [bytes]."""
+    journal = folder / NAME
+    return journal.stat().st_size if journal.exists() else 0
+
+
+def log_of(folder: Path) -> Path:
+    return folder.with_suffix(".log")
+
+
+def words_of(document: str, folder: Path) -> list[str]:
+    """Return the command that starts or resumes a run."""
+    if (folder / DETAILS).exists():
+        return ["resume", str(folder)]
+    return ["run", document, "--seed", "4", "--out", str(folder)]
+
+
+def undisturbed(document: str) -> Reference:
+    """Make the first run of a document, and count its instants."""
+    made = Reference(document, Path(Path(document).stem))
+    instants, listing = Instants("", 0, 0.0, []), Path(f"{made.folder}.json")
+    words = [*words_of(document, made.folder), *FLAGS]
+    spent_s = os.times().children_user + os.times().children_system
+    child = warm.start(
+        words, log_of(made.folder), instants.install, lambda: instants.save(listing)
+    )
+    code = warm.wait(child, log_of(made.folder))
+    assert code == 0, warm.tail(log_of(made.folder))
+    made.cpu_s = os.times().children_user + os.times().children_system - spent_s
+    kinds = json.loads(listing.read_text("utf-8"))
+    last = len(kinds) - kinds[::-1].index(JOURNAL)
+    made.running, made.ending = Counter(kinds[:last]), Counter(kinds[last:])
+    return made
+
+
+def check(reference: Reference, folder: Path, tally: Tally, kills: int) -> None:
+    """Compare a finished run with the first run of its document."""
+    assert (folder / STATE).read_text("utf-8") == "finished"
+    tally.per_run.append(kills)
+    words = ["compare", str(reference.folder), str(folder)]
+    child = warm.start(words, log_of(folder))
+    if warm.wait(child, log_of(folder)):
+        tally.differences.append(f"{folder}:\n{warm.tail(log_of(folder))}")
+
+
+class InstantKills:
+    """Kills of coordinators without a network."""
+
+    def __init__(self, tally: Tally, rng: np.random.Generator) -> None:
+        self._tally = tally
+        self._rng = rng
+
+    def run(self, reference: Reference, folder: Path, most: int) -> None:
+        """Execute a run with many kills, and compare it."""
+        kills = 0
+        plan = [*self._plan(reference)][:most]
+        for kind, number in plan:
+            if self._attempt(reference, folder, kind, number) is not None:
+                break
+            kills += 1
+            self._tally.kills[kind] += 1
+        else:
+            code = self._attempt(reference, folder, "", 0)
+            assert code == 0
+        check(reference, folder, self._tally, kills)
+
+    def _plan(self, reference: Reference) -> list[tuple[str, int]]:
+        """Draw the kind of each kill, and the number of the instant."""
+        rng = self._rng
+        weights = {kind: np.sqrt(n) for kind, n in reference.running.items()}
+        weights[BY_TIME] = weights[JOURNAL]
+        if reference.has_poses:
+            weights[RECOVERY] = weights[JOURNAL]
+        running, ending = sorted(weights), sorted(reference.ending)
+        shares = np.array([weights[kind] for kind in running])
+        shares /= shares.sum()
+        drawn = []
+        for _ in range(WHILE_RUNNING):
+            kind = running[rng.choice(len(running), p=shares)]
+            count = reference.running[kind] or MOST_RESTORED
+            drawn.append((kind, 1 + int(rng.integers(-(-count // 4)))))
+        for _ in range(AT_THE_END):
+            kind = ending[rng.integers(len(ending))]
+            drawn.append((kind, 1 + int(rng.integers(reference.ending[kind]))))
+        return drawn
+
+    def _attempt(
+        self, reference: Reference, folder: Path, kind: str, number: int
+    ) -> int | None:
+        """Run or resume once; return the exit code, or None if it was killed."""
+        rng = self._rng
+        if kind == RECOVERY and rng.random() < 0.7:
+            cut_poses(folder, rng.uniform(0.0, 0.8))
+        # The ends of a change are instants of their own.
+        share = float(np.clip(rng.uniform(-0.5, 1.5), 0.0, 1.0))
+        instants = Instants(kind, number, share, [])
+        words = [*words_of(reference.document, folder), *FLAGS]
+        child = warm.start(words, log_of(folder), instants.install)
+        limit_s = rng.uniform(0.0, 0.25) * reference.cpu_s
+        code = None
+        if kind == BY_TIME:
+            while cpu_s(child) < limit_s and (code := warm.ended(child)) is None:
+                time.sleep(0.0005)  # polling interval
+            code = warm.kill(child) if code is None else code
+        else:
+            code = warm.wait(child, log_of(folder))
+        assert code in (0, -signal.SIGKILL), warm.tail(log_of(folder))
+        return None if code else code
+
+
+def cpu_s(process: int) -> float:
+    """Return the CPU time of a process [s]; see clock_getcpuclockid(3)."""
+    return time.clock_gettime((~process << 3) | 2)
+
+
+def cut_poses(folder: Path, share: float) -> None:
+    """Cut the newest segment of poses to a share of its length."""
+    for _, path in segments_of(folder, "poses")[-1:]:
+        if path.exists():
+            os.truncate(path, round(share * path.stat().st_size))
+
+
+class FleetKills:
+    """Kills of coordinators and workers at a hub."""
+
+    def __init__(self, tally: Tally, rng: np.random.Generator) -> None:
+        self._tally = tally
+        self._rng = rng
+        self._stack = ExitStack()
+        socket = Path(
+            self._stack.enter_context(tempfile.TemporaryDirectory(prefix="hub"))
+        )
+        self._address = f"unixsock-stream/{socket / 'hub'}"
+        self._log = Path("fleet.log")
+        self._start("hub", "--listen", self._address)
+        flags = ("--connect", self._address, "--processes")
+        self._start("analyzer", *flags, "1")
+        self._workers = self._start("worker", *flags, str(PROCESSES))
+
+    def _start(self, *words: str) -> int:
+        child = warm.start(list(words), self._log)
+        self._stack.callback(warm.kill, child)
+        return child
+
+    def close(self) -> None:
+        self._stack.close()
+
+    def run(self, reference: Reference, folder: Path, left: Counter[str]) -> None:
+        """Execute a run with kills, and compare it.
+
+        Args:
+            reference: the first run of the document.
+            folder: of the run.
+            left: kills that are to be made, by role; decreases.
+        """
+        kills = 0
+        child = self._resume(reference, folder)
+        while (code := self._wait(child, reference, folder, left)) is None:
+            role = self._draw(left)
+            if role == "coordinator":
+                code = warm.kill(child)
+                if code == 0:
+                    break
+                assert code == -signal.SIGKILL, warm.tail(log_of(folder))
+                if self._rng.random() < 0.2:
+                    cut_poses(folder, self._rng.uniform(0.2, 0.9))
+                child = self._resume(reference, folder)
+            elif not self._kill_worker():
+                continue
+            kills += 1
+            left[role] -= 1
+            self._tally.kills[role] += 1
+        assert code == 0, warm.tail(log_of(folder))
+        check(reference, folder, self._tally, kills)
+
+    def _resume(self, reference: Reference, folder: Path) -> int:
+        words = [*words_of(reference.document, folder), "--quiet"]
+        return warm.start([*words, "--connect", self._address], log_of(folder))
+
+    def _draw(self, left: Counter[str]) -> str:
+        """Return the role of the next process to kill."""
+        share = left["coordinator"] / left.total()
+        return "coordinator" if self._rng.random() < share else "worker"
+
+    def _kill_worker(self) -> bool:
+        """Kill a worker process; return whether there was one."""
+        agents = warm.agents(self._workers)
+        if not agents:
+            return False
+        with suppress(ProcessLookupError):
+            os.kill(agents[self._rng.integers(len(agents))], signal.SIGKILL)
+            return True
+        return False
+
+    def _wait(
+        self, child: int, reference: Reference, folder: Path, left: Counter[str]
+    ) -> int | None:
+        """Wait for the next kill; return the exit code if the run ends before it."""
+        if not left.total():
+            return warm.wait(child, log_of(folder))
+        now_s = time.monotonic()
+        due_s, enough = (
+            np.inf,
+            size(folder) + self._rng.exponential(0.04) * reference.size,
+        )
+        if self._rng.random() < 0.3:
+            due_s, enough = now_s + self._rng.uniform(0.0, LONGEST_WAIT_S), np.inf
+        while time.monotonic() < due_s and size(folder) < enough:
+            code = warm.ended(child)
+            if code is not None:
+                return code
+            if time.monotonic() > now_s + warm.PATIENCE_S:
+                warm.kill(child)
+                raise TimeoutError(
+                    f"{folder} stands still:\n{warm.tail(log_of(folder))}"
+                )
+            time.sleep(0.001)  # polling interval
+        return None
+
+
+def main(mode: str, kills: Counter[str], seed: int, documents: list[str]) -> Tally:
+    """Make the kills; return the results."""
+    tally, rng = Tally(), np.random.default_rng(seed)
+    references = [undisturbed(document) for document in documents]
+    run = 0
+    if mode == "instants":
+        instants = InstantKills(tally, rng)
+        while run < len(documents) or tally.kills.total() < kills["coordinator"]:
+            reference = references[run % len(references)]
+            most = max(1, kills["coordinator"] - tally.kills.total())
+            instants.run(reference, Path(f"{reference.folder}-{run}"), most)
+            run += 1
+        return tally
+    fleet, left = FleetKills(tally, rng), kills.copy()
+    try:
+        while run < len(documents) or left.total():
+            reference = references[run % len(references)]
+            fleet.run(reference, Path(f"{reference.folder}-{run}"), left)
+            run += 1
+    finally:
+        fleet.close()
+    return tally
+
+
+if __name__ == "__main__":
+    began_s = time.monotonic()
+    wanted = Counter(coordinator=int(sys.argv[2]), worker=int(sys.argv[3]))
+    found = main(sys.argv[1], wanted, int(sys.argv[4]), sys.argv[5:])
+    seconds = round(time.monotonic() - began_s, 1)
+    sys.stdout.write(json.dumps({**vars(found), "seconds": seconds}) + "\n")
