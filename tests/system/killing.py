@@ -3,8 +3,8 @@
 Arguments: ``instants`` or ``fleet``, numbers of coordinator and of worker kills, a
 seed, and experiment documents, which take turns. A seed draws every kill. The first run
 of each document is undisturbed; each other one is resumed after every kill of its
-coordinator, and compared with the first when it is finished. Prints one line of JSON:
-kills by kind, kills per run, and the differences.
+coordinator, and compared with the first when it is finished. Prints a line for each
+run, and one of JSON at the end: kills by kind, kills per run, and the differences.
 
 ``instants``: coordinators without a network, killed at an instant of ``instants.py`` or
 after some CPU time. Before most kills in the recovery of poses the segment is cut, as a
@@ -22,7 +22,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -134,14 +134,14 @@ class InstantKills:
         self._tally = tally
         self._rng = rng
 
-    def run(self, reference: Reference, folder: Path, most: int) -> None:
-        """Execute a run with many kills, and compare it."""
+    def run(self, reference: Reference, folder: Path, left: Counter[str]) -> None:
+        """Execute a run with kills, and compare it; see ``FleetKills.run``."""
         kills = 0
-        plan = [*self._plan(reference)][:most]
-        for kind, number in plan:
+        for kind, number in self._plan(reference)[: left["coordinator"]]:
             if self._attempt(reference, folder, kind, number) is not None:
                 break
             kills += 1
+            left["coordinator"] -= 1
             self._tally.kills[kind] += 1
         else:
             code = self._attempt(reference, folder, "", 0)
@@ -306,23 +306,22 @@ def main(mode: str, kills: Counter[str], seed: int, documents: list[str]) -> Tal
     """Make the kills; return the results."""
     tally, rng = Tally(), np.random.default_rng(seed)
     references = [undisturbed(document) for document in documents]
-    run = 0
-    if mode == "instants":
-        instants = InstantKills(tally, rng)
-        while run < len(documents) or tally.kills.total() < kills["coordinator"]:
-            reference = references[run % len(references)]
-            most = max(1, kills["coordinator"] - tally.kills.total())
-            instants.run(reference, Path(f"{reference.folder}-{run}"), most)
-            run += 1
-        return tally
-    fleet, left = FleetKills(tally, rng), kills.copy()
-    try:
-        while run < len(documents) or left.total():
-            reference = references[run % len(references)]
-            fleet.run(reference, Path(f"{reference.folder}-{run}"), left)
-            run += 1
-    finally:
-        fleet.close()
+    most = {role: -(-number // len(documents)) for role, number in kills.items()}
+    left = kills.copy()
+    with ExitStack() as stack:
+        execute = InstantKills(tally, rng).run
+        if mode == "fleet":
+            execute = stack.enter_context(closing(FleetKills(tally, rng))).run
+        while len(tally.per_run) < len(documents) or left.total():
+            number = len(tally.per_run)
+            reference = references[number % len(references)]
+            wanted = Counter({role: min(left[role], most[role]) for role in left})
+            left -= wanted
+            execute(reference, Path(f"{reference.folder}-{number}"), wanted)
+            left += wanted
+            sys.stdout.write(
+                f"{reference.folder}-{number}: {tally.per_run[-1]} kills\n"
+            )
     return tally
 
 

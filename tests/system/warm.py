@@ -89,7 +89,7 @@ def _hurry() -> None:
 
     The server is a new interpreter: forks of it have no session of this process.
     """
-    supervisor.get_context = lambda _: (  # type: ignore[assignment]
+    supervisor.get_context = lambda _: (  # type: ignore[attr-defined,assignment]
         multiprocessing.get_context("forkserver")
     )
     main_loop._CHORES_S = 0.05
