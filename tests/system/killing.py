@@ -15,6 +15,9 @@ pool restarts. All kills are at sizes of the journal or times after the last kil
 coordinators find cut poses when they resume.
 """
 
+from tests.system import warm  # first: it prepares the process before NumPy's import
+
+# isort: split
 import json
 import os
 import signal
@@ -23,108 +26,36 @@ import tempfile
 import time
 from collections import Counter
 from contextlib import ExitStack, closing, suppress
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from tests.system import warm  # first: it prepares the process
 from tests.system.instants import JOURNAL, RECOVERY, Instants
+from tests.system.killed_runs import (
+    FLAGS,
+    Reference,
+    Tally,
+    check,
+    cut_poses,
+    log_of,
+    size,
+    undisturbed,
+    words_of,
+)
 
-from coordinator.storage.folder import DETAILS, STATE  # isort: skip
-from coordinator.storage.journal import NAME  # isort: skip
-from schema.tables.segments import segments_of  # isort: skip
-
-FLAGS = ["--in-process", "--threads", "1", "--quiet"]
 WHILE_RUNNING = 10
 """Kills of a run, at most, before those at its end."""
 AT_THE_END = 5
 PROCESSES = 3
 BY_TIME = "by CPU time"
 MOST_RESTORED = 16
+"""Most advances that a recovery repeats before it is killed, times four."""
+BY_JOURNAL = 0.7
+"""Share of the kills of a fleet that are at a size of the journal."""
+MEAN_GROWTH = 0.04
+"""Mean growth of the journal between these kills, as a share of a whole one."""
 LONGEST_WAIT_S = 0.3
-
-
-@dataclass
-class Reference:
-    """The undisturbed run of a document.
-
-    Attributes:
-        document: file.
-        folder: of the run.
-        cpu_s: CPU time of the run [s].
-        running: number of the instants of each kind up to the end of the journal.
-        ending: number of those behind it.
-    """
-
-    document: str
-    folder: Path
-    cpu_s: float = 0.0
-    running: Counter[str] = field(default_factory=Counter)
-    ending: Counter[str] = field(default_factory=Counter)
-
-    @property
-    def size(self) -> int:
-        """Size of the journal [bytes]."""
-        return size(self.folder)
-
-    @property
-    def has_poses(self) -> bool:
-        return any(kind.startswith("write poses") for kind in self.running)
-
-
-@dataclass
-class Tally:
-    """Results of the program."""
-
-    kills: Counter[str] = field(default_factory=Counter)
-    per_run: list[int] = field(default_factory=list)
-    differences: list[str] = field(default_factory=list)
-
-
-def size(folder: Path) -> int:
-    """Return the size of a run's journal [bytes]."""
-    journal = folder / NAME
-    return journal.stat().st_size if journal.exists() else 0
-
-
-def log_of(folder: Path) -> Path:
-    return folder.with_suffix(".log")
-
-
-def words_of(document: str, folder: Path) -> list[str]:
-    """Return the command that starts or resumes a run."""
-    if (folder / DETAILS).exists():
-        return ["resume", str(folder)]
-    return ["run", document, "--seed", "4", "--out", str(folder)]
-
-
-def undisturbed(document: str) -> Reference:
-    """Make the first run of a document, and count its instants."""
-    made = Reference(document, Path(Path(document).stem))
-    instants, listing = Instants("", 0, 0.0, []), Path(f"{made.folder}.json")
-    words = [*words_of(document, made.folder), *FLAGS]
-    spent_s = os.times().children_user + os.times().children_system
-    child = warm.start(
-        words, log_of(made.folder), instants.install, lambda: instants.save(listing)
-    )
-    code = warm.wait(child, log_of(made.folder))
-    assert code == 0, warm.tail(log_of(made.folder))
-    made.cpu_s = os.times().children_user + os.times().children_system - spent_s
-    kinds = json.loads(listing.read_text("utf-8"))
-    last = len(kinds) - kinds[::-1].index(JOURNAL)
-    made.running, made.ending = Counter(kinds[:last]), Counter(kinds[last:])
-    return made
-
-
-def check(reference: Reference, folder: Path, tally: Tally, kills: int) -> None:
-    """Compare a finished run with the first run of its document."""
-    assert (folder / STATE).read_text("utf-8") == "finished"
-    tally.per_run.append(kills)
-    words = ["compare", str(reference.folder), str(folder)]
-    child = warm.start(words, log_of(folder))
-    if warm.wait(child, log_of(folder)):
-        tally.differences.append(f"{folder}:\n{warm.tail(log_of(folder))}")
+"""Longest time from a kill to one of the others [s]."""
 
 
 class InstantKills:
@@ -197,13 +128,6 @@ def cpu_s(process: int) -> float:
     return time.clock_gettime((~process << 3) | 2)
 
 
-def cut_poses(folder: Path, share: float) -> None:
-    """Cut the newest segment of poses to a share of its length."""
-    for _, path in segments_of(folder, "poses")[-1:]:
-        if path.exists():
-            os.truncate(path, round(share * path.stat().st_size))
-
-
 class FleetKills:
     """Kills of coordinators and workers at a hub."""
 
@@ -211,12 +135,12 @@ class FleetKills:
         self._tally = tally
         self._rng = rng
         self._stack = ExitStack()
-        socket = Path(
-            self._stack.enter_context(tempfile.TemporaryDirectory(prefix="hub"))
-        )
-        self._address = f"unixsock-stream/{socket / 'hub'}"
+        # The path of a socket must be short.
+        short = tempfile.TemporaryDirectory(prefix="hub")
+        self._address = f"unixsock-stream/{self._stack.enter_context(short)}/hub"
         self._log = Path("fleet.log")
         self._start("hub", "--listen", self._address)
+        warm.wait_for("listening on ", self._log)
         flags = ("--connect", self._address, "--processes")
         self._start("analyzer", *flags, "1")
         self._workers = self._start("worker", *flags, str(PROCESSES))
@@ -282,13 +206,12 @@ class FleetKills:
         """Wait for the next kill; return the exit code if the run ends before it."""
         if not left.total():
             return warm.wait(child, log_of(folder))
-        now_s = time.monotonic()
-        due_s, enough = (
-            np.inf,
-            size(folder) + self._rng.exponential(0.04) * reference.size,
-        )
-        if self._rng.random() < 0.3:
-            due_s, enough = now_s + self._rng.uniform(0.0, LONGEST_WAIT_S), np.inf
+        rng, now_s = self._rng, time.monotonic()
+        due_s = enough = np.inf
+        if rng.random() < BY_JOURNAL:
+            enough = size(folder) + rng.exponential(MEAN_GROWTH) * reference.size
+        else:
+            due_s = now_s + rng.uniform(0.0, LONGEST_WAIT_S)
         while time.monotonic() < due_s and size(folder) < enough:
             code = warm.ended(child)
             if code is not None:

@@ -116,6 +116,19 @@ def wait(process: int, log: Path) -> int:
     return code
 
 
+def wait_for(text: str, log: Path) -> None:
+    """Wait until a log contains a text.
+
+    Raises:
+        TimeoutError: it does not come.
+    """
+    deadline = time.monotonic() + PATIENCE_S
+    while not (log.exists() and text in log.read_text("utf-8", errors="replace")):
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"never came: {text}\n{tail(log)}")
+        time.sleep(0.001)  # polling interval
+
+
 def kill(process: int) -> int:
     """Kill a command; return its exit code, which differs if it had just ended."""
     with suppress(ProcessLookupError):
