@@ -25,7 +25,10 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, closing, suppress
+from itertools import islice
+from math import isqrt
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +51,7 @@ WHILE_RUNNING = 10
 AT_THE_END = 5
 PROCESSES = 3
 BY_TIME = "by CPU time"
-MOST_RESTORED = 16
+MOST_RESTORED = 24
 """Most advances that a recovery repeats before it is killed, times four."""
 BY_JOURNAL = 0.7
 """Share of the kills of a fleet that are at a size of the journal."""
@@ -64,11 +67,12 @@ class InstantKills:
     def __init__(self, tally: Tally, rng: np.random.Generator) -> None:
         self._tally = tally
         self._rng = rng
+        self._decks: dict[tuple[str, ...], list[str]] = {}
 
     def run(self, reference: Reference, folder: Path, left: Counter[str]) -> None:
         """Execute a run with kills, and compare it; see ``FleetKills.run``."""
         kills = 0
-        for kind, number in self._plan(reference)[: left["coordinator"]]:
+        for kind, number in islice(self._plan(reference), left["coordinator"]):
             if self._attempt(reference, folder, kind, number) is not None:
                 break
             kills += 1
@@ -79,25 +83,30 @@ class InstantKills:
             assert code == 0
         check(reference, folder, self._tally, kills)
 
-    def _plan(self, reference: Reference) -> list[tuple[str, int]]:
+    def _plan(self, reference: Reference) -> Iterator[tuple[str, int]]:
         """Draw the kind of each kill, and the number of the instant."""
-        rng = self._rng
-        weights = {kind: np.sqrt(n) for kind, n in reference.running.items()}
-        weights[BY_TIME] = weights[JOURNAL]
+        running = dict(reference.running)
+        running[BY_TIME] = running[JOURNAL]
         if reference.has_poses:
-            weights[RECOVERY] = weights[JOURNAL]
-        running, ending = sorted(weights), sorted(reference.ending)
-        shares = np.array([weights[kind] for kind in running])
-        shares /= shares.sum()
-        drawn = []
+            running[RECOVERY] = MOST_RESTORED
         for _ in range(WHILE_RUNNING):
-            kind = running[rng.choice(len(running), p=shares)]
-            count = reference.running[kind] or MOST_RESTORED
-            drawn.append((kind, 1 + int(rng.integers(-(-count // 4)))))
+            kind = self._deal(running)
+            # A quarter of a run: the next kill of this kind hits it, too.
+            yield kind, 1 + int(self._rng.integers(-(-running[kind] // 4)))
         for _ in range(AT_THE_END):
-            kind = ending[rng.integers(len(ending))]
-            drawn.append((kind, 1 + int(rng.integers(reference.ending[kind]))))
-        return drawn
+            kind = self._deal(dict.fromkeys(reference.ending, 1))
+            yield kind, 1 + int(self._rng.integers(reference.ending[kind]))
+
+    def _deal(self, counts: Mapping[str, int]) -> str:
+        """Return a kind from a deck in which frequent kinds occur more than once.
+
+        So all kinds come up, which independent draws do not guarantee.
+        """
+        deck = self._decks.setdefault(tuple(counts), [])
+        if not deck:
+            deck += [kind for kind, n in counts.items() for _ in range(isqrt(n))]
+            self._rng.shuffle(deck)
+        return deck.pop()
 
     def _attempt(
         self, reference: Reference, folder: Path, kind: str, number: int
