@@ -2,7 +2,6 @@
 
 import io
 import os
-import signal
 import sys
 from collections.abc import Iterable
 from importlib import import_module
@@ -14,6 +13,7 @@ COMMANDS = {
     "coordinator": (_COORDINATOR, "run experiments for remote workers"),
     "hub": ("coordinator.cli.hub", "connect coordinators, workers and viewers"),
     "cluster": ("coordinator.cluster.command", "make certificates for a lab"),
+    "doctor": ("coordinator.doctor.command", "check this machine and its fleet"),
     "status": ("coordinator.cli.status", "show the progress of runs"),
     "log": ("coordinator.cli.log", "print the journal of a run"),
     "arena": ("coordinator.cli.arena", "inspect and control a running arena"),
@@ -45,20 +45,23 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         The command's exit code; 1 if the reader closed standard output, 2 for a
         user's error or output that cannot be written (one line on stderr), 130 after
-        Ctrl-C.
+        Ctrl-C, SIGTERM, SIGHUP or SIGUSR1.
     """
     if sys.stdout is None:
         # The next file to be opened would get its descriptor, and all output.
         print("revolve: standard output is closed", file=sys.stderr)
         return 2
     _ensure_buffer()
+    stopping = None
     if arguments is None:
         _separate_engine_log()
+        stopping = import_module("schema.agent.stopping")
+        stopping.prepare_stop(sys.argv[1:])
     try:
         try:
             return _run(sys.argv[1:] if arguments is None else arguments)
         finally:
-            sys.stdout.flush()
+            _flush()
     except OSError:
         output_error = _output_error()
         if output_error is None:
@@ -75,9 +78,9 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         return 130
     finally:
-        if arguments is None:
+        if stopping is not None:
             # The process ends now: another Ctrl-C must not print a traceback.
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            stopping.finish_stop()
 
 
 def _run(words: list[str]) -> int:
@@ -102,7 +105,7 @@ def _run(words: list[str]) -> int:
         room = import_module(COMMANDS[words[0]][0])
         return int(room.main(words))
     except error_type as error:
-        print(f"revolve: {error}", file=sys.stderr)
+        import_module("schema.agent.log").tell_error(f"revolve: {error}")
         return 2
     finally:
         if words[1:] in (["-h"], ["--help"]):
@@ -142,26 +145,60 @@ def _separate_engine_log() -> None:
     except OSError:
         return  # replaced by an object without a descriptor
     sys.stdout.flush()
-    own = os.dup(standard_output)
-    sys.stdout = open(  # noqa: PTH123, SIM115 - open until the process ends
-        own,
-        "w",
-        buffering=1 if sys.stdout.line_buffering else -1,
+    own = _Output(os.dup(standard_output), "w")
+    sys.stdout = io.TextIOWrapper(
+        io.BufferedWriter(own),
         encoding=sys.stdout.encoding,
         errors=sys.stdout.errors,
+        line_buffering=bool(sys.stdout.line_buffering),
     )
     os.dup2(standard_error, standard_output)
 
 
+class _Output(io.FileIO):
+    """Standard output that remembers why it could not be written.
+
+    A failed write of more than the buffer holds is not repeated at the next flush.
+    """
+
+    error: OSError | None = None
+
+    def write(self, data: bytes, /) -> int:  # type: ignore[override]
+        """Write bytes, and remember the error if that fails."""
+        try:
+            return super().write(data)
+        except OSError as error:
+            self.error = error
+            raise
+
+
+def _flush() -> None:
+    """Flush standard output.
+
+    Raises:
+        OSError: that fails, or an earlier write did: argparse ignores such errors.
+    """
+    sys.stdout.flush()
+    if (error := _first_write_error()) is not None:
+        raise error
+
+
+def _first_write_error() -> OSError | None:
+    raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
+    return raw.error if isinstance(raw, _Output) else None
+
+
 def _output_error() -> OSError | None:
     """Return why standard output cannot be written, or None if it can."""
+    error = _first_write_error()
     try:
         sys.stdout.flush()
-    except OSError as error:
+    except OSError as newest:
+        error = newest
+    if error is not None:
         # The interpreter flushes once more at exit, and must not fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return error
-    return None
+    return error
 
 
 def _also(command: str) -> str:

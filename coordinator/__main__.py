@@ -19,11 +19,14 @@ from coordinator.storage.campaign import (
 )
 from coordinator.storage.compare import compare
 from coordinator.storage.folder import holds_run, read_details
+from coordinator.storage.hints import command as command_line
 from coordinator.storage.hints import stopped
 from schema.agent.address import HUB, listen_address
 from schema.agent.capacity import memory_bytes, shards_that_fit
-from schema.agent.command import access_of, connect_of, tls_of
-from schema.agent.service import tell_user
+from schema.agent.command import access_of, check_load, connect_of, tls_of
+from schema.agent.log import start_log, tell_user
+from schema.agent.service import HubLost
+from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
 from schema.errors import NetworkError
 from schema.experiment.check import check_experiment
@@ -37,6 +40,7 @@ from schema.experiment.document import (
 from schema.experiment.file import experiment_from_text
 from schema.experiment.plugin_access import allow, allow_references
 from schema.experiment.settings import fitness_function
+from schema.limits import MOST_REPEATS
 
 
 def main(arguments: list[str]) -> int:
@@ -47,15 +51,19 @@ def main(arguments: list[str]) -> int:
 
     Returns:
         0 for success; 1 if ``compare`` found a difference, a run of a campaign
-        failed, or all evaluations failed; 130 after Ctrl-C.
+        failed, or all evaluations failed; 130 after Ctrl-C, SIGTERM, SIGHUP or SIGUSR1.
     """
     command, words = arguments[0], arguments[1:]
-    options = parser(command).parse_args(words)
+    flags = parser(command)
+    options = flags.parse_args(words)
     if command == "compare":
         return _compare(options)
     if command == "bench dispatch":
         return _bench(options)
+    start_log("coordinator", as_json=options.log_json)
     allow(options.plugins)
+    if not options.in_process and options.command != "coordinator":
+        check_load(flags, "--workers", options.workers or 0, options)
     if command == "resume":
         folder = Path(options.folder)
         deployment = _deployment(options, _experiments_of(folder))
@@ -73,7 +81,10 @@ def main(arguments: list[str]) -> int:
         return _stoppable(
             folder, lambda: start(folder, experiments[0], options.seed, deployment)
         )
-    campaign = Campaign(experiments, options.repeats or 1, options.seed)
+    repeats = options.repeats or 1
+    if repeats > MOST_REPEATS:
+        flags.error(f"--repeats: must be <= {MOST_REPEATS}, got {repeats}")
+    campaign = Campaign(experiments, repeats, options.seed)
     return _stoppable(folder, lambda: start_campaign(folder, campaign, deployment))
 
 
@@ -81,10 +92,14 @@ def _stoppable(folder: Path, execute: Callable[[], int]) -> int:
     """Execute a folder's runs; after Ctrl-C say how to resume them."""
     try:
         return execute()
+    except HubLost as error:
+        tell_user(f"{error}; to resume: {command_line('resume', folder)}")
+        return 1
     except KeyboardInterrupt:
         if is_campaign(folder) or holds_run(folder):
-            tell_user(stopped(folder))
-        raise
+            advise(stopped(folder))
+        tell_stopped()
+        return STOPPED
 
 
 def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
@@ -159,8 +174,10 @@ def _deployment(
         view=options.view,
         cpu_limit_s=options.cpu_limit,
         wait_limit_s=options.wait_limit,
+        give_up_after_s=options.give_up_after,
         checks=Checks(options.audit, options.on_quarantine == "pause"),
         allows_drift=options.allow_drift,
+        metrics=options.metrics,
     )
 
 

@@ -9,6 +9,9 @@ import math
 from collections.abc import Callable
 from typing import NoReturn
 
+# Those of 2^64; the interpreter reads no number of more than 4300.
+_MOST_DIGITS = 20
+
 
 class Flags(argparse.ArgumentParser):
     """Parser that reports an error in one line (argparse intends this override)."""
@@ -26,9 +29,10 @@ def whole_number(least: int = 1) -> Callable[[str], int]:
     """
 
     def read(text: str) -> int:
-        if not (text.isascii() and text.isdigit() and int(text) >= least):
+        is_number = text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS
+        if not (is_number and int(text) >= least):
             raise argparse.ArgumentTypeError(
-                f"must be a whole number >= {least}, got {text!r}"
+                f"must be a whole number >= {least}, got {text[:80]!r}"
             )
         return int(text)
 

@@ -100,6 +100,17 @@ MOST_CORES = 4096
 LONGEST_QUIET_S = 5.0
 """A job that used CPU time within this time makes progress [s]."""
 
+# Small files of a run folder
+
+MOST_DESCRIPTION = 1 << 24
+"""Bytes of ``run.json`` or ``campaign.toml``, which hold experiments with scenery."""
+MOST_MARK = 1000
+"""Bytes of the files ``state`` and ``epoch``."""
+MOST_NAME = 1000
+"""Characters of the name of an experiment in ``run.json``."""
+MOST_REPEATS = 100_000
+"""Repeats of a campaign."""
+
 # Documents: robot files, experiments, sceneries; measured before they are parsed
 
 MOST_TEXT_BYTES = 1_000_000
@@ -147,6 +158,11 @@ GREATEST_MASS = 1e9
 """Mass of a robot [kg]."""
 LONGEST_WALL_S = 1e9
 """Duration of a job by the clock [s]."""
+
+
+def printable_line(text: str) -> str:
+    """Return a text as one line of its length: control characters become spaces."""
+    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def printable_lines(text: str) -> str:

@@ -1,8 +1,11 @@
 """Settings of all tests, made before other modules are imported."""
 
+import logging
 import os
+from collections.abc import Iterator
 from contextlib import suppress
 
+import pytest
 from hypothesis import settings
 
 from analysis.render.picture import NoPictures, choose_engine
@@ -22,3 +25,11 @@ if _SETTING is None:
 # when they are decorated.
 settings.register_profile("fixed", derandomize=True, database=None, deadline=None)
 settings.load_profile("fixed")
+
+
+@pytest.fixture(autouse=True)
+def _plain_log(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Let no test change the form of the lines that others compare."""
+    monkeypatch.setenv("REVOLVE_LOG", "")
+    yield
+    logging.getLogger("revolve").handlers.clear()

@@ -12,18 +12,19 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
+from msgspec import structs
 from pyarrow.parquet import read_schema
 
 from schema.errors import RunFolderError
 from schema.tables.columns import TABLES, VERSION
-from schema.tables.files import finished_path, has_rows, read_table
-from schema.tables.segments import FINISHED
+from schema.tables.description import DETAILS, STATE, read_description, read_state
+from schema.tables.files import finished_path, has_rows, is_sealed, read_table
+from schema.tables.segments import FINISHED, warn_once
 
 TABLE = "table "
 """Prefix of the name of a table that was left out."""
 
-_DETAILS = "run.json"
-_STATE = "state"
+_MOST_ISLANDS = 10_000
 _NEEDED = (
     "births", "evaluations", "population", "fitness", "deaths", "touches", "migrations"
 )  # fmt: skip
@@ -91,7 +92,7 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
     for root in roots:
         if not root.is_dir():
             raise RunFolderError(f"{root}: no such folder")
-        folders |= {path.parent for path in root.glob(f"**/{_DETAILS}")}
+        folders |= {path.parent for path in root.glob(f"**/{DETAILS}")}
         finished = root.glob(f"**/{FINISHED}/experiment=*/run=*")
         folders |= {path.parents[2] for path in finished}
     if not folders:
@@ -103,7 +104,9 @@ def read_runs(roots: Iterable[Path]) -> tuple[list[Run], list[LeftOut]]:
         try:
             runs.append(read_run(folder))
         except RunFolderError as error:
-            left_out.append(LeftOut(str(folder), "run", str(error)))
+            left_out.append(
+                LeftOut(str(folder), "run", str(error).removeprefix(f"{folder}/"))
+            )
     if not runs:
         first = left_out[0]
         raise RunFolderError(f"no run can be read: {first.folder}: {first.why}")
@@ -150,9 +153,11 @@ def read_run(folder: Path) -> Run:
         document = json.loads(details["document"])
         islands = tuple(_settings(document))
         name, number, seed = details["name"], details["run"], details["seed"]
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (
+        ValueError, KeyError, TypeError, AttributeError, RecursionError
+    ) as error:  # fmt: skip
         cause = f"{type(error).__name__}: {error}"
-        raise RunFolderError(f"{_DETAILS}: cannot be read: {cause}") from None
+        raise RunFolderError(f"{DETAILS}: cannot be read: {cause}") from None
     run = Run(
         folder=folder,
         experiment=str(name),
@@ -170,25 +175,32 @@ def read_run(folder: Path) -> Run:
 def _details(folder: Path) -> dict[str, Any]:
     """Return the description of a run: from ``run.json``, or else from its tables."""
     try:
-        entries = json.loads((folder / _DETAILS).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        return structs.asdict(read_description(folder))
+    except RunFolderError as error:
         try:
             rows = read_table(folder, "runs").to_pylist()
         except RunFolderError:
             rows = []
         if not rows:
-            raise RunFolderError(f"{_DETAILS}: cannot be read: {error}") from None
+            raise
+        warn_once(f"{error}; using its row in the table runs")
         return dict(rows[0])
-    if not isinstance(entries, dict):
-        raise RunFolderError(f"{_DETAILS}: must be an object")
-    return entries
 
 
 def _state(folder: Path, details: dict[str, Any]) -> str:
-    try:
-        return (folder / _STATE).read_text(encoding="utf-8").strip()
-    except (OSError, ValueError):
+    """Return a run's state; that of a run without the file is in its table."""
+    if not (folder / STATE).exists():
         return str(details.get("state", "running"))
+    try:
+        state = read_state(folder)
+        is_true = state != "finished" or is_sealed(folder)
+    except RunFolderError as error:
+        warn_once(f"{error}; the run counts as unfinished")
+        return "stopped"
+    if not is_true:
+        warn_once(f"{folder / STATE}: damaged: is {state!r}, but the tables are not")
+        return "stopped"
+    return state
 
 
 def _settings(document: dict[str, Any]) -> Iterable[IslandSettings]:
@@ -197,7 +209,10 @@ def _settings(document: dict[str, Any]) -> Iterable[IslandSettings]:
         arena = entry.get("arena") or document.get("arena")
         births = int(entry.get("births") or document["births"])
         touches = bool(arena and arena.get("record_touches"))
-        for _ in range(int(entry.get("count", 1))):
+        count = int(entry.get("count", 1))
+        if not 0 < count <= _MOST_ISLANDS:
+            raise ValueError(f"islands: count must be from 1 to {_MOST_ISLANDS}")
+        for _ in range(count):
             yield IslandSettings(births, arena is not None, touches)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import repeat
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -51,8 +51,14 @@ def measure_runs(
         yield from map(measure_run, runs, repeat(slots))
         return
     with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
-        # Cancels the other runs if one cannot be measured.
-        yield from pool.map(measure_run, runs, repeat(slots))
+        try:
+            yield from pool.map(measure_run, runs, repeat(slots))
+        except BaseException:
+            # Not to wait for the runs that are being measured.
+            for child in active_children():
+                child.terminate()
+            pool.shutdown(cancel_futures=True)
+            raise
 
 
 def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:

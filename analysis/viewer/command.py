@@ -30,7 +30,7 @@ from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
 from analysis.viewer.watch import watch
 from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
-from schema.agent.service import tell_user
+from schema.agent.log import tell_user
 from schema.agent.supervisor import stop_on_signals
 from schema.experiment.file import own_experiment
 from schema.experiment.plugin_access import allow

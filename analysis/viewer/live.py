@@ -12,8 +12,9 @@ from typing import Self
 
 import zenoh
 
+from schema.agent.log import tell_user
 from schema.agent.network import ASK_TIMEOUT_S, Tls, client_config
-from schema.agent.service import log_engine, tell_user
+from schema.agent.service import log_engine
 from schema.agent.topics import (
     Member,
     agents_alive,

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from analysis.viewer.recording import Recording, ViewerError
-from schema.agent.service import tell_user
+from schema.agent.log import tell_user
 
 HOST, PORT = "127.0.0.1", 9876
 _ENDING = ".rrd"

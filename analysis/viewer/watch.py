@@ -13,7 +13,7 @@ from analysis.viewer.output import Output, Window, keep_serving
 from analysis.viewer.recording import Recording
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
-from schema.agent.service import tell_user
+from schema.agent.log import tell_user
 from schema.errors import MalformedMessage, NetworkError
 from schema.experiment.file import experiment_from_text
 from schema.limits import LIVE_BYTES, MOST_LIVE_ROWS

@@ -1,6 +1,7 @@
 """Deployment of a run: its network, its own processes, its viewer."""
 
 import contextlib
+import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -14,9 +15,9 @@ from coordinator.run.live_server import open_viewer
 from coordinator.storage.disk import replace_text
 from schema.agent.access import Certificate
 from schema.agent.address import ADDRESS
+from schema.agent.log import tell_user
 from schema.agent.network import Agent, Tls
 from schema.agent.platform_tag import platform_tag
-from schema.agent.service import tell_user
 from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, ProcessSlot
 from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name
@@ -44,7 +45,9 @@ class Deployment:
         cpu_limit_s: CPU time of a job after which its process here is ended [s].
         wait_limit_s: time that a job here may wait without using CPU time [s].
         checks: cross-checks of workers, and the reaction to quarantined robots.
+        give_up_after_s: time without the hub at ``connect`` after which to stop [s].
         allows_drift: an arena may continue on another platform if its own is gone.
+        metrics: address at which to serve metrics; None: nowhere.
     """
 
     workers: int
@@ -64,6 +67,8 @@ class Deployment:
     checks: Checks = NO_CHECKS
     certificates: tuple[Certificate, ...] | None = None
     allows_drift: bool = False
+    give_up_after_s: float = math.inf
+    metrics: str | None = None
 
 
 @contextmanager
@@ -91,6 +96,7 @@ def connected_agents(
                 connect=deployment.connect or "",
                 tls=deployment.tls,
                 certificates=deployment.certificates,
+                give_up_after_s=deployment.give_up_after_s,
             )
         )
         file = folder / ADDRESS
@@ -101,7 +107,7 @@ def connected_agents(
         if deployment.view:
             open_viewer(network.own_address, deployment.fleet, deployment.tls)
         sizes: dict[AgentKind, int] = {"analyzer": 1, "worker": deployment.workers}
-        pools = []
+        pools: list[ProcessPool] = []
         for kind, size in sizes.items() if deployment.workers else ():
             agent = Agent(
                 kind, f"own-{kind}", network.own_address, deployment.fleet,
@@ -114,7 +120,14 @@ def connected_agents(
             pools.append(stack.enter_context(pool))
         if deployment.listen is not None:
             tell_user(f"listening on {network.address}")
+        # All at once before one is waited for: their grace times run together.
+        stack.callback(_terminate, pools)
         yield network, pools
+
+
+def _terminate(pools: list[ProcessPool]) -> None:
+    for pool in pools:
+        pool.terminate()
 
 
 def _own_name(deployment: Deployment) -> str:

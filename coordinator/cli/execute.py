@@ -23,7 +23,6 @@ from coordinator.storage.folder import (
     RunFolder,
     holds_run,
     read_details,
-    read_state,
 )
 from coordinator.storage.folder_status import (
     check_rewritable,
@@ -33,10 +32,13 @@ from coordinator.storage.folder_status import (
 )
 from coordinator.storage.hints import command, stopped
 from coordinator.storage.lock import FolderLock
-from schema.agent.service import tell_user
-from schema.errors import NetworkError, RevolveError
+from schema.agent.log import tell_error, tell_user, warn_user
+from schema.agent.stopping import STOPPED, advise, tell_stopped
+from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text, experiment_text
+from schema.tables.description import STATE, read_state
+from schema.tables.files import is_sealed
 from schema.wire.status import RunStatus
 
 
@@ -89,7 +91,7 @@ def resume(folder: Path, deployment: Deployment) -> int:
         with FolderLock(folder):
             planned, failed = _plan(folder, read_campaign(folder))
             return _execute_campaign(folder, planned, failed, deployment)
-    if read_state(folder) == "finished" and not _is_to_be_rewritten(folder):
+    if not _is_to_be_rewritten(folder) and read_state(folder) == "finished":
         tell_user(f"{folder}: already finished")
         return 0 if has_evaluated(folder) else 1
     return _execute_run(folder, RunFolder(folder), deployment)
@@ -98,6 +100,7 @@ def resume(folder: Path, deployment: Deployment) -> int:
 def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:
     """Execute the run of a locked folder, print its summary, return the exit code."""
     conclusions: list[Conclusion] = []
+    advise(stopped(folder))
     with held:
         status = unbegun_status(folder, held.details)
         try:
@@ -114,8 +117,8 @@ def _execute_run(folder: Path, held: RunFolder, deployment: Deployment) -> int:
     for _, error in scheduler.failed:
         raise error
     if not scheduler.is_finished:
-        tell_user(stopped(folder))
-        return 130
+        tell_stopped()
+        return STOPPED
     print(conclusions[0].text)
     return 0 if conclusions[0].has_evaluated else 1
 
@@ -161,16 +164,26 @@ def _plan(folder: Path, campaign: Campaign) -> tuple[list[Planned], list[Path]]:
 
 
 def _is_to_be_rewritten(folder: Path) -> bool:
-    """Return whether a run is finished, but a table is damaged; tell the user so.
+    """Return whether a run's state or finished tables are damaged; tell the user so.
 
     Raises:
         RunFolderError: such a table cannot be written again.
     """
-    if read_state(folder) != "finished":
-        return False
+    try:
+        if read_state(folder) != "finished":
+            return False
+    except RunFolderError as error:
+        tell_user(f"{error}; continuing where the journal ends")
+        return True
+    if not is_sealed(folder):
+        tell_user(
+            f"{folder / STATE}: damaged: is 'finished', but the run has no finished "
+            "tables; continuing where the journal ends"
+        )
+        return True
     damages = table_damages(folder)
     for damage in damages:
-        tell_user(damage)
+        warn_user(damage)
     if damages:
         check_rewritable(folder)
         tell_user(f"{folder}: writing such tables again from the journal")
@@ -192,6 +205,7 @@ def _execute_campaign(
         failed: folders of finished runs in which all evaluations failed.
         deployment: processes and network.
     """
+    advise(stopped(folder))
     finished = sum(one.is_finished for one in planned)
     if finished:
         tell_user(f"{finished} of {len(planned)} runs are already finished")
@@ -199,14 +213,14 @@ def _execute_campaign(
     def conclude_run(run: RunSession) -> None:
         conclusion = conclude(run)
         if conclusion.failures:
-            tell_user(f"{run.held.path}: {conclusion.failures}")
+            warn_user(f"{run.held.path}: {conclusion.failures}")
         if not conclusion.has_evaluated:
             failed.append(run.held.path)
 
     scheduler = execute_runs(folder, planned, deployment, conclude_run, _report)
     if not scheduler.is_finished:
-        tell_user(stopped(folder))
-        return 130
+        tell_stopped()
+        return STOPPED
     if scheduler.failed:
         tell_user(
             f"{len(scheduler.failed)} of {len(planned)} runs failed; after fixing the "
@@ -220,4 +234,4 @@ def _execute_campaign(
 
 
 def _report(status: RunStatus, error: RevolveError) -> None:
-    tell_user(f"{status.name}-{status.run} failed: {error}")
+    tell_error(f"{status.name}-{status.run} failed: {error}")

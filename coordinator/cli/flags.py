@@ -4,7 +4,14 @@ import argparse
 
 from coordinator.storage.campaign import shipped_campaigns
 from schema.agent.address import FORMS
-from schema.agent.command import add_access, add_job_limits, add_network_flags
+from schema.agent.command import (
+    add_access,
+    add_give_up,
+    add_job_limits,
+    add_log,
+    add_network_flags,
+    add_oversubscribe,
+)
 from schema.experiment.file import shipped_experiments
 from schema.flags import (
     Flags,
@@ -111,6 +118,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
             "--connect)",
             least=0,
         )
+        add_oversubscribe(flags)
         add_count(
             flags,
             "--threads",
@@ -148,6 +156,7 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     )
     add_job_limits(flags)
     add_plugins(flags)
+    add_give_up(flags)
     flags.add_argument(
         "--audit",
         type=share,
@@ -170,6 +179,13 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         "one of its own; this is recorded and changes the results",
     )
     flags.add_argument("--quiet", action="store_true", help="show no progress")
+    add_log(flags)
+    flags.add_argument(
+        "--metrics",
+        metavar="ADDRESS",
+        help="serve metrics for Prometheus at PORT of this machine, or at HOST:PORT, "
+        "where every host that reaches it can read them (default: no metrics)",
+    )
     flags.add_argument(
         "--fsync", action="store_true", help="survive power loss, too; slower"
     )

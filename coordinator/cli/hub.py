@@ -5,9 +5,15 @@ Coordinators connect to it like workers, and may come and go.
 
 from coordinator.network.hub_service import serve_hub
 from schema.agent.address import FORMS, HUB, listen_address, parse_address
-from schema.agent.command import access_of, add_access, add_network_flags, tls_of
+from schema.agent.command import (
+    access_of,
+    add_access,
+    add_log,
+    add_network_flags,
+    tls_of,
+)
+from schema.agent.log import start_log, warn_user
 from schema.agent.network import hub_config
-from schema.agent.service import tell_user
 from schema.agent.supervisor import stop_on_signals
 from schema.flags import Flags
 
@@ -22,6 +28,7 @@ def main(arguments: list[str]) -> int:
         NetworkError: an address that cannot be listened on, or invalid certificates.
     """
     options = _flags().parse_args(arguments[1:])
+    start_log("hub", as_json=options.log_json)
     tls, certificates = tls_of(options), access_of(options)
     addresses = tuple(map(listen_address, options.listen or [HUB]))
     config = hub_config(addresses, tls, certificates)
@@ -30,7 +37,7 @@ def main(arguments: list[str]) -> int:
         return 0
     has_tls = any(parse_address(each).protocol == "tls" for each in addresses)
     if has_tls and certificates is None:
-        tell_user("without --access any certificate of the authority may do anything")
+        warn_user("without --access any certificate of the authority may do anything")
     serve_hub(config, addresses, stop_on_signals())
     return 0
 
@@ -50,6 +57,7 @@ def _flags() -> Flags:
     )
     add_access(flags)
     add_network_flags(flags)
+    add_log(flags)
     flags.add_argument(
         "--print-config",
         action="store_true",

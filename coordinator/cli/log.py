@@ -10,7 +10,7 @@ from pathlib import Path
 from coordinator.cli.log_lines import HEADER, Selection, describe, line
 from coordinator.islands.events import JournalledEvent
 from coordinator.storage.campaign import is_campaign
-from coordinator.storage.folder import holds_run, read_state
+from coordinator.storage.folder import holds_run
 from coordinator.storage.journal import (
     MAGIC,
     NAME,
@@ -22,6 +22,7 @@ from coordinator.storage.journal import (
 )
 from schema.errors import RunFolderError
 from schema.flags import Flags, add_count, whole_number
+from schema.tables.description import read_state
 
 POLL_S = 0.5
 """Time between two looks at a journal that is followed [s]."""

@@ -17,10 +17,10 @@ from coordinator.run.live_server import LiveServer
 from coordinator.run.operators import answer_operator
 from coordinator.run.scheduler import Planned, RunScheduler
 from coordinator.run.session import RunSession
-from schema.agent.service import tell_user
+from schema.agent.log import tell_user, warn_user
 from schema.agent.supervisor import stop_on_signals
 from schema.errors import RevolveError
-from schema.wire.status import RunStatus
+from schema.wire.status import RunStatus, Status
 
 _LOG = logging.getLogger(__name__)
 _TURN_S = 0.2
@@ -51,6 +51,7 @@ def execute_runs(
     """
     stop = stop_on_signals()
     with ExitStack() as stack:
+        publish = _open_metrics(deployment.metrics, stack)
         agents, pools = stack.enter_context(connected_agents(folder, deployment))
         network = agents if isinstance(agents, Network) else None
         scheduler = RunScheduler(
@@ -84,6 +85,9 @@ def execute_runs(
                     shown_s = now_s
                     if server is not None:
                         server.serve(now_s)
+                    if publish is not None:
+                        refused = 0 if network is None else len(network.refused)
+                        publish(scheduler.status(now_s), refused)
                     display.update(now_s)
                 if now_s - done_s >= _CHORES_S:
                     done_s = now_s
@@ -100,10 +104,27 @@ def execute_runs(
     return scheduler
 
 
+def _open_metrics(
+    address: str | None, stack: ExitStack
+) -> Callable[[Status, int], None] | None:
+    """Serve metrics until the stack is closed; return what publishes a snapshot.
+
+    Raises:
+        NetworkError: an address that cannot be listened on, or a missing package.
+    """
+    if address is None:
+        return None
+    from coordinator.cli.metrics import MetricsServer
+
+    metrics = stack.enter_context(MetricsServer(address))
+    tell_user(f"metrics at {metrics.url}")
+    return metrics.publish
+
+
 def _tell_faults(scheduler: RunScheduler) -> None:
     """Tell the user what peers have begun to send that is not used."""
     for line in scheduler.fleet.faults.lines():
-        tell_user(line)
+        warn_user(line)
 
 
 class _Server:

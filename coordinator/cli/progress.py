@@ -15,6 +15,7 @@ from rich.progress import (
 from coordinator.cli.format import about_arenas, best_of, duration, run_details
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import SPAN_S
+from schema.agent.log import log_form, tell_user, warn_user
 from schema.wire.status import IslandStatus, RunStatus, Status
 
 MOST_BARS = 16
@@ -29,13 +30,15 @@ class Display:
         self._scheduler = scheduler
         self._console = Console(stderr=True)
         self._quiet = quiet
+        # Bars would break lines of JSON.
+        self._has_bars = self._console.is_terminal and log_form() != "json"
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
             MofNCompleteColumn(),
             TextColumn("births {task.fields[about]}"),
             console=self._console,
-            disable=quiet or not self._console.is_terminal,
+            disable=quiet or not self._has_bars,
         )
         self._tasks: dict[str, TaskID] = {}
         self._next_line_s = -math.inf
@@ -60,11 +63,11 @@ class Display:
         if self._quiet:
             return
         status = self._scheduler.status(now_s)
-        if self._console.is_terminal:
+        if self._has_bars:
             self._draw(status)
         elif now_s >= self._next_line_s:
             self._next_line_s = now_s + SPAN_S
-            self._print(", ".join([_line(status), *self._recoveries()]))
+            tell_user(", ".join([_line(status), *self._recoveries()]))
         self._warn_of_missing(status, now_s)
 
     def _recoveries(self) -> list[str]:
@@ -116,7 +119,7 @@ class Display:
             self._missing_since_s = now_s
         elif now_s - self._missing_since_s > SPAN_S:
             self._missing_since_s = now_s + 6 * SPAN_S
-            self._print(f"waiting: no {' and no '.join(missing)} has joined")
+            self._warn(f"waiting: no {' and no '.join(missing)} has joined")
         waiting = {
             f"arena {shard} of {run.held.path.name}": platform
             for run in self._scheduler.active
@@ -125,13 +128,16 @@ class Display:
         if "worker" not in missing and waiting != self._shown_waiting:
             self._shown_waiting = waiting
             for arena, platform in waiting.items():
-                self._print(
+                self._warn(
                     f"waiting: {arena} needs a worker of platform {platform}; on "
                     "another platform its results differ (--allow-drift)"
                 )
 
-    def _print(self, line: str) -> None:
-        self._console.print(line, soft_wrap=True)
+    def _warn(self, line: str) -> None:
+        if self._has_bars:
+            self._console.print(line, soft_wrap=True)
+        else:
+            warn_user(line)
 
 
 def _line(status: Status) -> str:

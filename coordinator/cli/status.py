@@ -8,18 +8,20 @@ from rich.console import Console
 from rich.table import Table
 
 from coordinator.cli.format import duration, fault_lines, run_details
+from coordinator.cli.status_json import Source, status_json
 from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, read_campaign
-from coordinator.storage.folder import DETAILS, EPOCH, RunDetails, holds_run
+from coordinator.storage.folder import EPOCH, RunDetails, holds_run
 from coordinator.storage.folder_status import folder_status, unbegun_status
 from coordinator.storage.journal import NAME as JOURNAL
-from coordinator.storage.lock import LOCK
+from coordinator.storage.lock import LOCK, read_holder
 from schema.agent.address import read_address
 from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
-from schema.agent.service import tell_user
+from schema.agent.log import tell_user
 from schema.errors import NetworkError, RevolveError, RunFolderError
 from schema.flags import Flags
 from schema.limits import printable
+from schema.tables.description import DETAILS
 from schema.tables.segments import FINISHED, SEGMENTS
 from schema.wire.operator import (
     GetStatus,
@@ -52,13 +54,21 @@ def main(arguments: list[str]) -> int:
     if options.folder is not None and options.connect is not None:
         flags.error("give either a folder or --connect")
     if options.folder is None:
-        for name, status in ask_status(options).items():
-            _show(status, name)
-        return 0
-    folder = Path(options.folder)
-    status = _live(folder, options) or _by_folder(folder)
-    _show(status, str(folder), folder)
-    return 1 if any(run.state in ("damaged", "failed") for run in status.runs) else 0
+        found = ask_status(options)
+        sources = [Source(status, name) for name, status in found.items()]
+        code = 0
+    else:
+        folder = Path(options.folder)
+        name, status = _live(folder, options) or (None, _by_folder(folder))
+        sources = [Source(status, name, str(folder))]
+        code = int(any(run.state in ("damaged", "failed") for run in status.runs))
+    if options.json:
+        print(status_json(sources))
+        return code
+    for source in sources:
+        title = source.folder or source.coordinator or ""
+        _show(source.status, title, Path(source.folder) if source.folder else None)
+    return code
 
 
 def ask_status(options: argparse.Namespace) -> dict[str, Status]:
@@ -94,18 +104,20 @@ def ask(
     return {name: decode_operator_reply(data) for name, data in replies.items()}
 
 
-def _live(folder: Path, options: argparse.Namespace) -> Status | None:
-    """Return the status from a folder's coordinator; None if none is running."""
+def _live(folder: Path, options: argparse.Namespace) -> tuple[str, Status] | None:
+    """Return name and status of a folder's coordinator; None if none is running."""
     try:
         options.connect = read_address(folder)
         found = ask_status(options)
-    except NetworkError:
+    except NetworkError as error:
+        if read_holder(folder):
+            tell_user(f"its coordinator cannot be asked: {error}")
         return None
     here = folder.resolve()
-    for status in found.values():
+    for name, status in found.items():
         paths = [Path(run.folder) for run in status.runs]
         if any(here in (path, path.parent) for path in paths):
-            return status
+            return name, status
     return None
 
 
@@ -207,6 +219,9 @@ def _flags() -> Flags:
         metavar="FOLDER",
         help="run or campaign folder, or a folder that contains some (default: all "
         "coordinators at the hub)",
+    )
+    flags.add_argument(
+        "--json", action="store_true", help="print one JSON document for programs"
     )
     add_connect(flags)
     add_network_flags(flags)

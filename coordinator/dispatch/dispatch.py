@@ -122,6 +122,10 @@ class Dispatch:
         """Return the number of jobs of a kind of agent that are not assigned."""
         return len(self._pools[kind].waiting)
 
+    def assigned(self, kind: AgentKind) -> int:
+        """Return the number of jobs that the agents of a kind hold."""
+        return sum(len(agent.held) for agent in self._pools[kind].agents.values())
+
     @property
     def credits(self) -> int:
         """How many jobs all workers together hold while enough jobs wait."""

@@ -130,6 +130,18 @@ class ShardDispatch:
             if shard.is_wanted and not self._fit(shard)
         }
 
+    @property
+    def unassigned(self) -> int:
+        """Number of advances that are requested and that no worker has."""
+        return sum(
+            shard.is_wanted and shard.number < 0 for shard in self._shards.values()
+        )
+
+    @property
+    def assigned(self) -> int:
+        """Number of advances that workers have."""
+        return len(self._out)
+
     def holder(self, shard: int) -> str:
         """Return the name of the worker that holds a shard; empty if none does."""
         known = self._shards.get(shard)

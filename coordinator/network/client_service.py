@@ -43,10 +43,10 @@ def ask_coordinators(
         raise NetworkError(f"no coordinator at {connect}") from None
     replies_of: dict[str, bytes] = {}
     with session:
-        there = _coordinators(session, fleet)
+        there = coordinators(session, fleet)
         for member in sorted(there, key=lambda each: each.name):
             if only in ("", member.name):
-                reply = _reply_of(member, session, data)
+                reply = reply_of(member, session, data)
                 if reply is not None:
                     replies_of[member.name] = reply
     if not replies_of:
@@ -56,7 +56,9 @@ def ask_coordinators(
     return replies_of
 
 
-def _coordinators(session: zenoh.Session, fleet: str) -> set[Member]:
+def coordinators(
+    session: zenoh.Session, fleet: str, timeout_s: float = ASK_TIMEOUT_S
+) -> set[Member]:
     """Return the coordinators whose token exists, up to a limit."""
     # Not by a channel: a full one blocks the session, or loses what is not read yet.
     keys: list[str] = []
@@ -69,7 +71,7 @@ def _coordinators(session: zenoh.Session, fleet: str) -> set[Member]:
     session.liveliness().get(
         agents_alive(fleet, "coordinator"),
         zenoh.handlers.Callback(take, is_done.set, indirect=False),
-        timeout=ASK_TIMEOUT_S,
+        timeout=timeout_s,
     )
     is_done.wait()
     there = set()
@@ -79,12 +81,24 @@ def _coordinators(session: zenoh.Session, fleet: str) -> set[Member]:
     return there
 
 
-def _reply_of(member: Member, session: zenoh.Session, data: bytes) -> bytes | None:
-    """Return a coordinator's own reply; None without one."""
+def reply_of(
+    member: Member,
+    session: zenoh.Session,
+    data: bytes,
+    timeout_s: float = ASK_TIMEOUT_S,
+) -> bytes | None:
+    """Return a coordinator's own reply; None without one.
+
+    Args:
+        member: the coordinator.
+        session: of this process.
+        data: an encoded ``OperatorRequest``.
+        timeout_s: how long to wait [s].
+    """
     replies = session.get(
         member.command,
         payload=data,
-        timeout=ASK_TIMEOUT_S,
+        timeout=timeout_s,
         target=zenoh.QueryTarget.ALL,
         consolidation=_NOW,
     )

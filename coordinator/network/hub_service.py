@@ -4,8 +4,9 @@ import threading
 
 import zenoh
 
+from schema.agent.log import tell_user
 from schema.agent.network import cannot_listen
-from schema.agent.service import tell_user
+from schema.agent.service import log_engine
 
 
 def serve_hub(config: str, addresses: tuple[str, ...], stop: threading.Event) -> None:
@@ -19,7 +20,7 @@ def serve_hub(config: str, addresses: tuple[str, ...], stop: threading.Event) ->
     Raises:
         NetworkError: an address that cannot be listened on.
     """
-    zenoh.init_log_from_env_or("error")
+    log_engine()
     try:
         session = zenoh.open(zenoh.Config.from_json5(config))
     except zenoh.ZError as error:

@@ -5,6 +5,7 @@ events in the order of their arrival.
 """
 
 import json
+import math
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
@@ -20,6 +21,7 @@ from coordinator.network.info_queue import InfoQueue
 from coordinator.network.membership import Membership
 from schema.agent.access import Certificate
 from schema.agent.address import new_socket, parse_address
+from schema.agent.log import tell_user, warn_user
 from schema.agent.network import (
     ASK_TIMEOUT_S,
     CANCELLED,
@@ -33,7 +35,7 @@ from schema.agent.network import (
     hub_config,
 )
 from schema.agent.platform_tag import wire_version
-from schema.agent.service import Outlet, log_engine, session_config
+from schema.agent.service import HubWatch, Outlet, log_engine, session_config
 from schema.agent.topics import Member, agents_alive, check_name
 from schema.errors import MalformedMessage, NetworkError
 from schema.limits import LONGEST_REASON, MOST_ASKED_INFOS, MOST_QUERIES, printable
@@ -42,6 +44,7 @@ _KINDS: tuple[AgentKind, ...] = ("worker", "analyzer")
 _NOW = zenoh.ConsolidationMode.NONE
 _MOST_EVENTS = 1000
 _MOST_NEWS = 10_000
+_LOOK_S = 1.0
 # Properties that are malformed are hardly better after a second.
 _MALFORMED_SILENCES = 5
 
@@ -129,6 +132,7 @@ class Network:
         connect: str = "",
         tls: Tls | None = None,
         certificates: Iterable[Certificate] | None = None,
+        give_up_after_s: float = math.inf,
     ) -> None:
         """Configure the session; ``with`` opens it.
 
@@ -140,6 +144,8 @@ class Network:
             connect: address of a hub elsewhere; then nothing listens here.
             tls: files for ``tls/`` addresses.
             certificates: those that may connect; None: all of the authority.
+            give_up_after_s: time without a hub elsewhere after which ``receive``
+                raises [s].
 
         Raises:
             NetworkError: invalid names or addresses, or an address that other
@@ -157,6 +163,8 @@ class Network:
             else hub_config((*listen, self.own_address), tls, certificates)
         )
         self._is_hub = not connect
+        self._hub = HubWatch(self.address, tell_user, warn_user, give_up_after_s)
+        self._look_s = 0.0
         self._inbox: SimpleQueue[_News] = SimpleQueue()
         self._membership = Membership(wire_version(), self.faults)
         self._info_queue = InfoQueue()
@@ -276,7 +284,14 @@ class Network:
         Args:
             timeout_s: how long to wait for the first event, after the pause [s].
             pause_s: how long to let events collect first [s].
+
+        Raises:
+            HubLost: no hub has answered for too long.
         """
+        now_s = time.monotonic()
+        if not self._is_hub and now_s >= self._look_s:
+            self._look_s = now_s + _LOOK_S
+            self._hub.seen(is_there=bool(self._session.info.routers_zid()))
         while member := self._info_queue.take(began_s := time.monotonic()):
             self._ask_info(member)
             self._info_queue.spent(began_s, time.monotonic())

@@ -5,7 +5,6 @@ answer in the journal before it acts on it, so a coordinator that is killed at a
 point makes the same decisions again when it replays its journal.
 """
 
-import logging
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
@@ -49,9 +48,8 @@ from coordinator.run.requests import (
 from coordinator.run.run_context import RunContext
 from coordinator.run.shard_requests import Reached, ShardRequests, SnapshotStore
 from coordinator.run.throttle import RealTimeThrottle
+from schema.agent.log import warn_user
 from schema.errors import RunPaused, UnexpectedEvent
-
-_LOG = logging.getLogger(__name__)
 
 Request = Vet | Evaluate | AdvanceShard
 """Commands of islands and arenas that agents carry out."""
@@ -242,7 +240,7 @@ class Loop:
                 line = f"birth {birth.number} of island {birth.island}: {event.reason}"
                 if self.checks.pauses:
                     raise RunPaused(f"{line}; resume to go on without it")
-                _LOG.warning("%s", line)
+                warn_user(line)
 
     def _advance(self, command: AdvanceShard) -> None:
         """Request an advance, now or when it is due."""
@@ -293,7 +291,7 @@ class Loop:
             if isinstance(event, Advanced) and (
                 drift := self.shard_requests.commit(event)
             ):
-                _LOG.warning("%s", drift)
+                warn_user(str(drift))
                 self._write(drift.record)
             if not isinstance(event, Outcome):
                 return machine.handle(event)

@@ -4,6 +4,8 @@ An order takes effect at the arena's next decision. The journal holds the order 
 that step before the operator gets a reply, so that a replay carries it out too.
 """
 
+import time
+
 from coordinator.arena.arena import Arena
 from coordinator.arena.orders import check_order
 from coordinator.islands.events import (
@@ -137,7 +139,8 @@ def answer_operator(scheduler: RunScheduler, data: bytes, now_s: float) -> bytes
     try:
         request = decode_operator_request(data)
         if isinstance(request.action, GetStatus):
-            reply = OperatorReply("", status=scheduler.status(now_s))
+            status = scheduler.status(now_s)
+            reply = OperatorReply("", status=status, time_s=time.time())
         else:
             reply = _carry_out(request, scheduler)
     except MalformedMessage as error:

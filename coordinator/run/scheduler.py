@@ -13,12 +13,12 @@ from functools import partial
 
 from msgspec.structs import replace
 
-from coordinator.dispatch.events import Client
+from coordinator.dispatch.events import AgentKind, Client
 from coordinator.dispatch.fleet import End, Fleet
 from coordinator.run.session import RateMeter, RunSession
 from coordinator.storage.folder import RunFolder
 from schema.errors import RevolveError
-from schema.wire.status import PeerFault, RunStatus, Status
+from schema.wire.status import PeerFault, Queue, RunStatus, Status
 
 SLACK = 2
 """Open requests per job that the workers may hold at a time."""
@@ -215,7 +215,18 @@ class RunScheduler:
                 PeerFault(each.kind, each.peer, each.count)
                 for each in self.fleet.faults.counts
             ),
+            queues=_queues(self.fleet),
         )
+
+
+def _queues(fleet: Fleet) -> tuple[Queue, ...]:
+    """Return how many requests of each kind wait, and how many agents have."""
+    kinds: tuple[AgentKind, ...] = ("worker", "analyzer")
+    jobs = (
+        Queue(kind, fleet.dispatch.waiting(kind), fleet.dispatch.assigned(kind))
+        for kind in kinds
+    )
+    return (*jobs, Queue("arena", fleet.shards.unassigned, fleet.shards.assigned))
 
 
 def _cause(run: RunSession, error: RevolveError) -> RevolveError:

@@ -21,16 +21,17 @@ from coordinator.run.pose_recovery import TABLE as POSES
 from coordinator.run.pose_recovery import PoseRecovery, has_lost_poses
 from coordinator.run.run_context import RunContext
 from coordinator.run.throttle import RealTimeThrottle
-from coordinator.storage.folder import DETAILS, STATE, RunFolder
+from coordinator.storage.folder import RunFolder
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.journal import Journal, is_begun
 from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
+from schema.agent.log import warn_user
 from schema.agent.platform_tag import cpu_flags, our_version, platform_tag
-from schema.agent.service import tell_user
 from schema.errors import RunFolderError
 from schema.experiment.file import experiment_from_text
 from schema.tables.columns import TABLES
+from schema.tables.description import DETAILS, STATE
 from schema.tables.files import has_rows
 from schema.wire.status import IslandStatus, RunStatus
 
@@ -108,7 +109,7 @@ class RunSession:
                 Journal.open(held.path, epoch=held.epoch, fsync=fsync)
             )
             if self._journal.dropped:
-                tell_user(
+                warn_user(
                     f"{held.path}: journal: dropped a cut record of "
                     f"{self._journal.dropped} bytes at its end"
                 )
@@ -162,7 +163,7 @@ class RunSession:
             snapshots=Snapshots(self.held.path),
         )
         _, total = self.recovery.progress
-        tell_user(
+        warn_user(
             f"{self.held.path}: poses of arenas are lost; computing them again: "
             f"{total} advances"
         )

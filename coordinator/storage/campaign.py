@@ -8,10 +8,12 @@ experiment and repeat; a run that was made separately is used as it is.
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
+import msgspec
 from msgspec.structs import replace
 
 from coordinator.storage.disk import replace_text
@@ -26,6 +28,8 @@ from schema.experiment.file import (
     read_experiment,
     shipped_experiments,
 )
+from schema.limits import MOST_DESCRIPTION, MOST_REPEATS, printable, printable_line
+from schema.tables.description import read_small
 
 CAMPAIGN = "campaign.toml"
 
@@ -86,6 +90,16 @@ def read_experiments(sources: Sequence[str]) -> tuple[Experiment, ...]:
         check_source(source, [*shipped_experiments(), *shipped])
     words = [word for source in sources for word in shipped.get(source, (source,))]
     experiments = tuple(map(read_experiment, words))
+    _check_names(experiments)
+    return experiments
+
+
+def _check_names(experiments: Sequence[Experiment]) -> None:
+    """Raise unless names differ and can be those of folders.
+
+    Raises:
+        ExperimentError: two experiments have the same name, or one is no folder's.
+    """
     names = [experiment.name for experiment in experiments]
     for name in names:
         if names.count(name) > 1:
@@ -98,7 +112,6 @@ def read_experiments(sources: Sequence[str]) -> tuple[Experiment, ...]:
                 f"name: a campaign's experiment cannot be called {name!r}: its name "
                 "becomes a folder's name"
             )
-    return experiments
 
 
 def refuse_used(folder: Path) -> None:
@@ -124,14 +137,19 @@ def write_campaign(folder: Path, campaign: Campaign) -> None:
     Raises:
         RunFolderError: the disk is full or failed.
     """
+    # JSON with all defaults; without a single quote it cannot end the literal.
+    documents = [
+        experiment_text(experiment).replace("'", "\\u0027")
+        for experiment in campaign.experiments
+    ]
+    digest = _digest(campaign.seed, campaign.repeats, documents)
     lines = [
-        f"# To resume it:  {command('resume', folder)}",
+        f"# To resume it:  {printable_line(command('resume', folder))}",
+        f'digest = "{digest}"',
         f"seed = {campaign.seed}",
         f"repeats = {campaign.repeats}",
     ]
-    for experiment in campaign.experiments:
-        # JSON with all defaults; without a single quote it cannot end the literal.
-        document = experiment_text(experiment).replace("'", "\\u0027")
+    for document in documents:
         lines += ["", "[[experiments]]", f"document = '''\n{document}'''"]
     replace_text(folder / CAMPAIGN, "\n".join(lines) + "\n")
 
@@ -144,17 +162,47 @@ def read_campaign(folder: Path) -> Campaign:
     """
     file = folder / CAMPAIGN
     try:
-        document: dict[str, Any] = tomllib.loads(file.read_text(encoding="utf-8"))
-        return Campaign(
-            tuple(
-                experiment_from_text(each["document"])
-                for each in document["experiments"]
-            ),
-            int(document["repeats"]),
-            int(document["seed"]),
+        text = read_small(file, MOST_DESCRIPTION).decode("utf-8")
+        found = msgspec.convert(tomllib.loads(text), type=_Document)
+        documents = [each.document for each in found.experiments]
+        experiments = tuple(map(experiment_from_text, documents))
+        _check_names(experiments)
+    except FileNotFoundError:
+        raise RunFolderError(f"{folder}: no campaign is there") from None
+    except (
+        ValueError, RecursionError, ExperimentError, msgspec.MsgspecError
+    ) as error:  # fmt: skip
+        why = printable(str(error), 200)
+        raise RunFolderError(
+            f"{file}: damaged: {why}; restore a copy of the file"
+        ) from None
+    if found.seed >> 64:
+        raise RunFolderError(f"{file}: damaged: seed must be < 2^64, got {found.seed}")
+    if found.digest not in ("", _digest(found.seed, found.repeats, documents)):
+        raise RunFolderError(
+            f"{file}: damaged: its digest is not that of its content; restore a copy "
+            "of the file"
         )
-    except (OSError, ValueError, KeyError, TypeError, ExperimentError) as error:
-        raise RunFolderError(f"{file}: is not a valid campaign: {error}") from None
+    return Campaign(experiments, found.repeats, found.seed)
+
+
+class _Entry(msgspec.Struct, forbid_unknown_fields=True):
+    document: str
+
+
+class _Document(msgspec.Struct, forbid_unknown_fields=True):
+    """Content of ``campaign.toml``; that of older versions has no digest."""
+
+    seed: Annotated[int, msgspec.Meta(ge=0)]
+    repeats: Annotated[int, msgspec.Meta(ge=1, le=MOST_REPEATS)]
+    experiments: Annotated[list[_Entry], msgspec.Meta(min_length=1)]
+    digest: str = ""
+
+
+def _digest(seed: int, repeats: int, documents: Sequence[str]) -> str:
+    """Return the SHA-256 of a campaign's seed, repeats and experiments."""
+    parts = [str(seed), str(repeats), *documents]
+    return sha256("\n".join(parts).encode()).hexdigest()
 
 
 def forget_campaign(folder: Path) -> None:

@@ -5,33 +5,43 @@ part of every job: answers to an earlier coordinator of the run are recognised, 
 coordinator that was replaced while it was suspended notices it.
 """
 
-import json
 import os
+import re
 import secrets
 import socket
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal, Self
+from typing import Self
 
-import msgspec
 from msgspec import structs
 
 from coordinator.storage.disk import replace_durably, replace_text, storage_errors
 from coordinator.storage.hints import command
+from coordinator.storage.journal import MOST_RECORDED_EPOCH, newest_epoch
 from coordinator.storage.journal import NAME as JOURNAL
-from coordinator.storage.journal import newest_epoch
 from coordinator.storage.lock import LOCK, FolderLock
 from schema.errors import RunFolderError
 from schema.experiment.identity import Origin
-from schema.limits import MOST_EPOCH
+from schema.limits import MOST_MARK
+from schema.tables.description import (
+    DETAILS,
+    STATE,
+    Description,
+    State,
+    description_text,
+    read_description,
+    read_small,
+)
+from schema.tables.segments import warn_once
 
-State = Literal["running", "stopped", "finished"]
-STATES: tuple[State, ...] = ("running", "stopped", "finished")
-
-DETAILS = "run.json"
 EPOCH = "epoch"
-STATE = "state"
+
+# Coordinators that opened the run and ended before they wrote a record have an epoch
+# that the journal does not show.
+_UNRECORDED = 1000
+MOST_FILED_EPOCH = MOST_RECORDED_EPOCH - _UNRECORDED
+_DIGITS = re.compile(rb"[1-9][0-9]{0,9}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,16 +100,14 @@ class RunFolder:
         try:
             if details is not None:
                 _refuse_used(path)
-                nonce = secrets.token_hex(4)
-                entries = {**asdict(details), "nonce": nonce, "checksums": True}
-                replace_text(path / DETAILS, json.dumps(entries, indent=1))
+                new = Description(
+                    **asdict(details), nonce=secrets.token_hex(4), checksums=True
+                )
+                replace_text(path / DETAILS, description_text(new))
             self.details = read_details(path)
-            nonce = _read_description(path).nonce
+            nonce = read_description(path).nonce
             self.name = f"{socket.gethostname()}:{nonce}:{path.resolve()}"
-            # The journal's epoch counts, too: with a lower one, as a lost or older
-            # file gives, all new records would be void.
-            self.epoch = max(_read_epoch(path), newest_epoch(path)) + 1
-            _check_epoch(path / EPOCH, self.epoch)
+            self.epoch = _next_epoch(path)
             replace_text(path / EPOCH, str(self.epoch))
         except BaseException:
             self.close()
@@ -125,9 +133,9 @@ class RunFolder:
             RunFolderError: the description is damaged, or the disk is full or failed.
         """
         file = self.path / DETAILS
-        known = _read_description(self.path)
+        known = read_description(self.path)
         sealed = structs.replace(known, digests={**known.digests, **digests})
-        text = json.dumps(msgspec.to_builtins(sealed), indent=1)
+        text = description_text(sealed)
         with storage_errors(file):
             began = file.stat().st_mtime_ns
 
@@ -141,9 +149,15 @@ class RunFolder:
         """Check that no other coordinator has taken over the run.
 
         Raises:
-            RunFolderError: one has opened the folder, or the folder is gone.
+            RunFolderError: one has opened the folder, the folder is gone, or the
+                file with the epoch is damaged.
         """
-        epoch = _read_epoch(self.path)
+        try:
+            epoch = _read_epoch(self.path)
+        except RunFolderError as error:
+            raise RunFolderError(
+                f"{error}; to write it again: {command('resume', self.path)}"
+            ) from None
         if not epoch:
             raise RunFolderError(
                 f"{self.path}: the folder or its file {EPOCH!r} was moved or removed"
@@ -193,55 +207,8 @@ def read_details(path: Path) -> RunDetails:
     Raises:
         RunFolderError: there is no run, or its description is damaged.
     """
-    found = _read_description(path)
+    found = read_description(path)
     return RunDetails(found.name, found.run, found.seed, found.document)
-
-
-class _Description(msgspec.Struct, forbid_unknown_fields=True):
-    """Content of ``run.json``.
-
-    Runs of older versions have no nonce; ``schema.tables.checksums.Seal`` describes the
-    fields about tables.
-    """
-
-    name: str
-    run: int
-    seed: int
-    document: str
-    nonce: str = ""
-    checksums: bool = False
-    digests: dict[str, str] = {}
-
-
-def _read_description(path: Path) -> _Description:
-    file = path / DETAILS
-    try:
-        return msgspec.json.decode(file.read_bytes(), type=_Description)
-    except (FileNotFoundError, NotADirectoryError):
-        raise RunFolderError(
-            f"{path}: no run is there ({DETAILS} is missing)"
-        ) from None
-    except (OSError, msgspec.MsgspecError) as error:
-        raise RunFolderError(f"{file}: cannot be read: {error}") from None
-
-
-def read_state(path: Path) -> State:
-    """Return a run's state; after a kill it is still "running".
-
-    Raises:
-        RunFolderError: the file is damaged.
-    """
-    file = path / STATE
-    try:
-        text = file.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return "running"
-    except (OSError, ValueError) as error:
-        raise RunFolderError(f"{file}: cannot be read: {error}") from None
-    for state in STATES:
-        if text == state:
-            return state
-    raise RunFolderError(f"{file}: must be one of {', '.join(STATES)}, got {text!r}")
 
 
 def _refuse_used(path: Path) -> None:
@@ -265,22 +232,43 @@ def _refuse_foreign(path: Path) -> None:
         )
 
 
-def _check_epoch(file: Path, epoch: int) -> None:
-    if epoch > MOST_EPOCH:
+def _next_epoch(path: Path) -> int:
+    """Return the epoch of a coordinator that opens a folder now.
+
+    The journal's epoch counts, too: with a lower one, as a lost or older file gives,
+    all new records would be void.
+
+    Raises:
+        RunFolderError: the journal cannot be read, or the run has no more epochs.
+    """
+    recorded = newest_epoch(path)
+    try:
+        epoch = max(_read_epoch(path), recorded) + 1
+    except RunFolderError as error:
+        epoch = recorded + _UNRECORDED
+        warn_once(f"{error}; continuing with epoch {epoch}, after that of the journal")
+    if epoch > MOST_RECORDED_EPOCH:
         raise RunFolderError(
-            f"{file}: an epoch must be below {MOST_EPOCH}, got {epoch - 1}: replace it "
-            "by a number that is greater than any before"
+            f"{path}: the run was opened {epoch - 1} times, more than its journal can "
+            "number: copy its experiment and start another run"
         )
+    return epoch
 
 
 def _read_epoch(path: Path) -> int:
+    """Return the epoch in a folder; 0 if there is no file.
+
+    Raises:
+        RunFolderError: it is damaged.
+    """
     file = path / EPOCH
     try:
-        return int(file.read_text(encoding="ascii"))
+        text = read_small(file, MOST_MARK).strip()
     except FileNotFoundError:
         return 0
-    except (OSError, ValueError) as error:
-        raise RunFolderError(
-            f"{file}: cannot be read ({error}): replace its content by a number that "
-            "is greater than any before"
-        ) from None
+    if _DIGITS.fullmatch(text) and int(text) <= MOST_FILED_EPOCH:
+        return int(text)
+    raise RunFolderError(
+        f"{file}: damaged: must be a number from 1 to {MOST_FILED_EPOCH}, got "
+        f"{text[:40]!r}"
+    )

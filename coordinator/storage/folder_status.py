@@ -5,7 +5,7 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from coordinator.storage.folder import RunDetails, read_details, read_state
+from coordinator.storage.folder import RunDetails, read_details
 from coordinator.storage.hints import command
 from coordinator.storage.journal import is_begun
 from coordinator.storage.lock import read_holder
@@ -13,7 +13,8 @@ from schema.errors import RunFolderError
 from schema.experiment.document import island_count, island_experiment
 from schema.experiment.file import experiment_from_text
 from schema.tables.columns import TABLES
-from schema.tables.files import damage_of, has_rows, read_table
+from schema.tables.description import STATE, read_state
+from schema.tables.files import damage_of, has_rows, is_sealed, read_table
 from schema.wire.status import IslandStatus, RunStatus
 
 
@@ -29,6 +30,11 @@ def folder_status(folder: Path) -> RunStatus:
     if state == "running" and not read_holder(folder):
         state = "stopped"
     status = unbegun_status(folder, details)
+    if state == "finished" and not is_sealed(folder):
+        raise RunFolderError(
+            f"{folder / STATE}: damaged: is {state!r}, but the run has no finished "
+            f"tables; to continue it: {command('resume', folder)}"
+        )
     if state == "finished" and not has_rows(folder, "births"):
         check_rewritable(folder)
         raise RunFolderError(

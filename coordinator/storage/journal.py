@@ -11,6 +11,7 @@ one has taken over the run. Its records are void: the later coordinator continue
 the records that it found.
 """
 
+import shlex
 import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -31,6 +32,8 @@ _CHECK = struct.Struct("<I")
 _FRAME = _HEAD.size + _CHECK.size
 _RECORDS = 1 << 40
 """Upper bound of sequence numbers; a record's number is epoch * _RECORDS + sequence."""
+MOST_RECORDED_EPOCH = (1 << 64) // _RECORDS - 1
+"""Greatest epoch that the number of a record can hold."""
 
 
 class Journal:
@@ -204,8 +207,8 @@ def check_gap(path: Path, data: bytes, position: Position, start: int = 0) -> No
                 f"{path}: damaged at byte {position.end} (record {position.records}), "
                 f"but record {found[0] % _RECORDS} is intact at byte {start + offset}: "
                 "restore a sound copy of the file, or give up everything behind the "
-                f"damage ('truncate -s {position.end} {path}') and resume; lost "
-                "results are computed again"
+                f"damage ('truncate -s {position.end} {shlex.quote(str(path))}') and "
+                "resume; lost results are computed again"
             )
 
 

@@ -10,12 +10,14 @@ from typing import Self
 
 from coordinator.storage.disk import storage_errors
 from schema.errors import RunFolderError
+from schema.limits import printable
 
 LOCK = "lock"
 
 # `read_holder` locks the file for an instant, which must not refuse a coordinator.
 _RETRY_FOR_S = 0.2
 _RETRY_EVERY_S = 0.005
+_LONGEST_HOLDER = 200
 
 
 class FolderLock:
@@ -97,4 +99,5 @@ def _lock(descriptor: int) -> None:
 
 
 def _holder(descriptor: int) -> str:
-    return os.pread(descriptor, 500, 0).decode(errors="replace") or "another process"
+    text = os.pread(descriptor, 500, 0).decode(errors="replace")
+    return printable(text, _LONGEST_HOLDER) or "another process"

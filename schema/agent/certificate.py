@@ -1,16 +1,20 @@
-"""Name and expiry of a certificate file.
+"""Name, expiry and validity of a certificate file.
 
 Importing this module raises ``NetworkError`` where ``cryptography`` is not installed:
 import it only where there are certificates.
 """
 
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from schema.agent.network import Tls
 from schema.errors import NetworkError
 
 try:
     from cryptography import x509
+    from cryptography.exceptions import InvalidSignature
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
 except ImportError:
     raise NetworkError(
         "certificates need the package cryptography: "
@@ -37,6 +41,50 @@ def expiry(file: str) -> datetime:
         NetworkError: the file holds no certificate.
     """
     return _read(file).not_valid_after_utc
+
+
+@dataclass(frozen=True, slots=True)
+class CertificateFacts:
+    """What is known of a certificate.
+
+    Attributes:
+        name: common name.
+        begins, ends: when it is valid.
+        is_issued: by the given authority.
+        fits_key: the private key is its own.
+    """
+
+    name: str
+    begins: datetime
+    ends: datetime
+    is_issued: bool
+    fits_key: bool
+
+
+def examine(tls: Tls) -> CertificateFacts:
+    """Return what is known of a process's certificate.
+
+    Raises:
+        NetworkError: a file cannot be read, or holds something else.
+    """
+    own, authority = _read(tls.certificate), _read(tls.ca)
+    try:
+        own.verify_directly_issued_by(authority)
+        is_issued = True
+    except (InvalidSignature, ValueError, TypeError):
+        is_issued = False
+    try:
+        key = load_pem_private_key(Path(tls.key).read_bytes(), password=None)
+    except (OSError, ValueError, TypeError) as error:
+        reason = str(error).partition("\n")[0]
+        raise NetworkError(f"{tls.key}: not a private key (PEM): {reason}") from None
+    return CertificateFacts(
+        certificate_name(tls.certificate),
+        own.not_valid_before_utc,
+        own.not_valid_after_utc,
+        is_issued,
+        key.public_key() == own.public_key(),
+    )
 
 
 def _read(file: str) -> x509.Certificate:

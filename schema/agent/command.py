@@ -6,10 +6,10 @@ themselves.
 """
 
 import argparse
+import math
 import os
 import re
 import socket
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -21,15 +21,24 @@ from schema.agent.address import (
     hub_of,
     parse_address,
 )
+from schema.agent.log import LOG_VARIABLE, start_log, tell_error, warn_user
 from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config
+from schema.agent.service import GAVE_UP, gave_up
 from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, Death, ProcessSlot
-from schema.agent.supervisor import ProcessPool, stop_on_signals, stop_with_input
+from schema.agent.supervisor import (
+    ProcessPool,
+    cores,
+    stop_on_signals,
+    stop_with_input,
+)
 from schema.agent.topics import Role, check_name
 from schema.errors import NetworkError, RevolveError
 from schema.experiment.plugin_access import allow, allowed
 from schema.flags import Flags, add_plugins, positive_number, whole_number
 
 _POLL_S = 0.5
+MOST_PER_CORE = 4
+"""Processes per core that a command starts without being told twice."""
 
 
 _TLS_FILES = {
@@ -86,6 +95,16 @@ def add_network_flags(flags: argparse.ArgumentParser) -> None:
         )
 
 
+def add_log(flags: argparse.ArgumentParser) -> None:
+    """Add the flag for the form of log lines, for ``start_log``."""
+    flags.add_argument(
+        "--log-json",
+        action="store_true",
+        help=f"write each log line as a JSON object (default: ${LOG_VARIABLE}, else "
+        "with time and level unless standard error is a terminal)",
+    )
+
+
 def add_access(flags: argparse.ArgumentParser) -> None:
     """Add the flag for the rights of certificates at a hub."""
     flags.add_argument(
@@ -122,6 +141,49 @@ def add_job_limits(flags: argparse.ArgumentParser) -> None:
         help="time that one job may wait without using CPU time in seconds (default: "
         f"{WAIT_LIMIT_S:.0f})",
     )
+
+
+def add_give_up(flags: argparse.ArgumentParser) -> None:
+    """Add the flag for the time without a hub after which a command ends."""
+    flags.add_argument(
+        "--give-up-after",
+        type=positive_number,
+        default=math.inf,
+        metavar="S",
+        help="stop with exit code 1 when no hub has answered for S seconds (default: "
+        "retry for ever)",
+    )
+
+
+def add_oversubscribe(flags: argparse.ArgumentParser) -> None:
+    """Add the flag that allows more processes than ``check_load`` does."""
+    flags.add_argument(
+        "--oversubscribe",
+        action="store_true",
+        help=f"allow more than {MOST_PER_CORE} processes per core",
+    )
+
+
+def check_load(
+    flags: argparse.ArgumentParser,
+    flag: str,
+    processes: int,
+    options: argparse.Namespace,
+) -> None:
+    """Exit with an error if a command is to start too many processes.
+
+    Args:
+        flags: the command's parser.
+        flag: name of the flag with the number.
+        processes: the number.
+        options: with ``oversubscribe``.
+    """
+    most = MOST_PER_CORE * cores()
+    if processes > most and not options.oversubscribe:
+        flags.error(
+            f"{flag}: must be <= {most}, {MOST_PER_CORE} for each of {cores()} cores, "
+            f"got {processes}; --oversubscribe allows more"
+        )
 
 
 def tls_of(options: argparse.Namespace) -> Tls | None:
@@ -164,6 +226,7 @@ def run_pool(
     flags = _flags(role, processes)
     options = flags.parse_args(arguments)
     try:
+        start_log(role, as_json=options.log_json)
         allow(options.plugins)
         connect, tls = connect_of(options), tls_of(options)
         agent = Agent(
@@ -177,10 +240,12 @@ def run_pool(
             wait_limit_s=options.wait_limit,
             processes=options.processes,
             plugins=allowed(),
+            give_up_after_s=options.give_up_after,
         )
         client_config(connect, tls)
     except RevolveError as error:
         flags.error(str(error))
+    check_load(flags, "--processes", options.processes, options)
     stop = stop_on_signals()
     if options.until_closed:
         stop_with_input(stop)
@@ -191,10 +256,13 @@ def run_pool(
                 process_pool.look_after()
                 process_pool.wait(_POLL_S)
                 for death in process_pool.deaths[deaths:]:
-                    sys.stderr.write(f"{tell_death(death)}\n")
+                    warn_user(tell_death(death))
                 if process_pool.restarts > restarts:
-                    sys.stderr.write(f"a {role} process ended and is restarted\n")
+                    warn_user(f"a {role} process ended and is restarted")
                 restarts, deaths = process_pool.restarts, len(process_pool.deaths)
+                if GAVE_UP in process_pool.exit_codes:
+                    tell_error(gave_up(connect, options.give_up_after))
+                    return 1
                 if len(process_pool.exit_codes) == options.processes:
                     return max(process_pool.exit_codes)
     except KeyboardInterrupt:
@@ -252,7 +320,10 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
         help="stop when standard input is closed, too",
     )
     add_job_limits(flags)
+    add_log(flags)
     add_plugins(flags)
+    add_give_up(flags)
+    add_oversubscribe(flags)
     flags.set_defaults(threads=1)
     if role == "worker":
         flags.add_argument(

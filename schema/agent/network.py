@@ -5,6 +5,7 @@ discovery, and only addresses with certificates are reachable from other machine
 """
 
 import json
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from ipaddress import ip_address
@@ -65,6 +66,7 @@ class Agent:
         processes: that share the memory of this machine.
         shards: arenas whose state the process keeps.
         plugins: modules and files that it may import, for ``plugin_access.allow``.
+        give_up_after_s: time without a hub after which the process ends [s].
     """
 
     role: Role
@@ -81,6 +83,7 @@ class Agent:
     processes: int = 1
     shards: int = 1
     plugins: tuple[str, ...] = ()
+    give_up_after_s: float = math.inf
 
 
 def _is_loopback(host: str) -> bool:

@@ -6,6 +6,7 @@ counted; they never end the loop.
 """
 
 import json
+import math
 import os
 import sys
 import threading
@@ -19,20 +20,23 @@ import zenoh
 
 from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.job_watch import LOOK_S
+from schema.agent.log import start_log, tell_user, warn_user
 from schema.agent.network import UNFIT, Agent, client_config
 from schema.agent.platform_tag import platform_tag, wire_version
 from schema.agent.request_handler import FairQueue, ReplyCounts, Server
 from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
+from schema.errors import NetworkError
 from schema.experiment.plugin_access import allow
 
 _POLL_S = 0.2
 _RETRY_S = 0.3
-_SAY_S = 5.0
 # Different lines about refused runs that are written.
 _MOST_REFUSALS = 20
 
+GAVE_UP = 75
+"""Exit status of a process that gave up for lack of a hub (EX_TEMPFAIL)."""
 UNSUPERVISED = ProcessSlot()
 """Slot of a process without a supervisor."""
 
@@ -69,10 +73,55 @@ def session_config(text: str, member: Member) -> zenoh.Config:
     return config
 
 
-def tell_user(line: str) -> None:
-    """Write a line to standard error."""
-    sys.stderr.write(f"{line}\n")
-    sys.stderr.flush()
+class HubLost(NetworkError):  # noqa: N818 - reads as what it says
+    """No hub has answered for the time after which the process gives up."""
+
+
+@dataclass(slots=True)
+class HubWatch:
+    """Presence of the hub, as the user was told.
+
+    Attributes:
+        address: of the hub.
+        say: called with a line when the hub is back.
+        warn: called with a line when the hub is lost, or a run is refused.
+        give_up_after_s: time without a hub after which ``seen`` raises [s].
+    """
+
+    address: str
+    say: Callable[[str], None]
+    warn: Callable[[str], None]
+    give_up_after_s: float = math.inf
+    _lost_s: float | None = None
+    _refusals: set[str] = field(default_factory=set)
+
+    def refused(self, line: str) -> None:
+        """Write a line about a refused run, once, and not without end."""
+        if line not in self._refusals and len(self._refusals) < _MOST_REFUSALS:
+            self._refusals.add(line)
+            self.warn(line)
+
+    def seen(self, *, is_there: bool) -> None:
+        """Note whether the hub is there.
+
+        Raises:
+            HubLost: it has not been there for too long.
+        """
+        now_s = time.monotonic()
+        if is_there:
+            if self._lost_s is not None:
+                self.say(f"connected to {self.address}")
+            self._lost_s = None
+        elif self._lost_s is None:
+            self._lost_s = now_s
+            self.warn(f"no hub at {self.address}; retrying; press Ctrl-C to stop")
+        elif now_s - self._lost_s >= self.give_up_after_s:
+            raise HubLost(gave_up(self.address, self.give_up_after_s))
+
+
+def gave_up(address: str, after_s: float) -> str:
+    """Return the line of a command that ends because no hub answers."""
+    return f"no hub at {address} for {after_s:g} s: giving up (--give-up-after)"
 
 
 class Outlet:
@@ -119,6 +168,7 @@ def serve(
     stop: threading.Event,
     say: Callable[[str], None] = tell_user,
     *,
+    warn: Callable[[str], None] | None = None,
     outlet: Outlet | None = None,
     slot: ProcessSlot = UNSUPERVISED,
 ) -> ReplyCounts:
@@ -132,19 +182,20 @@ def serve(
             is bad.
         agent: this agent, and the address of its hub.
         stop: ends the loop; checked between jobs.
-        say: called with a line when the hub is gone and when it is back.
+        say: called with a line when the hub is back.
+        warn: called with a line when the hub is gone; None: ``say``.
         outlet: publishes through this agent's session while there is one.
         slot: this process's slot in a pool, if it has one.
 
     Raises:
-        NetworkError: an invalid name or address.
+        NetworkError: an invalid name or address, or ``HubLost``.
     """
     check_name(agent.name, "name")
     check_name(agent.fleet, "fleet")
     me = Member(agent.fleet, agent.role, agent.name)
     config = session_config(client_config(agent.connect, agent.tls), me)
     server = Server(answer, agent, slot)
-    hub = _Hub(agent.connect, say)
+    hub = HubWatch(agent.connect, say, warn or say, agent.give_up_after_s)
     log_engine()
     session = _open(config, hub, stop)
     if session is not None:
@@ -191,10 +242,16 @@ def serve_as_process(
     stop = stop_on_signals()
     stop_with_parent(stop)
     own = agent if agent.version else own_agent(agent, slot.index)
-    say = tell_user if slot.index == 0 else _keep_quiet
-    counts = serve(answer, own, stop, say, outlet=outlet, slot=slot)
+    start_log(own.name)
+    say, warn = (
+        (tell_user, warn_user) if slot.index == 0 else (_keep_quiet, _keep_quiet)
+    )
+    try:
+        counts = serve(answer, own, stop, say, warn=warn, outlet=outlet, slot=slot)
+    except HubLost:
+        sys.exit(GAVE_UP)  # the pool's command says why
     if counts.refused:
-        tell_user(
+        warn_user(
             f"{own.name} refused {counts.refused} requests, "
             f"{counts.malformed} of them malformed"
         )
@@ -205,7 +262,7 @@ def _keep_quiet(_line: str) -> None:
 
 
 def _open(
-    config: zenoh.Config, hub: "_Hub", stop: threading.Event
+    config: zenoh.Config, hub: "HubWatch", stop: threading.Event
 ) -> zenoh.Session | None:
     """Return a session as soon as there is a hub; None if stopped before."""
     while not stop.is_set():
@@ -220,7 +277,7 @@ def _open(
 def _serve_session(
     session: zenoh.Session,
     server: Server,
-    hub: "_Hub",
+    hub: "HubWatch",
     stop: threading.Event,
     me: Member,
 ) -> None:
@@ -280,7 +337,7 @@ def _queue_all(inbox: SimpleQueue[zenoh.Query], turns: FairQueue[zenoh.Query]) -
         return bool(turns)
 
 
-def _answer(query: zenoh.Query, server: Server, me: Member, hub: "_Hub") -> None:
+def _answer(query: zenoh.Query, server: Server, me: Member, hub: "HubWatch") -> None:
     """Reply with the answer, or with the reason why there is none."""
     payload = query.payload
     reply = server.reply(b"" if payload is None else payload.to_bytes())
@@ -290,32 +347,3 @@ def _answer(query: zenoh.Query, server: Server, me: Member, hub: "_Hub") -> None
         query.reply_err(reply.reason)
     else:
         query.reply(me.jobs, reply.answer)
-
-
-@dataclass(slots=True)
-class _Hub:
-    """State of the hub, and refusals of runs, as the user knows them."""
-
-    address: str
-    say: Callable[[str], None]
-    is_there: bool = True
-    said_s: float = 0.0
-    refusals: set[str] = field(default_factory=set)
-
-    def refused(self, line: str) -> None:
-        """Write a line about a refused run, once, and not without end."""
-        if line not in self.refusals and len(self.refusals) < _MOST_REFUSALS:
-            self.refusals.add(line)
-            self.say(line)
-
-    def seen(self, *, is_there: bool) -> None:
-        """Write changes, and every few seconds that the hub is still missing."""
-        now_s = time.monotonic()
-        if is_there and not self.is_there:
-            self.say(f"connected to {self.address}")
-        if not is_there and (self.is_there or now_s - self.said_s >= _SAY_S):
-            self.say(
-                f"no coordinator at {self.address}; retrying; press Ctrl-C to stop"
-            )
-            self.said_s = now_s
-        self.is_there = is_there

@@ -19,6 +19,7 @@ from multiprocessing import connection, get_context, parent_process, resource_tr
 from multiprocessing.context import SpawnProcess
 from typing import Any, Self
 
+from schema.agent.stopping import catch_stop_signals
 from schema.agent.supervision import (
     LAST_DEATHS,
     CurrentJob,
@@ -46,7 +47,8 @@ _NETWORK = (
 # default glibc raises it to the size of a robot's simulation, and the memory becomes
 # fragmented: that of a worker grows by a tenth over 3000 births.
 _MAP_BYTES = "131072"
-GRACE_S = 10.0
+GRACE_S = 2.5
+"""Time between asking a process to end and killing it [s]."""
 _BETWEEN_STARTS_S = 1.0
 _LONGEST_REST_S = 30.0
 # A second Ctrl-C within this time does not count.
@@ -103,6 +105,7 @@ class ProcessPool:
         self._rests_s = [_BETWEEN_STARTS_S] * size
         self._slots = [ProcessSlot(index, CurrentJob()) for index in range(size)]
         self._codes: list[int | None] = [None] * size
+        self._until_s: float | None = None
         self.restarts = 0
         self.deaths: list[Death] = []
 
@@ -181,15 +184,22 @@ class ProcessPool:
         else:
             time.sleep(min(timeout_s, _BETWEEN_STARTS_S / 10))
 
+    def terminate(self) -> None:
+        """Ask all processes to end; ``end`` gives them the rest of the grace time."""
+        if self._until_s is None:
+            self._until_s = time.monotonic() + GRACE_S
+        for process in self._processes:
+            if process:
+                process.terminate()
+
     def end(self) -> None:
-        """Terminate all processes; kill those that remain after 10 s."""
+        """Terminate all processes; kill those that remain after the grace time."""
+        self.terminate()
+        assert self._until_s is not None
         there = [process for process in self._processes if process]
-        for process in there:
-            process.terminate()
-        until_s = time.monotonic() + GRACE_S
         try:
             for process in there:
-                process.join(max(0.0, until_s - time.monotonic()))
+                process.join(max(0.0, self._until_s - time.monotonic()))
         finally:
             for process in there:
                 process.kill()
@@ -197,7 +207,7 @@ class ProcessPool:
 
 
 def stop_on_signals() -> threading.Event:
-    """Return an event that Ctrl-C or SIGTERM sets; Ctrl-C a second later interrupts."""
+    """Return an event that a stop signal sets; Ctrl-C a second later interrupts."""
     stop = threading.Event()
     signalled_s = -math.inf
 
@@ -210,8 +220,7 @@ def stop_on_signals() -> threading.Event:
         elif number == signal.SIGINT and now_s >= signalled_s + _REPEAT_S:
             raise KeyboardInterrupt
 
-    signal.signal(signal.SIGINT, handle)
-    signal.signal(signal.SIGTERM, handle)
+    catch_stop_signals(handle)
     return stop
 
 

@@ -83,6 +83,11 @@ class Member:
         """Key on which an ``Update`` appears when something has happened."""
         return f"{self._prefix}/events"
 
+    @property
+    def trial(self) -> str:
+        """Key on which ``revolve doctor`` tries the rights of a certificate."""
+        return f"{self._prefix}/trial"
+
     def poses(self, shard: int) -> str:
         """Key on which a ``Live`` is published after each advance of a shard."""
         return f"{self._prefix}/arena/{shard}/pose"

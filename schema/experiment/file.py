@@ -197,7 +197,8 @@ def experiment_from_text(text: str) -> Experiment:
     """
     try:
         return msgspec.json.decode(text.encode(), type=Experiment)
-    except msgspec.MsgspecError as error:
+    # A UnicodeError is a ValueError: an escape may be half a character.
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
         raise ExperimentError(f"experiment of a run: {error}") from None
 
 

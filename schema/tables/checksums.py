@@ -16,7 +16,10 @@ from zlib import crc32
 import msgspec
 import pyarrow as pa
 
-DESCRIPTION = "run.json"
+from schema.errors import RunFolderError
+from schema.limits import MOST_DESCRIPTION
+from schema.tables.description import DETAILS, read_small
+
 MAGIC = b"revolve sums 1\n\0"
 
 _FIELDS = struct.Struct("<QI")
@@ -57,8 +60,9 @@ def read_seal(folder: Path) -> Seal:
     if the file cannot be read: then only checksums that are found are checked.
     """
     try:
-        return msgspec.json.decode((folder / DESCRIPTION).read_bytes(), type=Seal)
-    except (OSError, msgspec.MsgspecError):
+        data = read_small(folder / DETAILS, MOST_DESCRIPTION)
+        return msgspec.json.decode(data, type=Seal)
+    except (OSError, RunFolderError, ValueError, RecursionError):
         return Seal()
 
 

@@ -21,6 +21,7 @@ from pyarrow.parquet import ParquetFile
 from schema.errors import RunFolderError
 from schema.tables.checksums import digest_of, read_seal
 from schema.tables.columns import TABLES, completed
+from schema.tables.description import read_description
 from schema.tables.segments import (
     FINISHED,
     Batch,
@@ -144,6 +145,22 @@ def _chain(folder: Path, table: str) -> Iterator[tuple[Path, Batch, int | None]]
 def has_rows(folder: Path, table: str) -> bool:
     """Return whether a run has any file of a table."""
     return bool(parquet_files(folder, table) or segments_of(folder, table))
+
+
+def is_sealed(folder: Path) -> bool:
+    """Return whether a run has once had finished tables.
+
+    They get their digests together before the run's state becomes "finished". Runs of
+    earlier versions have no digests, but files.
+
+    Raises:
+        RunFolderError: the run's description is damaged.
+    """
+    description = read_description(folder)
+    if description.checksums:
+        return bool(description.digests)
+    is_converted = any((folder / FINISHED).glob("*/*/*.parquet"))
+    return is_converted or not segments_of(folder, "births")
 
 
 def finished_path(folder: Path, table: str) -> Path | None:

@@ -98,11 +98,19 @@ class OperatorRequest(Message, frozen=True):
 
 
 class OperatorReply(Message, frozen=True):
-    """What was done or why not, as text; the status if it was requested."""
+    """What was done or why not, as text; the status if it was requested.
+
+    Attributes:
+        text: for the operator.
+        is_refused: nothing was done.
+        status: of all runs, if it was requested.
+        time_s: Unix time of the coordinator's clock, with the status [s].
+    """
 
     text: str
     is_refused: bool = False
     status: Status | None = None
+    time_s: Finite | None = None
 
 
 _REQUEST = Decoder(OperatorRequest)

@@ -1,6 +1,7 @@
 """Progress of runs, as a coordinator reports it or a run folder shows it."""
 
-from typing import Annotated
+from collections.abc import Iterable
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
@@ -60,6 +61,11 @@ class RunStatus(Message, frozen=True):
         """Number of births on all islands at the end."""
         return sum(island.wanted for island in self.islands)
 
+    @property
+    def left_s(self) -> float | None:
+        """Estimated time to the end at the present rate [s]; None if the rate is 0."""
+        return _left_s((self,), self.births_per_s)
+
 
 class PeerFault(Message, frozen=True):
     """How often a peer sent something that the coordinator did not use.
@@ -75,6 +81,21 @@ class PeerFault(Message, frozen=True):
     count: Count
 
 
+class Queue(Message, frozen=True):
+    """Requests of one kind that are not done.
+
+    Attributes:
+        kind: "worker" or "analyzer", jobs for such agents; or "arena", advances of
+            arenas, which workers do.
+        waiting: number of those that no agent has.
+        assigned: number of those that agents have, copies of late jobs included.
+    """
+
+    kind: Literal["worker", "analyzer", "arena"]
+    waiting: Count
+    assigned: Count
+
+
 class Status(Message, frozen=True):
     """Progress of all runs of a coordinator.
 
@@ -83,6 +104,7 @@ class Status(Message, frozen=True):
         workers, analyzers: number of connected agents.
         births_per_s: recent rate of all runs [1/s].
         faults: what peers sent and nothing used, by kind and peer.
+        queues: by kind; empty if no coordinator is running.
     """
 
     runs: tuple[RunStatus, ...]
@@ -90,6 +112,7 @@ class Status(Message, frozen=True):
     analyzers: Count
     births_per_s: Finite
     faults: tuple[PeerFault, ...] = ()
+    queues: tuple[Queue, ...] = ()
 
     @property
     def births(self) -> int:
@@ -104,8 +127,13 @@ class Status(Message, frozen=True):
     @property
     def left_s(self) -> float | None:
         """Estimated time to the end at the present rate [s]; None if the rate is 0."""
-        open_runs = [run for run in self.runs if run.state in ("waiting", "running")]
-        left = sum(run.wanted - run.births for run in open_runs)
-        if not left:
-            return 0.0
-        return left / self.births_per_s if self.births_per_s else None
+        return _left_s(self.runs, self.births_per_s)
+
+
+def _left_s(runs: Iterable[RunStatus], births_per_s: float) -> float | None:
+    """Return the time to the end of runs at a rate [s]; None if the rate is 0."""
+    open_runs = [run for run in runs if run.state in ("waiting", "running")]
+    left = sum(run.wanted - run.births for run in open_runs)
+    if not left:
+        return 0.0
+    return left / births_per_s if births_per_s else None

@@ -9,8 +9,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from coordinator.storage.folder import DETAILS, STATE
 from coordinator.storage.journal import NAME
+from schema.tables.description import DETAILS, STATE
 from schema.tables.segments import segments_of
 from tests.system.instants import JOURNAL, Instants
 

@@ -63,7 +63,8 @@ def test_agent_reports_and_retries_a_missing_coordinator(role: str) -> None:
     with command(role, "--connect", address, "--processes", "1") as process:
         assert process.stderr is not None
         line = process.stderr.readline()
-        assert line == f"no coordinator at {address}; retrying; press Ctrl-C to stop\n"
+        complaint = f"no hub at {address}; retrying; press Ctrl-C to stop"
+        assert line.endswith(f" warning: {complaint}\n")
         with Network(name="c", listen=(address,)) as network:
             (joined,) = until(network, 1)
             assert isinstance(joined, Joined)
@@ -183,7 +184,7 @@ def test_only_agents_with_a_certificate_connect(
         command("worker", *flags(stranger), "--name", "stranger") as outside,
     ):
         assert outside.stderr is not None
-        assert outside.stderr.readline().startswith("no coordinator at")
+        assert "no hub at" in outside.stderr.readline()
         with command("worker", *flags(friend), "--name", "friend"):
             (name,) = agents(until(network, 1))
             assert name.startswith("friend-0.")

@@ -11,9 +11,10 @@ import pytest
 import zenoh
 
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunDetails, RunFolder, read_state
+from coordinator.storage.folder import RunDetails, RunFolder
 from schema.agent.network import hub_config
 from schema.experiment.file import experiment_text, read_experiment
+from schema.tables.description import read_state
 from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]

@@ -124,7 +124,7 @@ def test_disconnecting_a_worker_gives_an_equal_run(
     share = np.random.default_rng(31).uniform(0.1, 0.7)
     fleet.wait_for(share * (undisturbed / NAME).stat().st_size)
     remote_fleets.cable.cut()
-    wait_for_line(fleet.agents["far"], "no coordinator at")
+    wait_for_line(fleet.agents["far"], "no hub at")
     assert not fleet.is_over
     remote_fleets.cable.reconnect()
     wait_for_line(fleet.agents["far"], "connected to")

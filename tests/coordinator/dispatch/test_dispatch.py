@@ -719,3 +719,15 @@ def test_same_events_give_the_same_commands() -> None:
             getattr(world, world.random.choice(ACTIONS))()
         stories.append((world.past, world.held, list(world.delivered)))
     assert stories[0] == stories[1]
+
+
+def test_jobs_are_counted_while_they_wait_and_while_agents_hold_them() -> None:
+    dispatch = told(*(Requested(job(number)) for number in range(5)))
+    assert (dispatch.waiting("worker"), dispatch.assigned("worker")) == (5, 0)
+    dispatch.handle(worker("a"))
+    assert (dispatch.waiting("worker"), dispatch.assigned("worker")) == (3, 2)
+    dispatch.handle(ok(0, "a"))
+    assert (dispatch.waiting("worker"), dispatch.assigned("worker")) == (2, 2)
+    dispatch.handle(Left("a"))
+    assert (dispatch.waiting("worker"), dispatch.assigned("worker")) == (4, 0)
+    assert (dispatch.waiting("analyzer"), dispatch.assigned("analyzer")) == (0, 0)

@@ -318,6 +318,20 @@ def test_shard_does_not_drift_unless_allowed() -> None:
     assert dispatch.handle(Ticked(1e9)) == []
 
 
+def test_advances_are_counted_while_they_wait_and_while_a_worker_has_them() -> None:
+    dispatch = fleet()
+    shards = dispatch.shards
+    dispatch.handle(ShardRequested(0))
+    dispatch.handle(ShardRequested(1))
+    assert (shards.unassigned, shards.assigned) == (2, 0)
+    dispatch.handle(joined("a"))
+    assert (shards.unassigned, shards.assigned) == (0, 2)
+    dispatch.handle(ShardReturned(1, "done"))
+    assert (shards.unassigned, shards.assigned) == (0, 1)
+    dispatch.handle(Left("a"))
+    assert (shards.unassigned, shards.assigned) == (1, 0)
+
+
 def advance(dispatch: Fleet, shard: int, start_s: float, lasts_s: float) -> None:
     """Make one advance of a shard."""
     dispatch.handle(Ticked(start_s))

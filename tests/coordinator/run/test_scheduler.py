@@ -17,11 +17,12 @@ from coordinator.run.scheduler import SLACK, Planned, RunScheduler
 from coordinator.run.session import RunSession
 from coordinator.storage.campaign import Campaign
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import RunFolder, read_state
+from coordinator.storage.folder import RunFolder
 from coordinator.storage.folder_status import folder_status, unbegun_status
 from coordinator.storage.lock import LOCK
 from schema.errors import RevolveError, RunFolderError
 from schema.experiment.file import read_experiment
+from schema.tables.description import read_state
 from schema.wire.status import RunStatus
 
 BIRTHS = 24

@@ -18,12 +18,12 @@ from coordinator.storage.folder import (
     RunDetails,
     RunFolder,
     read_details,
-    read_state,
 )
 from coordinator.storage.journal import Journal
 from coordinator.storage.lock import read_holder
 from schema.errors import RunFolderError
 from schema.robot.ids import BirthId
+from schema.tables.description import read_description, read_state
 
 DETAILS = RunDetails("scenario1", 3, 2**64 - 1, '{"name": "scenario1", "ü": 1}')
 HOLD = """
@@ -70,7 +70,7 @@ def test_a_new_run_in_a_removed_folder_has_another_name(tmp_path: Path) -> None:
 def test_a_description_without_nonce_is_read(tmp_path: Path) -> None:
     RunFolder(tmp_path, DETAILS).close()
     entries = json.loads((tmp_path / "run.json").read_text())
-    del entries["nonce"]
+    del entries["nonce"], entries["digest"]
     (tmp_path / "run.json").write_text(json.dumps(entries))
     with RunFolder(tmp_path) as folder:
         assert folder.details == DETAILS
@@ -240,7 +240,7 @@ def test_a_folder_without_a_run_is_refused_and_nothing_is_made(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("text", "story"),
     [
-        ("{", "cannot be read"),
+        ("{", "damaged: Input data was truncated"),
         ('{"name": "a"}', "missing required field `run`"),
         (
             '{"name": "a", "run": "0", "seed": 1, "document": ""}',
@@ -256,12 +256,91 @@ def test_a_damaged_description_is_refused(
         read_details(tmp_path)
 
 
-def test_a_damaged_epoch_is_refused_and_the_lock_released(tmp_path: Path) -> None:
-    RunFolder(tmp_path / "run", DETAILS).close()
-    (tmp_path / "run" / "epoch").write_text("many")
-    with pytest.raises(RunFolderError, match="greater than any before"):
-        RunFolder(tmp_path / "run")
-    assert read_holder(tmp_path / "run") == ""
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"many",
+        b"",
+        b"-3",
+        b"\xff\x00",
+        b"1" * 5000,
+        b"99999999",
+        b"18446744073709551615",
+    ],
+)
+def test_a_damaged_epoch_is_replaced_by_one_after_that_of_the_journal(
+    tmp_path: Path, content: bytes
+) -> None:
+    """No record that the next coordinator writes is void."""
+    path = tmp_path / "run"
+    events = [VettingFailed(BirthId(0, number), 0, "refused") for number in range(2)]
+    RunFolder(path, DETAILS).close()
+    for event in events:
+        with (
+            RunFolder(path) as folder,
+            Journal.open(path, epoch=folder.epoch) as journal,
+        ):
+            (path / "epoch").write_bytes(content)
+            with pytest.raises(RunFolderError, match=r"damaged.*revolve resume"):
+                folder.confirm()
+            journal.append([event])
+    with RunFolder(path) as folder:
+        folder.confirm()
+        assert int((path / "epoch").read_text()) == folder.epoch
+    with Journal.open(path) as journal:
+        assert journal.replay() == events
+
+
+@pytest.mark.parametrize("bit", range(8))
+def test_each_changed_bit_of_a_description_is_noticed(tmp_path: Path, bit: int) -> None:
+    """JSON with the same values may differ in white space only."""
+    with RunFolder(tmp_path, DETAILS) as folder:
+        folder.seal({"births": "0" * 64})
+    file = tmp_path / "run.json"
+    sound = file.read_bytes()
+    for at in range(len(sound)):
+        file.write_bytes(sound[:at] + bytes([sound[at] ^ 1 << bit]) + sound[at + 1 :])
+        try:
+            found = read_description(tmp_path)
+        except RunFolderError as error:
+            assert "damaged" in str(error)  # noqa: PT017 - not all bits are damage
+        else:
+            assert sound[at : at + 1].isspace()
+            assert found.seed == DETAILS.seed
+
+
+def test_a_large_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    RunFolder(tmp_path, DETAILS).close()
+    for name, read in (("run.json", read_details), ("state", read_state)):
+        with (tmp_path / name).open("wb") as file:
+            file.truncate(100 << 30)  # more than the memory
+        with pytest.raises(RunFolderError, match=f"{name}: damaged: must have at most"):
+            read(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("run", -1), ("run", 2**31), ("seed", -1), ("seed", 2**64), ("seed", 10**400),
+        ("name", ""), ("name", "a\x1b[31m"), ("name", "a" * 2000),
+    ],
+)  # fmt: skip
+def test_a_description_without_digest_has_names_and_numbers_within_limits(
+    tmp_path: Path, key: str, value: object
+) -> None:
+    entries = {"name": "a", "run": 0, "seed": 0, "document": "{}", key: value}
+    (tmp_path / "run.json").write_text(json.dumps(entries))
+    with pytest.raises(RunFolderError, match=rf"damaged: .*{key}") as caught:
+        read_details(tmp_path)
+    assert str(caught.value).isprintable()
+
+
+def test_the_holder_of_a_lock_is_shown_without_terminal_escapes(tmp_path: Path) -> None:
+    with RunFolder(tmp_path, DETAILS):
+        (tmp_path / "lock").write_bytes(b"\x1b[2J\nprocess\x00" + b"\xff" * 1000)
+        holder = read_holder(tmp_path)
+        assert holder.isprintable()
+        assert len(holder) <= 200
 
 
 def test_the_state_is_read_by_other_processes(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from schema import parts
+from schema.experiment.plugin_access import allow
 from schema.parts import Box, Shape
 from schema.robot.brain import Brain, Connection
 from schema.robot.ids import BirthId
@@ -43,6 +44,11 @@ SPACE = replace(
     ),
 )
 ABSURD = replace(SETTINGS, space=SPACE)
+
+
+@pytest.fixture(autouse=True)
+def _plugins() -> None:
+    allow(["tests.worker.arena.test_divergence"])
 
 
 def with_brick(turtle: Robot, kind: str) -> Robot:

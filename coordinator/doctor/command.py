@@ -1,0 +1,146 @@
+"""Command ``revolve doctor``."""
+
+import argparse
+import os
+import platform
+import shutil
+import stat
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from importlib.util import find_spec
+from pathlib import Path
+
+from coordinator.doctor import machine, system
+from coordinator.doctor.finding import Finding
+from schema.agent.address import CONNECT_VARIABLE, runtime_directory
+from schema.agent.command import (
+    access_of,
+    add_access,
+    add_connect,
+    add_network_flags,
+    connect_of,
+    host_name,
+    tls_of,
+)
+from schema.agent.network import Tls
+from schema.agent.platform_tag import cpu_flags, platform_tag
+from schema.agent.supervisor import cores
+from schema.errors import NetworkError
+from schema.flags import Flags
+
+_REACH_S = 1.0
+_RENDER_S = 4.5
+
+
+def main(arguments: list[str]) -> int:
+    """Print one line for each check, within about five seconds.
+
+    Args:
+        arguments: the command's name first.
+
+    Returns:
+        0 if no check failed, else 1.
+    """
+    options = _flags().parse_args(arguments[1:])
+    began_s = time.monotonic()
+    rendering = system.start_rendering()
+    has_failed = False
+    try:
+        for finding in (*_machine(), *_fleet(options)):
+            print(finding)
+            has_failed |= finding.level == "fail"
+    finally:
+        left_s = max(0.1, _RENDER_S - (time.monotonic() - began_s))
+        found = system.end_rendering(rendering, left_s)
+    print(machine.check_pictures(*found))
+    return int(has_failed)
+
+
+def _machine() -> Iterator[Finding]:
+    yield machine.check_versions(system.versions())
+    flags = cpu_flags(Path("/proc/cpuinfo"))
+    yield machine.check_cpu(platform.machine().lower(), flags, platform_tag())
+    group = system.control_group()
+    quota = system.core_quota(group)
+    yield machine.check_cores(cores(), os.cpu_count() or 1, quota)
+    limit = system.group_bytes(group)
+    yield machine.check_memory(system.available_bytes(), limit, cores())
+    built_s = Path(__file__).stat().st_mtime
+    yield machine.check_clock(time.time(), built_s)
+    here = Path.cwd()
+    free = shutil.disk_usage(here).free
+    yield machine.check_disk(here, free, is_writable=os.access(here, os.W_OK))
+    try:
+        yield machine.check_runtime(str(runtime_directory()), "")
+    except NetworkError as error:
+        yield machine.check_runtime("", str(error))
+    yield machine.check_plugins(system.plugin_modules())
+    yield machine.check_viewer(
+        has_package=find_spec("rerun") is not None, display=system.display()
+    )
+
+
+def _fleet(options: argparse.Namespace) -> Iterator[Finding]:
+    try:
+        tls = tls_of(options)
+    except NetworkError as error:
+        yield Finding("fail", "certificate", str(error))
+        return
+    name = host_name()
+    if tls is not None:
+        try:
+            from schema.agent.certificate import certificate_name
+
+            name = certificate_name(tls.certificate)
+            yield from _certificate(tls, options)
+        except NetworkError as error:
+            yield Finding("fail", "certificate", str(error))
+            return
+    try:
+        connect = connect_of(options)
+        yield from _hub(connect, options, tls, name)
+    except NetworkError as error:
+        yield Finding("fail", "hub", str(error))
+
+
+def _certificate(tls: Tls, options: argparse.Namespace) -> list[Finding]:
+    from coordinator.doctor.certificate import check_certificate
+    from schema.agent.certificate import examine
+
+    return check_certificate(
+        examine(tls),
+        stat.S_IMODE(Path(tls.key).stat().st_mode),
+        access_of(options),
+        datetime.now(UTC),
+    )
+
+
+def _hub(
+    connect: str, options: argparse.Namespace, tls: Tls | None, name: str
+) -> Iterator[Finding]:
+    from coordinator.doctor import hub
+    from coordinator.network.probe_service import probe, reach
+
+    if why := reach(connect, _REACH_S):
+        is_wanted = bool(options.connect or os.environ.get(CONNECT_VARIABLE))
+        yield hub.no_hub(connect, why, is_wanted=is_wanted)
+        return
+    found = probe(connect, options.fleet, tls, name)
+    if found.error:
+        yield hub.refused(connect, found.error)
+        return
+    yield from hub.check_hub(found, connect)
+
+
+def _flags() -> Flags:
+    flags = Flags(
+        prog="revolve doctor",
+        description="Check this machine, its certificate and its way to the hub.",
+        epilog="example: revolve doctor --connect tls/hub.example:7447",
+        allow_abbrev=False,
+    )
+    add_connect(flags)
+    add_access(flags)
+    add_network_flags(flags)
+    return flags

@@ -1,0 +1,29 @@
+"""Result of one check."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Level = Literal["ok", "warn", "fail"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What a check found.
+
+    Attributes:
+        level: "ok"; "warn": something works worse or not at all that a run does not
+            need; "fail": runs do not work.
+        subject: what was checked.
+        text: what was found.
+        advice: what to do; empty if nothing is.
+    """
+
+    level: Level
+    subject: str
+    text: str
+    advice: str = ""
+
+    def __str__(self) -> str:
+        """Return the finding as one line."""
+        line = f"{self.level:4}  {self.subject:12}  {self.text}"
+        return f"{line}; {self.advice}" if self.advice else line

@@ -1,0 +1,179 @@
+"""What a process sees at a hub: round trip, coordinators, and its own rights."""
+
+import socket
+import threading
+import time
+from collections.abc import Mapping
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
+from secrets import token_hex
+from uuid import uuid4
+
+import zenoh
+
+from coordinator.network.client_service import coordinators, reply_of
+from schema.agent.address import UNIX, parse_address
+from schema.agent.network import Tls, client_config
+from schema.agent.service import log_engine
+from schema.agent.topics import Member, Role
+from schema.errors import MalformedMessage
+from schema.wire.operator import (
+    GetStatus,
+    OperatorReply,
+    OperatorRequest,
+    decode_operator_reply,
+    encode_operator_request,
+)
+
+ROLES: tuple[Role, ...] = ("worker", "analyzer", "coordinator")
+_STEP_S = 1.0
+_MOST_ASKED = 3
+_POLL_S = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class HubProbe:
+    """What was seen at a hub.
+
+    Attributes:
+        error: why there is no connection; empty if there is one.
+        round_trip_s: time of the fastest query to the hub [s]; None: no reply.
+        coordinators: names of those that are visible.
+        replies: of the first ones to a request for their status.
+        malformed: names of coordinators whose replies do not decode.
+        offset_s: their clock minus this machine's [s]; None without a reply.
+        roles: whose keys this process may use; None: not tried, as there is no TLS.
+    """
+
+    error: str = ""
+    round_trip_s: float | None = None
+    coordinators: tuple[str, ...] = ()
+    replies: Mapping[str, OperatorReply] = field(default_factory=dict)
+    malformed: tuple[str, ...] = ()
+    offset_s: float | None = None
+    roles: tuple[Role, ...] | None = None
+
+
+def reach(connect: str, timeout_s: float) -> str:
+    """Return why a hub's address accepts no connection; empty if it does.
+
+    Args:
+        connect: address of the hub.
+        timeout_s: how long to wait, for the name's address included [s].
+    """
+    protocol, host, port = parse_address(connect)
+    result: list[str] = []
+
+    def try_it() -> None:
+        try:
+            if protocol == UNIX:
+                with socket.socket(socket.AF_UNIX) as link:
+                    link.settimeout(timeout_s)
+                    link.connect(host)
+            else:
+                socket.create_connection((host, port), timeout_s).close()
+        except OSError as error:
+            result.append(error.strerror or str(error))
+        else:
+            result.append("")
+
+    # The resolver of names has no timeout.
+    thread = threading.Thread(target=try_it, daemon=True)
+    thread.start()
+    thread.join(timeout_s)
+    return result[0] if result else f"no answer within {timeout_s:g} s"
+
+
+def probe(connect: str, fleet: str, tls: Tls | None, name: str) -> HubProbe:
+    """Return what a process sees at a hub, within a few seconds.
+
+    Args:
+        connect: address of the hub.
+        fleet: name of the fleet.
+        tls: files, for a ``tls/`` address.
+        name: of the certificate, or of this machine.
+
+    Raises:
+        NetworkError: an address that needs files.
+    """
+    config = zenoh.Config.from_json5(client_config(connect, tls))
+    config.insert_json5("connect/timeout_ms", "1500")
+    log_engine()
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        # What follows is a place in the engine's source.
+        return HubProbe(str(error).partition(" at /")[0])
+    with session:
+        round_trip_s, members = _look(session, fleet)
+        has_tls = connect.startswith("tls/")
+        roles = _roles(session, config, fleet, name) if has_tls else None
+        replies: dict[str, OperatorReply] = {}
+        malformed: list[str] = []
+        offset_s: float | None = None
+        request = OperatorRequest(uuid4().hex, 0, GetStatus())
+        until_s = time.monotonic() + _STEP_S
+        for member in members[:_MOST_ASKED]:
+            timeout_s = until_s - time.monotonic()
+            if timeout_s <= 0.0:
+                break
+            asked_s = time.time()
+            data = encode_operator_request(request)
+            reply = reply_of(member, session, data, timeout_s)
+            if reply is None:
+                continue
+            middle_s = 0.5 * (asked_s + time.time())
+            try:
+                found = replies[member.name] = decode_operator_reply(reply)
+            except MalformedMessage:
+                malformed.append(member.name)
+                continue
+            if found.time_s is not None and offset_s is None:
+                offset_s = found.time_s - middle_s
+    names = tuple(member.name for member in members)
+    return HubProbe("", round_trip_s, names, replies, tuple(malformed), offset_s, roles)
+
+
+def _look(session: zenoh.Session, fleet: str) -> tuple[float | None, list[Member]]:
+    """Return the time of a query to the hub [s], and the coordinators there."""
+    shortest_s: float | None = None
+    members: set[Member] = set()
+    for _ in range(3):
+        asked_s = time.monotonic()
+        members |= coordinators(session, fleet, _STEP_S)
+        elapsed_s = time.monotonic() - asked_s
+        if elapsed_s >= _STEP_S:
+            break  # the engine has ended the query
+        shortest_s = min(elapsed_s, shortest_s or elapsed_s)
+    return shortest_s, sorted(members, key=lambda member: member.name)
+
+
+def _roles(
+    session: zenoh.Session, config: zenoh.Config, fleet: str, name: str
+) -> tuple[Role, ...]:
+    """Return the roles whose keys a certificate may use.
+
+    A message through the hub to this process itself arrives where the rules allow both
+    ways; no other process takes notice.
+    """
+    nonce = token_hex(4)
+    keys: dict[str, Role] = {}
+    for role in ROLES:
+        separator = "." if role == "coordinator" else "-"
+        keys[Member(fleet, role, f"{name}{separator}doctor-{nonce}").trial] = role
+    heard: set[Role] = set()
+
+    def hear(sample: zenoh.Sample) -> None:
+        heard.add(keys[str(sample.key_expr)])
+
+    until_s = time.monotonic() + _STEP_S
+    # If the hub is gone meanwhile, what was heard counts.
+    with ExitStack() as opened, suppress(zenoh.ZError):
+        for key in keys:
+            opened.enter_context(session.declare_subscriber(key, hear))
+        other = opened.enter_context(zenoh.open(config))
+        while time.monotonic() < until_s and len(heard) < len(keys):
+            for key in keys:
+                other.put(key, b"")
+            time.sleep(_POLL_S)
+    return tuple(role for role in ROLES if role in heard)

@@ -1,0 +1,148 @@
+"""Small files of a run folder: its description ``run.json`` and its ``state``.
+
+Each is written whole, has a limited size and is checked when it is read. The
+description has a digest of its content, so that a changed byte never gives another run.
+"""
+
+import os
+import stat
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+
+from schema.errors import RunFolderError
+from schema.limits import MOST_DESCRIPTION, MOST_MARK, MOST_NAME, printable
+
+DETAILS = "run.json"
+STATE = "state"
+
+State = Literal["running", "stopped", "finished"]
+STATES: tuple[State, ...] = ("running", "stopped", "finished")
+
+
+class Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Content of ``run.json``; older runs have only the first four fields.
+
+    Attributes:
+        name: name of the experiment.
+        run: number of the repeat, from 0.
+        seed: random seed of the run or campaign.
+        document: the experiment as JSON, with all defaults.
+        nonce: distinguishes runs that were made in the same folder.
+        checksums: all segments have checksums.
+        digests: SHA-256 of each finished table in hexadecimal, by name of the table.
+        digest: SHA-256 of the other fields in hexadecimal; empty in older runs.
+    """
+
+    name: str
+    run: int
+    seed: int
+    document: str
+    nonce: str = ""
+    checksums: bool = False
+    digests: dict[str, str] = {}
+    digest: str = ""
+
+
+def description_text(description: Description) -> str:
+    """Return the text of ``run.json``, with its digest."""
+    entries = msgspec.to_builtins(description)
+    entries["digest"] = _digest(entries)
+    return msgspec.json.format(msgspec.json.encode(entries), indent=1).decode()
+
+
+def read_description(folder: Path) -> Description:
+    """Return the description of a folder's run.
+
+    Raises:
+        RunFolderError: there is no run, or its description is damaged.
+    """
+    file = folder / DETAILS
+    try:
+        data = read_small(file, MOST_DESCRIPTION)
+    except FileNotFoundError:
+        raise RunFolderError(
+            f"{folder}: no run is there ({DETAILS} is missing)"
+        ) from None
+    try:
+        found = msgspec.json.decode(data, type=Description)
+        why = _fault(found, data)
+    # A UnicodeError is a ValueError; an escape in JSON may be half a character.
+    except (msgspec.MsgspecError, ValueError, RecursionError) as error:
+        why = str(error)
+    if why:
+        raise RunFolderError(
+            f"{file}: damaged: {printable(why, 200)}; restore a copy of the file"
+        )
+    return found
+
+
+def _fault(found: Description, data: bytes) -> str:
+    """Return what is wrong with a decoded description; empty if nothing is."""
+    if found.digest and found.digest != _digest(msgspec.json.decode(data)):
+        return "its digest is not that of its content"
+    if not (0 < len(found.name) <= MOST_NAME and found.name.isprintable()):
+        return f"name must be printable and not empty, got {found.name[:MOST_NAME]!r}"
+    for key, value, bits in (("run", found.run, 31), ("seed", found.seed, 64)):
+        if not 0 <= value < 1 << bits:
+            return f"{key} must be from 0 to 2^{bits} - 1, got {value}"
+    return ""
+
+
+def _digest(entries: dict[str, Any]) -> str:
+    """Return the SHA-256 of all entries but the digest, in order of their names."""
+    rest = {key: value for key, value in entries.items() if key != "digest"}
+    return sha256(msgspec.json.encode(rest, order="sorted")).hexdigest()
+
+
+def read_state(folder: Path) -> State:
+    """Return a run's state; after a kill it is still "running".
+
+    Raises:
+        RunFolderError: the file is damaged.
+    """
+    file = folder / STATE
+    try:
+        text = read_small(file, MOST_MARK)
+    except FileNotFoundError:
+        return "running"
+    for state in STATES:
+        if text.strip() == state.encode():
+            return state
+    raise RunFolderError(
+        f"{file}: damaged: must be one of {', '.join(STATES)}, got {text[:40]!r}"
+    )
+
+
+def read_small(file: Path, most: int) -> bytes:
+    """Return the content of a small file.
+
+    Args:
+        file: its path.
+        most: greatest size [bytes]; a larger file is not read.
+
+    Raises:
+        FileNotFoundError: there is none.
+        RunFolderError: too large, no regular file, or unreadable.
+    """
+    try:
+        # A named pipe must not block.
+        descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            found = os.fstat(descriptor)
+            if not stat.S_ISREG(found.st_mode):
+                raise RunFolderError(f"{file}: damaged: must be a regular file")
+            if found.st_size > most:
+                raise RunFolderError(
+                    f"{file}: damaged: must have at most {most} bytes, got "
+                    f"{found.st_size}"
+                )
+            return os.read(descriptor, most)
+        finally:
+            os.close(descriptor)
+    except (FileNotFoundError, NotADirectoryError):
+        raise FileNotFoundError(file) from None
+    except OSError as error:
+        raise RunFolderError(f"{file}: cannot be read: {error.strerror}") from None

@@ -1,0 +1,111 @@
+"""The command ``revolve doctor`` at real hubs."""
+
+import socket
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from coordinator.cluster.kit import Cluster, Kit
+from tests.system.test_agents import free_address
+from tests.system.workspace import PATIENCE_S, Workspace, wait_until
+
+pytestmark = pytest.mark.system
+
+LONGEST_S = 15.0
+"""Of a command that is to take five seconds, on a loaded machine."""
+
+
+def lines_of(
+    workspace: Workspace, *words: str, environment: dict[str, str] | None = None
+) -> tuple[int, dict[str, str]]:
+    """Return exit code and lines of ``revolve doctor``, by subject."""
+    process = workspace.start("doctor", *words, environment=environment)
+    out, err = process.communicate(timeout=PATIENCE_S)
+    assert err == ""
+    return process.returncode, {line[6:19].strip(): line for line in out.splitlines()}
+
+
+def files_of(kit: Kit, name: str) -> tuple[str, ...]:
+    folder = kit.folder / "members" / name
+    return (
+        *("--tls-ca", str(folder / "ca.pem")),
+        *("--tls-certificate", str(folder / "certificate.pem")),
+        *("--tls-key", str(folder / "key.pem")),
+    )
+
+
+def test_a_machine_without_a_hub(workspace: Workspace, tmp_path: Path) -> None:
+    here = {"XDG_RUNTIME_DIR": str(tmp_path)}
+    code, lines = lines_of(workspace, environment=here)
+    assert code == 0, lines
+    assert lines["hub"].startswith("warn")
+    assert lines["versions"].startswith("ok")
+    code, lines = lines_of(workspace, "--connect", free_address())
+    assert code == 1
+    assert "refused" in lines["hub"]
+
+
+def test_a_hub_that_never_answers_costs_a_few_seconds(workspace: Workspace) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"tcp/127.0.0.1:{silent.getsockname()[1]}"
+        began_s = time.monotonic()
+        code, lines = lines_of(workspace, "--connect", address)
+        assert time.monotonic() - began_s < LONGEST_S
+    assert code == 1
+    assert lines["hub"].startswith("fail")
+
+
+def test_the_hub_of_a_run(workspace: Workspace) -> None:
+    words = ("--listen", "tcp/127.0.0.1:0", "--quiet", "--out", "run")
+    workspace.start("coordinator", "scenario1", *words)
+    wait_until((workspace.folder / "run" / "address").exists, "the run has an address")
+    code, lines = lines_of(workspace, "--connect", "run")
+    assert code == 0, lines
+    assert "round trip" in lines["hub"]
+    assert "coordinator" in lines["coordinators"].split()[2]
+    assert lines["its clock"].startswith("ok")
+
+
+def test_rights_of_certificates(workspace: Workspace) -> None:
+    address = free_address().replace("tcp/", "tls/")
+    port = int(address.rsplit(":", 1)[1])
+    kit = Kit.new(
+        workspace.folder / "lab",
+        Cluster("127.0.0.1", port, 90),
+        lambda: datetime.now(UTC).replace(microsecond=0),
+    )
+    kit.add("a", "worker")
+    kit.add("boss", "operator")
+    kit.add("chief", "coordinator")
+    kit.add("gone", "worker")
+    kit.revoke("gone")
+    access = ("--access", str(kit.folder / "access.json"))
+    hub = workspace.start("hub", "--listen", address, *files_of(kit, "hub"), *access)
+    assert hub.stderr is not None
+    assert "listening" in hub.stderr.readline()
+    code, lines = lines_of(
+        workspace, "--connect", address, *files_of(kit, "a"), *access
+    )
+    assert code == 0, lines
+    assert "'a', worker, 89 days left" in lines["certificate"]
+    assert lines["rights"].endswith("those of worker")
+    code, lines = lines_of(
+        workspace, "--connect", address, *files_of(kit, "gone"), *access
+    )
+    assert code == 1
+    assert "not in --access" in lines["certificate"]
+    assert "revoked" in lines["rights"]
+    chief = ("--connect", address, *files_of(kit, "chief"), "--out", "run")
+    run = workspace.start("coordinator", "scenario1", "--quiet", *chief)
+    wait_until((workspace.folder / "run" / "address").exists, "the run has an address")
+    code, lines = lines_of(workspace, "--connect", address, *files_of(kit, "boss"))
+    assert code == 0, lines
+    assert lines["rights"].endswith("those of operator")
+    assert lines["coordinators"].split()[2].startswith("chief.")
+    run.kill()
+    (kit.folder / "members" / "a" / "key.pem").chmod(0o644)
+    code, lines = lines_of(workspace, "--connect", address, *files_of(kit, "a"))
+    assert code == 1
+    assert "644" in lines["key"]

@@ -1,0 +1,238 @@
+"""Signals that stop commands: how soon they end, and what they leave and say."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from schema.agent.supervisor import cores
+
+pytestmark = [
+    pytest.mark.system,
+    pytest.mark.skipif(sys.platform != "linux", reason="reads /proc"),
+]
+
+ROOT = Path(__file__).parents[2]
+LIMIT_S = 5.0
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+NOWHERE = "tcp/127.0.0.1:9"
+Workspace = Any
+_STARTED: list[int] = []
+Until = Callable[[Callable[[], bool], str], None]
+
+SLOW = """
+name = "slow"
+births = 1000
+[simulation]
+window_steps = 2000000
+"""
+"""Experiment whose evaluations take minutes."""
+
+COMMANDS = {
+    "run": ("run", "slow.toml", "--workers", "2", "--out", "run", "--quiet"),
+    "in-process": ("run", "slow.toml", "--in-process", "--out", "run", "--quiet"),
+    "coordinator": ("coordinator", "slow.toml", "--out", "run", "--quiet"),
+    "worker": ("worker", "--processes", "2", "--connect", NOWHERE),
+    "analyzer": ("analyzer", "--connect", NOWHERE),
+    "hub": ("hub", "--listen", "tcp/127.0.0.1:0"),
+    "bench": ("bench", "evaluate", "--robots", "10000"),
+    "bench dispatch": ("bench", "dispatch", "--seconds", "100"),
+}
+ADVICE = dict.fromkeys(
+    ("run", "in-process", "coordinator"), "to resume: revolve resume run"
+)
+
+
+def family(process: int) -> set[int]:
+    """Return the processes of a session, by its leader."""
+    found = set()
+    for entry in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            state, _, _, session = entry.read_text().rpartition(")")[2].split()[:4]
+        except OSError:
+            continue  # it has ended
+        if int(session) == process and state != "Z":
+            found.add(int(entry.parent.name))
+    return found
+
+
+def start(folder: Path, *words: str, prefix: tuple[str, ...] = ()) -> Any:  # noqa: ANN401
+    (folder / "slow.toml").write_text(SLOW)
+    process = subprocess.Popen(
+        [*prefix, sys.executable, "-m", "revolve", *words],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        stdin=subprocess.DEVNULL,
+        text=True,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "XDG_RUNTIME_DIR": str(folder)},
+        start_new_session=True,
+    )
+    _STARTED.append(process.pid)
+    return process
+
+
+@pytest.fixture(autouse=True)
+def nothing_stays() -> Iterator[None]:
+    """Kill what a failed test has left."""
+    yield
+    while _STARTED:
+        for each in family(_STARTED.pop()):
+            os.kill(each, signal.SIGKILL)
+
+
+def wait_until_begun(folder: Path, name: str, process: Any, until: Until) -> str:  # noqa: ANN401
+    """Wait until a command does what it is to be stopped in; return what it said."""
+
+    def is_begun() -> bool:
+        if process.poll() is not None:
+            return True
+        size = len(family(process.pid))
+        if name == "run":
+            journal = folder / "run" / "journal.bin"
+            is_vetted = journal.exists() and journal.stat().st_size > 1000
+            return is_vetted and size >= 4
+        if name == "coordinator":
+            return (folder / "run" / "address").exists()
+        is_there = name != "in-process" or (folder / "run" / "state").exists()
+        return is_there and _cpu_s(process.pid) > 3.0
+
+    told: str = ""
+    if name in ("worker", "analyzer", "hub"):
+        told = process.stderr.readline()
+        assert told.startswith(("no hub", "listening")), told
+    else:
+        until(is_begun, name)
+    assert process.poll() is None, process.stderr.read()
+    return told
+
+
+def _cpu_s(process: int) -> float:
+    times = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(times[11]) + int(times[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def stop(process: Any, number: int, family_before: set[int]) -> tuple[float, str]:  # noqa: ANN401
+    """Send a signal; return the time until all processes are gone, and stderr."""
+    sent_s = time.monotonic()
+    process.send_signal(number)
+    while family(process.pid) & family_before or process.poll() is None:
+        time.sleep(0.02)  # polling interval
+        if time.monotonic() - sent_s > 20:
+            left = family(process.pid)
+            for each in left:
+                os.kill(each, signal.SIGKILL)
+            pytest.fail(f"{len(left)} processes are still there after 20 s")
+    taken_s = time.monotonic() - sent_s
+    _, told = process.communicate()
+    return taken_s, told
+
+
+@pytest.mark.parametrize("number", SIGNALS, ids=lambda number: number.name)
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_signal_ends_a_command_with_its_children(
+    tmp_path: Path, until: Until, name: str, number: signal.Signals
+) -> None:
+    process = start(tmp_path, *COMMANDS[name])
+    wait_until_begun(tmp_path, name, process, until)
+    taken_s, told = stop(process, number, family(process.pid))
+    sys.stdout.write(f"{name} {number.name}: {taken_s:.2f} s\n{told}\n")
+    assert taken_s < LIMIT_S
+    assert "Traceback" not in told
+    again = f"to start again: revolve {' '.join(COMMANDS[name])}"
+    assert told.splitlines()[-1] == f"stopped; {ADVICE.get(name, again)}"
+    assert process.returncode in (0, 130)
+    assert not family(process.pid)
+
+
+def test_a_command_under_nohup_ignores_hangups(tmp_path: Path, until: Until) -> None:
+    process = start(tmp_path, *COMMANDS["worker"], prefix=("nohup",))
+    wait_until_begun(tmp_path, "worker", process, until)
+    processes = family(process.pid)
+    for each in processes:
+        os.kill(each, signal.SIGHUP)
+    ignored = 1 << signal.SIGHUP - 1
+    for each in processes:
+        status = Path(f"/proc/{each}/status").read_text()
+        (mask,) = (line for line in status.splitlines() if line.startswith("SigIgn"))
+        assert int(mask.split()[1], 16) & ignored
+    taken_s, told = stop(process, signal.SIGTERM, processes)
+    assert taken_s < LIMIT_S
+    assert "a worker process ended" not in told
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("worker", "--processes", "5000", "--connect", NOWHERE),
+        ("analyzer", "--processes", "5000", "--connect", NOWHERE),
+        ("run", "scenario1", "--workers", "5000"),
+    ],
+)
+def test_too_many_processes_need_a_flag(
+    workspace: Workspace, words: tuple[str, ...]
+) -> None:
+    output = workspace.run(*words, code=2)
+    assert (
+        f"must be <= {4 * cores()}, 4 for each of {cores()} cores, got 5000" in output
+    )
+    assert len(output.splitlines()) == 1
+    assert not (workspace.folder / "runs").exists()
+
+
+@pytest.mark.parametrize("role", ["worker", "analyzer"])
+def test_an_agent_gives_up_without_a_hub(workspace: Workspace, role: str) -> None:
+    words = (role, "--processes", "2", "--connect", NOWHERE, "--give-up-after", "1.5")
+    output = workspace.run(*words, code=1)
+    assert output.splitlines() == [
+        f"no hub at {NOWHERE}; retrying; press Ctrl-C to stop",
+        f"no hub at {NOWHERE} for 1.5 s: giving up (--give-up-after)",
+    ]
+
+
+def test_a_lost_hub_is_told_once_and_its_return(
+    workspace: Workspace, until: Until
+) -> None:
+    """A coordinator and a worker go on when the hub is back."""
+    document = SLOW.replace("2000000", "120").replace("1000", "30000")
+    (workspace.folder / "quick.toml").write_text(document)
+    place = f"unixsock-stream/{workspace.folder}/h"
+    words = ("quick.toml", "--connect", place, "--quiet", "--out", "run")
+
+    def hub() -> Any:  # noqa: ANN401 - a process
+        process = workspace.start("hub", "--listen", place)
+        assert process.stderr.readline().startswith("listening")
+        return process
+
+    first = hub()
+    coordinator = workspace.start("coordinator", *words, "--give-up-after", "8")
+    agents = [
+        workspace.start(role, "--connect", place, "--give-up-after", "30")
+        for role in ("worker", "analyzer")
+    ]
+    journal = workspace.folder / "run" / "journal.bin"
+
+    def grows() -> None:
+        until(journal.exists, "journal")
+        size = journal.stat().st_size
+        until(lambda: journal.stat().st_size > size + 1000, "more births")
+
+    grows()
+    first.terminate()
+    lost = f"no hub at {place}; retrying; press Ctrl-C to stop\n"
+    for process in (coordinator, *agents):
+        assert process.stderr.readline() == lost
+    second = hub()
+    for process in (coordinator, *agents):
+        assert process.stderr.readline() == f"connected to {place}\n"
+    grows()
+    second.terminate()
+    assert coordinator.wait(60) == 1
+    *_, last = coordinator.stderr.read().splitlines()
+    assert last.endswith("(--give-up-after); to resume: revolve resume run")
