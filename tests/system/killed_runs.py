@@ -99,8 +99,10 @@ def check(reference: Reference, folder: Path, tally: Tally, kills: int) -> None:
         tally.differences.append(f"{folder}:\n{warm.tail(log_of(folder))}")
 
 
-def cut_poses(folder: Path, share: float) -> None:
-    """Cut the newest segment of poses to a share of its length."""
+def cut_poses(folder: Path, share: float) -> bool:
+    """Cut the newest segment of poses to a share of its length, if there is one."""
     for _, path in segments_of(folder, "poses")[-1:]:
-        if path.exists():
-            os.truncate(path, round(share * path.stat().st_size))
+        if path.exists() and path.stat().st_size:
+            os.truncate(path, int(share * path.stat().st_size))
+            return True
+    return False

@@ -7,7 +7,7 @@ coordinator, and compared with the first when it is finished. Prints a line for 
 run, and one of JSON at the end: kills by kind, kills per run, and the differences.
 
 ``instants``: coordinators without a network, killed at an instant of ``instants.py`` or
-after some CPU time. Before most kills in the recovery of poses the segment is cut, as a
+after some CPU time. Before a kill in the recovery of poses the segment is cut, as a
 power loss does.
 
 ``fleet``: coordinators at a hub, with an analyzer and three worker processes that their
@@ -52,7 +52,7 @@ AT_THE_END = 5
 PROCESSES = 3
 BY_TIME = "by CPU time"
 MOST_RESTORED = 24
-"""Most advances that a recovery repeats before it is killed, times four."""
+"""Most advances that a recovery repeats before it is killed, times eight."""
 BY_JOURNAL = 0.7
 """Share of the kills of a fleet that are at a size of the journal."""
 MEAN_GROWTH = 0.04
@@ -71,8 +71,14 @@ class InstantKills:
 
     def run(self, reference: Reference, folder: Path, left: Counter[str]) -> None:
         """Execute a run with kills, and compare it; see ``FleetKills.run``."""
-        kills = 0
+        kills, before = 0, ""
         for kind, number in islice(self._plan(reference), left["coordinator"]):
+            # A recovery that was killed is resumed, or begins again with less.
+            is_new = before != RECOVERY or self._rng.random() < 0.5
+            share = self._rng.uniform(0.0, 0.5)
+            if kind == RECOVERY and is_new and not cut_poses(folder, share):
+                continue
+            before = kind
             if self._attempt(reference, folder, kind, number) is not None:
                 break
             kills += 1
@@ -91,8 +97,8 @@ class InstantKills:
             running[RECOVERY] = MOST_RESTORED
         for _ in range(WHILE_RUNNING):
             kind = self._deal(running)
-            # A quarter of a run: the next kill of this kind hits it, too.
-            yield kind, 1 + int(self._rng.integers(-(-running[kind] // 4)))
+            # Soon enough for the others to hit the same run.
+            yield kind, 1 + int(self._rng.integers(-(-running[kind] // 8)))
         for _ in range(AT_THE_END):
             kind = self._deal(dict.fromkeys(reference.ending, 1))
             yield kind, 1 + int(self._rng.integers(reference.ending[kind]))
@@ -113,14 +119,12 @@ class InstantKills:
     ) -> int | None:
         """Run or resume once; return the exit code, or None if it was killed."""
         rng = self._rng
-        if kind == RECOVERY and rng.random() < 0.7:
-            cut_poses(folder, rng.uniform(0.0, 0.8))
         # The ends of a change are instants of their own.
         share = float(np.clip(rng.uniform(-0.5, 1.5), 0.0, 1.0))
         instants = Instants(kind, number, share, [])
         words = [*words_of(reference.document, folder), *FLAGS]
         child = warm.start(words, log_of(folder), instants.install)
-        limit_s = rng.uniform(0.0, 0.25) * reference.cpu_s
+        limit_s = rng.uniform(0.0, 0.15) * reference.cpu_s
         code = None
         if kind == BY_TIME:
             while cpu_s(child) < limit_s and (code := warm.ended(child)) is None:
