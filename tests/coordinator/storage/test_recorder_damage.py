@@ -96,7 +96,7 @@ def test_a_kill_while_a_segment_is_removed_is_no_damage(
     rows = [each for each in make_records(6) if each.table == "births"]
     feed_rows(tmp_path, rows, every=1).close()
     path = segment_path(tmp_path, "births", 0)
-    files = []
+    files: list[Path] = []
     unlink = Path.unlink
 
     def stop(file: Path) -> None:
