@@ -12,10 +12,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
+from msgspec.structs import replace
 from rerun.chunk import RrdReader
 
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import NAME
+from schema.tables.checksums import digest_of
+from schema.tables.description import description_text, read_description
 from schema.tables.files import read_table
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
@@ -262,6 +265,11 @@ def test_wrong_record_is_reported(workspace: Workspace, undisturbed: Path) -> No
     index = table.schema.get_field_index("fitness")
     fitness = pc.add(table["fitness"], 1e-9)
     pq.write_table(table.set_column(index, table.schema.field(index), fitness), file)
+    # A forger with access to the folder also replaces the digest.
+    known = read_description(folder)
+    digests = {**known.digests, "evaluations": digest_of(file)}
+    text = description_text(replace(known, digests=digests))
+    (folder / "run.json").write_text(text)
     out = workspace.run("view", str(folder), "--robot", "0:4", "--save", "a.rrd")
     assert "0:4: DIFFERS from the record: fitness" in out
 
@@ -269,7 +277,7 @@ def test_wrong_record_is_reported(workspace: Workspace, undisturbed: Path) -> No
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("view",), "give either a run folder or --connect"),
+        (("view", "x", "--connect", "hub"), "give either a run folder or --connect"),
         (("view", "nowhere"), "no run found"),
         (("view", "--connect", "tcp/127.0.0.1:1"), "no coordinator at"),
         (("view", "nowhere", "--serve", "9876"), "must be HOST:PORT"),
