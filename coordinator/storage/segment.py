@@ -85,7 +85,11 @@ def remove_segment(path: Path) -> None:
     Raises:
         RunFolderError: the disk failed.
     """
+    sums = sums_path(path)
     with storage_errors(path):
-        for file in (sums_path(path), path):
+        # First the records: one without its message would be damage after a kill.
+        if sums.exists() and sums.stat().st_size > sums_size(0):
+            os.truncate(sums, sums_size(0))
+        for file in (path, sums):
             if file.exists():
                 file.unlink()

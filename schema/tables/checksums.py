@@ -125,8 +125,9 @@ def _records(segment: Path, sums: bytes) -> Iterator[tuple[int, int]]:
     """
     path = sums_path(segment)
     if not sums.startswith(MAGIC):
-        # Both files are made before anything is written to them.
-        if segment.exists() and not segment.stat().st_size and not sums:
+        # A kill while both files were made: the segment gets its first bytes after.
+        is_begun = segment.exists() and segment.stat().st_size > 0
+        if MAGIC.startswith(sums) and not is_begun:
             return
         raise Damaged(path, 0, "no checksums of this version of Revolve")
     for at in range(len(MAGIC), len(sums) - _RECORD + 1, _RECORD):

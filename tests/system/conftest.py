@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from schema.agent.network import Tls
+from tests.system.documents import SMALL_ARENA
 from tests.system.fleet import Fleet, make_certificate
 from tests.system.workspace import Workspace, wait_until
 
@@ -122,25 +123,6 @@ def crowded_arena_run(once: Once) -> Path:
         once("crowd", lambda workspace: _arena(workspace, "crowd.toml", CROWDED_ARENA))
         / "run"
     )
-
-
-SMALL_ARENA = """
-name = "hamlet"
-births = 12
-[selection]
-population = 5
-[simulation]
-warmup_steps = 200
-window_steps = 800
-[arena]
-birth_interval_s = 4.0
-cull_interval_s = 8.0
-sample_interval_s = 2.0
-snapshot_interval_s = 6.0
-birth_radius_m = 0.4
-record_touches = true
-"""
-"""Arena of little more than half a minute that covers all kinds of events."""
 
 
 @pytest.fixture(scope="session")

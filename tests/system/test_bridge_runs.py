@@ -10,33 +10,16 @@ import pytest
 
 from coordinator.storage.compare import compare
 from schema.tables.files import read_table
+from tests.system.documents import BRIDGE
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
-
-SHORT = """
-name = "short-bridge"
-births = 24
-[simulation]
-window_steps = 400
-evaluation_s = [2.0, 4.0]
-[selection]
-population = 8
-children = 1
-[selection.reevaluation]
-interval = 3
-share = 0.4
-[selection.culling]
-population_limit = 12
-population_floor = 6
-"""
-"""Evaluations of 2 s to 4 s; a quarter of them are re-evaluations."""
 
 
 def test_killed_bridge_resumes_to_the_tables_of_a_single_process(
     workspace: Any,  # noqa: ANN401 - the fixture
     until: Callable[[Callable[[], bool], str], None],
 ) -> None:
-    (workspace.folder / "short.toml").write_text(SHORT)
+    (workspace.folder / "short.toml").write_text(BRIDGE)
     words = ("short.toml", "--seed", "3", "--quiet", "--out")
     workspace.run("run", *words, "calm", "--in-process")
     reference, killed = workspace.folder / "calm", workspace.folder / "killed"

@@ -1,13 +1,10 @@
-"""Faults of the coordinator: kills at random instants, and a replacement while stopped.
+"""Faults of the coordinator: it is stopped, and replaced while it is stopped.
 
-test_equal_runs.py and test_arena_runs.py kill coordinators that have a network. These
-tests kill many processes at instants that are independent of the journal.
+test_equal_runs.py and test_arena_runs.py kill single coordinators, test_many_kills.py
+kills many.
 """
 
-import os
-import re
 import signal
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -29,47 +26,6 @@ pytestmark = [
 Workspace = Any
 Fleets = Callable[..., Any]
 PATIENCE_S = 120
-ROOT = Path(__file__).parents[2]
-KILLABLE = Path(__file__).with_name("killable.py")
-
-OFF_LINE = """
-name = "singles"
-births = 40
-[selection]
-population = 8
-children = 8
-[simulation]
-window_steps = 400
-"""
-
-
-@pytest.mark.long
-@pytest.mark.slow
-@pytest.mark.parametrize(("kind", "kills", "seed"), [("off", 40, 41), ("on", 20, 42)])
-def test_kills_at_random_instants_give_equal_runs(
-    tmp_path: Path, small_arena_document: str, kind: str, kills: int, seed: int
-) -> None:
-    """Sixty kills in total, each after up to half the time of a whole run."""
-    document = OFF_LINE if kind == "off" else small_arena_document
-    (tmp_path / "mine.toml").write_text(document)
-    done = subprocess.run(
-        [sys.executable, str(KILLABLE), "mine.toml", str(kills), str(seed)],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=280,
-    )
-    sys.stdout.write(done.stdout)
-    assert done.returncode == 0, done.stderr
-    assert len(done.stdout.splitlines()) >= kills
-    sizes = re.findall(r"at (\d+) bytes", done.stdout)
-    assert len(set(sizes)) > kills // 4
-    runs = sorted(tmp_path.glob("run-*"))
-    assert len(runs) >= 2
-    for run in runs:
-        assert compare(tmp_path / "whole", run) == []
 
 
 def stopped_coordinator(

@@ -12,6 +12,7 @@ import pytest
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import NAME
 from schema.tables.files import read_table
+from tests.system.documents import MIXED, SHORT_ARENA, SHORT_EVALUATIONS
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
 
@@ -31,48 +32,18 @@ epoch = 15
 judge_anew = true
 """
 
-_ARENA = """
-[islands.arena]
-birth_interval_s = 5.0
-cull_interval_s = 10.0
-population_limit = 8
-population_floor = 4
-record_touches = true
-"""
-
-_SHARED = """
-[simulation]
-window_steps = 400
-[selection]
-population = 5
-tournament_size = 2
-"""
-
 ARENAS = f"""
 name = "arenas"
 births = 10
-{_SHARED}
+{SHORT_EVALUATIONS}
 [[islands]]
 count = 2
-{_ARENA}
+{SHORT_ARENA}
 [migration]
 topology = "ring"
 epoch = 7
 epoch_s = 10.0
 handling = "evict"
-"""
-
-MIXED = f"""
-name = "mixed"
-births = 9
-{_SHARED}
-[[islands]]
-births = 35
-[[islands]]
-{_ARENA}
-[migration]
-topology = "ring"
-epoch = 6
 """
 
 

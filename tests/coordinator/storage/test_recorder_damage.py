@@ -12,12 +12,17 @@ import pytest
 from coordinator.islands.events import Record
 from coordinator.storage.folder import RunDetails, RunFolder, read_details
 from coordinator.storage.recorder import Recorder
-from coordinator.storage.segment import Segment
+from coordinator.storage.segment import Segment, remove_segment
 from schema.errors import RunFolderError
 from schema.tables.checksums import read_seal, sums_path
 from schema.tables.columns import BIRTHS, TABLES
 from schema.tables.files import parquet_path, read_table
-from schema.tables.segments import read_segment, segment_path, segments_of
+from schema.tables.segments import (
+    read_segment,
+    segment_path,
+    segments_of,
+    warn_once,
+)
 
 DETAILS = RunDetails("a/b c", 2, 1, "{}")
 Make = Callable[..., list[Record]]
@@ -76,6 +81,37 @@ def test_an_opened_segment_is_cut_with_its_checksums(
     flip(path, 3)
     Recorder(tmp_path, DETAILS).close()
     assert segments_of(tmp_path, "births") == []
+
+
+@pytest.mark.parametrize("removed", [0, 1])
+def test_a_kill_while_a_segment_is_removed_is_no_damage(
+    tmp_path: Path,
+    make_records: Make,
+    feed_rows: Feed,
+    *,
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    removed: int,
+) -> None:
+    rows = [each for each in make_records(6) if each.table == "births"]
+    feed_rows(tmp_path, rows, every=1).close()
+    path = segment_path(tmp_path, "births", 0)
+    files: list[Path] = []
+    unlink = Path.unlink
+
+    def stop(file: Path) -> None:
+        if len(files) == removed:
+            raise KeyboardInterrupt
+        files.append(file)
+        unlink(file)
+
+    monkeypatch.setattr(Path, "unlink", stop)
+    with pytest.raises(KeyboardInterrupt):
+        remove_segment(path)
+    (tmp_path / "run.json").write_text('{"name": "any", "checksums": true}')
+    warn_once.cache_clear()
+    assert read_table(tmp_path, "births").num_rows == 0
+    assert caplog.messages == []
 
 
 def test_a_batch_whose_checksum_cannot_be_written_is_removed(

@@ -157,6 +157,20 @@ def test_bytes_without_a_checksum_do_not_count(tmp_path: Path) -> None:
     assert births(tmp_path) == WHOLE
 
 
+@pytest.mark.parametrize("is_made", [False, True])
+def test_a_kill_while_the_files_are_made_is_no_damage(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, *, is_made: bool
+) -> None:
+    write(tmp_path)
+    path = segment_path(tmp_path, "evaluations", 1)
+    if is_made:
+        path.touch()
+    for written in range(len(MAGIC) + 1):
+        sums_path(path).write_bytes(MAGIC[:written])
+        assert births(tmp_path) == WHOLE
+    assert caplog.messages == []
+
+
 @pytest.mark.parametrize("lost", ["segment", "sums"])
 def test_a_lost_file_is_named(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, lost: str

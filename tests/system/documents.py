@@ -1,0 +1,78 @@
+"""Experiments of a few seconds that several tests run."""
+
+OFF_LINE = """
+name = "singles"
+births = 40
+[selection]
+population = 8
+children = 8
+[simulation]
+window_steps = 400
+"""
+"""Off-line island of short evaluations."""
+
+BRIDGE = """
+name = "short-bridge"
+births = 24
+[simulation]
+window_steps = 400
+evaluation_s = [2.0, 4.0]
+[selection]
+population = 8
+children = 1
+[selection.reevaluation]
+interval = 3
+share = 0.4
+[selection.culling]
+population_limit = 12
+population_floor = 6
+"""
+"""Evaluations of 2 s to 4 s; a quarter of them are re-evaluations."""
+
+SMALL_ARENA = """
+name = "hamlet"
+births = 12
+[selection]
+population = 5
+[simulation]
+warmup_steps = 200
+window_steps = 800
+[arena]
+birth_interval_s = 4.0
+cull_interval_s = 8.0
+sample_interval_s = 2.0
+snapshot_interval_s = 6.0
+birth_radius_m = 0.4
+record_touches = true
+"""
+"""Arena of little more than half a minute that covers all kinds of events."""
+
+SHORT_ARENA = """
+[islands.arena]
+birth_interval_s = 5.0
+cull_interval_s = 10.0
+population_limit = 8
+population_floor = 4
+record_touches = true
+"""
+
+SHORT_EVALUATIONS = """
+[simulation]
+window_steps = 400
+[selection]
+population = 5
+tournament_size = 2
+"""
+
+MIXED = f"""
+name = "mixed"
+births = 9
+{SHORT_EVALUATIONS}
+[[islands]]
+births = 35
+[[islands]]
+{SHORT_ARENA}
+[migration]
+topology = "ring"
+epoch = 6
+"""
