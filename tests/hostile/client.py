@@ -13,6 +13,7 @@ import argparse
 import json
 import sys
 import threading
+import time
 from collections import Counter, defaultdict, deque
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -42,6 +43,8 @@ from tests.hostile.decoders import update
 from tests.hostile.mutation import Mutator
 
 _NOW = zenoh.ConsolidationMode.NONE
+_PATIENCE_S = 30.0
+"""Time without a hub after which the run is over [s]."""
 _OPEN = 200
 """Most queries that wait for replies at a time."""
 _KEPT = 30
@@ -360,8 +363,13 @@ def main() -> None:
         client.join()
         number = 0
         while not stop.is_set() and sum(client.sent.values()) < chosen.messages:
-            if number % 500 == 0 and client.look() == 0:
-                break  # the run is over
+            if number % 500 == 0:
+                # A hub closes the link of a peer that floods it: wait until it is back.
+                end_s = time.monotonic() + _PATIENCE_S
+                while client.look() == 0 and time.monotonic() < end_s:
+                    stop.wait(0.5)
+                if time.monotonic() >= end_s:
+                    break  # the run is over
             number += 1
             client.send()
             is_half = 2 * sum(client.sent.values()) >= chosen.messages
