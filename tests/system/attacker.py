@@ -130,7 +130,12 @@ class Attacker:
                 config = session_config(client_config(self._address), fake)
                 session = self._stack.enter_context(zenoh.open(config))
                 info = pb.AgentInfo(
-                    agent=fake.name, kind="worker", slots=1, version=wire_version()
+                    agent=fake.name,
+                    kind="worker",
+                    slots=1,
+                    shards=1,
+                    cores=1,
+                    version=wire_version(),
                 )
                 info.deaths.add(
                     agent=member.name,

@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import zenoh
 
 from coordinator.storage.compare import compare
+from schema.agent.network import client_config
+from schema.agent.topics import Member
 from tests.hostile.decode import peak_mb
 from tests.system.fleet import agent_processes
 from tests.system.workspace import PATIENCE_S, wait_until
@@ -58,6 +61,17 @@ def note_peaks(fleet: Any, viewer: Any, peaks_mb: dict[str, float]) -> None:  # 
             peaks_mb[name] = max(peaks_mb.get(name, 0.0), peak)
 
 
+def _wait_for_viewer(address: str) -> None:
+    """Wait until a viewer subscribes to the news of coordinators."""
+    config = zenoh.Config.from_json5(client_config(address))
+    with zenoh.open(config) as session:
+        key = Member("default", "coordinator", "nobody").events
+        publisher = session.declare_publisher(key)
+        # Zenoh's stubs call the status a bool; it is an object that is always true.
+        status: Callable[[], Any] = lambda: publisher.matching_status  # noqa: E731
+        wait_until(lambda: bool(status().matching), "the viewer subscribes")
+
+
 def outcome(
     workspace: Workspace, fleet_of: FleetOf, words: tuple[str, ...], messages: int
 ) -> Outcome:
@@ -76,6 +90,7 @@ def outcome(
     fleet.begin(2, has_analyzer=False)
     recording = f"{messages}.rrd"
     viewer = workspace.start("view", "--connect", fleet.address, "--save", recording)
+    _wait_for_viewer(fleet.address)
     processes = {"coordinator": fleet.coordinator, "viewer": viewer, **fleet.agents}
     told: dict[str, Future[tuple[str, str]]] = {}
     peaks_mb: dict[str, float] = {}
@@ -122,8 +137,12 @@ def check(calm: Outcome, hostile: Outcome, messages: int) -> None:
         assert not any("\x1b" in line for line in own), name
     sent = hostile.hostile["sent"]
     growth = {
-        name: round(hostile.peaks_mb[name] - calm.peaks_mb[name], 1) for name in ROLES
+        name: round(hostile.peaks_mb[name] - calm.peaks_mb[name], 1)
+        for name in ROLES
+        if name in hostile.peaks_mb.keys() & calm.peaks_mb.keys()
     }
+    # An analyzer or a viewer may end before its memory is read.
+    assert growth.keys() >= {"coordinator", "w1", "w2"}
     report = {
         "sent": sent,
         "came": hostile.hostile["came"],
@@ -132,9 +151,9 @@ def check(calm: Outcome, hostile: Outcome, messages: int) -> None:
     }
     sys.stdout.write(f"{json.dumps(report, indent=1)}\n")
     assert sum(sent.values()) >= messages // 2
-    assert max(growth[name] for name in ROLES[:-1]) <= MOST_GROWTH_MB
+    assert max(growth[name] for name in growth if name != "viewer") <= MOST_GROWTH_MB
     assert dropped(hostile.told["coordinator"], "malformed") > 0
-    for name in ("w1", "w2", "judge"):
+    for name in ("w1", "w2"):
         assert re.search(r"refused \d+ requests", hostile.told[name]), name
     assert re.search(r"dropped \d+ messages", hostile.told["viewer"])
 
