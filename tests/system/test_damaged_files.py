@@ -18,6 +18,7 @@ from coordinator.storage.lock import read_holder
 from schema.errors import RunFolderError
 from schema.tables import segments
 from schema.tables.description import description_text, read_description, read_state
+from tests.system.workspace import said
 
 pytestmark = pytest.mark.system
 
@@ -104,10 +105,12 @@ class Command:
         self._log.clear()
         self._output.readouterr()
         code = revolve.main(list(words))
-        said = self._output.readouterr().err.splitlines()
-        said += [record.getMessage() for record in self._log.records]
-        assert all(line.isprintable() for line in said), said
-        return code, [line for line in said if "already finished" not in line]
+        told = said(self._output.readouterr().err)
+        # Lines for the user are both on standard error and in the log.
+        told += [each.getMessage() for each in self._log.records]
+        assert all(line.isprintable() for line in told), told
+        lines = dict.fromkeys(told)
+        return code, [line for line in lines if "already finished" not in line]
 
 
 @pytest.fixture
@@ -136,24 +139,24 @@ def test_a_damaged_file_gives_one_line_and_never_another_run(
         run = tmp_path / str(number)
         shutil.copytree(folders / which, run)
         (run / name).write_bytes(content)
-        said = f"{name} as {content[:60]!r}"
+        case = f"{name} as {content[:60]!r}"
         for words in (["status"], ["log", "--json"], ["compare", str(whole)]):
             code, lines = command(*words, str(run))
-            assert code in (0, 1, 2), said
-            assert len(lines) <= 1, (said, lines)
+            assert code in (0, 1, 2), case
+            assert len(lines) <= 1, (case, lines)
         shown = command("status", str(run))
         for read in readers:
             with suppress(RunFolderError):
                 read(run)
         code, lines = command("resume", str(run), *QUIET)
-        assert len(lines) <= 2, (said, lines)
+        assert len(lines) <= 2, (case, lines)
         if code == 0:
             # Finished is true: all rows are there.
-            assert read_state(run) == "finished", said
-            assert not compare(whole, run), said
+            assert read_state(run) == "finished", case
+            assert not compare(whole, run), case
         else:
-            assert name == "run.json", (said, lines)
-            assert "damaged" in lines[0], (said, lines)
-            assert shown[0] == 1, said
+            assert name == "run.json", (case, lines)
+            assert "damaged" in lines[0], (case, lines)
+            assert shown[0] == 1, case
         assert read_holder(run) == ""
         shutil.rmtree(run)

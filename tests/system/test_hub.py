@@ -58,6 +58,7 @@ def told_of_hub(process: Running) -> tuple[int, int]:
     return process.text.count("; retrying"), process.text.count("connected to")
 
 
+@pytest.mark.long
 def test_viewer_and_run_go_on_after_the_hub_is_killed(
     site: Site, undisturbed: Path
 ) -> None:
