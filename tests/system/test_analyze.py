@@ -9,9 +9,11 @@ import duckdb
 import polars as pl
 import pyarrow.parquet as pq
 import pytest
+from msgspec.structs import replace
 
 from analysis.figures.catalogue import FIGURES
 from analysis.measures.outputs import OUTPUTS, schema
+from schema.tables.description import description_text, read_description
 from tests.system.workspace import Workspace
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]
@@ -36,11 +38,12 @@ def report_and_output(
         ):
             shutil.copytree(run, workspace.folder / "runs" / name)
         shutil.copytree(undisturbed, workspace.folder / "runs" / "e")
-        details = workspace.folder / "runs" / "e" / "run.json"
-        entries = json.loads(details.read_text())
-        document = json.loads(entries["document"])
+        other = workspace.folder / "runs" / "e"
+        known = read_description(other)
+        document = json.loads(known.document)
         document["vetting"]["tolerance_m"] = 0.001
-        details.write_text(json.dumps({**entries, "document": json.dumps(document)}))
+        text = description_text(replace(known, document=json.dumps(document)))
+        (other / "run.json").write_text(text)
         (workspace.folder / "runs" / "d").mkdir()
         (workspace.folder / "runs" / "d" / "run.json").write_text("{")
         output = workspace.run("analyze", "runs", "--out", "report")
@@ -70,7 +73,7 @@ def test_runs_are_measured_and_left_out_runs_are_reported(
     everything = measures["left_out"].to_pylist()
     named = [row for row in everything if row["folder"]]
     assert [(row["folder"], row["why"][:12]) for row in named] == [
-        ("runs/d", "run.json: ca"),
+        ("runs/d", "run.json: da"),
         ("runs/c", "the same run"),
     ]
     assert "left out: runs/d: run: run.json" in output
