@@ -91,14 +91,20 @@ class RemoteFleets:
     certify: Certify
     fleet_of: Fleets
 
-    def fleet(self, workspace: Workspace, *words: str) -> tuple[Any, list[str]]:
-        """Return a fleet with a remote worker, and the TLS flags of all processes."""
-        tls = self.certify(workspace.folder, "machine", "ca", HOST)
-        flags = ["--tls-ca", tls.ca, "--tls-certificate", tls.certificate]
-        flags += ["--tls-key", tls.key]
+    def fleet(
+        self, workspace: Workspace, *words: str
+    ) -> tuple[Any, Callable[[str], list[str]]]:
+        """Return a fleet with a remote worker, and the TLS flags of a process."""
+
+        def flags(name: str) -> list[str]:
+            tls = self.certify(workspace.folder, name, "ca", HOST)
+            files = ["--tls-ca", tls.ca, "--tls-certificate", tls.certificate]
+            return [*files, "--tls-key", tls.key]
+
         listen, near = f"tls/{HOST}:{PORT}", self.cable.near
-        fleet = self.fleet_of(workspace, *words, *flags, listen=listen, inside=near)
-        fleet.join("far", "worker", *flags, inside=self.cable.far)
+        own = flags("machine")
+        fleet = self.fleet_of(workspace, *words, *own, listen=listen, inside=near)
+        fleet.join("far", "worker", *flags("far"), inside=self.cable.far)
         return fleet, flags
 
 
@@ -120,7 +126,7 @@ def test_disconnecting_a_worker_gives_an_equal_run(
 ) -> None:
     words = ("scenario1", "--seed", "5", "--births", str(births), "--quiet")
     fleet, flags = remote_fleets.fleet(workspace, *words)
-    fleet.join("judge", "analyzer", *flags, inside=remote_fleets.cable.near)
+    fleet.join("judge", "analyzer", *flags("judge"), inside=remote_fleets.cable.near)
     share = np.random.default_rng(31).uniform(0.1, 0.7)
     fleet.wait_for(share * (undisturbed / NAME).stat().st_size)
     remote_fleets.cable.cut()
@@ -139,10 +145,10 @@ def test_arena_moves_to_another_worker_when_its_holder_is_disconnected(
     fleet, flags = remote_fleets.fleet(small_arena_workspace, *words)
     whole = (small_arena_run / NAME).stat().st_size
     share = np.random.default_rng(32).uniform(0.1, 0.5)
-    fleet.join("judge", "analyzer", *flags, inside=remote_fleets.cable.near)
+    fleet.join("judge", "analyzer", *flags("judge"), inside=remote_fleets.cable.near)
     fleet.wait_for(share * whole)
     remote_fleets.cable.cut()
-    fleet.join("near", "worker", *flags, inside=remote_fleets.cable.near)
+    fleet.join("near", "worker", *flags("near"), inside=remote_fleets.cable.near)
     fleet.wait_for((share + 0.3) * whole)
     remote_fleets.cable.reconnect()
     fleet.finish()
