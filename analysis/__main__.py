@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from schema.errors import RevolveError
-from schema.experiment.plugin_access import allow
 from schema.flags import Flags, add_plugins, whole_number
+from schema.plugins.permission import allow
 
 
 class MissingExtra(RevolveError):  # noqa: N818 - names what is missing

@@ -38,9 +38,9 @@ from schema.experiment.document import (
     with_births,
 )
 from schema.experiment.file import experiment_from_text
-from schema.experiment.plugin_access import allow, allow_references
 from schema.experiment.settings import fitness_function
 from schema.limits import MOST_REPEATS
+from schema.plugins.permission import allow, allow_references
 
 
 def main(arguments: list[str]) -> int:

@@ -7,10 +7,10 @@ from pathlib import Path
 from schema.errors import RevolveError
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
-from schema.experiment.plugin_access import allow
 from schema.flags import Flags, add_plugins
 from schema.formats.files import read_robot, settings_of, write_robot
 from schema.parts import BUILT_IN, BodySpace
+from schema.plugins.permission import allow
 from schema.robot.brain import neuron_names
 from schema.robot.robot import Robot
 

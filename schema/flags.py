@@ -65,7 +65,7 @@ def add_count(
 
 
 def add_plugins(flags: argparse.ArgumentParser) -> None:
-    """Add the flag for modules that may be imported (``plugin_access.allow``)."""
+    """Add the flag for modules that may be imported (``permission.allow``)."""
     flags.add_argument(
         "--plugins",
         action="append",

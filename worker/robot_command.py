@@ -6,11 +6,11 @@ from pathlib import Path
 
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
-from schema.experiment.plugin_access import allow
 from schema.experiment.settings import EvaluationSettings
 from schema.flags import Flags, add_plugins
 from schema.formats.files import MJCF_ENDING, read_robot, settings_of
 from schema.formats.mjcf import read_mjcf
+from schema.plugins.permission import allow
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
 

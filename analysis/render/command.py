@@ -18,9 +18,9 @@ from analysis.render.picture import (
 )
 from schema.experiment.document import Simulation, body_space
 from schema.experiment.file import read_experiment
-from schema.experiment.plugin_access import allow
 from schema.flags import Flags, add_plugins, whole_number
 from schema.formats.files import read_robot, settings_of
+from schema.plugins.permission import allow
 from schema.robot.results import Floats
 
 FILM_ENDING = ".gif"

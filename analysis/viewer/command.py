@@ -33,8 +33,8 @@ from schema.agent.command import add_connect, add_network_flags, connect_of, tls
 from schema.agent.log import tell_user
 from schema.agent.supervisor import stop_on_signals
 from schema.experiment.file import own_experiment
-from schema.experiment.plugin_access import allow
 from schema.flags import Flags, add_plugins, number
+from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
 from schema.wire.codec import decode_body
 

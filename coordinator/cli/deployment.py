@@ -21,7 +21,7 @@ from schema.agent.platform_tag import platform_tag
 from schema.agent.supervision import CPU_LIMIT_S, WAIT_LIMIT_S, ProcessSlot
 from schema.agent.supervisor import ProcessPool
 from schema.agent.topics import unique_name
-from schema.experiment.plugin_access import allowed
+from schema.plugins.permission import allowed
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from schema.agent.platform_tag import our_version, wire_version
-from schema.experiment.plugin_access import GROUP
+from schema.plugins.permission import GROUP
 
 _LIBRARIES = {
     "MuJoCo": "mujoco-core",

@@ -16,7 +16,7 @@ from coordinator.network.service import Network, Order
 from coordinator.run.feed import Feed
 from coordinator.run.loop import Loop
 from schema.agent.network import Tls
-from schema.experiment.plugin_access import allowed
+from schema.plugins.permission import allowed
 from schema.wire.updates import WorkerInfo, encode_update
 
 _UPDATE_S = 0.2

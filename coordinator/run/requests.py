@@ -24,7 +24,7 @@ from coordinator.run.cross_checks import CrossChecks
 from coordinator.run.run_context import RunContext
 from schema.errors import JobRefused
 from schema.experiment.identity import NO_IDENTITY, Identity
-from schema.experiment.plugin_source import plugins_of
+from schema.plugins.source import plugins_of
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.robot.robot import Robot

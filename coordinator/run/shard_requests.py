@@ -27,8 +27,8 @@ from coordinator.run.pose_checks import place_poses, read_poses
 from coordinator.run.run_context import RunContext
 from schema.errors import JobRefused, MalformedMessage, UnexpectedEvent
 from schema.experiment.document import body_space
-from schema.experiment.plugin_source import plugins_of
 from schema.parts import BodySpace, Vector
+from schema.plugins.source import plugins_of
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance
 from schema.wire.arena import Advance, Changes

@@ -33,8 +33,8 @@ from schema.agent.supervisor import (
 )
 from schema.agent.topics import Role, check_name
 from schema.errors import NetworkError, RevolveError
-from schema.experiment.plugin_access import allow, allowed
 from schema.flags import Flags, add_plugins, positive_number, whole_number
+from schema.plugins.permission import allow, allowed
 
 _POLL_S = 0.5
 MOST_PER_CORE = 4

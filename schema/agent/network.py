@@ -65,7 +65,7 @@ class Agent:
         wait_limit_s: time that a job may wait without using CPU time [s].
         processes: that share the memory of this machine.
         shards: arenas whose state the process keeps.
-        plugins: modules and files that it may import, for ``plugin_access.allow``.
+        plugins: modules and files that it may import, for ``permission.allow``.
         give_up_after_s: time without a hub after which the process ends [s].
     """
 

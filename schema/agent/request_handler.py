@@ -19,7 +19,6 @@ from schema.agent.job_watch import JobWatch, thread_clock
 from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.supervision import ProcessSlot, Task
 from schema.errors import MalformedMessage, PluginDiffers, RevolveError, UnknownPlugin
-from schema.experiment.plugin_source import check_plugins
 from schema.limits import (
     ADVANCE_REQUEST_BYTES,
     LONGEST_REASON,
@@ -29,6 +28,7 @@ from schema.limits import (
     WAITING_JOB_BYTES,
     printable,
 )
+from schema.plugins.source import check_plugins
 from schema.wire import revolve_pb2 as pb
 from schema.wire.packing import fingerprint
 from schema.wire.parsing import parsed, require_most

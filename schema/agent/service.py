@@ -28,8 +28,8 @@ from schema.agent.supervision import ProcessSlot
 from schema.agent.supervisor import stop_on_signals, stop_with_parent
 from schema.agent.topics import Member, check_name, unique_name
 from schema.errors import NetworkError
-from schema.experiment.plugin_access import allow
 from schema.limits import MOST_SHOWN
+from schema.plugins.permission import allow
 
 _POLL_S = 0.2
 # Queries that are taken before a job is done.

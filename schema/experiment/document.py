@@ -15,7 +15,6 @@ from msgspec import Meta, structs
 from schema.errors import ExperimentError
 from schema.experiment.environment import FLAT, Environment
 from schema.experiment.migration import Migration
-from schema.experiment.plugin import load_instance
 from schema.experiment.section import (
     AtLeastOne,
     Count,
@@ -25,6 +24,7 @@ from schema.experiment.section import (
     Section,
 )
 from schema.parts import BodySpace, Parameter, PartType
+from schema.plugins.load import load_instance
 
 
 class Space(Section, frozen=True):

@@ -16,7 +16,6 @@ from schema.experiment.bounded import read_bytes
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, references
 from schema.experiment.environment import is_mjcf
-from schema.experiment.plugin_access import allow_references
 from schema.limits import (
     MOST_BRACKETS,
     MOST_DIGITS,
@@ -25,6 +24,7 @@ from schema.limits import (
     MOST_KEY_PARTS,
     MOST_TEXT_BYTES,
 )
+from schema.plugins.permission import allow_references
 
 # ``tomllib`` stores all beginnings of a dotted key. Possessive: without backtracking.
 _KEY_PART = r"""(?:[\w-]++|"(?:[^"\\\n]++|\\.)*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+"""

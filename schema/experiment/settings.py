@@ -18,9 +18,9 @@ from schema.experiment.document import (
 )
 from schema.experiment.environment import FLAT, Environment, ground_problems
 from schema.experiment.identity import Origin
-from schema.experiment.plugin import load_function
 from schema.experiment.section import Section
 from schema.limits import MOST_SETTINGS_BYTES
+from schema.plugins.load import load_function
 
 T = TypeVar("T")
 

@@ -119,7 +119,7 @@ class Live:
 def encode_advance_request(request: AdvanceRequest, plugins: str = "") -> bytes:
     """Return the bytes of a request.
 
-    ``plugins`` is the result of ``plugin_source.plugins_of`` for its settings.
+    ``plugins`` is the result of ``source.plugins_of`` for its settings.
     """
     message = pb.AdvanceRequest(
         run=request.run,

@@ -151,7 +151,7 @@ def encode_request(
     """Return the bytes of a request.
 
     ``robot`` holds encoded bytes of the robot or its body; ``plugins`` is the result
-    of ``plugin_source.plugins_of`` for the settings.
+    of ``source.plugins_of`` for the settings.
     """
     message = pb.Request(
         run=run,

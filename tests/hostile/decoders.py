@@ -48,7 +48,6 @@ from schema.experiment.file import (
     parse_experiment,
 )
 from schema.experiment.identity import Identity, Origin
-from schema.experiment.plugin_source import check_plugins
 from schema.experiment.settings import (
     arena_settings,
     evaluation_settings,
@@ -64,6 +63,7 @@ from schema.formats.robogen_text import robot_from_robogen_text
 from schema.formats.yaml import robot_to_yaml
 from schema.limits import LIVE_BYTES, MOST_LIVE_ROWS
 from schema.parts import BUILT_IN, BodySpace
+from schema.plugins.source import check_plugins
 from schema.robot.inverse_development import genome_of
 from schema.robot.results import Provenance
 from schema.robot.robot import Robot, check_types

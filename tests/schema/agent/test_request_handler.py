@@ -13,9 +13,9 @@ from schema.agent.network import CANCELLED, FENCED, UNFIT, Agent
 from schema.agent.request_handler import MOST_SOURCES, FairQueue, Reply, Server
 from schema.agent.supervision import CurrentJob, Death, ProcessSlot, Task
 from schema.errors import InvalidRobot, PluginDiffers, UnknownPlugin
-from schema.experiment.plugin_access import allow
-from schema.experiment.plugin_source import check_plugins, plugins_of
 from schema.limits import LONGEST_REASON, MOST_EPOCH, WAITING_JOB_BYTES
+from schema.plugins.permission import allow
+from schema.plugins.source import check_plugins, plugins_of
 from schema.wire import revolve_pb2 as pb
 from schema.wire.packing import fingerprint
 

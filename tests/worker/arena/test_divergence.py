@@ -7,8 +7,8 @@ import pytest
 from msgspec.structs import replace
 
 from schema import parts
-from schema.experiment.plugin_access import allow
 from schema.parts import Box, Shape
+from schema.plugins.permission import allow
 from schema.robot.brain import Brain, Connection
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot

@@ -9,13 +9,13 @@ from functools import lru_cache
 from hashlib import sha256
 
 from schema.errors import PluginDiffers, shown
-from schema.experiment.plugin_access import (
+from schema.limits import MOST_PLUGIN_CHARACTERS
+from schema.plugins.permission import (
     ROOMS,
     allows_any_of,
     how_to_allow,
     source_of,
 )
-from schema.limits import MOST_PLUGIN_CHARACTERS
 
 _PATH = re.compile(r'"([A-Za-z_]\w*)(?:\.[A-Za-z_]\w*)*:[A-Za-z_]\w*"')
 _DIGITS = 12

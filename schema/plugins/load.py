@@ -6,13 +6,13 @@ caller declares.
 """
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from functools import lru_cache
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
-from schema.errors import ExperimentError, UnknownPlugin, shown
-from schema.experiment.plugin_access import how_to_allow, import_allowed, is_allowed
+from schema.errors import ExperimentError, UnknownPlugin, nearest, shown
+from schema.plugins.permission import how_to_allow, import_allowed, is_allowed
 
 T = TypeVar("T")
 
@@ -35,6 +35,36 @@ def load_instance(path: str, where: str, kind: type[T]) -> T:
     if not isinstance(found, kind):
         raise ExperimentError(f"{where}: {path!r} is not a {kind.__name__}")
     return found
+
+
+def load_object(
+    path: str, where: str, built_in: Mapping[str, T], members: tuple[str, ...] = ()
+) -> T:
+    """Return the built-in or own object that a key of an experiment names.
+
+    Args:
+        path: the short name of a built-in object, or ``module:attribute``.
+        where: the key that holds it, for messages.
+        built_in: objects of this kind by short name.
+        members: attributes that an own object must have.
+
+    Raises:
+        UnknownPlugin: no such built-in object (the nearest is named); else as for
+            ``load_instance``.
+        ExperimentError: as for ``load_instance``; an attribute is missing.
+    """
+    if ":" not in path:
+        if path not in built_in:
+            raise UnknownPlugin(
+                f"{where}: must be one of {', '.join(built_in)} or 'module:attribute', "
+                f"got {shown(path)}{nearest(path, built_in)}"
+            )
+        return built_in[path]
+    found = _load(path, where)
+    for member in members:
+        if not hasattr(found, member):
+            raise ExperimentError(f"{where}: {path!r} has no {member!r}")
+    return cast("T", found)
 
 
 def load_function(path: str, where: str, arguments: int) -> Callable[..., Any]:

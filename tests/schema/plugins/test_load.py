@@ -6,12 +6,8 @@ from pathlib import Path
 import pytest
 
 from schema.errors import ExperimentError, PluginDiffers, UnknownPlugin
-from schema.experiment import plugin_access, plugin_source
 from schema.experiment.document import Fitness, body_space
 from schema.experiment.file import parse_experiment, read_experiment
-from schema.experiment.plugin import load_function, load_instance
-from schema.experiment.plugin_access import allow, allowed
-from schema.experiment.plugin_source import check_plugins, plugins_of
 from schema.experiment.settings import (
     evaluation_settings,
     fitness_function,
@@ -20,6 +16,10 @@ from schema.experiment.settings import (
     vetting_settings,
 )
 from schema.parts import BUILT_IN, PartType
+from schema.plugins import permission, source
+from schema.plugins.load import load_function, load_instance, load_object
+from schema.plugins.permission import allow, allowed
+from schema.plugins.source import check_plugins, plugins_of
 
 FITNESS = "def fitness(track, settings):\n    return 1.0\n"
 
@@ -30,7 +30,7 @@ def load(path: str) -> PartType:
 
 @pytest.fixture(autouse=True)
 def _nothing_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(plugin_access, "_allowed", {})
+    monkeypatch.setattr(permission, "_allowed", {})
 
 
 @pytest.fixture
@@ -193,7 +193,7 @@ def test_digest_does_not_depend_on_how_a_module_is_found(
     allow([str(tmp_path / "digested.py")])
     by_file = plugins_of(named)
     check_plugins(by_file)
-    plugin_access._allowed.clear()
+    permission._allowed.clear()
     _forget_digests()
     assert plugins_of(named) == "digested="
     monkeypatch.syspath_prepend(tmp_path)
@@ -203,7 +203,7 @@ def test_digest_does_not_depend_on_how_a_module_is_found(
 
 def _forget_digests() -> None:
     plugins_of.cache_clear()
-    plugin_source._digest.cache_clear()
+    source._digest.cache_clear()
 
 
 @pytest.mark.parametrize(
@@ -258,9 +258,27 @@ def test_entry_points_are_allowed(folder: Path) -> None:
     meta.mkdir()
     (meta / "METADATA").write_text("Metadata-Version: 2.1\nName: pointed-at\n")
     (meta / "entry_points.txt").write_text("[revolve.plugins]\nmine = pointed_at\n")
-    plugin_access._installed_modules.cache_clear()
+    permission._installed_modules.cache_clear()
     try:
         function = load_function("pointed_at:fitness", "key", 2)
         assert function(None, None) == 1.0
     finally:
-        plugin_access._installed_modules.cache_clear()
+        permission._installed_modules.cache_clear()
+
+
+def test_a_short_name_is_built_in() -> None:
+    assert load_object("best", "selection.survivors", {"best": 1, "random": 2}) == 1
+    with pytest.raises(UnknownPlugin) as caught:
+        load_object("bset", "selection.survivors", {"best": 1, "random": 2})
+    assert str(caught.value) == (
+        "selection.survivors: must be one of best, random or 'module:attribute', got "
+        "'bset'; did you mean 'best'?"
+    )
+
+
+def test_an_own_object_must_have_the_members() -> None:
+    built_in: dict[str, object] = {}
+    path = "schema.parts:CORE"
+    assert load_object(path, "x", built_in, ("arity",)) is BUILT_IN["Core"]
+    with pytest.raises(ExperimentError, match="x: 'schema.parts:CORE' has no 'fly'"):
+        load_object(path, "x", built_in, ("arity", "fly"))

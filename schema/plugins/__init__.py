@@ -1,0 +1,1 @@
+"""Plug-ins: which modules may be imported, loading by name, checks, parameters."""
