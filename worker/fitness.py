@@ -1,36 +1,42 @@
 """Fitness functions and the check of their contract.
 
-A fitness function is any ``module:attribute`` that takes a track and the
-experiment's fitness section and returns a finite number, higher is better.
+A fitness function is any ``module:attribute`` that takes a trace and its parameters
+and returns a finite number, higher is better. Its second argument is annotated with a
+msgspec Struct, which gets the table ``[fitness.parameters]``; without such an
+annotation it gets the experiment's fitness section.
 """
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from schema.errors import ExperimentError, FitnessUndefined
 from schema.experiment.document import Fitness
-from schema.experiment.settings import fitness_function
+from schema.experiment.settings import fitness_argument, fitness_function
 from schema.robot.results import Floats, Track
+from schema.robot.trace import Trace
 
-FitnessFunction = Callable[[Track, Fitness], float]
-"""Function that ``fitness.function`` names: fitness of a track; finite, maximised."""
+FitnessFunction = Callable[[Trace, Any], float]
+"""Function that ``fitness.function`` names: fitness of a trace; finite, maximised."""
 
 
-def fitness_of(track: Track, fitness: Fitness) -> float:
-    """Return the fitness of a track, by the experiment's function.
+def fitness_of(trace: Trace, fitness: Fitness) -> float:
+    """Return the fitness of a trace, by the experiment's function.
 
     Args:
-        track: (T, 3) positions; T >= 2.
-        fitness: names the function and its weights.
+        trace: of T samples with all channels that the function declares; T >= 2.
+        fitness: names the function and its parameters.
 
     Raises:
         FitnessUndefined: the function raised or gave no finite number.
+        ExperimentError: an unknown function, or parameters that it refuses.
     """
     function = fitness_function(fitness)
+    argument = fitness_argument(function, fitness)
     try:
-        value = float(function(track, fitness))
+        value = float(function(trace, argument))
     except Exception as error:
         raise FitnessUndefined(
             f"{fitness.function} raised {type(error).__name__}: {error}"

@@ -6,7 +6,7 @@ part types are checked by ``schema.robot.robot.check_robot``.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 
 from schema.errors import MalformedMessage
 from schema.experiment.identity import NO_IDENTITY, Identity
@@ -309,6 +309,10 @@ def evaluation_from_message(message: pb.Evaluation) -> Evaluation:
     Raises:
         MalformedMessage: a number that is not finite.
     """
-    names = [field.name for field in fields(Evaluation)]
-    numbers = (finite(getattr(message, name), f"evaluation.{name}") for name in names)
-    return Evaluation(*numbers)
+    return Evaluation(
+        finite(message.fitness, "evaluation.fitness"),
+        finite(message.path_velocity, "evaluation.path_velocity"),
+        finite(message.straight_velocity, "evaluation.straight_velocity"),
+        finite(message.simulated_s, "evaluation.simulated_s"),
+        tuple(finite(each, "evaluation.measures") for each in message.measures),
+    )
