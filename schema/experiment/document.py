@@ -8,9 +8,9 @@ folders, addresses) are flags of the commands, not keys.
 from dataclasses import replace
 from functools import lru_cache
 from math import pi
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
-from msgspec import Meta, structs
+from msgspec import Meta, field, structs
 
 from schema.errors import ExperimentError
 from schema.experiment.environment import FLAT, Environment
@@ -19,10 +19,13 @@ from schema.experiment.section import (
     AtLeastOne,
     Count,
     NotNegative,
+    Parameters,
+    PluginSection,
     Positive,
     Probability,
     Section,
 )
+from schema.limits import MOST_MEASURES
 from schema.parts import BodySpace, Parameter, PartType
 from schema.plugins.load import load_instance
 
@@ -239,7 +242,7 @@ class Simulation(Section, frozen=True):
     actuator_noise: NoiseLevel = 0.0
 
 
-class Fitness(Section, frozen=True):
+class Fitness(PluginSection, frozen=True):
     """The function that evolution maximises.
 
     Attributes:
@@ -247,12 +250,34 @@ class Fitness(Section, frozen=True):
         path_weight, straight_weight: weights of the velocities along the path and
             between its ends.
         limit: greatest realistic fitness; above it, fitness is 0.
+        parameters: of a function with a Struct of its own.
     """
+
+    later: ClassVar = ("parameters",)
 
     function: str = "worker.fitness:thesis"
     path_weight: float = 1.0
     straight_weight: float = 5.0
     limit: Positive = 1.0
+    parameters: Parameters = field(default_factory=dict)
+
+
+class Measures(PluginSection, frozen=True):
+    """Numbers of a robot's life that are recorded beside its fitness.
+
+    Attributes:
+        names: short names of built-in measures, or ``module:attribute``.
+        parameters: a table for each measure that has parameters, by short name or
+            attribute.
+    """
+
+    names: Annotated[tuple[str, ...], Meta(max_length=MOST_MEASURES)] = ()
+    parameters: dict[str, Parameters] = field(default_factory=dict)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the measures in tables: short names and attributes."""
+        return tuple(name.rpartition(":")[2] for name in self.names)
 
 
 class Arena(Section, frozen=True):
@@ -341,6 +366,7 @@ class Experiment(Section, frozen=True):
         births: number of births on each island, the initial population included.
         islands: numbered from 0, in the order of the document; none is one island.
         migration: between the islands.
+        measures: of the robots of all islands.
     """
 
     name: str
@@ -356,6 +382,7 @@ class Experiment(Section, frozen=True):
     arena: Arena | None = None
     islands: tuple[Islands, ...] = ()
     migration: Migration | None = None
+    measures: Measures = Measures()
 
     @property
     def window(self) -> int:
@@ -399,7 +426,7 @@ def references(experiment: Experiment) -> list[str]:
     """Return the ``module:attribute`` of all plug-ins that a document names."""
     own = [each.fitness for each in experiment.islands if each.fitness is not None]
     functions = [fitness.function for fitness in (experiment.fitness, *own)]
-    return [*experiment.space.part_types, *functions]
+    return [*experiment.space.part_types, *functions, *experiment.measures.names]
 
 
 @lru_cache(maxsize=64)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import msgspec
 from msgspec.structs import replace
@@ -12,6 +12,7 @@ from schema.experiment.document import (
     Arena,
     Experiment,
     Fitness,
+    Measures,
     Simulation,
     Space,
     Vetting,
@@ -21,6 +22,7 @@ from schema.experiment.identity import Origin
 from schema.experiment.section import Section
 from schema.limits import MOST_SETTINGS_BYTES
 from schema.plugins.load import load_function
+from schema.plugins.parameters import parameters_type, read_parameters
 
 T = TypeVar("T")
 
@@ -35,14 +37,19 @@ class VettingSettings(Section, frozen=True):
 class EvaluationSettings(Section, frozen=True):
     """Settings of an evaluation request."""
 
+    later: ClassVar = ("measures",)
+
     space: Space
     simulation: Simulation
     fitness: Fitness
     environment: Environment = FLAT
+    measures: Measures = Measures()
 
 
 class ArenaSettings(Section, frozen=True):
     """Settings of a request to advance an arena."""
+
+    later: ClassVar = ("measures",)
 
     space: Space
     simulation: Simulation
@@ -50,6 +57,7 @@ class ArenaSettings(Section, frozen=True):
     arena: Arena
     environment: Environment = FLAT
     origin: Origin = Origin()
+    measures: Measures = Measures()
 
 
 def vetting_settings(experiment: Experiment) -> bytes:
@@ -173,6 +181,32 @@ def fitness_function(fitness: Fitness) -> Callable[..., float]:
 
     Raises:
         UnknownPlugin: no such module or attribute, or a module that is not allowed.
-        ExperimentError: not a function of a track and a fitness section.
+        ExperimentError: not a function of a trace and its parameters.
     """
     return load_function(fitness.function, "fitness.function", 2)
+
+
+@lru_cache(maxsize=64)
+def fitness_argument(
+    function: Callable[..., float], fitness: Fitness
+) -> Fitness | msgspec.Struct:
+    """Return the second argument of a fitness function.
+
+    Args:
+        function: annotated with a Struct of its own, which gets the table
+            ``fitness.parameters``; any other function gets the section.
+        fitness: the section.
+
+    Raises:
+        ExperimentError: parameters that the Struct refuses, or without a Struct.
+    """
+    where = "fitness.parameters"
+    kind = parameters_type(function, "fitness.function")
+    if kind is not None and not issubclass(kind, Fitness):
+        return read_parameters(fitness.parameters, kind, where)
+    if fitness.parameters:
+        raise ExperimentError(
+            f"{where}: {fitness.function} has no parameters of its own; it must "
+            "annotate its second argument with a msgspec Struct"
+        )
+    return fitness

@@ -306,6 +306,7 @@ def evaluation_to_message(evaluation: Evaluation) -> pb.Evaluation:
         path_velocity=evaluation.path_velocity,
         straight_velocity=evaluation.straight_velocity,
         simulated_s=evaluation.simulated_s,
+        measures=evaluation.measures,
     )
 
 
@@ -320,4 +321,5 @@ def evaluation_from_message(message: pb.Evaluation) -> Evaluation:
         finite(message.path_velocity, "evaluation.path_velocity"),
         finite(message.straight_velocity, "evaluation.straight_velocity"),
         finite(message.simulated_s, "evaluation.simulated_s"),
+        tuple(finite(each, "evaluation.measures") for each in message.measures),
     )
