@@ -16,11 +16,18 @@ from schema.experiment.document import (
     Simulation,
     Space,
     Vetting,
+    light_of,
 )
-from schema.experiment.environment import FLAT, Environment, ground_problems
+from schema.experiment.environment import (
+    FLAT,
+    Environment,
+    arena_problems,
+    ground_problems,
+)
 from schema.experiment.identity import Origin
 from schema.experiment.section import Section
 from schema.limits import MOST_SETTINGS_BYTES
+from schema.parts import Vector
 from schema.plugins.load import load_function
 from schema.plugins.parameters import parameters_type, read_parameters
 
@@ -58,6 +65,11 @@ class ArenaSettings(Section, frozen=True):
     environment: Environment = FLAT
     origin: Origin = Origin()
     measures: Measures = Measures()
+
+    @property
+    def light(self) -> Vector | None:
+        """Position of the light [m]; None is no light."""
+        return light_of(self.environment, self.arena)
 
 
 def vetting_settings(experiment: Experiment) -> bytes:
@@ -146,7 +158,10 @@ def _from_json(settings: bytes, kind: type[T]) -> T:
     except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
         raise ExperimentError(f"{where}: {error}") from None
     environment = getattr(found, "environment", FLAT)
-    for problem in ground_problems(environment):
+    problems = list(ground_problems(environment))
+    if isinstance(found, ArenaSettings):
+        problems += arena_problems(environment)
+    for problem in problems:
         raise ExperimentError(f"{where}: {problem}")
     return found
 
