@@ -6,6 +6,7 @@ from urllib.parse import quote
 
 from schema.errors import ExperimentError
 from schema.experiment.check_migration import migration_problems
+from schema.experiment.check_world import world_problems
 from schema.experiment.document import (
     Arena,
     Culling,
@@ -16,7 +17,6 @@ from schema.experiment.document import (
     island_experiment,
     steps_of,
 )
-from schema.experiment.environment import arena_problems, ground_problems
 
 # File systems hold names of 255 bytes, of which the run's folders need some.
 _LONGEST_NAME = 200
@@ -67,12 +67,9 @@ def _island_problems(experiment: Experiment) -> Iterator[str]:
     yield from _reevaluation_problems(experiment)
     yield from _pose_problems(experiment.simulation, "window_steps")
     yield from _duration_problems(experiment)
-    yield from _environment_problems(experiment)
-    yield from _push_problems(experiment)
-    yield from _light_problems(experiment)
+    yield from world_problems(experiment)
     if experiment.arena is not None:
         yield from _arena_problems(experiment, experiment.arena)
-        yield from arena_problems(experiment.environment)
         yield from _arena_clock_problems(experiment.arena, experiment.simulation)
 
 
@@ -139,36 +136,6 @@ def _pose_problems(clock: Simulation, name: str) -> Iterator[str]:
         )
 
 
-def _environment_problems(experiment: Experiment) -> Iterator[str]:
-    yield from ground_problems(experiment.environment)
-    if scenery := experiment.environment.scenery:
-        # MuJoCo is imported only if needed: it is slow to load.
-        from schema.experiment.scenery import (  # noqa: PLC0415
-            refuse_objects,
-            scenery_model,
-        )
-
-        try:
-            scenery_model(scenery, experiment.simulation)
-            if experiment.arena is not None:
-                refuse_objects(experiment.environment, experiment.simulation)
-        except ExperimentError as error:
-            yield str(error)
-
-
-def _push_problems(experiment: Experiment) -> Iterator[str]:
-    """Yield whether pushes do not begin at a tick."""
-    world, clock = experiment.environment, experiment.simulation
-    tick_s = clock.brain_steps * clock.timestep_s
-    ticks = max(1, round(world.push_interval_s / tick_s))
-    is_whole = isclose(ticks * tick_s, world.push_interval_s, rel_tol=1e-9)
-    if world.push_impulse and not is_whole:
-        yield (
-            f"environment.push_interval_s: must be a whole multiple of {tick_s:g} s, "
-            f"the time between brain ticks, got {world.push_interval_s:g}"
-        )
-
-
 def _arena_problems(experiment: Experiment, arena: Arena) -> Iterator[str]:
     selection = experiment.selection
     if selection.survivors != "best" or not selection.keep_parents:
@@ -187,16 +154,6 @@ def _arena_problems(experiment: Experiment, arena: Arena) -> Iterator[str]:
         yield (
             "arena.split_distance_m: must be >= arena.merge_distance_m = "
             f"{arena.merge_distance_m}, got {arena.split_distance_m}"
-        )
-
-
-def _light_problems(experiment: Experiment) -> Iterator[str]:
-    arena, there = experiment.arena, experiment.environment.light
-    here = None if arena is None else arena.light
-    if here and there and here != there:
-        yield (
-            f"arena.light: differs from environment.light = {list(there)}, got "
-            f"{list(here)}; remove one of the two"
         )
 
 

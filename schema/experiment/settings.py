@@ -28,10 +28,20 @@ from schema.experiment.identity import Origin
 from schema.experiment.section import Section
 from schema.limits import MOST_SETTINGS_BYTES
 from schema.parts import Vector
-from schema.plugins.load import load_function
+from schema.plugins.load import full_name, load_function
 from schema.plugins.parameters import parameters_type, read_parameters
 
 T = TypeVar("T")
+
+FITNESS = {
+    "locomotion": "worker.fitness:thesis",
+    "directed-locomotion": "worker.tasks:directed_locomotion",
+    "target": "worker.tasks:target",
+    "light": "worker.tasks:light",
+    "turning": "worker.tasks:turning",
+    "balance": "worker.tasks:balance",
+}
+"""Fitness functions that come with the toolkit, by short name."""
 
 
 class VettingSettings(Section, frozen=True):
@@ -198,7 +208,8 @@ def fitness_function(fitness: Fitness) -> Callable[..., float]:
         UnknownPlugin: no such module or attribute, or a module that is not allowed.
         ExperimentError: not a function of a trace and its parameters.
     """
-    return load_function(fitness.function, "fitness.function", 2)
+    where = "fitness.function"
+    return load_function(full_name(fitness.function, where, FITNESS), where, 2)
 
 
 @lru_cache(maxsize=64)

@@ -63,6 +63,17 @@ def test_light_is_a_place_of_the_world_off_line_and_in_arenas() -> None:
     )
 
 
+def test_the_task_light_needs_a_light() -> None:
+    text = '[fitness]\nfunction = "light"\n'
+    assert refused(text) == (
+        "mine.toml: fitness.function: 'light' needs environment.light = [x, y, z], got "
+        "none"
+    )
+    for table in ("environment", "arena"):
+        lit = f"{text}[{table}]\nlight = [1.0, 0.0, 0.5]\n"
+        assert parse_experiment(HEAD + lit, "it").fitness.function == "light"
+
+
 def test_pushes_are_off_line_and_begin_at_ticks() -> None:
     text = "[environment]\npush_impulse = 0.1\n"
     assert parse_experiment(HEAD + text, "it").environment.push_interval_s == 3.0
