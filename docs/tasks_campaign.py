@@ -22,6 +22,7 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from analysis.measures.load import read_runs
 from schema.experiment.document import Experiment, body_space
 from schema.experiment.file import own_experiment
 from schema.experiment.identity import Identity, Origin
@@ -170,8 +171,8 @@ def _outcome(out: Path) -> dict[str, object]:
 
 def _best(out: Path) -> tuple[Experiment, int, Robot]:
     """Return the experiment of a run, and birth and robot of the last best fitness."""
-    document = read_table(out, "runs")["experiment"][0].as_py()
-    experiment = own_experiment(document)
+    (one,), _ = read_runs([out])
+    experiment = own_experiment(one.document)
     alive = _last(out)
     best = int(np.argmax(alive["fitness"].to_numpy()))
     birth = alive["birth"][best].as_py()
