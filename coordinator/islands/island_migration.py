@@ -34,6 +34,7 @@ class IslandMigration:
         selection = experiment.selection
         self.epochs = epochs
         self._space = body_space(experiment.space)
+        self._labels = experiment.measures.labels
         rules = selection.culling
         self._limit = rules.population_limit if rules else selection.population
         self._stay = selection.parents_needed
@@ -88,7 +89,7 @@ class IslandMigration:
             assert outcome is not None
             immigrant = self._immigrants[birth]
             self._immigrants[birth] = immigrant.evaluated(fitness_of(outcome))
-            commands.append(evaluation_record(outcome))
+            commands.append(evaluation_record(outcome, self._labels))
         settled = self._settle(population, self._immigrants.values())
         self._immigrants, self._outcomes = None, {}
         return commands, settled

@@ -52,6 +52,7 @@ class Reevaluations:
         assert rules is not None
         self._rules = rules
         self._space = body_space(experiment.space)
+        self._labels = experiment.measures.labels
         self._island = island
         self._founders = experiment.selection.population
         self._due_births = self._founders + rules.interval
@@ -116,7 +117,7 @@ class Reevaluations:
         for birth, outcome in sorted(outcomes.items()):
             assert outcome is not None
             self._trials[birth].append(fitness_of(outcome))
-            records.append(evaluation_record(outcome))
+            records.append(evaluation_record(outcome, self._labels))
         evaluated = (
             self._evaluated(one) if one.birth in outcomes else one for one in population
         )

@@ -25,6 +25,7 @@ from schema.experiment.section import (
     Probability,
     Section,
 )
+from schema.limits import MOST_MEASURES
 from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
 
@@ -270,7 +271,7 @@ class Measures(PluginSection, frozen=True):
             attribute.
     """
 
-    names: tuple[str, ...] = ()
+    names: Annotated[tuple[str, ...], Meta(max_length=MOST_MEASURES)] = ()
     parameters: dict[str, Parameters] = field(default_factory=dict)
 
     @property

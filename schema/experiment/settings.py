@@ -62,6 +62,11 @@ class EvaluationSettings(Section, frozen=True):
     environment: Environment = FLAT
     measures: Measures = Measures()
 
+    @property
+    def light(self) -> Vector | None:
+        """Position of the light [m]; None is no light."""
+        return self.environment.light
+
 
 class ArenaSettings(Section, frozen=True):
     """Settings of a request to advance an arena."""

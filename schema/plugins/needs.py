@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from schema.errors import ExperimentError, nearest, shown
-from schema.robot.trace import CONSTANT, RECORDED
+from schema.robot.trace import COMPUTED, CONSTANT, RECORDED
 
 _Function = TypeVar("_Function", bound=Callable[..., float])
 _ATTRIBUTE = "__revolve_needs__"
@@ -14,12 +14,12 @@ def needs(*channels: str) -> Callable[[_Function], _Function]:
     """Return a decorator that declares the channels of a trace that a function reads.
 
     Args:
-        channels: names of ``schema.robot.trace.RECORDED`` or ``CONSTANT``.
+        channels: names of channels of ``schema.robot.trace.Trace``.
 
     Raises:
         ExperimentError: no such channel.
     """
-    known = (*RECORDED, *CONSTANT)
+    known = (*RECORDED, *COMPUTED, *CONSTANT)
     for name in channels:
         if name not in known:
             raise ExperimentError(
@@ -35,6 +35,6 @@ def needs(*channels: str) -> Callable[[_Function], _Function]:
 
 
 def channels_of(functions: Iterable[Callable[..., Any]]) -> tuple[str, ...]:
-    """Return the recorded channels that some functions need, in their fixed order."""
+    """Return the channels that exist only for some functions, in their fixed order."""
     wanted = {name for each in functions for name in getattr(each, _ATTRIBUTE, ())}
-    return tuple(name for name in RECORDED if name in wanted)
+    return tuple(name for name in (*RECORDED, *COMPUTED) if name in wanted)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,8 @@ from schema.errors import ExperimentError
 from schema.robot.robot import Robot
 
 Floats = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+Counts = npt.NDArray[np.int64]
 
 RECORDED = (
     "core_attitude",
@@ -23,6 +25,8 @@ RECORDED = (
     "neighbours",
 )
 """Channels with a value per sample, which exist only if a function declares them."""
+COMPUTED = ("part_position",)
+"""Channels with one value, which exist only if a function declares them."""
 CONSTANT = ("light", "robot", "mass", "gravity")
 """Channels with one value, which always exist; they may be declared, too."""
 NEIGHBOUR_M = 0.5
@@ -33,8 +37,9 @@ NEIGHBOUR_M = 0.5
 class Trace:
     """Recording of one robot over its fitness window, in T samples.
 
-    A function that reads a channel of ``RECORDED`` declares it with the decorator
-    ``needs``; a channel that no function of the experiment declares is not recorded.
+    A function that reads a channel of ``RECORDED`` or ``COMPUTED`` declares it with the
+    decorator ``needs``; a channel that no function of the experiment declares is not
+    recorded.
 
     Attributes:
         interval_s: time between two samples [s].
@@ -55,17 +60,17 @@ class Trace:
     @property
     def core_attitude(self) -> Floats:
         """(T, 4) unit quaternions w, x, y, z of the core, core to world frame."""
-        return self._channel("core_attitude")
+        return cast("Floats", self._channel("core_attitude"))
 
     @property
     def joint_angle(self) -> Floats:
         """(T, J) positions of all joints, driven or not, in part order [rad or m]."""
-        return self._channel("joint_angle")
+        return cast("Floats", self._channel("joint_angle"))
 
     @property
     def joint_velocity(self) -> Floats:
         """(T, J) velocities of the joints [rad/s or m/s]."""
-        return self._channel("joint_velocity")
+        return cast("Floats", self._channel("joint_velocity"))
 
     @property
     def joint_torque(self) -> Floats:
@@ -73,7 +78,7 @@ class Trace:
 
         It is 0 for joints without a motor.
         """
-        return self._channel("joint_torque")
+        return cast("Floats", self._channel("joint_torque"))
 
     @property
     def energy(self) -> Floats:
@@ -82,15 +87,16 @@ class Trace:
         The sum over physics steps and motors of abs(torque x displacement): a motor
         that brakes takes as much energy as one that drives.
         """
-        return self._channel("energy")
+        return cast("Floats", self._channel("energy"))
 
     @property
-    def contact(self) -> npt.NDArray[np.bool_]:
+    def contact(self) -> Mask:
         """(T, P) whether each part touched anything but its own robot.
 
-        As of the last physics step before the sample; false before the first step.
+        As of the last physics step before the sample; at the start, of the initial
+        position.
         """
-        return self._channel("contact")
+        return cast("Mask", self._channel("contact"))
 
     @property
     def readings(self) -> Floats:
@@ -98,34 +104,39 @@ class Trace:
 
         Units: m/s2 and rad/s of an imu, 0 to 1 of touch and light.
         """
-        return self._channel("readings")
+        return cast("Floats", self._channel("readings"))
 
     @property
-    def neighbours(self) -> npt.NDArray[np.int64]:
+    def neighbours(self) -> Counts:
         """(T,) number of robots whose core is within ``NEIGHBOUR_M``; 0 off-line."""
-        return self._channel("neighbours")
+        return cast("Counts", self._channel("neighbours"))
+
+    @property
+    def part_position(self) -> Floats:
+        """(P, 3) origins of the parts with all joints at 0, core frame [m]."""
+        return cast("Floats", self._channel("part_position"))
 
     @property
     def light(self) -> tuple[float, float, float] | None:
         """Position of the light, world frame [m]; None if there is none."""
-        return self._channel("light")
+        return cast("tuple[float, float, float] | None", self._channel("light"))
 
     @property
     def robot(self) -> Robot:
         """Body and brain."""
-        return self._channel("robot")
+        return cast("Robot", self._channel("robot"))
 
     @property
     def mass(self) -> float:
         """Mass of the whole robot [kg]."""
-        return self._channel("mass")
+        return cast("float", self._channel("mass"))
 
     @property
     def gravity(self) -> float:
         """Acceleration of free fall, ``simulation.gravity`` [m/s2]."""
-        return self._channel("gravity")
+        return cast("float", self._channel("gravity"))
 
-    def _channel(self, name: str) -> Any:  # noqa: ANN401 - of any channel
+    def _channel(self, name: str) -> object:
         """Return a channel.
 
         Raises:
