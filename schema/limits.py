@@ -158,6 +158,8 @@ MOST_COUNT = 2**63 - 1
 """Greatest whole number in an experiment."""
 MOST_GEOMS = 10_000
 """Geoms of scenery, replicated ones included."""
+MOST_OBJECTS = 100
+"""Objects of scenery that move, replicated ones included."""
 MOST_PLUGIN_CHARACTERS = 10_000
 """Length of the list of plug-ins and digests in a request."""
 

@@ -6,6 +6,7 @@ from urllib.parse import quote
 
 from schema.errors import ExperimentError, nearest, shown
 from schema.experiment.check_migration import migration_problems
+from schema.experiment.check_world import world_problems
 from schema.experiment.document import (
     Arena,
     Culling,
@@ -17,7 +18,6 @@ from schema.experiment.document import (
     island_experiment,
     steps_of,
 )
-from schema.experiment.environment import ground_problems
 
 # File systems hold names of 255 bytes, of which the run's folders need some.
 _LONGEST_NAME = 200
@@ -70,7 +70,7 @@ def _island_problems(experiment: Experiment) -> Iterator[str]:
     yield from _reevaluation_problems(experiment)
     yield from _pose_problems(experiment.simulation, "window_steps")
     yield from _duration_problems(experiment)
-    yield from _environment_problems(experiment)
+    yield from world_problems(experiment)
     if experiment.arena is not None:
         yield from _arena_problems(experiment, experiment.arena)
         yield from _arena_clock_problems(experiment.arena, experiment.simulation)
@@ -151,18 +151,6 @@ def _pose_problems(clock: Simulation, name: str) -> Iterator[str]:
             f"simulation.{name}: must be a multiple of simulation.pose_steps = "
             f"{clock.pose_steps}, got {steps}"
         )
-
-
-def _environment_problems(experiment: Experiment) -> Iterator[str]:
-    yield from ground_problems(experiment.environment)
-    if scenery := experiment.environment.scenery:
-        # MuJoCo is imported only if needed: it is slow to load.
-        from schema.experiment.scenery import scenery_model  # noqa: PLC0415
-
-        try:
-            scenery_model(scenery, experiment.simulation)
-        except ExperimentError as error:
-            yield str(error)
 
 
 def _arena_problems(experiment: Experiment, arena: Arena) -> Iterator[str]:

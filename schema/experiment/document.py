@@ -26,7 +26,7 @@ from schema.experiment.section import (
     Section,
 )
 from schema.limits import MOST_MEASURES
-from schema.parts import BodySpace, Parameter, PartType
+from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
 
 
@@ -304,7 +304,7 @@ class Arena(Section, frozen=True):
         drop_m: height above the ground at birth [m].
         wall_diameter_m: of the ring wall [m]; 0 is no wall.
         wall_segments, wall_height_m, wall_thickness_m: of the ring wall [m].
-        light: position of the light [m]; None is no light.
+        light: as ``environment.light``; only one of the two is needed.
         record_touches: write the table ``touches``.
         proximity_steps: physics steps between checks of distances.
         merge_distance_m: robots that may come nearer than this before the next check
@@ -414,6 +414,12 @@ def island_experiment(experiment: Experiment, number: int) -> Experiment:
     changes.pop("count", None)
     changes = {name: value for name, value in changes.items() if value is not None}
     return structs.replace(experiment, islands=(), **changes)
+
+
+def light_of(environment: Environment, arena: Arena | None) -> Vector | None:
+    """Return the position of the light of a world [m]; None is no light."""
+    own = None if arena is None else arena.light
+    return own or environment.light
 
 
 def with_births(experiment: Experiment, births: int) -> Experiment:

@@ -16,15 +16,32 @@ from schema.experiment.document import (
     Simulation,
     Space,
     Vetting,
+    light_of,
 )
-from schema.experiment.environment import FLAT, Environment, ground_problems
+from schema.experiment.environment import (
+    FLAT,
+    Environment,
+    arena_problems,
+    ground_problems,
+)
 from schema.experiment.identity import Origin
 from schema.experiment.section import Section
 from schema.limits import MOST_SETTINGS_BYTES
-from schema.plugins.load import load_function
+from schema.parts import Vector
+from schema.plugins.load import full_name, load_function
 from schema.plugins.parameters import parameters_type, read_parameters
 
 T = TypeVar("T")
+
+FITNESS = {
+    "locomotion": "worker.fitness:thesis",
+    "directed-locomotion": "worker.tasks:directed_locomotion",
+    "target": "worker.tasks:target",
+    "light": "worker.tasks:light",
+    "turning": "worker.tasks:turning",
+    "balance": "worker.tasks:balance",
+}
+"""Fitness functions that come with the toolkit, by short name."""
 
 
 class VettingSettings(Section, frozen=True):
@@ -45,6 +62,11 @@ class EvaluationSettings(Section, frozen=True):
     environment: Environment = FLAT
     measures: Measures = Measures()
 
+    @property
+    def light(self) -> Vector | None:
+        """Position of the light [m]; None is no light."""
+        return self.environment.light
+
 
 class ArenaSettings(Section, frozen=True):
     """Settings of a request to advance an arena."""
@@ -58,6 +80,11 @@ class ArenaSettings(Section, frozen=True):
     environment: Environment = FLAT
     origin: Origin = Origin()
     measures: Measures = Measures()
+
+    @property
+    def light(self) -> Vector | None:
+        """Position of the light [m]; None is no light."""
+        return light_of(self.environment, self.arena)
 
 
 def vetting_settings(experiment: Experiment) -> bytes:
@@ -146,7 +173,10 @@ def _from_json(settings: bytes, kind: type[T]) -> T:
     except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
         raise ExperimentError(f"{where}: {error}") from None
     environment = getattr(found, "environment", FLAT)
-    for problem in ground_problems(environment):
+    problems = list(ground_problems(environment))
+    if isinstance(found, ArenaSettings):
+        problems += arena_problems(environment)
+    for problem in problems:
         raise ExperimentError(f"{where}: {problem}")
     return found
 
@@ -183,7 +213,8 @@ def fitness_function(fitness: Fitness) -> Callable[..., float]:
         UnknownPlugin: no such module or attribute, or a module that is not allowed.
         ExperimentError: not a function of a trace and its parameters.
     """
-    return load_function(fitness.function, "fitness.function", 2)
+    where = "fitness.function"
+    return load_function(full_name(fitness.function, where, FITNESS), where, 2)
 
 
 @lru_cache(maxsize=64)

@@ -22,8 +22,10 @@ from schema.robot.trace import Trace
 from worker.fitness import fitness_of, path_velocity, straight_velocity
 from worker.measures.functions import measures_of
 from worker.robot.controller import SoloNetwork, pack, widths
+from worker.robot.light import read_light
 from worker.robot.motors import Servos
 from worker.robot.noise import Noise, NoiseSource
+from worker.robot.pushes import Pushes
 from worker.robot.recording import Channels, Recorder
 from worker.robot.sensors import Sensors
 
@@ -38,7 +40,7 @@ def evaluate(
     Args:
         robot: a robot that passes ``check_robot`` in the settings' body space.
         settings: body space, simulation, environment, fitness and measures.
-        identity: of the evaluation; only noise depends on it.
+        identity: of the evaluation; noise and pushes depend on it.
 
     Raises:
         SimulationDiverged: the physics diverged; with reason and simulated time.
@@ -78,7 +80,7 @@ def simulate(
         settings: body space, simulation and environment; of fitness and measures only
             the channels that they declare.
         watch: called with the state after each tick, before the steps that follow.
-        identity: of the evaluation; only noise depends on it.
+        identity: of the evaluation; noise and pushes depend on it.
 
     Raises:
         SimulationDiverged: the state is not finite, the engine warned or failed, or
@@ -123,7 +125,15 @@ class _ControlLoop:
         self._velocities = self.data.qvel.data
         self._simulation = simulation
         self._tick_s = simulation.brain_steps * simulation.timestep_s
-        self._sensors = Sensors(robot, types, model, self.data, width=width.inputs)
+        self._light = settings.environment.light
+        self._sensors = Sensors(
+            robot,
+            types,
+            model,
+            self.data,
+            width=width.inputs,
+            has_light=self._light is not None,
+        )
         self._servos = Servos(robot, types, model, self.data)
         steps = simulation.warmup_steps + simulation.window_steps
         ticks = steps // simulation.brain_steps + 1
@@ -134,6 +144,10 @@ class _ControlLoop:
         if simulation.sensor_noise or simulation.actuator_noise:
             source = NoiseSource(simulation, width, identity.origin)
             self._noise = Noise(source, (identity.birth,), identity.trial)
+        self._pushes: Pushes | None = None
+        if settings.environment.push_impulse:
+            environment = settings.environment
+            self._pushes = Pushes(environment, simulation, identity, model, self.data)
         inputs = sum(neuron.layer == "input" for neuron in robot.brain.neurons)
         self._inputs = self._controller.readings[:, :inputs]
         self._channels = Channels(robot, model, settings)
@@ -174,6 +188,7 @@ class _ControlLoop:
             step = until
         if recorder is not None:
             self._sensors.read(self._tick_s)
+            self._read_light()
             recorder.readings = self._sensors.readings
             recorder.sample()
         if data.warning.number.any() or not math.isfinite(
@@ -196,7 +211,10 @@ class _ControlLoop:
             self._sensors.read(self._tick_s)
         else:
             self._sensors.start()
+        self._read_light()
         tick = step // self._simulation.brain_steps
+        if self._pushes is not None:
+            self._pushes.apply(tick)
         if self._noise is None:
             self._servos.drive(self._controller.step(tick))
             return
@@ -205,6 +223,12 @@ class _ControlLoop:
         self._inputs[:] = self._noise.perturb_readings(tick, self._inputs)
         outputs = self._controller.step(tick)[np.newaxis]
         self._servos.drive(self._noise.perturb_outputs(tick, outputs)[0])
+
+    def _read_light(self) -> None:
+        if self._light is not None:
+            mujoco.mj_kinematics(self._model, self.data)
+            world = self._model, self.data
+            read_light(self._light, self._sensors, world, (world,))
 
 
 def _raise_diverged(data: mujoco.MjData, time_s: float) -> None:

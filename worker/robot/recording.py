@@ -32,6 +32,7 @@ class Channels:
         width: numbers of a row.
         has_probe: some of them need a probe.
         has_work: the probe must see every step.
+        dofs: number of the robot's velocities.
     """
 
     def __init__(
@@ -49,7 +50,8 @@ class Channels:
         """
         wanted = channels_needed(settings.fitness, settings.measures)
         free = model.joint("free").id
-        joints = int(model.nv) - _FREE_DOFS
+        # Without the free joints of the robot and of objects in scenery.
+        joints = int((model.jnt_type != mujoco.mjtJoint.mjJNT_FREE).sum())
         inputs = sum(neuron.layer == "input" for neuron in robot.brain.neurons)
         sizes = {
             "core_attitude": 4,
@@ -63,6 +65,7 @@ class Channels:
         }
         self.names = tuple(name for name in RECORDED if name in wanted)
         self._joints, self._inputs = joints, inputs
+        self.dofs = _FREE_DOFS + joints
         self._spans: dict[str, slice] = {}
         self.width = 0
         for name in self.names:
@@ -70,9 +73,8 @@ class Channels:
             self.width += sizes[name]
         self.has_probe = not {"energy", "joint_torque", "contact"}.isdisjoint(wanted)
         self.has_work = "energy" in wanted
-        arena = settings.arena if isinstance(settings, ArenaSettings) else None
         self._constants: dict[str, Any] = {
-            "light": arena.light if arena is not None else None,
+            "light": settings.light,
             "robot": robot,
             "mass": float(model.body_subtreemass[model.jnt_bodyid[free]]),
             "gravity": settings.simulation.gravity,
@@ -93,8 +95,8 @@ class Channels:
         """Return a sample as a row.
 
         Args:
-            qpos: (7 + J,) of the robot.
-            qvel: (6 + J,) of the robot.
+            qpos: (7 + J,) of the robot, or more.
+            qvel: (6 + J,) of the robot, or more.
             probe: ``Probe.numbers``; None if there is no probe.
             readings: (1, I') of its sensors, I' >= I.
             neighbours: number of robots near it.
@@ -104,9 +106,9 @@ class Channels:
             if name == "core_attitude":
                 row[span] = qpos[3:_FREE]
             elif name == "joint_angle":
-                row[span] = qpos[_FREE:]
+                row[span] = qpos[_FREE : _FREE + self._joints]
             elif name == "joint_velocity":
-                row[span] = qvel[_FREE_DOFS:]
+                row[span] = qvel[_FREE_DOFS : _FREE_DOFS + self._joints]
             elif name == "readings":
                 row[span] = readings[0, : self._inputs]
             elif name == "neighbours":
@@ -254,8 +256,9 @@ class Recorder:
         self._probe: Probe | None = None
         if channels.has_probe:
             root = int(model.jnt_bodyid[model.joint("free").id])
-            geoms = (int(model.body_geomadr[root]), int(model.ngeom))
-            dofs = slice(0, int(model.nv))
+            first = int(model.body_geomadr[root])
+            own = int((model.body_rootid[model.geom_bodyid] == root).sum())
+            geoms, dofs = (first, first + own), slice(0, channels.dofs)
             self._probe = Probe(model, data, robot, dofs=dofs, geoms=geoms)
         self._working = [self._probe] if self._probe and channels.has_work else []
 

@@ -8,6 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from schema.experiment.document import Measures, body_space
+from schema.experiment.environment import Environment
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.mjcf.model import solo_spec
@@ -149,3 +150,24 @@ def test_contacts_are_those_with_the_ground_alone(
     high = replace(everything, simulation=replace(CLOCK, drop_m=20.0))
     assert not simulate(turtle, high).contact.any()
     assert simulate(turtle, everything).contact[-1].any()
+
+
+def test_objects_out_of_reach_change_no_channel(
+    turtle: Robot, everything: EvaluationSettings
+) -> None:
+    """A ball that moves freely, 20 m away."""
+    ball = '<geom type="sphere" size="0.1"/>'
+    body = f'<body pos="20 0 0.1"><freejoint/>{ball}</body>'
+    light = (1.0, 2.0, 3.0)
+    world = Environment(
+        scenery=f"<mujoco><worldbody>{body}</worldbody></mujoco>", light=light
+    )
+    plain = simulate(turtle, everything)
+    found = simulate(turtle, replace(everything, environment=world))
+    assert found.light == light
+    assert found.mass == plain.mass
+    for name in RECORDED:
+        # The first part of a second: chaos has not yet magnified rounding.
+        expected, got = plain.channels[name][:3], found.channels[name][:3]
+        assert got.shape == expected.shape
+        np.testing.assert_allclose(got, expected, rtol=1e-3, atol=1e-3, err_msg=name)
