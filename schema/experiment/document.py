@@ -10,7 +10,7 @@ from functools import lru_cache
 from math import pi
 from typing import Annotated, Literal
 
-from msgspec import Meta, structs
+from msgspec import Meta, field, structs
 
 from schema.errors import ExperimentError
 from schema.experiment.environment import FLAT, Environment
@@ -19,12 +19,17 @@ from schema.experiment.section import (
     AtLeastOne,
     Count,
     NotNegative,
+    Parameters,
+    PluginSection,
     Positive,
     Probability,
     Section,
 )
 from schema.parts import BodySpace, Parameter, PartType
 from schema.plugins.load import load_instance
+
+REVOLVE_ANGLE = "revolve-angle"
+"""Name of the encoding of the thesis."""
 
 
 class Space(Section, frozen=True):
@@ -99,6 +104,18 @@ class Variation(Section, frozen=True):
     duplicable_size: Literal["mean", "sum"] = "mean"
     hidden_rounding: Literal["stochastic", "half-up"] = "stochastic"
     check_min_parts: bool = True
+
+
+class Encoding(PluginSection, frozen=True):
+    """How genomes describe robots.
+
+    Attributes:
+        type: ``revolve-angle`` (thesis), ``cppn`` or ``module:attribute``.
+        parameters: of the encoding.
+    """
+
+    type: str = REVOLVE_ANGLE
+    parameters: Parameters = field(default_factory=dict)
 
 
 class Culling(Section, frozen=True):
@@ -341,6 +358,7 @@ class Experiment(Section, frozen=True):
         births: number of births on each island, the initial population included.
         islands: numbered from 0, in the order of the document; none is one island.
         migration: between the islands.
+        encoding: of all islands.
     """
 
     name: str
@@ -356,6 +374,7 @@ class Experiment(Section, frozen=True):
     arena: Arena | None = None
     islands: tuple[Islands, ...] = ()
     migration: Migration | None = None
+    encoding: Encoding = Encoding()
 
     @property
     def window(self) -> int:
@@ -399,7 +418,9 @@ def references(experiment: Experiment) -> list[str]:
     """Return the ``module:attribute`` of all plug-ins that a document names."""
     own = [each.fitness for each in experiment.islands if each.fitness is not None]
     functions = [fitness.function for fitness in (experiment.fitness, *own)]
-    return [*experiment.space.part_types, *functions]
+    # A short name is not that of a module.
+    encodings = [experiment.encoding.type] if ":" in experiment.encoding.type else []
+    return [*experiment.space.part_types, *functions, *encodings]
 
 
 @lru_cache(maxsize=64)
