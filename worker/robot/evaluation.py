@@ -44,8 +44,21 @@ def evaluate(
             unknown fitness function.
         InvalidRobot: more neurons than the limits.
     """
+    return judge(simulate(robot, settings, identity=identity), settings)
+
+
+def judge(track: Track, settings: EvaluationSettings) -> Evaluation:
+    """Return the evaluation of a track.
+
+    Args:
+        track: that ``simulate`` returned for these settings.
+        settings: simulation and fitness.
+
+    Raises:
+        FitnessUndefined: the fitness function raised or gave no finite number.
+        ExperimentError: an unknown fitness function.
+    """
     clock = settings.simulation
-    track = simulate(robot, settings, identity=identity)
     return Evaluation(
         fitness_of(track, settings.fitness),
         path_velocity(track),

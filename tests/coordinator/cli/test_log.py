@@ -27,7 +27,7 @@ from coordinator.islands.events import (
     VettingFailed,
 )
 from coordinator.storage.journal import NAME, Journal
-from revolve import main as revolve
+from revolve.command import main as revolve
 from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
