@@ -20,6 +20,7 @@ import msgspec
 from revolve.messages import Outcome, Problem, Task, error_of
 from schema.agent.supervision import crash_cause
 from schema.errors import RevolveError
+from schema.plugins.permission import allowed, source_of
 
 _GRACE_S = 5.0
 _OUTCOMES = msgspec.msgpack.Decoder(Outcome)
@@ -30,6 +31,19 @@ def environment() -> dict[str, str]:
     """Return the environment of children, which import what this process can."""
     paths = [str(Path(path).absolute()) for path in sys.path]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
+
+
+def plugins() -> tuple[str, ...]:
+    """Return the modules that children may import: those allowed here that exist."""
+    return tuple(
+        entry
+        for entry in allowed()
+        if (Path(entry).is_file() if entry.endswith(".py") else _is_module(entry))
+    )
+
+
+def _is_module(name: str) -> bool:
+    return bool(source_of(name.partition(".")[0]))
 
 
 class Child:

@@ -27,6 +27,7 @@ _CHORES_S = 1.0
 _ALONE_S = 10.0
 """Time without any worker after which the user is told [s]."""
 _EPOCH = 1
+_CLOSED = RevolveError("the fleet is closed")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,6 +89,20 @@ class Engine:
         """Number of workers that have joined."""
         return 0 if self._fleet is None else self._fleet.dispatch.agents("worker")
 
+    def check(self) -> None:
+        """Raise if there can be no more jobs.
+
+        Raises:
+            RevolveError: the fleet is closed, or cannot do jobs any more.
+        """
+        if self._fault is not None:
+            raise type(self._fault)(*self._fault.args)
+
+    def refuse(self) -> None:
+        """Refuse further orders."""
+        with self._lock:
+            self._fault = self._fault or _CLOSED
+
     def order(self, order: Order) -> None:
         """Order a job; its future gets the outcome.
 
@@ -95,8 +110,7 @@ class Engine:
             RevolveError: the fleet is closed, or cannot do jobs any more.
         """
         with self._lock:
-            if self._fault is not None:
-                raise self._fault
+            self.check()
             self._orders.put(order)
         order.future.add_done_callback(self._note_cancelled)
         self._network.wake()
@@ -114,7 +128,7 @@ class Engine:
             self._network.wake()
 
     def _run(self) -> None:
-        why = RevolveError("the fleet is closed")
+        why = _CLOSED
         try:
             with self._network:
                 self._fleet = fleet = Fleet(
@@ -134,7 +148,7 @@ class Engine:
     def _end(self, why: RevolveError) -> None:
         """Refuse further orders and settle the open ones."""
         with self._lock:
-            self._fault = why
+            self._fault = self._fault or why
         waiting = [*self._open.values(), *_all_of(self._orders)]
         for order in waiting:
             if self._is_closing:

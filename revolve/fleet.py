@@ -2,6 +2,7 @@
 
 import atexit
 import os
+import threading
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future
@@ -17,6 +18,7 @@ from coordinator.dispatch.events import Deliver
 from coordinator.network.service import Network
 from coordinator.run.answer_checks import read_evaluation
 from coordinator.run.requests import QUARANTINED
+from revolve.children import plugins as allowed_plugins
 from revolve.engine import Engine, Order
 from revolve.evaluation import Result, result_of, settings_for
 from revolve.experiment import Experiment
@@ -28,7 +30,7 @@ from schema.agent.supervisor import cores
 from schema.agent.topics import unique_name
 from schema.errors import ExperimentError, JobRefused
 from schema.experiment.settings import EvaluationSettings
-from schema.plugins.permission import allow, allowed
+from schema.plugins.permission import allow
 from schema.plugins.source import plugins_of
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot as PlainRobot
@@ -96,6 +98,7 @@ class Fleet:
         self._engine: Engine | None = None
         self._workers: list[Workers] = []
         self._owner = os.getpid()
+        self._lock = threading.Lock()
 
     def __enter__(self) -> Self:
         """Open the fleet.
@@ -120,7 +123,9 @@ class Fleet:
         if self._engine is None or self._owner != os.getpid():
             return
         atexit.unregister(self.close)
-        workers, self._workers = self._workers, []
+        self._engine.refuse()
+        with self._lock:
+            workers, self._workers = self._workers, []
         for each in workers:
             each.close()
         # The hub last: workers that lose it say so.
@@ -197,8 +202,11 @@ class Fleet:
         return self._order(order)
 
     def _order(self, order: Order) -> "Future[T]":
-        self._start_workers()
-        self._opened.order(order)
+        engine = self._opened
+        with self._lock:
+            engine.check()
+            self._start_workers()
+        engine.order(order)
         return order.future
 
     def _in_order(self, futures: Iterator["Future[T]"]) -> Iterator[T]:
@@ -208,7 +216,7 @@ class Fleet:
 
     def _start_workers(self) -> None:
         """Start the workers, or replace them by some that may import more plug-ins."""
-        plugins = allowed()
+        plugins = allowed_plugins()
         if not self._count or (self._workers and self._workers[-1].plugins == plugins):
             return
         for earlier in self._workers:

@@ -8,14 +8,13 @@ import msgspec
 
 from coordinator.evolution.generation import generate
 from coordinator.evolution.random_streams import Purpose, stream
-from revolve.children import SIMULATOR
+from revolve.children import SIMULATOR, plugins
 from revolve.experiment import Experiment, document_of
 from revolve.messages import Task
 from schema.errors import RevolveError
 from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import read_robot, settings_of, write_robot
-from schema.plugins.permission import allowed
 from schema.robot.brain import Brain
 from schema.robot.genome import develop
 from schema.robot.ids import BirthId
@@ -183,7 +182,7 @@ def task_of(
     """
     encoded = encode_robot(checked(robot, settings))
     data = msgspec.json.encode(settings)
-    return Task(data, encoded, allowed(), is_judged, size)
+    return Task(data, encoded, plugins(), is_judged, size)
 
 
 def _settings(experiment: Experiment | None) -> EvaluationSettings:

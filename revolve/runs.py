@@ -9,13 +9,13 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from revolve.children import plugins as allowed_plugins
 from revolve.children import run_command
 from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, of_plain
 from schema.errors import RevolveError, RunFolderError
 from schema.experiment.document import body_space, island_experiment
 from schema.experiment.file import own_experiment
-from schema.plugins.permission import allowed
 from schema.robot.genome import develop
 from schema.tables.description import DETAILS, read_description, read_state
 from schema.tables.files import read_table
@@ -267,7 +267,7 @@ def resume(
 
 
 def _common(plugins: Iterable[str], *, progress: bool) -> list[str]:
-    entries = dict.fromkeys((*allowed(), *plugins))
+    entries = dict.fromkeys((*allowed_plugins(), *plugins))
     words = [word for entry in entries for word in ("--plugins", entry)]
     return words if progress else [*words, "--quiet"]
 
