@@ -225,6 +225,6 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 if __name__ == "__main__":
-    from revolve import main as revolve
+    from revolve.command import main as revolve
 
     sys.exit(revolve())

@@ -50,8 +50,22 @@ def evaluate(
             unknown fitness function or measure.
         InvalidRobot: more neurons than the limits.
     """
+    return judge(simulate(robot, settings, identity=identity), settings)
+
+
+def judge(trace: Trace, settings: EvaluationSettings) -> Evaluation:
+    """Return the evaluation of a trace.
+
+    Args:
+        trace: that ``simulate`` returned for these settings.
+        settings: simulation, fitness and measures.
+
+    Raises:
+        FitnessUndefined: the fitness function or a measure raised or gave no finite
+            number.
+        ExperimentError: an unknown fitness function or measure.
+    """
     clock = settings.simulation
-    trace = simulate(robot, settings, identity=identity)
     return Evaluation(
         fitness_of(trace, settings.fitness),
         path_velocity(trace),
