@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +10,8 @@ from coordinator.cli.deployment import Deployment
 from coordinator.cli.execute import resume, start, start_campaign
 from coordinator.cli.flags import parser
 from coordinator.dispatch.events import AgentKind
+from coordinator.evolution.check_encoding import check_encoding
+from coordinator.evolution.encodings import encoding_of
 from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
     Campaign,
@@ -38,7 +41,6 @@ from schema.experiment.document import (
     with_births,
 )
 from schema.experiment.file import experiment_from_text
-from schema.experiment.settings import fitness_function
 from schema.limits import MOST_REPEATS
 from schema.plugins.permission import allow, allow_references
 
@@ -103,7 +105,9 @@ def _stoppable(folder: Path, execute: Callable[[], int]) -> int:
 
 
 def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
-    """Return the experiments to run, checked as far as possible in advance."""
+    """Return the experiments to run, checked; imports the room of the worker."""
+    import worker.measures.functions
+
     experiments = read_experiments(options.experiments)
     if options.births is not None:
         experiments = tuple(
@@ -111,9 +115,18 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
         )
     for experiment in experiments:
         check_experiment(experiment, "--births" if options.births else experiment.name)
-        for number in range(island_count(experiment)):
-            fitness_function(island_experiment(experiment, number).fitness)
+        worker.measures.functions.check_functions(experiment)
+        _check_encodings(experiment)
     return experiments
+
+
+def _check_encodings(experiment: Experiment) -> None:
+    """Raise unless the encoding works with the settings of each island."""
+    numbers = range(island_count(experiment))
+    for own in dict.fromkeys(island_experiment(experiment, each) for each in numbers):
+        encoding_of(own)
+        if ":" in own.encoding.type:
+            check_encoding(own, time.monotonic)
 
 
 def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
@@ -124,6 +137,7 @@ def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
         experiments = (experiment_from_text(read_details(folder).document),)
     for experiment in experiments:
         allow_references(references(experiment))
+        _check_encodings(experiment)
     return experiments
 
 

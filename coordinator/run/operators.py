@@ -21,9 +21,7 @@ from coordinator.run.loop import Loop
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from schema.errors import MalformedMessage, RevolveError
-from schema.experiment.document import body_space
 from schema.limits import LONGEST_REASON, printable
-from schema.robot.inverse_development import genome_of
 from schema.robot.robot import check_robot
 from schema.wire.codec import decode_robot
 from schema.wire.operator import (
@@ -92,7 +90,8 @@ def _order(
 
     Raises:
         Refused: no living robot has the given birth number.
-        InvalidRobot: a robot that breaks the rules of the experiment.
+        InvalidRobot: a robot that breaks the rules of the experiment, or that its
+            encoding cannot describe.
     """
     match action:
         case PauseArena():
@@ -101,8 +100,10 @@ def _order(
             return Resume()
         case InsertRobot():
             robot = decode_robot(action.robot)
-            check_robot(robot, body_space(arena.experiment.space))
-            insert = Insert(genome_of(robot), action.place)
+            encoding = arena.encoding
+            check_robot(robot, encoding.types)
+            genome = encoding.to_bytes(encoding.from_robot(robot))
+            insert = Insert(genome, action.place)
             check_order(insert, arena.experiment)
             return insert
     living = [one.birth for one in arena.population]

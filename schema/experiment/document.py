@@ -29,6 +29,9 @@ from schema.limits import MOST_MEASURES
 from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
 
+REVOLVE_ANGLE = "revolve-angle"
+"""Name of the encoding of the thesis."""
+
 
 class Space(Section, frozen=True):
     """Part types and limits of robots (thesis tables 4.1, 5.1).
@@ -102,6 +105,18 @@ class Variation(Section, frozen=True):
     duplicable_size: Literal["mean", "sum"] = "mean"
     hidden_rounding: Literal["stochastic", "half-up"] = "stochastic"
     check_min_parts: bool = True
+
+
+class Encoding(PluginSection, frozen=True):
+    """How genomes describe robots.
+
+    Attributes:
+        type: ``revolve-angle`` (thesis), ``cppn`` or ``module:attribute``.
+        parameters: of the encoding.
+    """
+
+    type: str = REVOLVE_ANGLE
+    parameters: Parameters = field(default_factory=dict)
 
 
 class Culling(Section, frozen=True):
@@ -367,6 +382,7 @@ class Experiment(Section, frozen=True):
         islands: numbered from 0, in the order of the document; none is one island.
         migration: between the islands.
         measures: of the robots of all islands.
+        encoding: of all islands.
     """
 
     name: str
@@ -383,6 +399,7 @@ class Experiment(Section, frozen=True):
     islands: tuple[Islands, ...] = ()
     migration: Migration | None = None
     measures: Measures = Measures()
+    encoding: Encoding = Encoding()
 
     @property
     def window(self) -> int:
@@ -432,7 +449,14 @@ def references(experiment: Experiment) -> list[str]:
     """Return the ``module:attribute`` of all plug-ins that a document names."""
     own = [each.fitness for each in experiment.islands if each.fitness is not None]
     functions = [fitness.function for fitness in (experiment.fitness, *own)]
-    return [*experiment.space.part_types, *functions, *experiment.measures.names]
+    named = [
+        *experiment.space.part_types,
+        *functions,
+        *experiment.measures.names,
+        experiment.encoding.type,
+    ]
+    # A short name is not that of a module.
+    return [path for path in named if ":" in path]
 
 
 @lru_cache(maxsize=64)

@@ -6,7 +6,7 @@ part types are checked by ``schema.robot.robot.check_robot``.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 from schema.errors import MalformedMessage
 from schema.experiment.identity import NO_IDENTITY, Identity
@@ -300,7 +300,14 @@ def report_from_message(message: pb.Report) -> Report:
 
 def evaluation_to_message(evaluation: Evaluation) -> pb.Evaluation:
     """Return an evaluation as a message."""
-    return pb.Evaluation(**asdict(evaluation))
+    # Not by ``asdict``: it copies each value, at a tenth of an evaluation's cost here.
+    return pb.Evaluation(
+        fitness=evaluation.fitness,
+        path_velocity=evaluation.path_velocity,
+        straight_velocity=evaluation.straight_velocity,
+        simulated_s=evaluation.simulated_s,
+        measures=evaluation.measures,
+    )
 
 
 def evaluation_from_message(message: pb.Evaluation) -> Evaluation:

@@ -430,11 +430,11 @@ class InsertOrder(_message.Message):
     HAS_PLACE_FIELD_NUMBER: _ClassVar[int]
     X_FIELD_NUMBER: _ClassVar[int]
     Y_FIELD_NUMBER: _ClassVar[int]
-    genome: Genome
+    genome: bytes
     has_place: bool
     x: float
     y: float
-    def __init__(self, genome: _Optional[_Union[Genome, _Mapping]] = ..., has_place: _Optional[bool] = ..., x: _Optional[float] = ..., y: _Optional[float] = ...) -> None: ...
+    def __init__(self, genome: _Optional[bytes] = ..., has_place: _Optional[bool] = ..., x: _Optional[float] = ..., y: _Optional[float] = ...) -> None: ...
 
 class Command(_message.Message):
     __slots__ = ("command_id", "step", "pause", "resume", "insert", "remove", "replace_brain")

@@ -45,7 +45,7 @@ def birth_row(number: int) -> dict[str, Any]:
         **dict.fromkeys(counts, number % 4),
         "hidden": 0,
         "connections": 3,
-        **dict.fromkeys(("sim_time_s", "x", "y")),
+        **dict.fromkeys(("sim_time_s", "x", "y", "robot")),
     }
 
 
