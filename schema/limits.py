@@ -153,6 +153,8 @@ MOST_COUNT = 2**63 - 1
 """Greatest whole number in an experiment."""
 MOST_GEOMS = 10_000
 """Geoms of scenery, replicated ones included."""
+MOST_PLUGIN_BYTES = 4 * MIB
+"""Source of a plug-in file, which a run folder keeps."""
 MOST_PLUGIN_CHARACTERS = 10_000
 """Length of the list of plug-ins and digests in a request."""
 
