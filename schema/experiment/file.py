@@ -42,11 +42,7 @@ def read_experiment(source: str) -> Experiment:
         ExperimentError: no such experiment or file, or an invalid document.
     """
     if source.endswith(".toml"):
-        try:
-            text = read_bytes(Path(source)).decode()
-        except (OSError, UnicodeDecodeError) as error:
-            raise ExperimentError(f"{source}: cannot be read: {error}") from None
-        return parse_experiment(text, source)
+        return parse_experiment(_text(source), source)
     check_source(source, shipped_experiments())
     folder = resources.files("schema.experiment") / "shipped"
     text = (folder / f"{source}.toml").read_text(encoding="utf-8")
@@ -89,15 +85,7 @@ def parse_experiment(text: str, where: str) -> Experiment:
         ExperimentError: not TOML; an unknown key (the nearest is named); a value of a
             wrong type or outside its range; inconsistent values.
     """
-    document = _parse_toml(text, where)
-    _refuse_unknown(document, Experiment, where, "")
-    _refuse_many_islands(document, where)
-    _read_scenery(document, where)
-    _complete(document)
-    try:
-        experiment = msgspec.convert(document, type=Experiment)
-    except msgspec.ValidationError as error:
-        raise ExperimentError(f"{where}: {_explain(error, document)}") from None
+    experiment = _converted(text, where)
     allow_references(references(experiment), Path(where).parent)
     check_experiment(experiment, where)
     return experiment
@@ -114,6 +102,42 @@ def own_experiment(text: str) -> Experiment:
     experiment = experiment_from_text(text)
     allow_references(references(experiment))
     return experiment
+
+
+def own_references(source: str) -> list[str]:
+    """Return the ``module:attribute`` that an experiment names; nothing is imported.
+
+    Args:
+        source: as for ``read_experiment``; a shipped one has none of its own.
+
+    Raises:
+        ExperimentError: the file cannot be read, or has an unknown key or a value of a
+            wrong type.
+    """
+    if not source.endswith(".toml"):
+        return []
+    return references(_converted(_text(source), source))
+
+
+def _converted(text: str, where: str) -> Experiment:
+    """Return the experiment of a TOML text before the checks across its keys."""
+    document = _parse_toml(text, where)
+    _refuse_unknown(document, Experiment, where, "")
+    _refuse_many_islands(document, where)
+    _read_scenery(document, where)
+    _complete(document)
+    try:
+        return msgspec.convert(document, type=Experiment)
+    except msgspec.ValidationError as error:
+        raise ExperimentError(f"{where}: {_explain(error, document)}") from None
+
+
+def _text(source: str) -> str:
+    """Return the text of a TOML file."""
+    try:
+        return read_bytes(Path(source)).decode()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ExperimentError(f"{source}: cannot be read: {error}") from None
 
 
 def _parse_toml(text: str, where: str) -> dict[str, Any]:
