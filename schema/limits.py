@@ -160,6 +160,8 @@ MOST_GEOMS = 10_000
 """Geoms of scenery, replicated ones included."""
 MOST_OBJECTS = 100
 """Objects of scenery that move, replicated ones included."""
+MOST_PLUGIN_BYTES = 4 * MIB
+"""Source of a plug-in file, which a run folder keeps."""
 MOST_PLUGIN_CHARACTERS = 10_000
 """Length of the list of plug-ins and digests in a request."""
 

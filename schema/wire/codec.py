@@ -168,18 +168,25 @@ def encode_request(
 
 
 def decode_request(
-    data: bytes, read: Callable[[bytes], Robot] = decode_robot
+    data: bytes,
+    read: Callable[[bytes], Robot] = decode_robot,
+    prepare: Callable[[bytes], object] | None = None,
 ) -> Request:
     """Return the request of some bytes.
 
     Args:
         data: the bytes.
         read: decodes its robot; ``decode_body`` skips the brain.
+        prepare: called with the settings before the robot is decoded, to load the
+            plug-ins that they name.
 
     Raises:
         MalformedMessage: not a request's bytes, or its robot is malformed.
+        RevolveError: raised by ``prepare``.
     """
     message = parsed(data, pb.Request(), REQUEST_BYTES)
+    if prepare is not None:
+        prepare(message.settings)
     has_identity = message.HasField("identity")
     return Request(
         run=message.run,
