@@ -41,7 +41,6 @@ from schema.experiment.document import (
     with_births,
 )
 from schema.experiment.file import experiment_from_text
-from schema.experiment.settings import fitness_function
 from schema.limits import MOST_REPEATS
 from schema.plugins.permission import allow, allow_references
 
@@ -106,7 +105,9 @@ def _stoppable(folder: Path, execute: Callable[[], int]) -> int:
 
 
 def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
-    """Return the experiments to run, checked as far as possible in advance."""
+    """Return the experiments to run, checked; imports the room of the worker."""
+    import worker.measures.functions
+
     experiments = read_experiments(options.experiments)
     if options.births is not None:
         experiments = tuple(
@@ -114,8 +115,7 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
         )
     for experiment in experiments:
         check_experiment(experiment, "--births" if options.births else experiment.name)
-        for number in range(island_count(experiment)):
-            fitness_function(island_experiment(experiment, number).fitness)
+        worker.measures.functions.check_functions(experiment)
         _check_encodings(experiment)
     return experiments
 
@@ -225,6 +225,6 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 if __name__ == "__main__":
-    from revolve import main as revolve
+    from revolve.command import main as revolve
 
     sys.exit(revolve())

@@ -183,7 +183,9 @@ class Arena:
             return [*self._insert(self._founders.pop()), *self._conclude()]
         commands: list[ArenaCommand] = []
         if self.step % self.clock.sample == 0:
-            commands += sample_records(self._living, self._moment)
+            commands += sample_records(
+                self._living, self._moment, self.experiment.measures.labels
+            )
         if self.step % self.clock.birth == 0:
             self.is_extinct = not self._orders.insertions and (
                 len(self._living) < self._parents_needed

@@ -226,7 +226,7 @@ class Island:
         self._brood.append(individual)
         self.births += 1
         born = birth_record(candidate, individual, self._encoding)
-        return [born, evaluation_record(outcome)]
+        return [born, evaluation_record(outcome, self.experiment.measures.labels)]
 
     def _close_brood(self) -> list[IslandCommand]:
         """Select the survivors, and end the epoch of migration if it is due."""

@@ -33,6 +33,7 @@ class IslandMigration:
     def __init__(self, experiment: Experiment, epochs: MigrationEpochs) -> None:
         selection = experiment.selection
         self.epochs = epochs
+        self._labels = experiment.measures.labels
         self._develop = encoding_of(experiment).develop
         rules = selection.culling
         self._limit = rules.population_limit if rules else selection.population
@@ -88,7 +89,7 @@ class IslandMigration:
             assert outcome is not None
             immigrant = self._immigrants[birth]
             self._immigrants[birth] = immigrant.evaluated(fitness_of(outcome))
-            commands.append(evaluation_record(outcome))
+            commands.append(evaluation_record(outcome, self._labels))
         settled = self._settle(population, self._immigrants.values())
         self._immigrants, self._outcomes = None, {}
         return commands, settled

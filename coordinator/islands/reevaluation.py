@@ -51,6 +51,7 @@ class Reevaluations:
         rules = experiment.selection.reevaluation
         assert rules is not None
         self._rules = rules
+        self._labels = experiment.measures.labels
         self._develop = encoding_of(experiment).develop
         self._island = island
         self._founders = experiment.selection.population
@@ -116,7 +117,7 @@ class Reevaluations:
         for birth, outcome in sorted(outcomes.items()):
             assert outcome is not None
             self._trials[birth].append(fitness_of(outcome))
-            records.append(evaluation_record(outcome))
+            records.append(evaluation_record(outcome, self._labels))
         evaluated = (
             self._evaluated(one) if one.birth in outcomes else one for one in population
         )

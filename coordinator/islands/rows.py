@@ -70,17 +70,31 @@ def outcome_columns(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def evaluation_record(outcome: Outcome) -> Record:
-    """Return the evaluations row of an outcome."""
+def named_measures(
+    labels: Sequence[str], measures: Sequence[float]
+) -> list[tuple[str, float]] | None:
+    """Return the column ``measures``; None if there are none."""
+    return list(zip(labels, measures, strict=True)) if measures else None
+
+
+def evaluation_record(outcome: Outcome, labels: Sequence[str] = ()) -> Record:
+    """Return the evaluations row of an outcome.
+
+    Args:
+        outcome: of the evaluation.
+        labels: names of its measures.
+    """
     island = outcome.birth.island if outcome.requester is None else outcome.requester
+    found = outcome.evaluation
     row = {
         **named(outcome.birth, island),
         "trial": outcome.trial,
-        "status": "ok" if outcome.evaluation else "failed",
+        "status": "ok" if found else "failed",
         **outcome_columns(outcome),
         "wall_s": outcome.provenance.wall_s,
         "worker": outcome.provenance.agent,
         "platform": outcome.provenance.platform,
+        "measures": found and named_measures(labels, found.measures),
     }
     return Record("evaluations", row)
 

@@ -1,7 +1,5 @@
 """Events of the journal as Protobuf bytes, and back."""
 
-from dataclasses import asdict
-
 from coordinator.islands.events import (
     Advanced,
     Audited,
@@ -91,7 +89,12 @@ def _entry(event: JournalledEvent) -> pb.Entry:
                 entry.evaluated.CopyFrom(evaluation_to_message(event.evaluation))
             else:
                 entry.evaluation_failed = event.reason
-    entry.provenance.CopyFrom(pb.Provenance(**asdict(event.provenance)))
+    provenance = event.provenance
+    entry.provenance.agent = provenance.agent
+    entry.provenance.platform = provenance.platform
+    entry.provenance.wall_s = provenance.wall_s
+    # Present also if all three have their defaults.
+    entry.provenance.SetInParent()
     return entry
 
 

@@ -8,7 +8,7 @@ folders, addresses) are flags of the commands, not keys.
 from dataclasses import replace
 from functools import lru_cache
 from math import pi
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from msgspec import Meta, field, structs
 
@@ -25,7 +25,8 @@ from schema.experiment.section import (
     Probability,
     Section,
 )
-from schema.parts import BodySpace, Parameter, PartType
+from schema.limits import MOST_MEASURES
+from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
 
 REVOLVE_ANGLE = "revolve-angle"
@@ -256,7 +257,7 @@ class Simulation(Section, frozen=True):
     actuator_noise: NoiseLevel = 0.0
 
 
-class Fitness(Section, frozen=True):
+class Fitness(PluginSection, frozen=True):
     """The function that evolution maximises.
 
     Attributes:
@@ -264,12 +265,34 @@ class Fitness(Section, frozen=True):
         path_weight, straight_weight: weights of the velocities along the path and
             between its ends.
         limit: greatest realistic fitness; above it, fitness is 0.
+        parameters: of a function with a Struct of its own.
     """
+
+    later: ClassVar = ("parameters",)
 
     function: str = "worker.fitness:thesis"
     path_weight: float = 1.0
     straight_weight: float = 5.0
     limit: Positive = 1.0
+    parameters: Parameters = field(default_factory=dict)
+
+
+class Measures(PluginSection, frozen=True):
+    """Numbers of a robot's life that are recorded beside its fitness.
+
+    Attributes:
+        names: short names of built-in measures, or ``module:attribute``.
+        parameters: a table for each measure that has parameters, by short name or
+            attribute.
+    """
+
+    names: Annotated[tuple[str, ...], Meta(max_length=MOST_MEASURES)] = ()
+    parameters: dict[str, Parameters] = field(default_factory=dict)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the measures in tables: short names and attributes."""
+        return tuple(name.rpartition(":")[2] for name in self.names)
 
 
 class Arena(Section, frozen=True):
@@ -296,7 +319,7 @@ class Arena(Section, frozen=True):
         drop_m: height above the ground at birth [m].
         wall_diameter_m: of the ring wall [m]; 0 is no wall.
         wall_segments, wall_height_m, wall_thickness_m: of the ring wall [m].
-        light: position of the light [m]; None is no light.
+        light: as ``environment.light``; only one of the two is needed.
         record_touches: write the table ``touches``.
         proximity_steps: physics steps between checks of distances.
         merge_distance_m: robots that may come nearer than this before the next check
@@ -358,6 +381,7 @@ class Experiment(Section, frozen=True):
         births: number of births on each island, the initial population included.
         islands: numbered from 0, in the order of the document; none is one island.
         migration: between the islands.
+        measures: of the robots of all islands.
         encoding: of all islands.
     """
 
@@ -374,6 +398,7 @@ class Experiment(Section, frozen=True):
     arena: Arena | None = None
     islands: tuple[Islands, ...] = ()
     migration: Migration | None = None
+    measures: Measures = Measures()
     encoding: Encoding = Encoding()
 
     @property
@@ -408,6 +433,12 @@ def island_experiment(experiment: Experiment, number: int) -> Experiment:
     return structs.replace(experiment, islands=(), **changes)
 
 
+def light_of(environment: Environment, arena: Arena | None) -> Vector | None:
+    """Return the position of the light of a world [m]; None is no light."""
+    own = None if arena is None else arena.light
+    return own or environment.light
+
+
 def with_births(experiment: Experiment, births: int) -> Experiment:
     """Return an experiment with another number of births on each island."""
     islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
@@ -418,9 +449,14 @@ def references(experiment: Experiment) -> list[str]:
     """Return the ``module:attribute`` of all plug-ins that a document names."""
     own = [each.fitness for each in experiment.islands if each.fitness is not None]
     functions = [fitness.function for fitness in (experiment.fitness, *own)]
+    named = [
+        *experiment.space.part_types,
+        *functions,
+        *experiment.measures.names,
+        experiment.encoding.type,
+    ]
     # A short name is not that of a module.
-    encodings = [experiment.encoding.type] if ":" in experiment.encoding.type else []
-    return [*experiment.space.part_types, *functions, *encodings]
+    return [path for path in named if ":" in path]
 
 
 @lru_cache(maxsize=64)

@@ -41,16 +41,26 @@ def read_experiment(source: str) -> Experiment:
     Raises:
         ExperimentError: no such experiment or file, or an invalid document.
     """
+    return parse_experiment(*source_text(source))
+
+
+def source_text(source: str) -> tuple[str, str]:
+    """Return the TOML text of an experiment, and its path for ``parse_experiment``.
+
+    Args:
+        source: as for ``read_experiment``.
+
+    Raises:
+        ExperimentError: no such experiment or file.
+    """
     if source.endswith(".toml"):
         try:
-            text = read_bytes(Path(source)).decode()
+            return read_bytes(Path(source)).decode(), source
         except (OSError, UnicodeDecodeError) as error:
             raise ExperimentError(f"{source}: cannot be read: {error}") from None
-        return parse_experiment(text, source)
     check_source(source, shipped_experiments())
     folder = resources.files("schema.experiment") / "shipped"
-    text = (folder / f"{source}.toml").read_text(encoding="utf-8")
-    return parse_experiment(text, f"{source}.toml")
+    return (folder / f"{source}.toml").read_text(encoding="utf-8"), f"{source}.toml"
 
 
 def check_source(source: str, shipped: Collection[str]) -> None:
@@ -89,7 +99,19 @@ def parse_experiment(text: str, where: str) -> Experiment:
         ExperimentError: not TOML; an unknown key (the nearest is named); a value of a
             wrong type or outside its range; inconsistent values.
     """
-    document = _parse_toml(text, where)
+    return experiment_from_tables(parse_toml(text, where), where)
+
+
+def experiment_from_tables(document: dict[str, Any], where: str) -> Experiment:
+    """Return the experiment of the tables of a TOML text, which are changed.
+
+    Args:
+        document: the tables.
+        where: as for ``parse_experiment``.
+
+    Raises:
+        ExperimentError: as for ``parse_experiment``.
+    """
     _refuse_unknown(document, Experiment, where, "")
     _refuse_many_islands(document, where)
     _read_scenery(document, where)
@@ -116,7 +138,7 @@ def own_experiment(text: str) -> Experiment:
     return experiment
 
 
-def _parse_toml(text: str, where: str) -> dict[str, Any]:
+def parse_toml(text: str, where: str) -> dict[str, Any]:
     """Return the document of a TOML text.
 
     Raises:

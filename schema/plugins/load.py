@@ -67,6 +67,27 @@ def load_object(
     return cast("T", found)
 
 
+def full_name(path: str, where: str, built_in: Mapping[str, str]) -> str:
+    """Return the dotted path of a built-in object, or of a user's own.
+
+    Args:
+        path: the short name of a built-in object, or ``module:attribute``.
+        where: the key that holds it, for messages.
+        built_in: dotted paths by short name.
+
+    Raises:
+        UnknownPlugin: no such built-in object (the nearest is named).
+    """
+    if ":" in path:
+        return path
+    if path not in built_in:
+        raise UnknownPlugin(
+            f"{where}: must be one of {', '.join(built_in)} or 'module:attribute', "
+            f"got {shown(path)}{nearest(path, built_in)}"
+        )
+    return built_in[path]
+
+
 def load_function(path: str, where: str, arguments: int) -> Callable[..., Any]:
     """Return the function that a dotted path names.
 

@@ -43,7 +43,7 @@ def _where_assigned(value: object) -> str:
     """Return file and line of the assignment of a module's object; or empty."""
     for module in list(sys.modules.values()):
         # A snapshot: the import of another thread may change it.
-        names = dict(vars(module)) if isinstance(module, ModuleType) else {}
+        names = dict(getattr(module, "__dict__", {}))
         for name, each in names.items():
             if each is value and (line := _assignment(module, name)):
                 return f"{Path(str(module.__file__)).name}:{line}"

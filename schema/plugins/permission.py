@@ -21,7 +21,7 @@ from types import ModuleType
 
 from schema.errors import ExperimentError, UnknownPlugin, shown
 
-BUILT_IN = ("schema.parts", "schema.robogen_parts", "worker.fitness")
+BUILT_IN = ("schema.parts", "schema.robogen_parts", "worker.fitness", "worker.tasks")
 ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis", "revolve")
 GROUP = "revolve.plugins"
 FLAG = "--plugins"
@@ -66,8 +66,8 @@ def allow_references(paths: Iterable[str], folder: Path | None = None) -> None:
         ExperimentError: a file in the folder has the name of another module.
     """
     for path in paths:
-        module = path.partition(":")[0]
-        if not _may_be_plugin(module):
+        module, colon, _ = path.partition(":")
+        if not colon or not _may_be_plugin(module):
             continue
         file = (folder / f"{module}.py").resolve() if folder else None
         if file is not None and "." not in module and file.is_file():

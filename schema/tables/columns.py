@@ -16,6 +16,8 @@ Columns of several tables:
 - ``path_velocity``, ``straight_velocity``: length of the path of the core, and
   distance between its ends, per second of the fitness window [m/s].
 - ``fitness``: higher is better.
+- ``measures``: numbers of ``measures.names`` by name; null if the experiment has none,
+  if the evaluation failed, or if the robot has no fitness yet.
 """
 
 from itertools import chain
@@ -96,6 +98,12 @@ PART = pa.struct(
 )
 """Part of a body; the fields are those of ``schema.robot.robot.Part``."""
 
+MEASURES = pa.map_(
+    pa.field("key", pa.string(), nullable=False),
+    pa.field("value", pa.float64(), nullable=False),
+)
+"""Measures of a robot by name: short names of ``measures.names``, or attributes."""
+
 _ISLAND = _columns("island", pa.int32())
 _INDIVIDUAL = [
     *_ISLAND,
@@ -147,6 +155,7 @@ EVALUATIONS = _table(
     _OUTCOME,
     _columns("wall_s", pa.float64(), "s", is_repeatable=False),
     _columns("worker platform", pa.string(), is_repeatable=False),
+    _columns("measures", MEASURES, "by measure", is_nullable=True),
 )
 """One row per finished evaluation.
 
@@ -180,6 +189,7 @@ FITNESS = _table(
     _columns("path_velocity straight_velocity", pa.float64(), "m/s"),
     _columns("fitness", pa.float64()),
     _columns("is_mature", pa.bool_()),
+    _columns("measures", MEASURES, "by measure", is_nullable=True),
 )
 """One row per living robot and sample of an arena, mature or not.
 

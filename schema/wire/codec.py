@@ -6,7 +6,7 @@ part types are checked by ``schema.robot.robot.check_robot``.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 from schema.errors import MalformedMessage
 from schema.experiment.identity import NO_IDENTITY, Identity
@@ -300,7 +300,14 @@ def report_from_message(message: pb.Report) -> Report:
 
 def evaluation_to_message(evaluation: Evaluation) -> pb.Evaluation:
     """Return an evaluation as a message."""
-    return pb.Evaluation(**asdict(evaluation))
+    # Not by ``asdict``: it copies each value, at a tenth of an evaluation's cost here.
+    return pb.Evaluation(
+        fitness=evaluation.fitness,
+        path_velocity=evaluation.path_velocity,
+        straight_velocity=evaluation.straight_velocity,
+        simulated_s=evaluation.simulated_s,
+        measures=evaluation.measures,
+    )
 
 
 def evaluation_from_message(message: pb.Evaluation) -> Evaluation:
@@ -309,6 +316,10 @@ def evaluation_from_message(message: pb.Evaluation) -> Evaluation:
     Raises:
         MalformedMessage: a number that is not finite.
     """
-    names = [field.name for field in fields(Evaluation)]
-    numbers = (finite(getattr(message, name), f"evaluation.{name}") for name in names)
-    return Evaluation(*numbers)
+    return Evaluation(
+        finite(message.fitness, "evaluation.fitness"),
+        finite(message.path_velocity, "evaluation.path_velocity"),
+        finite(message.straight_velocity, "evaluation.straight_velocity"),
+        finite(message.simulated_s, "evaluation.simulated_s"),
+        tuple(finite(each, "evaluation.measures") for each in message.measures),
+    )

@@ -67,6 +67,7 @@ def evaluation_row(number: int, worker: str, platform: str) -> dict[str, Any]:
         "wall_s": 0.5,
         "worker": worker,
         "platform": platform,
+        "measures": None if is_failed else [("height", value), ("turning", 0.5)],
     }
 
 

@@ -15,6 +15,7 @@ from msgspec import Struct
 
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.document import body_space
+from schema.experiment.section import stable_json
 from schema.experiment.settings import ArenaSettings
 from schema.parts import Vector
 from schema.robot.ids import BirthId
@@ -128,7 +129,7 @@ def read_snapshot(
 
 def _digest(settings: ArenaSettings) -> bytes:
     """Return the SHA-256 of an arena's settings."""
-    return hashlib.sha256(msgspec.json.encode(settings)).digest()
+    return hashlib.sha256(stable_json(settings)).digest()
 
 
 def _robot_state(robot: ArenaRobot) -> _RobotState:

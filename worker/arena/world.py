@@ -21,7 +21,7 @@ from schema.wire.arena import Advance, Casualty, Changes, Insertion, Judgement
 from worker.arena.batched_control import BatchedControllers, BatchedIO
 from worker.arena.births import check_changes, newborn
 from worker.arena.divergence import diverged
-from worker.arena.light import read_light
+from worker.arena.light import read_lights
 from worker.arena.records import Contacts, Poses
 from worker.arena.snapshot import read_snapshot, write_snapshot
 from worker.arena.threads import Pool
@@ -206,8 +206,8 @@ class World:
         self._io.drive(state, outputs)
 
     def _read_light(self, robots: Sequence[ArenaRobot]) -> None:
-        if self._settings.arena.light is not None:
-            read_light(self._settings.arena.light, self.population, robots)
+        if self._settings.light is not None:
+            read_lights(self._settings.light, self.population, robots)
 
     def _sample(self, state: Floats) -> None:
         layout = self.population.layout

@@ -9,6 +9,7 @@ import mujoco
 from msgspec.structs import replace
 
 from schema.experiment.document import body_space
+from schema.experiment.scenery import refuse_objects
 from schema.experiment.settings import ArenaSettings
 from schema.mjcf.footing import footprint, standing_height
 from schema.mjcf.model import robot_spec, shared_model, solo_spec
@@ -47,7 +48,12 @@ class ModelCache:
     """
 
     def __init__(self, settings: ArenaSettings) -> None:
-        """Initialise an empty cache."""
+        """Initialise an empty cache.
+
+        Raises:
+            ExperimentError: scenery that is invalid, or has objects that move.
+        """
+        refuse_objects(settings.environment, settings.simulation)
         self.settings = settings
         self._simulation = replace(settings.simulation, drop_m=settings.arena.drop_m)
         self.width = widths(settings.space)

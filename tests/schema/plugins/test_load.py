@@ -280,5 +280,5 @@ def test_an_own_object_must_have_the_members() -> None:
     built_in: dict[str, object] = {}
     path = "schema.parts:CORE"
     assert load_object(path, "x", built_in, ("arity",)) is BUILT_IN["Core"]
-    with pytest.raises(ExperimentError, match="x: 'schema.parts:CORE' has no 'fly'"):
+    with pytest.raises(ExperimentError, match=r"x: 'schema\.parts:CORE' has no 'fly'"):
         load_object(path, "x", built_in, ("arity", "fly"))

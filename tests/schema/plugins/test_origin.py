@@ -1,5 +1,6 @@
 """File and line of a plug-in's code."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -57,7 +58,7 @@ def test_object_without_a_name_is_found_by_its_class(lab: str) -> None:
 
 
 def test_partial_function_is_found_by_the_function_inside(lab: str) -> None:
-    judge = load_object(f"{lab}:judge", "key", {})
+    judge: Callable[..., object] = load_object(f"{lab}:judge", "key", {})
     assert where_defined(partial(judge, parameters=3)) == f"{lab}.py:6"
 
 
