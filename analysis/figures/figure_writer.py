@@ -169,7 +169,8 @@ def _add_gaits(
     caption = (
         "The fittest robot of each experiment's last populations, simulated alone and "
         "shown from the middle of its evaluation on. A part's colour shows the founder "
-        "that the part descends from; white parts were added by mutation."
+        "that the part descends from; white parts were added by mutation. Parts of "
+        "encodings that give them no identity keep their own colour."
     )
     title = "Gaits of the best robots"
     writer.add(Figure(number, title, caption, _SOURCE, lambda _: gaits(pictures)), {})
@@ -190,13 +191,20 @@ def _add_tree(writer: FigureWriter, one: RobotPicture, robots: pa.Table) -> None
     fitness = {
         BirthId(row["birth_island"], row["birth"]): row["fitness"] for row in known
     }
+    colours = (
+        "Above the dashed line are the founders whose parts survive in these robots; a "
+        "part has the colour of its founder, and white parts were added by mutation."
+    )
+    if not family.founders:
+        colours = (
+            "The encoding gives parts no identity that children inherit, so the "
+            "founders of parts are not known."
+        )
     caption = (
         f"Robot {best.birth} of {best.folder.name}, the fittest robot of the last "
         "populations, at the bottom, and its ancestors over five levels of "
         "reproduction: parents are drawn above their children. A dotted line leads to "
-        "a parent that is drawn on another level. Above the dashed line are the "
-        "founders whose parts survive in these robots; a part has the colour of its "
-        "founder, and white parts were added by mutation. The robot has "
+        f"a parent that is drawn on another level. {colours} The robot has "
         f"{one.lineage.num_rows - 1} ancestors in total."
     )
     title = f"Ancestry of the best robot of {label(best.experiment)}"
