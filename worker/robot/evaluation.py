@@ -22,6 +22,7 @@ from worker.fitness import fitness_of, path_velocity, straight_velocity
 from worker.robot.controller import SoloNetwork, pack, widths
 from worker.robot.motors import Servos
 from worker.robot.noise import Noise, NoiseSource
+from worker.robot.own_sensors import Surroundings
 from worker.robot.sensors import Sensors
 
 Watch = Callable[[mujoco.MjData], None]
@@ -39,6 +40,7 @@ def evaluate(
 
     Raises:
         SimulationDiverged: the physics diverged; with reason and simulated time.
+        SensorFailed: a sensor of a plug-in raised or gave wrong values.
         FitnessUndefined: the fitness function raised or gave no finite number.
         ExperimentError: a sensor that has no stimulus in this environment, or an
             unknown fitness function.
@@ -76,6 +78,7 @@ def simulate(
     Raises:
         SimulationDiverged: the state is not finite, the engine warned or failed, or
             it cannot build the robot.
+        SensorFailed: a sensor of a plug-in raised or gave wrong values.
         ExperimentError: a sensor that has no stimulus in this environment.
         InvalidRobot: more neurons than the limits.
     """
@@ -170,6 +173,12 @@ class _ControlLoop:
             self._sensors.read(self._tick_s)
         else:
             self._sensors.start()
+        if self._sensors.own is not None:
+            # Frames are those of the state before the last step.
+            mujoco.mj_kinematics(self._model, self.data)
+            age_s = step * self._simulation.timestep_s
+            around = Surroundings(age_s, self._sensors.touching())
+            self._sensors.own.read(self._sensors.readings[0], around)
         tick = step // self._simulation.brain_steps
         if self._noise is None:
             self._servos.drive(self._controller.step(tick))
