@@ -28,6 +28,7 @@ from schema.experiment.section import (
 from schema.limits import MOST_MEASURES
 from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
+from schema.plugins.part_checks import check_part_type
 
 REVOLVE_ANGLE = "revolve-angle"
 """Name of the encoding of the thesis."""
@@ -465,7 +466,8 @@ def body_space(space: Space) -> BodySpace:
 
     Raises:
         UnknownPlugin: no such module or attribute, or a module that is not allowed.
-        ExperimentError: not a part type, two of one name, or not exactly one core.
+        ExperimentError: not a part type, or one that ``check_part_type`` refuses; two
+            of one name, or not exactly one core.
     """
     types: dict[str, PartType] = {}
     for path in space.part_types:
@@ -475,6 +477,7 @@ def body_space(space: Space) -> BodySpace:
                 f"space.part_types: two part types are named {kind.name!r}"
             )
         types[kind.name] = kind if space.planar else _freed(kind)
+        check_part_type(types[kind.name], "space.part_types")
     cores = [name for name, kind in types.items() if kind.is_root]
     if len(cores) != 1:
         raise ExperimentError(

@@ -14,6 +14,7 @@ from functools import partial
 from typing import Self
 
 from schema.errors import UnexpectedEvent
+from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
@@ -22,6 +23,7 @@ from worker.arena.batched_control import BatchedControllers, BatchedIO
 from worker.arena.births import check_changes, newborn
 from worker.arena.divergence import diverged
 from worker.arena.light import read_lights
+from worker.arena.own_sensors import has_own_sensors, read_own_sensors
 from worker.arena.records import Contacts, Poses
 from worker.arena.snapshot import read_snapshot, write_snapshot
 from worker.arena.threads import Pool
@@ -66,6 +68,7 @@ class World:
         self._casualties: list[Casualty] = []
         self._contacts = Contacts(settings) if settings.arena.record_touches else None
         self._poses = Poses(clock.timestep_s)
+        self._has_own_sensors = has_own_sensors(body_space(settings.space))
 
     def close(self) -> None:
         """Stop the threads; the world cannot be advanced any more."""
@@ -190,7 +193,7 @@ class World:
             diverged(self.population, rollout, step, reads_warnings=reads_warnings)
         )
         if is_tick:
-            self._tick(rollout.state)
+            self._tick(rollout)
         if is_sample:
             self._sample(rollout.state)
         if is_merge:
@@ -198,10 +201,18 @@ class World:
                 self._contacts.count(self.population.clusters, rollout.moment)
             self.population.merge()
 
-    def _tick(self, state: Floats) -> None:
+    def _tick(self, rollout: Rollout) -> None:
+        state = rollout.state
         self._io.settle(self.population.layout)
         self._io.read(state)
         self._read_light(self.population.robots)
+        if self._has_own_sensors:
+            failed = read_own_sensors(
+                self.population, self.population.robots, self.step, self._settings
+            )
+            self._remove(failed)
+            self._io.settle(self.population.layout)
+            state = rollout.state
         outputs = self._controllers.tick(self.step, self._io.readings)
         self._io.drive(state, outputs)
 
@@ -229,6 +240,13 @@ class World:
                 robots.append(robot)
         self.population.add(robots)
         self._read_light(robots)
+        if self._has_own_sensors:
+            failed = read_own_sensors(
+                self.population, robots, self.step, self._settings
+            )
+            self._casualties += failed
+            self.population.remove([each.birth for each in failed])
+            robots = [robot for robot in robots if robot.birth in self.population]
         for robot in robots:
             self._controllers.first_tick(self.step, robot)
         self.population.kinematics()

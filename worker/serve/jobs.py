@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-from schema.errors import FitnessUndefined, SimulationDiverged
+from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
 from schema.experiment.document import body_space
 from schema.experiment.settings import lasting
 from schema.robot.results import Evaluation
@@ -57,7 +57,8 @@ def answer(request: bytes) -> bytes:
     """Return the encoded answer to an encoded evaluation request.
 
     A function of the request but for ``wall_s``, which affects nothing. Diverged
-    physics and an undefined fitness are results, answered with the reason.
+    physics, a failed sensor and an undefined fitness are results, answered with the
+    reason.
 
     Raises:
         MalformedMessage: the bytes are no request.
@@ -72,7 +73,7 @@ def answer(request: bytes) -> bytes:
     result: Evaluation | str
     try:
         result = evaluate(job.robot, lasting(settings, job.steps), job.identity)
-    except (SimulationDiverged, FitnessUndefined) as error:
+    except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
         result = str(error)
     wall_s = time.perf_counter() - start
     return encode_answer(Answer(job.epoch, job.number, wall_s, result))
