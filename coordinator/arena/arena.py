@@ -214,7 +214,9 @@ class Arena:
         while orders.insertions and not self._founders and self._living.has_room:
             order = orders.insertions.pop(0)
             birth = self._vetting_queue.take_number()
-            commands += self._insert(inserted(order, birth, self._space), order.place)
+            commands += self._insert(
+                inserted(order, birth, self.experiment), order.place
+            )
         if self._migration is not None and not self._founders:
             commands += self._migration.exchange(self._moment)
             if self._migration.epochs.is_waiting:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from coordinator.evolution.generation import generate
 from coordinator.evolution.random_streams import Purpose, stream
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.flags import Flags, add_count
@@ -32,6 +33,7 @@ def main(arguments: list[str]) -> int:
     options = _parser().parse_args(arguments[1:])
     experiment = read_experiment(options.experiment)
     space = body_space(experiment.space)
+    kinds = neuron_kinds(experiment.brain, experiment.space)
     for number in range(options.count):
         birth = BirthId(0, number)
         rng = stream(options.seed, 0, birth, 0, Purpose.GENERATE)
@@ -39,7 +41,7 @@ def main(arguments: list[str]) -> int:
         path: Path = options.file
         if options.count > 1:
             path = path.with_stem(f"{path.stem}-{number}")
-        write_robot(robot, path, space, settings_of(experiment))
+        write_robot(robot, path, space, settings_of(experiment), kinds)
         print(f"{path}: {len(robot.parts)} parts, {len(robot.brain.neurons)} neurons")
     return 0
 

@@ -11,6 +11,7 @@ from coordinator.arena.arena import Arena
 from coordinator.evolution.selection import fittest_first
 from coordinator.run.session import RunSession
 from coordinator.storage.hints import command
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.formats.files import write_robot
 from schema.robot.genome import develop
@@ -71,7 +72,8 @@ def _results(run: RunSession) -> list[str]:
     mean = sum(one.fitness for one in judged) / len(judged)
     space = body_space(run.experiment.space)
     robot = develop(best.genome, space)
-    write_robot(robot, file, space)
+    kinds = neuron_kinds(run.experiment.brain, run.experiment.space)
+    write_robot(robot, file, space, kinds=kinds)
     motors = sum(space[part.kind].outputs for part in robot.parts)
     where = f" of island {best.birth.island}" if len(islands) > 1 else ""
     return [

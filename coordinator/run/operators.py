@@ -21,8 +21,10 @@ from coordinator.run.loop import Loop
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from schema.errors import MalformedMessage, RevolveError
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.limits import LONGEST_REASON, printable
+from schema.robot.brain import check_neurons
 from schema.robot.inverse_development import genome_of
 from schema.robot.robot import check_robot
 from schema.wire.codec import decode_robot
@@ -94,6 +96,8 @@ def _order(
         Refused: no living robot has the given birth number.
         InvalidRobot: a robot that breaks the rules of the experiment.
     """
+    space = arena.experiment.space
+    kinds = neuron_kinds(arena.experiment.brain, space)
     match action:
         case PauseArena():
             return Pause()
@@ -101,7 +105,7 @@ def _order(
             return Resume()
         case InsertRobot():
             robot = decode_robot(action.robot)
-            check_robot(robot, body_space(arena.experiment.space))
+            check_robot(robot, body_space(space), kinds)
             insert = Insert(genome_of(robot), action.place)
             check_order(insert, arena.experiment)
             return insert
@@ -112,7 +116,9 @@ def _order(
         raise Refused(f"birth {number}: is not alive; alive are {alive}")
     if isinstance(action, RemoveRobot):
         return Remove(action.birth)
-    return ReplaceBrain(action.birth, decode_robot(action.robot).brain)
+    brain = decode_robot(action.robot).brain
+    check_neurons(brain, kinds)
+    return ReplaceBrain(action.birth, brain)
 
 
 def _list(arena: Arena) -> str:

@@ -8,9 +8,9 @@ folders, addresses) are flags of the commands, not keys.
 from dataclasses import replace
 from functools import lru_cache
 from math import pi
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
-from msgspec import Meta, structs
+from msgspec import Meta, field, structs
 
 from schema.errors import ExperimentError
 from schema.experiment.environment import FLAT, Environment
@@ -19,6 +19,8 @@ from schema.experiment.section import (
     AtLeastOne,
     Count,
     NotNegative,
+    Parameters,
+    PluginSection,
     Positive,
     Probability,
     Section,
@@ -35,7 +37,11 @@ class Space(Section, frozen=True):
         min_parts, max_parts: allowed number of parts, core included.
         max_inputs, max_outputs, max_hidden: allowed number of neurons.
         planar: keep all parts in the plane of the core.
+        neuron_types: types of output and hidden neurons: short names of built-in
+            types, or ``module:attribute``; each is equally likely.
     """
+
+    later: ClassVar = ("neuron_types",)
 
     part_types: tuple[str, ...] = (
         "schema.parts:CORE",
@@ -51,6 +57,25 @@ class Space(Section, frozen=True):
     max_outputs: AtLeastOne = 10
     max_hidden: Count = 10
     planar: bool = True
+    neuron_types: tuple[str, ...] = ("Simple", "Sigmoid", "Oscillator")
+
+
+class BrainSection(PluginSection, frozen=True):
+    """The type of all brains of an experiment.
+
+    Attributes:
+        type: short name of a built-in type, or ``module:attribute``: ``network`` is
+            the thesis's recurrent network of ``space.neuron_types``, ``cpg`` couples
+            an oscillator for each motor.
+        parameters: of the type.
+    """
+
+    type: str = "network"
+    parameters: Parameters = field(default_factory=dict)
+
+
+NETWORK = BrainSection()
+"""The thesis's brains."""
 
 
 class Generation(Section, frozen=True):
@@ -341,6 +366,7 @@ class Experiment(Section, frozen=True):
         births: number of births on each island, the initial population included.
         islands: numbered from 0, in the order of the document; none is one island.
         migration: between the islands.
+        brain: of the robots of all islands.
     """
 
     name: str
@@ -356,6 +382,7 @@ class Experiment(Section, frozen=True):
     arena: Arena | None = None
     islands: tuple[Islands, ...] = ()
     migration: Migration | None = None
+    brain: BrainSection = NETWORK
 
     @property
     def window(self) -> int:
@@ -399,7 +426,10 @@ def references(experiment: Experiment) -> list[str]:
     """Return the ``module:attribute`` of all plug-ins that a document names."""
     own = [each.fitness for each in experiment.islands if each.fitness is not None]
     functions = [fitness.function for fitness in (experiment.fitness, *own)]
-    return [*experiment.space.part_types, *functions]
+    brains = (*experiment.space.neuron_types, experiment.brain.type)
+    # A short name is not that of a module.
+    own_brains = [path for path in brains if ":" in path]
+    return [*experiment.space.part_types, *functions, *own_brains]
 
 
 @lru_cache(maxsize=64)

@@ -2,14 +2,16 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import msgspec
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError
 from schema.experiment.document import (
+    NETWORK,
     Arena,
+    BrainSection,
     Experiment,
     Fitness,
     Simulation,
@@ -35,14 +37,19 @@ class VettingSettings(Section, frozen=True):
 class EvaluationSettings(Section, frozen=True):
     """Settings of an evaluation request."""
 
+    later: ClassVar = ("brain",)
+
     space: Space
     simulation: Simulation
     fitness: Fitness
     environment: Environment = FLAT
+    brain: BrainSection = NETWORK
 
 
 class ArenaSettings(Section, frozen=True):
     """Settings of a request to advance an arena."""
+
+    later: ClassVar = ("brain",)
 
     space: Space
     simulation: Simulation
@@ -50,6 +57,7 @@ class ArenaSettings(Section, frozen=True):
     arena: Arena
     environment: Environment = FLAT
     origin: Origin = Origin()
+    brain: BrainSection = NETWORK
 
 
 def vetting_settings(experiment: Experiment) -> bytes:

@@ -19,7 +19,7 @@ from schema.mjcf.model import solo_spec
 from schema.robot.results import Evaluation, Track
 from schema.robot.robot import Robot
 from worker.fitness import fitness_of, path_velocity, straight_velocity
-from worker.robot.controller import SoloNetwork, pack, widths
+from worker.robot.brains import controls_of
 from worker.robot.motors import Servos
 from worker.robot.noise import Noise, NoiseSource
 from worker.robot.sensors import Sensors
@@ -109,18 +109,18 @@ class _ControlLoop:
         model: mujoco.MjModel,
         identity: Identity,
     ) -> None:
-        types, width = body_space(settings.space), widths(settings.space)
-        simulation = settings.simulation
+        types, simulation = body_space(settings.space), settings.simulation
         self._model, self.data = model, mujoco.MjData(model)
         self._velocities = self.data.qvel.data
         self._simulation = simulation
         self._tick_s = simulation.brain_steps * simulation.timestep_s
+        controls = controls_of(settings.brain, settings.space, self._tick_s)
+        width = controls.width
         self._sensors = Sensors(robot, types, model, self.data, width=width.inputs)
         self._servos = Servos(robot, types, model, self.data)
         steps = simulation.warmup_steps + simulation.window_steps
         ticks = steps // simulation.brain_steps + 1
-        network = pack(robot.brain, width)
-        self._controller = SoloNetwork(network, width, self._tick_s, ticks)
+        self._controller = controls.solo(robot.brain, ticks)
         self._sensors.write_to(self._controller.readings)
         self._noise: Noise | None = None
         if simulation.sensor_noise or simulation.actuator_noise:

@@ -14,9 +14,9 @@ import numpy as np
 
 from schema.experiment.document import Simulation
 from schema.experiment.identity import Origin
+from schema.robot.brain import Widths
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
-from worker.robot.controller import Widths
 
 BLOCK_TICKS = 64
 """Ticks that are drawn at once, because starting a generator costs more than a draw."""
