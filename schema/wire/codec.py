@@ -2,7 +2,7 @@
 
 Encoding is deterministic: equal values give equal bytes. Decoding checks the type and
 the rules of a message and raises ``MalformedMessage`` otherwise. Rules that need the
-part types are checked by ``schema.robot.robot.check_robot``.
+part types or neuron types are checked by ``schema.robot.robot.check_robot``.
 """
 
 from collections.abc import Callable
@@ -132,7 +132,7 @@ def decode_genome(data: bytes) -> Genome:
 
     Raises:
         MalformedMessage: not a genome's bytes, nodes that are not a tree, an unknown
-            neuron type or layer, a number that is not finite.
+            layer, a number that is not finite.
     """
     return genome_from_message(parsed(data, pb.Genome(), ROBOT_BYTES))
 

@@ -21,7 +21,7 @@ from schema.robot.robot import Robot
 from schema.robot.trace import Trace
 from worker.fitness import fitness_of, path_velocity, straight_velocity
 from worker.measures.functions import measures_of
-from worker.robot.controller import SoloNetwork, pack, widths
+from worker.robot.brains import controls_of
 from worker.robot.light import read_light
 from worker.robot.motors import Servos
 from worker.robot.noise import Noise, NoiseSource
@@ -136,12 +136,13 @@ class _ControlLoop:
         model: mujoco.MjModel,
         identity: Identity,
     ) -> None:
-        types, width = body_space(settings.space), widths(settings.space)
-        simulation = settings.simulation
+        types, simulation = body_space(settings.space), settings.simulation
         self._model, self.data = model, mujoco.MjData(model)
         self._velocities = self.data.qvel.data
         self._simulation = simulation
         self._tick_s = simulation.brain_steps * simulation.timestep_s
+        controls = controls_of(settings.brain, settings.space, self._tick_s)
+        width = controls.width
         self._light = settings.environment.light
         self._sensors = Sensors(
             robot,
@@ -154,8 +155,7 @@ class _ControlLoop:
         self._servos = Servos(robot, types, model, self.data)
         steps = simulation.warmup_steps + simulation.window_steps
         ticks = steps // simulation.brain_steps + 1
-        network = pack(robot.brain, width)
-        self._controller = SoloNetwork(network, width, self._tick_s, ticks)
+        self._controller = controls.solo(robot.brain, ticks)
         self._sensors.write_to(self._controller.readings)
         self._noise: Noise | None = None
         if simulation.sensor_noise or simulation.actuator_noise:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Protocol, Self
 
 from schema.errors import StateDiffers
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings, read_arena_settings
 from schema.robot.ids import BirthId
@@ -195,8 +196,9 @@ def _closed_on_error(world: World) -> Iterator[World]:
 
 def _check_robots(changes: Changes, settings: ArenaSettings) -> None:
     space = body_space(settings.space)
+    kinds = neuron_kinds(settings.brain, settings.space)
     for insertion in changes.insertions:
-        check_robot(insertion.robot, space)
+        check_robot(insertion.robot, space, kinds)
 
 
 def _repeat(world: World, history: Sequence[PastAdvance]) -> None:
