@@ -56,7 +56,7 @@ def _takes(plugin: object, arguments: int) -> bool:
     return True
 
 
-FITNESS = Kind(
+FITNESS_KIND = Kind(
     "fitness",
     {
         "worker.fitness:thesis": worker.fitness.thesis,
@@ -66,7 +66,7 @@ FITNESS = Kind(
     lambda path: fitness_use(Fitness(function=path)),
     _fitness_functions,
 )
-MEASURE = Kind(
+MEASURE_KIND = Kind(
     "measure",
     BUILT_IN,
     # One with parameters looks like a fitness function: ``--kind`` says that it is not.
@@ -74,4 +74,4 @@ MEASURE = Kind(
     lambda path: measure_use(Measures(names=(path,))),
     _measures,
 )
-KINDS = (FITNESS, MEASURE)
+KINDS = (FITNESS_KIND, MEASURE_KIND)
