@@ -61,12 +61,12 @@ def check_function(
                     f"{key} of a {name} one"
                 )
     if len(raised) == len(traces):
-        error = raised[0]
-        story = f"{type(error).__name__}: {error}"
+        first = raised[0]
+        story = f"{type(first).__name__}: {first}"
         raise ExperimentError(
-            f"{where}: {_where_raised(error, place)}: must return a number, raised "
+            f"{where}: {_where_raised(first, place)}: must return a number, raised "
             f"{story}"
-        ) from error
+        ) from first
 
 
 def simple_traces(function: Callable[..., Any]) -> dict[str, Trace]:

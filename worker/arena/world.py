@@ -23,6 +23,7 @@ from worker.arena.births import check_changes, newborn
 from worker.arena.divergence import diverged
 from worker.arena.light import read_light
 from worker.arena.records import Contacts, Poses
+from worker.arena.samples import Samples
 from worker.arena.snapshot import read_snapshot, write_snapshot
 from worker.arena.threads import Pool
 from worker.clusters.population import ArenaPopulation
@@ -66,6 +67,7 @@ class World:
         self._casualties: list[Casualty] = []
         self._contacts = Contacts(settings) if settings.arena.record_touches else None
         self._poses = Poses(clock.timestep_s)
+        self._samples = Samples(settings, self.population)
 
     def close(self) -> None:
         """Stop the threads; the world cannot be advanced any more."""
@@ -211,10 +213,7 @@ class World:
 
     def _sample(self, state: Floats) -> None:
         layout = self.population.layout
-        places = state[layout.roots[:, :3]].tolist()
-        for robot, (x, y, z) in zip(self.population.robots, places, strict=True):
-            robot.place = (x, y, z)
-            robot.window.add(self.step, robot.place)
+        self._samples.add(self.step, state)
         self._poses.add(self.step, layout, state)
 
     # --- births and deaths ------------------------------------------------------
@@ -231,6 +230,7 @@ class World:
         self._read_light(robots)
         for robot in robots:
             self._controllers.first_tick(self.step, robot)
+            self._samples.first(self.step, robot)
         self.population.kinematics()
         self.population.merge()
 
