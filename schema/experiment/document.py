@@ -423,10 +423,14 @@ def with_births(experiment: Experiment, births: int) -> Experiment:
 
 
 def references(experiment: Experiment) -> list[str]:
-    """Return the ``module:attribute`` of all plug-ins that a document names."""
+    """Return the ``module:attribute`` of all plug-ins that a document names.
+
+    Short names of built-in plug-ins are left out.
+    """
     own = [each.fitness for each in experiment.islands if each.fitness is not None]
     functions = [fitness.function for fitness in (experiment.fitness, *own)]
-    return [*experiment.space.part_types, *functions, *experiment.measures.names]
+    paths = [*experiment.space.part_types, *functions, *experiment.measures.names]
+    return [path for path in paths if ":" in path]
 
 
 @lru_cache(maxsize=64)
