@@ -20,6 +20,7 @@ from schema.errors import RevolveError
 from schema.experiment.file import own_experiment
 from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
+from schema.tables.description import allow_plugins_of
 from schema.tables.files import read_table
 
 _TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
@@ -139,6 +140,7 @@ def _robot_pictures(
     for name in bar.track(in_order(best), description="rendering robots"):
         run = runs[best[name].folder]
         try:
+            allow_plugins_of(run.folder)
             pictures[name] = robot_picture(
                 best[name],
                 read_table(run.folder, "births"),
