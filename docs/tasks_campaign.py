@@ -28,11 +28,10 @@ from schema.experiment.file import own_experiment
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import evaluation_settings_of
 from schema.formats.files import write_robot
-from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.tables.files import read_table
-from schema.wire.codec import decode_genome
+from schema.wire.born import robot_of_birth
 from worker.robot.evaluation import evaluate
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -177,8 +176,8 @@ def _best(out: Path) -> tuple[Experiment, int, Robot]:
     best = int(np.argmax(alive["fitness"].to_numpy()))
     birth = alive["birth"][best].as_py()
     births = read_table(out, "births")
-    genome = births.filter(pc.equal(births["birth"], birth))["genome"][0].as_py()
-    robot = develop(decode_genome(genome), body_space(experiment.space))
+    row = births.filter(pc.equal(births["birth"], birth)).to_pylist()[0]
+    robot = robot_of_birth(row["genome"], row["robot"], experiment)
     return experiment, birth, robot
 
 
