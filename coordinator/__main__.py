@@ -10,6 +10,7 @@ from coordinator.cli.deployment import Deployment
 from coordinator.cli.execute import resume, start, start_campaign
 from coordinator.cli.flags import parser
 from coordinator.dispatch.events import AgentKind
+from coordinator.evolution.kinds import KINDS
 from coordinator.plugins.checks import refuse_faulty
 from coordinator.plugins.command import check, list_plugins
 from coordinator.run.cross_checks import Checks
@@ -103,7 +104,7 @@ def plugin_kinds() -> tuple[Kind, ...]:
     """Return all kinds of plug-ins; imports the room of the worker."""
     import worker.kinds
 
-    return (*schema.experiment.kinds.KINDS, *worker.kinds.KINDS)
+    return (*schema.experiment.kinds.KINDS, *worker.kinds.KINDS, *KINDS)
 
 
 def _stoppable(folder: Path, execute: Callable[[], int]) -> int:
