@@ -14,6 +14,8 @@ import pytest
 from revolve import COMMANDS
 from schema.experiment.document import Arena
 from schema.experiment.file import parse_experiment
+from schema.experiment.settings import fitness_function
+from worker.fitness import check_fitness
 
 pytestmark = pytest.mark.system
 
@@ -84,6 +86,14 @@ def test_experiments_of_the_experiments_page_run(tmp_path: Path) -> None:
         assert done.returncode == 0, f"{document}\n{done.stderr}"
         if "my_parts" not in document:
             parse_experiment(document, str(tmp_path / page.name))
+
+
+def test_experiments_of_the_tasks_page_are_accepted(tmp_path: Path) -> None:
+    documents = _blocks(TOP / "docs" / "tasks.md", "toml")
+    assert len(documents) >= 5
+    for document in documents:
+        fitness = parse_experiment(document, str(tmp_path / "mine.toml")).fitness
+        check_fitness(fitness_function(fitness), fitness)
 
 
 def test_arenas_page_lists_all_keys_with_their_defaults() -> None:
