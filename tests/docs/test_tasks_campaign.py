@@ -43,9 +43,13 @@ def test_only_seeds_of_both_searches_count() -> None:
         row("random", 2, 0.3),
     ]
     (_, _, line) = table(kept)
-    assert line.startswith(
-        "| turning | 2 | 0.600 rad/s | 0.200 rad/s | +0.400 rad/s | +0.200 to +0.600 |"
+    assert line == (
+        "| turning | 2 | 0.600 rad/s | 0.200 rad/s | +0.400 rad/s | too few seeds |"
     )
+    kept += [row("random", 3, 0.3)]
+    (_, _, line) = table(kept)
+    start = "| turning | 3 | 0.700 rad/s | 0.300 rad/s | +0.400 rad/s | +0.200 to "
+    assert line.startswith(start)
 
 
 def test_each_task_is_a_shipped_experiment_and_has_a_section() -> None:
