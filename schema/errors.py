@@ -78,6 +78,10 @@ class RunPaused(RevolveError):  # noqa: N818 - reads as what it says
     """A run stops and waits for its user; ``revolve resume`` continues it."""
 
 
+class SensorFailed(RevolveError):  # noqa: N818 - reads as what it says
+    """A sensor of a plug-in raised or gave wrong values: a failed result."""
+
+
 class SimulationDiverged(RevolveError):  # noqa: N818 - reads as what it says
     """The simulation diverged: a failed result."""
 

@@ -69,6 +69,10 @@ MOST_PARTS = 1000
 MOST_NEURONS = 10_000
 MOST_CONNECTIONS = 50_000
 """Parts, neurons and connections of a robot, or of a genome."""
+MOST_NEURON_PARAMETERS = 32
+"""Evolving parameters of a neuron."""
+MOST_NEURON_STATES = 16
+"""State variables of a neuron."""
 MOST_LIVE_ROWS = 500_000
 """Poses in a message to viewers."""
 UNCOUNTED_BYTES = 1 * MIB
@@ -160,6 +164,8 @@ MOST_GEOMS = 10_000
 """Geoms of scenery, replicated ones included."""
 MOST_OBJECTS = 100
 """Objects of scenery that move, replicated ones included."""
+MOST_PLUGIN_BYTES = 4 * MIB
+"""Source of a plug-in file, which a run folder keeps."""
 MOST_PLUGIN_CHARACTERS = 10_000
 """Length of the list of plug-ins and digests in a request."""
 

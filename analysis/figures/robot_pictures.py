@@ -106,6 +106,8 @@ def robot_picture(
         robot = robot_of_birth(genome, stored, experiment)
         parts = tuple(
             replace(part, parameters=(*part.parameters[:-3], *colour(part.gene)))
+            if part.gene
+            else part
             for part in robot.parts
         )
         return Robot(parts, robot.brain)

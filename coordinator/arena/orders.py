@@ -19,10 +19,9 @@ from coordinator.islands.events import (
 )
 from schema.errors import InvalidRobot
 from schema.experiment.document import Experiment
-from schema.parts import BodySpace
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
-from schema.robot.robot import Robot, check_robot
+from schema.robot.robot import Robot
 
 
 class Orders:
@@ -40,7 +39,7 @@ class Orders:
         self.pending: list[Order] = []
         self.insertions: list[Insert] = []
         self._experiment = experiment
-        self._types = encoding_of(experiment).types
+        self._encoding = encoding_of(experiment)
         self._living = living
         self.ids: set[str] = set()
 
@@ -68,11 +67,20 @@ class Orders:
                     records.append(death_record(removed, "removed", moment))
                 case ReplaceBrain(birth=birth, brain=brain):
                     living = self._living.get(birth)
-                    robot = living and _with_brain(living.robot, brain, self._types)
+                    robot = living and self._with_brain(living.robot, brain)
                     if living and robot:
                         self._living.replace_brain(living, robot)
         self.pending = []
         return records
+
+    def _with_brain(self, robot: Robot, brain: Brain) -> Robot | None:
+        """Return a robot with another brain; None if the brain does not fit it."""
+        changed = replace(robot, brain=brain)
+        try:
+            self._encoding.check(changed)
+        except InvalidRobot:
+            return None
+        return changed
 
 
 def check_order(order: Order, experiment: Experiment) -> None:
@@ -95,19 +103,9 @@ def inserted(order: Insert, birth: BirthId, encoding: IslandEncoding) -> Candida
 
     Raises:
         InvalidRobot: not a genome of this encoding, or its robot does not fit the
-            part types.
+            part types or the brain type.
     """
     genome = encoding.from_bytes(order.genome)
     robot = encoding.develop(genome)
-    check_robot(robot, encoding.types)
+    encoding.check(robot)
     return Candidate(birth, 0, None, genome, robot)
-
-
-def _with_brain(robot: Robot, brain: Brain, space: BodySpace) -> Robot | None:
-    """Return a robot with another brain; None if the brain does not fit its body."""
-    changed = replace(robot, brain=brain)
-    try:
-        check_robot(changed, space)
-    except InvalidRobot:
-        return None
-    return changed

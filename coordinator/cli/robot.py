@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from coordinator.evolution.breeding import Breeder
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.flags import Flags, add_count
@@ -31,6 +32,7 @@ def main(arguments: list[str]) -> int:
     experiment = read_experiment(options.experiment)
     breeder = Breeder(experiment, options.seed, run=0)
     space = body_space(experiment.space)
+    kinds = neuron_kinds(experiment.brain, experiment.space)
     for number in range(options.count):
         candidate = breeder.candidate(BirthId(0, number), 0, ())
         assert candidate is not None
@@ -38,7 +40,7 @@ def main(arguments: list[str]) -> int:
         path: Path = options.file
         if options.count > 1:
             path = path.with_stem(f"{path.stem}-{number}")
-        write_robot(robot, path, space, settings_of(experiment))
+        write_robot(robot, path, space, settings_of(experiment), kinds)
         print(f"{path}: {len(robot.parts)} parts, {len(robot.brain.neurons)} neurons")
     return 0
 

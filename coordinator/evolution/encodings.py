@@ -12,6 +12,7 @@ import numpy as np
 from coordinator.cppn.encoding import Cppn
 from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError, InvalidRobot, RevolveError, one_line, shown
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import (
     REVOLVE_ANGLE,
     Experiment,
@@ -81,6 +82,7 @@ class IslandEncoding:
     def __init__(self, encoding: Encoding[Any], experiment: Experiment) -> None:
         self.name = experiment.encoding.type
         self.types: BodySpace = body_space(experiment.space)
+        self._kinds = neuron_kinds(experiment.brain, experiment.space)
         self._encoding = encoding
         self._mates = encoding if isinstance(encoding, OneStepMating) else None
         self._space = experiment.space
@@ -138,10 +140,18 @@ class IslandEncoding:
                     f"{WHERE}: {self.name!r}: develop must return a Robot, "
                     f"got {shown(robot)}"
                 )
-            check_robot(robot, self.types)
+            self.check(robot)
         if problem := outside_limits(robot, self._space, self.types):
             raise InvalidRobot(f"{WHERE}: {self.name!r}: {problem}")
         return robot
+
+    def check(self, robot: Robot) -> None:
+        """Raise unless a robot has the part types and a brain of the experiment.
+
+        Raises:
+            InvalidRobot: it does not.
+        """
+        check_robot(robot, self.types, self._kinds)
 
     def to_bytes(self, genome: object) -> bytes:
         """Return a genome as bytes.

@@ -21,8 +21,9 @@ from coordinator.run.loop import Loop
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from schema.errors import MalformedMessage, RevolveError
+from schema.experiment.brains import neuron_kinds
 from schema.limits import LONGEST_REASON, printable
-from schema.robot.robot import check_robot
+from schema.robot.brain import check_neurons
 from schema.wire.codec import decode_robot
 from schema.wire.operator import (
     GetStatus,
@@ -93,6 +94,8 @@ def _order(
         InvalidRobot: a robot that breaks the rules of the experiment, or that its
             encoding cannot describe.
     """
+    space = arena.experiment.space
+    kinds = neuron_kinds(arena.experiment.brain, space)
     match action:
         case PauseArena():
             return Pause()
@@ -101,7 +104,7 @@ def _order(
         case InsertRobot():
             robot = decode_robot(action.robot)
             encoding = arena.encoding
-            check_robot(robot, encoding.types)
+            encoding.check(robot)
             genome = encoding.to_bytes(encoding.from_robot(robot))
             insert = Insert(genome, action.place)
             check_order(insert, arena.experiment)
@@ -113,7 +116,9 @@ def _order(
         raise Refused(f"birth {number}: is not alive; alive are {alive}")
     if isinstance(action, RemoveRobot):
         return Remove(action.birth)
-    return ReplaceBrain(action.birth, decode_robot(action.robot).brain)
+    brain = decode_robot(action.robot).brain
+    check_neurons(brain, kinds)
+    return ReplaceBrain(action.birth, brain)
 
 
 def _list(arena: Arena) -> str:

@@ -5,6 +5,7 @@ from math import isclose, lcm
 from urllib.parse import quote
 
 from schema.errors import ExperimentError, nearest, shown
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.check_migration import migration_problems
 from schema.experiment.check_world import world_problems
 from schema.experiment.document import (
@@ -60,6 +61,8 @@ def _problems(experiment: Experiment) -> Iterator[str]:
         )
     if not any(kind.outputs for kind in types.values()):
         yield "space.part_types: at least one type must have a motor"
+    # Loads and checks both; raises what is wrong.
+    neuron_kinds(experiment.brain, experiment.space)
 
 
 def _island_problems(experiment: Experiment) -> Iterator[str]:

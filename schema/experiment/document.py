@@ -28,6 +28,7 @@ from schema.experiment.section import (
 from schema.limits import MOST_MEASURES
 from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
+from schema.plugins.part_checks import check_part_type
 
 REVOLVE_ANGLE = "revolve-angle"
 """Name of the encoding of the thesis."""
@@ -41,7 +42,11 @@ class Space(Section, frozen=True):
         min_parts, max_parts: allowed number of parts, core included.
         max_inputs, max_outputs, max_hidden: allowed number of neurons.
         planar: keep all parts in the plane of the core.
+        neuron_types: types of output and hidden neurons: short names of built-in
+            types, or ``module:attribute``; each is equally likely.
     """
+
+    later: ClassVar = ("neuron_types",)
 
     part_types: tuple[str, ...] = (
         "schema.parts:CORE",
@@ -57,6 +62,25 @@ class Space(Section, frozen=True):
     max_outputs: AtLeastOne = 10
     max_hidden: Count = 10
     planar: bool = True
+    neuron_types: tuple[str, ...] = ("Simple", "Sigmoid", "Oscillator")
+
+
+class BrainSection(PluginSection, frozen=True):
+    """The type of all brains of an experiment.
+
+    Attributes:
+        type: short name of a built-in type, or ``module:attribute``: ``network`` is
+            the thesis's recurrent network of ``space.neuron_types``, ``cpg`` couples
+            an oscillator for each motor.
+        parameters: of the type.
+    """
+
+    type: str = "network"
+    parameters: Parameters = field(default_factory=dict)
+
+
+NETWORK = BrainSection()
+"""The thesis's brains."""
 
 
 class Generation(Section, frozen=True):
@@ -383,6 +407,7 @@ class Experiment(Section, frozen=True):
         migration: between the islands.
         measures: of the robots of all islands.
         encoding: of all islands.
+        brain: of the robots of all islands.
     """
 
     name: str
@@ -400,6 +425,7 @@ class Experiment(Section, frozen=True):
     migration: Migration | None = None
     measures: Measures = Measures()
     encoding: Encoding = Encoding()
+    brain: BrainSection = NETWORK
 
     @property
     def window(self) -> int:
@@ -451,9 +477,11 @@ def references(experiment: Experiment) -> list[str]:
     functions = [fitness.function for fitness in (experiment.fitness, *own)]
     named = [
         *experiment.space.part_types,
+        *experiment.space.neuron_types,
         *functions,
         *experiment.measures.names,
         experiment.encoding.type,
+        experiment.brain.type,
     ]
     # A short name is not that of a module.
     return [path for path in named if ":" in path]
@@ -465,7 +493,8 @@ def body_space(space: Space) -> BodySpace:
 
     Raises:
         UnknownPlugin: no such module or attribute, or a module that is not allowed.
-        ExperimentError: not a part type, two of one name, or not exactly one core.
+        ExperimentError: not a part type, or one that ``check_part_type`` refuses; two
+            of one name, or not exactly one core.
     """
     types: dict[str, PartType] = {}
     for path in space.part_types:
@@ -475,6 +504,7 @@ def body_space(space: Space) -> BodySpace:
                 f"space.part_types: two part types are named {kind.name!r}"
             )
         types[kind.name] = kind if space.planar else _freed(kind)
+        check_part_type(types[kind.name], "space.part_types")
     cores = [name for name, kind in types.items() if kind.is_root]
     if len(cores) != 1:
         raise ExperimentError(

@@ -9,7 +9,9 @@ from msgspec.structs import replace
 
 from schema.errors import ExperimentError
 from schema.experiment.document import (
+    NETWORK,
     Arena,
+    BrainSection,
     Experiment,
     Fitness,
     Measures,
@@ -54,13 +56,14 @@ class VettingSettings(Section, frozen=True):
 class EvaluationSettings(Section, frozen=True):
     """Settings of an evaluation request."""
 
-    later: ClassVar = ("measures",)
+    later: ClassVar = ("measures", "brain")
 
     space: Space
     simulation: Simulation
     fitness: Fitness
     environment: Environment = FLAT
     measures: Measures = Measures()
+    brain: BrainSection = NETWORK
 
     @property
     def light(self) -> Vector | None:
@@ -71,7 +74,7 @@ class EvaluationSettings(Section, frozen=True):
 class ArenaSettings(Section, frozen=True):
     """Settings of a request to advance an arena."""
 
-    later: ClassVar = ("measures",)
+    later: ClassVar = ("measures", "brain")
 
     space: Space
     simulation: Simulation
@@ -80,6 +83,7 @@ class ArenaSettings(Section, frozen=True):
     environment: Environment = FLAT
     origin: Origin = Origin()
     measures: Measures = Measures()
+    brain: BrainSection = NETWORK
 
     @property
     def light(self) -> Vector | None:

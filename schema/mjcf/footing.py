@@ -1,8 +1,8 @@
 """Height at which a robot stands on rough ground and scenery.
 
-Each box of a robot is replaced by a column that extends upwards from its lowest
-point. The robot is lifted until no column intersects ground or scenery, so a robot
-that is born at an obstacle stands on top of it.
+Each box or cylinder of a robot is replaced by a column that extends upwards from its
+lowest point. The robot is lifted until no column intersects ground or scenery, so a
+robot that is born at an obstacle stands on top of it.
 """
 
 import copy
@@ -16,6 +16,7 @@ import numpy as np
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment, relief
 from schema.experiment.scenery import add_scenery
+from schema.robot.frames import round_reach
 from schema.robot.results import Floats
 
 _FINE_M = 1e-5
@@ -33,6 +34,8 @@ _ABOVE_M = 0.1
 @dataclass(frozen=True, slots=True)
 class Footprint:
     """Boxes of a robot at neutral pose as upright columns, in the core's frame.
+
+    The column of a cylinder encloses it.
 
     Attributes:
         centres: (N, 3) [m].
@@ -58,6 +61,10 @@ def footprint(model: mujoco.MjModel) -> Footprint:
     turns = np.arctan2(along[:, 1], along[:, 0])
     level = _turned(axes, -turns)
     halves = (np.abs(level) @ model.geom_size[own][:, :, None])[:, :, 0]
+    for index in np.flatnonzero(model.geom_type[own] == mujoco.mjtGeom.mjGEOM_CYLINDER):
+        radius, half, _ = model.geom_size[own][index].tolist()
+        rows: list[list[float]] = level[index].tolist()
+        halves[index] = [round_reach(row, (radius, radius, half)) for row in rows]
     return Footprint(data.geom_xpos[own], turns, halves)
 
 

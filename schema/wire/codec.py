@@ -2,7 +2,7 @@
 
 Encoding is deterministic: equal values give equal bytes. Decoding checks the type and
 the rules of a message and raises ``MalformedMessage`` otherwise. Rules that need the
-part types are checked by ``schema.robot.robot.check_robot``.
+part types or neuron types are checked by ``schema.robot.robot.check_robot``.
 """
 
 from collections.abc import Callable
@@ -132,7 +132,7 @@ def decode_genome(data: bytes) -> Genome:
 
     Raises:
         MalformedMessage: not a genome's bytes, nodes that are not a tree, an unknown
-            neuron type or layer, a number that is not finite.
+            layer, a number that is not finite.
     """
     return genome_from_message(parsed(data, pb.Genome(), ROBOT_BYTES))
 
@@ -168,18 +168,25 @@ def encode_request(
 
 
 def decode_request(
-    data: bytes, read: Callable[[bytes], Robot] = decode_robot
+    data: bytes,
+    read: Callable[[bytes], Robot] = decode_robot,
+    prepare: Callable[[bytes], object] | None = None,
 ) -> Request:
     """Return the request of some bytes.
 
     Args:
         data: the bytes.
         read: decodes its robot; ``decode_body`` skips the brain.
+        prepare: called with the settings before the robot is decoded, to load the
+            plug-ins that they name.
 
     Raises:
         MalformedMessage: not a request's bytes, or its robot is malformed.
+        RevolveError: raised by ``prepare``.
     """
     message = parsed(data, pb.Request(), REQUEST_BYTES)
+    if prepare is not None:
+        prepare(message.settings)
     has_identity = message.HasField("identity")
     return Request(
         run=message.run,

@@ -156,7 +156,10 @@ def _restored(state: _RobotState, population: ArenaPopulation) -> ArenaRobot:
     window = Window(cache.settings.simulation, state.born)
     for x, y, z in _unpack(state.window, -1, 3).tolist():
         window.positions.append((x, y, z))
-    robot = ArenaRobot(state.birth, body, cache.width, window, state.place)
+    try:
+        robot = ArenaRobot(state.birth, body, cache.controls, window, state.place)
+    except InvalidRobot as error:
+        raise MalformedMessage(f"snapshot: {error}") from None
     view, sensors = robot.view, robot.view.sensors
     view.qpos[:] = _unpack(state.qpos, *view.qpos.shape)
     view.qvel[:] = _unpack(state.qvel, *view.qvel.shape)

@@ -11,7 +11,12 @@ from pathlib import Path
 import numpy as np
 from msgspec.structs import replace
 
-from schema.errors import ExperimentError, RunFolderError, SimulationDiverged
+from schema.errors import (
+    ExperimentError,
+    RunFolderError,
+    SensorFailed,
+    SimulationDiverged,
+)
 from schema.experiment.document import Experiment, Simulation
 from schema.experiment.file import own_experiment
 from schema.formats.files import settings_of
@@ -127,7 +132,7 @@ def _fitness(robot: Robot, experiment: Experiment, world: Simulation) -> float:
     settings = replace(settings_of(experiment), simulation=world)
     try:
         return evaluate(robot, settings).fitness
-    except SimulationDiverged:
+    except (SimulationDiverged, SensorFailed):
         return 0.0
 
 

@@ -140,7 +140,7 @@ class Cluster:
         failure: the engine's error; empty if there was none.
         failed_at: moment of the interval of that error.
         touched: geoms in contact in the last step; kept only if a member has touch
-            sensors.
+            sensors, or own ones.
     """
 
     def __init__(
@@ -172,7 +172,9 @@ class Cluster:
         self.cost = int(model.nv + 4 * model.ngeom)
         self.failure, self.failed_at = "", NEVER
         self.touched: frozenset[int] = frozenset()
-        self._has_pads = any(view.sensors.pads for view in self.views)
+        self._has_pads = any(
+            view.sensors.pads or view.sensors.own for view in self.views
+        )
         self._records_contacts = settings.arena.record_touches and len(births) > 1
 
     def run(self, plan: Sequence[int], first: int = 0) -> None:

@@ -21,10 +21,11 @@ from schema.robot.robot import Robot
 from schema.robot.trace import Trace
 from worker.fitness import fitness_of, path_velocity, straight_velocity
 from worker.measures.functions import measures_of
-from worker.robot.controller import SoloNetwork, pack, widths
+from worker.robot.brains import controls_of
 from worker.robot.light import read_light
 from worker.robot.motors import Servos
 from worker.robot.noise import Noise, NoiseSource
+from worker.robot.own_sensors import Surroundings
 from worker.robot.pushes import Pushes
 from worker.robot.recording import Channels, Recorder
 from worker.robot.sensors import Sensors
@@ -44,14 +45,29 @@ def evaluate(
 
     Raises:
         SimulationDiverged: the physics diverged; with reason and simulated time.
+        SensorFailed: a sensor of a plug-in raised or gave wrong values.
         FitnessUndefined: the fitness function or a measure raised or gave no finite
             number.
         ExperimentError: a sensor that has no stimulus in this environment, or an
             unknown fitness function or measure.
         InvalidRobot: more neurons than the limits.
     """
+    return judge(simulate(robot, settings, identity=identity), settings)
+
+
+def judge(trace: Trace, settings: EvaluationSettings) -> Evaluation:
+    """Return the evaluation of a trace.
+
+    Args:
+        trace: that ``simulate`` returned for these settings.
+        settings: simulation, fitness and measures.
+
+    Raises:
+        FitnessUndefined: the fitness function or a measure raised or gave no finite
+            number.
+        ExperimentError: an unknown fitness function or measure.
+    """
     clock = settings.simulation
-    trace = simulate(robot, settings, identity=identity)
     return Evaluation(
         fitness_of(trace, settings.fitness),
         path_velocity(trace),
@@ -85,6 +101,7 @@ def simulate(
     Raises:
         SimulationDiverged: the state is not finite, the engine warned or failed, or
             it cannot build the robot.
+        SensorFailed: a sensor of a plug-in raised or gave wrong values.
         ExperimentError: a sensor that has no stimulus in this environment, or an
             unknown fitness function or measure.
         InvalidRobot: more neurons than the limits.
@@ -119,12 +136,13 @@ class _ControlLoop:
         model: mujoco.MjModel,
         identity: Identity,
     ) -> None:
-        types, width = body_space(settings.space), widths(settings.space)
-        simulation = settings.simulation
+        types, simulation = body_space(settings.space), settings.simulation
         self._model, self.data = model, mujoco.MjData(model)
         self._velocities = self.data.qvel.data
         self._simulation = simulation
         self._tick_s = simulation.brain_steps * simulation.timestep_s
+        controls = controls_of(settings.brain, settings.space, self._tick_s)
+        width = controls.width
         self._light = settings.environment.light
         self._sensors = Sensors(
             robot,
@@ -137,8 +155,7 @@ class _ControlLoop:
         self._servos = Servos(robot, types, model, self.data)
         steps = simulation.warmup_steps + simulation.window_steps
         ticks = steps // simulation.brain_steps + 1
-        network = pack(robot.brain, width)
-        self._controller = SoloNetwork(network, width, self._tick_s, ticks)
+        self._controller = controls.solo(robot.brain, ticks)
         self._sensors.write_to(self._controller.readings)
         self._noise: Noise | None = None
         if simulation.sensor_noise or simulation.actuator_noise:
@@ -212,6 +229,12 @@ class _ControlLoop:
         else:
             self._sensors.start()
         self._read_light()
+        if self._sensors.own is not None:
+            # Frames are those of the state before the last step.
+            mujoco.mj_kinematics(self._model, self.data)
+            age_s = step * self._simulation.timestep_s
+            around = Surroundings(age_s, self._sensors.touching(), light=self._light)
+            self._sensors.own.read(self._sensors.readings[0], around)
         tick = step // self._simulation.brain_steps
         if self._pushes is not None:
             self._pushes.apply(tick)

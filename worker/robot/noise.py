@@ -13,9 +13,9 @@ import numpy as np
 
 from schema.experiment.document import Simulation
 from schema.experiment.identity import Origin
+from schema.robot.brain import Widths
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
-from worker.robot.controller import Widths
 from worker.robot.random_streams import Purpose, stream
 
 BLOCK_TICKS = 64

@@ -27,7 +27,7 @@ from coordinator.islands.events import (
     VettingFailed,
 )
 from coordinator.storage.journal import NAME, Journal
-from revolve import main as revolve
+from revolve.command import main as revolve
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.wire.arena import Advance, Casualty, Judgement, Touch
