@@ -14,6 +14,8 @@ import pytest
 from revolve.command import COMMANDS
 from schema.experiment.document import Arena
 from schema.experiment.file import parse_experiment
+from schema.experiment.settings import fitness_function
+from worker.fitness import check_fitness
 
 pytestmark = pytest.mark.system
 
@@ -145,6 +147,14 @@ def test_parts_page_runs(tmp_path: Path) -> None:
     )
     assert done.returncode != 0
     assert quoted in done.stderr
+
+
+def test_experiments_of_the_tasks_page_are_accepted(tmp_path: Path) -> None:
+    documents = _blocks(TOP / "docs" / "tasks.md", "toml")
+    assert len(documents) >= 5
+    for document in documents:
+        fitness = parse_experiment(document, str(tmp_path / "mine.toml")).fitness
+        check_fitness(fitness_function(fitness), fitness)
 
 
 def test_arenas_page_lists_all_keys_with_their_defaults() -> None:
