@@ -139,10 +139,31 @@ class Run:
             raise RunFolderError(
                 f"{self.folder}: has no birth {number} on island {island}"
             )
-        genome = decode_genome(found["genome"][0].as_py())
-        document = island_experiment(document_of(self.experiment), island)
-        space = body_space(document.space)
-        return of_plain(develop(genome, space), Experiment(document))
+        return self.robots(found)[0]
+
+    def robots(self, births: pa.Table | None = None) -> list[Robot]:
+        """Return the robots of some births.
+
+        Args:
+            births: rows of the table ``births``; None: all of them.
+
+        Raises:
+            RunFolderError: the table is damaged.
+        """
+        rows = self.births if births is None else births
+        homes = rows["island"].to_pylist()
+        documents = {
+            island: island_experiment(document_of(self.experiment), island)
+            for island in set(homes)
+        }
+        own = {island: Experiment(each) for island, each in documents.items()}
+        return [
+            of_plain(
+                develop(decode_genome(genome), body_space(documents[island].space)),
+                own[island],
+            )
+            for island, genome in zip(homes, rows["genome"].to_pylist(), strict=True)
+        ]
 
     def best(self, count: int = 1) -> list[Robot]:
         """Return the robots with the highest fitness of all off-line evaluations.

@@ -71,6 +71,12 @@ def check_plugins(wanted: str) -> None:
             )
 
 
+def forget_digests() -> None:
+    """Read the sources again next time: their owner may have changed them."""
+    for cached in (plugins_of, check_plugins, _digest):
+        cached.cache_clear()
+
+
 @lru_cache(maxsize=64)
 def _digest(module: str) -> str:
     """Return the digest of a top-level module's source; empty if not installed."""
