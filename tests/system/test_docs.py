@@ -106,6 +106,17 @@ def test_selection_of_the_selection_page_runs(tmp_path: Path) -> None:
     assert "equal" in revolve("compare", "calm", "two")
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_code_of_the_python_page_runs_from_top_to_bottom(tmp_path: Path) -> None:
+    blocks = _blocks(TOP / "docs" / "python.md", "python")
+    assert len(blocks) >= 8
+    done = _python(("-W", "error", "-c", "\n".join(blocks)), tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "no such experiment; did you mean 'scenario1'" in done.stdout
+    assert "\n20 of 20\n" in done.stdout
+
+
 def test_experiments_of_the_experiments_page_run(tmp_path: Path) -> None:
     page = TOP / "docs" / "experiments.md"
     (module,) = _blocks(page, "python")
