@@ -14,7 +14,7 @@ from coordinator.dispatch.events import AgentKind
 from coordinator.evolution.check_brain_genes import check_brain_genes
 from coordinator.evolution.check_encoding import check_encoding
 from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.kinds import KINDS
+from coordinator.evolution.kinds import KINDS, brain_kind
 from coordinator.plugins.checks import refuse_faulty
 from coordinator.plugins.command import check, list_plugins
 from coordinator.run.cross_checks import Checks
@@ -107,7 +107,12 @@ def plugin_kinds() -> tuple[Kind, ...]:
     """Return all kinds of plug-ins; imports the room of the worker."""
     import worker.kinds
 
-    return (*schema.experiment.kinds.KINDS, *worker.kinds.KINDS, *KINDS)
+    return (
+        *schema.experiment.kinds.KINDS,
+        *worker.kinds.KINDS,
+        *KINDS,
+        brain_kind(_check_own_brain),
+    )
 
 
 def _stoppable(folder: Path, execute: Callable[[], int]) -> int:
