@@ -11,8 +11,8 @@ from coordinator.cli.execute import resume, start, start_campaign
 from coordinator.cli.flags import parser
 from coordinator.dispatch.events import AgentKind
 from coordinator.evolution.check_brain_genes import check_brain_genes
-from coordinator.evolution.check_encoding import KIND as ENCODING
 from coordinator.evolution.encodings import encoding_of
+from coordinator.evolution.kinds import KINDS
 from coordinator.plugins.checks import refuse_faulty
 from coordinator.plugins.command import check, list_plugins
 from coordinator.run.cross_checks import Checks
@@ -105,7 +105,7 @@ def plugin_kinds() -> tuple[Kind, ...]:
     """Return all kinds of plug-ins; imports the room of the worker."""
     import worker.kinds
 
-    return (*schema.experiment.kinds.KINDS, *worker.kinds.KINDS, ENCODING)
+    return (*schema.experiment.kinds.KINDS, *worker.kinds.KINDS, *KINDS)
 
 
 def _stoppable(folder: Path, execute: Callable[[], int]) -> int:

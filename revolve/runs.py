@@ -138,10 +138,29 @@ class Run:
             raise RunFolderError(
                 f"{self.folder}: has no birth {number} on island {island}"
             )
-        genome, stored = (found[name][0].as_py() for name in ("genome", "robot"))
-        document = island_experiment(document_of(self.experiment), island)
-        robot = robot_of_birth(genome, stored, document)
-        return of_plain(robot, Experiment(document))
+        return self.robots(found)[0]
+
+    def robots(self, births: pa.Table | None = None) -> list[Robot]:
+        """Return the robots of some births.
+
+        Args:
+            births: rows of the table ``births``; None: all of them.
+
+        Raises:
+            RunFolderError: the table is damaged.
+        """
+        rows = self.births if births is None else births
+        homes = rows["island"].to_pylist()
+        documents = {
+            island: island_experiment(document_of(self.experiment), island)
+            for island in set(homes)
+        }
+        own = {island: Experiment(each) for island, each in documents.items()}
+        columns = (rows[name].to_pylist() for name in ("genome", "robot"))
+        return [
+            of_plain(robot_of_birth(genome, stored, documents[island]), own[island])
+            for island, genome, stored in zip(homes, *columns, strict=True)
+        ]
 
     def best(self, count: int = 1) -> list[Robot]:
         """Return the robots with the highest fitness of all off-line evaluations.

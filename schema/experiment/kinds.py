@@ -11,10 +11,12 @@ from typing import Any
 import schema.parts
 import schema.robogen_parts
 from schema.errors import ExperimentError, RevolveError
+from schema.experiment.brains import NEURON_MEMBERS, neuron_types
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import PartType
 from schema.plugins.load import load_instance
 from schema.plugins.origin import where_defined, where_raised
+from schema.robot.neurons import BUILT_IN_NEURONS
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,5 +132,30 @@ PART_TYPE = Kind(
     _part_type,
     _part_types,
 )
-KINDS = (PART_TYPE,)
+
+
+def _neuron_type(path: str) -> Use:
+    return Use(
+        "space.neuron_types", path, lambda: neuron_types((path,))[0], lambda _: None
+    )
+
+
+def _neuron_types(experiment: Experiment) -> Iterator[Use]:
+    for path in experiment.space.neuron_types:
+        yield _neuron_type(path)
+
+
+def _is_neuron_type(plugin: object) -> bool:
+    return all(hasattr(plugin, name) for name in NEURON_MEMBERS)
+
+
+NEURON_TYPE = Kind(
+    "neuron-type",
+    BUILT_IN_NEURONS,
+    _is_neuron_type,
+    # Loading one checks it.
+    _neuron_type,
+    _neuron_types,
+)
+KINDS = (PART_TYPE, NEURON_TYPE)
 """Kinds whose checks need no other room."""
