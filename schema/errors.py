@@ -90,7 +90,7 @@ class StateDiffers(RevolveError):  # noqa: N818 - reads as what it says
     """A rebuilt arena has another state: this machine computes differently."""
 
 
-def one_line(error: Exception) -> str:
+def one_line(error: BaseException) -> str:
     """Return the message of an error as one line."""
     return " ".join(str(error).split())
 

@@ -14,7 +14,7 @@ from schema.experiment.document import Simulation
 from schema.mjcf.model import robot_spec
 from schema.parts import BodySpace
 from schema.robot.results import Floats
-from schema.robot.robot import Robot, check_robot
+from schema.robot.robot import Robot, check_body, check_tree
 
 _FREE = (0.0, 1e6)
 """Effort [N m] and velocity [rad/s] of a joint without a motor, or [N] and [m/s] of a
@@ -30,9 +30,10 @@ def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str
         simulation: gives the damping of the joints.
 
     Raises:
-        InvalidRobot: the robot is not well formed in this body space.
+        InvalidRobot: the body is not well formed in this body space.
     """
-    check_robot(robot, space)
+    check_tree(robot.parts)
+    check_body(robot.parts, space)
     model = robot_spec(robot, space, simulation).spec.compile()
     root = ET.Element("robot", name="robot")
     for body in range(1, model.nbody):

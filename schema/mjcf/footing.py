@@ -142,10 +142,12 @@ def _highest(
 
 @lru_cache(maxsize=16)
 def _probe(scenery: str, simulation: Simulation) -> mujoco.MjModel:
-    """Return scenery with a box for a column as last geom; do not change it."""
+    """Return scenery with a box named ``column``; do not change it."""
     spec = mujoco.MjSpec()
     add_scenery(spec, scenery, simulation)
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(1.0, 1.0, 1.0))
+    spec.worldbody.add_geom(
+        name="column", type=mujoco.mjtGeom.mjGEOM_BOX, size=(1.0, 1.0, 1.0)
+    )
     return spec.compile()
 
 
@@ -163,10 +165,11 @@ class _Obstacles:
         self._model = copy.copy(_probe(scenery, simulation))
         self._data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, self._data)
-        self._column = self._model.ngeom - 1
+        self._column = int(self._model.geom("column").id)
         model = self._model
         is_solid = (model.geom_contype | model.geom_conaffinity) & _ROBOTS
-        self._solid = is_solid[: self._column].nonzero()[0]
+        is_solid[self._column] = 0
+        self._solid = is_solid.nonzero()[0]
 
     def move(self, spot: Floats, turn: float, half: Floats) -> None:
         """Move the column.

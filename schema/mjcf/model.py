@@ -20,6 +20,7 @@ import numpy as np
 
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
+from schema.experiment.scenery import object_count
 from schema.mjcf.footing import footprint, standing_height
 from schema.mjcf.world import add_ground, set_contacts, set_options
 from schema.parts import IDENTITY, BodySpace, Joint, PartType, Sensor
@@ -33,6 +34,8 @@ MEMORY_BYTES = 1 << 20
 A pile of 30 parts needs about 120 KB, on rough ground of 5 mm patches 270 KB.
 """
 
+OBJECT_BYTES = 1 << 16
+"""Size of the memory arena for each movable object of scenery."""
 LEVER_M = 0.1
 """Lever at which a servo moves a slider [m].
 
@@ -106,7 +109,8 @@ def solo_spec(
     add_ground(spec, simulation, environment)
     if furnish is not None:
         furnish(spec)
-    spec.memory = MEMORY_BYTES
+    objects = object_count(environment, simulation)
+    spec.memory = MEMORY_BYTES + OBJECT_BYTES * objects
     spec.body("root").pos = (0.0, 0.0, height + simulation.drop_m)
     return spec
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from revolve import COMMANDS
+from revolve.command import COMMANDS
 from schema.experiment.document import Arena
 from schema.experiment.file import parse_experiment
 

@@ -56,7 +56,7 @@ def read_own_sensors(
             sensors.touching() if is_newborn else cluster.touched,
             [(c.model, c.data) for c in population.clusters if c is not cluster],
             np.delete(places, rows[robot.birth], axis=0),
-            settings.arena.light,
+            settings.light,
         )
         assert sensors.own is not None
         try:

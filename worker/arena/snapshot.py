@@ -15,6 +15,7 @@ from msgspec import Struct
 
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.document import body_space
+from schema.experiment.section import stable_json
 from schema.experiment.settings import ArenaSettings
 from schema.parts import Vector
 from schema.robot.ids import BirthId
@@ -128,7 +129,7 @@ def read_snapshot(
 
 def _digest(settings: ArenaSettings) -> bytes:
     """Return the SHA-256 of an arena's settings."""
-    return hashlib.sha256(msgspec.json.encode(settings)).digest()
+    return hashlib.sha256(stable_json(settings)).digest()
 
 
 def _robot_state(robot: ArenaRobot) -> _RobotState:
@@ -155,7 +156,10 @@ def _restored(state: _RobotState, population: ArenaPopulation) -> ArenaRobot:
     window = Window(cache.settings.simulation, state.born)
     for x, y, z in _unpack(state.window, -1, 3).tolist():
         window.positions.append((x, y, z))
-    robot = ArenaRobot(state.birth, body, cache.width, window, state.place)
+    try:
+        robot = ArenaRobot(state.birth, body, cache.controls, window, state.place)
+    except InvalidRobot as error:
+        raise MalformedMessage(f"snapshot: {error}") from None
     view, sensors = robot.view, robot.view.sensors
     view.qpos[:] = _unpack(state.qpos, *view.qpos.shape)
     view.qvel[:] = _unpack(state.qvel, *view.qvel.shape)

@@ -22,7 +22,7 @@ from schema.wire.arena import Advance, Casualty, Changes, Insertion, Judgement
 from worker.arena.batched_control import BatchedControllers, BatchedIO
 from worker.arena.births import check_changes, newborn
 from worker.arena.divergence import diverged
-from worker.arena.light import read_light
+from worker.arena.light import read_lights
 from worker.arena.own_sensors import has_own_sensors, read_own_sensors
 from worker.arena.records import Contacts, Poses
 from worker.arena.snapshot import read_snapshot, write_snapshot
@@ -60,11 +60,11 @@ class World:
         self._settings = settings
         self._schedule = Schedule(settings)
         self._pool = Pool(threads)
-        width = self.population.model_cache.width
-        noise = NoiseSource(clock, width, settings.origin)
-        self._controllers = BatchedControllers(noise)
+        controls = self.population.model_cache.controls
+        noise = NoiseSource(clock, controls.width, settings.origin)
+        self._controllers = BatchedControllers(noise, controls)
         gravity = settings.environment.gravity_vector(clock.gravity)
-        self._io = BatchedIO(width, clock, gravity)
+        self._io = BatchedIO(controls.width, clock, gravity)
         self._casualties: list[Casualty] = []
         self._contacts = Contacts(settings) if settings.arena.record_touches else None
         self._poses = Poses(clock.timestep_s)
@@ -108,8 +108,7 @@ class World:
         for change in changes.brains:
             robot = self.population.find(change.birth)
             start = self._schedule.next_tick(self.step)
-            width = self.population.model_cache.width
-            robot.set_brain(change.brain, width, start)
+            robot.set_brain(change.brain, self.population.model_cache.controls, start)
         if changes.removals or changes.insertions or changes.brains:
             self._controllers.gather(self.population.robots)
 
@@ -215,10 +214,13 @@ class World:
             state = rollout.state
         outputs = self._controllers.tick(self.step, self._io.readings)
         self._io.drive(state, outputs)
+        if self._controllers.broken:
+            robots = self.population.robots
+            self._remove_broken([robots[row] for row in self._controllers.broken])
 
     def _read_light(self, robots: Sequence[ArenaRobot]) -> None:
-        if self._settings.arena.light is not None:
-            read_light(self._settings.arena.light, self.population, robots)
+        if self._settings.light is not None:
+            read_lights(self._settings.light, self.population, robots)
 
     def _sample(self, state: Floats) -> None:
         layout = self.population.layout
@@ -247,8 +249,8 @@ class World:
             self._casualties += failed
             self.population.remove([each.birth for each in failed])
             robots = [robot for robot in robots if robot.birth in self.population]
-        for robot in robots:
-            self._controllers.first_tick(self.step, robot)
+        first_tick = partial(self._controllers.first_tick, self.step)
+        self._remove_broken([robot for robot in robots if not first_tick(robot)])
         self.population.kinematics()
         self.population.merge()
 
@@ -258,6 +260,10 @@ class World:
         if casualties:
             self.population.remove([casualty.birth for casualty in casualties])
             self._controllers.gather(self.population.robots)
+
+    def _remove_broken(self, robots: Sequence[ArenaRobot]) -> None:
+        reason = "brain diverged: state not finite"
+        self._remove([Casualty(r.birth, self.step, reason, r.place) for r in robots])
 
     def _report(self) -> Advance:
         found = [r.judgement(self.step, self._settings) for r in self.population.robots]

@@ -78,7 +78,7 @@ class EngineView:
             data,
             width=settings.space.max_inputs,
             prefix=prefix,
-            has_light=settings.arena.light is not None,
+            has_light=settings.light is not None,
         )
         self.servos = Servos(member.robot, types, model, data, prefix=prefix)
         self.qpos: Floats = data.qpos[self.joints]

@@ -10,13 +10,13 @@ from schema.experiment.settings import ArenaSettings
 from schema.parts import Vector
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
-from schema.robot.results import Floats, Track
+from schema.robot.results import Track
 from schema.robot.robot import Robot
 from schema.wire.arena import Casualty, Judgement
 from schema.wire.codec import encode_robot
 from worker.clusters.models import Body
 from worker.fitness import fitness_of, path_velocity, straight_velocity
-from worker.robot.controller import Widths, pack
+from worker.robot.brains import Controls
 
 LEAST_SHARE = 0.25
 """Share of the window that a robot must have lived to have a fitness."""
@@ -82,39 +82,44 @@ class ArenaRobot:
         window: its latest positions.
         place: of the core's centre at the last sample, world frame [m].
         encoded: bytes of its body and present brain, for snapshots.
-        network: its brain as arrays.
-        states: (S,) of its neurons after the last tick; a row of the batch.
+        packed: its brain in the form of its brain type.
+        states: (K,) of its brain after the last tick; a row of the batch.
         brain_start: step from which the age of its brain counts.
     """
 
     def __init__(
-        self, birth: BirthId, body: Body, width: Widths, window: Window, place: Vector
+        self,
+        birth: BirthId,
+        body: Body,
+        controls: Controls,
+        window: Window,
+        place: Vector,
     ) -> None:
         """Initialise in its own cluster, with a brain that starts at its birth.
 
         Args:
             birth: its name.
             body: its engine models.
-            width: of every network.
+            controls: brains of the arena.
             window: its latest positions.
             place: of the core's centre, world frame [m].
         """
         self.birth, self.body, self.view = birth, body, body.solo.views[0]
         self.window, self.place = window, place
-        self.set_brain(body.robot.brain, width, window.born)
+        self.set_brain(body.robot.brain, controls, window.born)
 
-    def set_brain(self, brain: Brain, width: Widths, start: int) -> None:
-        """Replace the brain; all neuron states are 0.
+    def set_brain(self, brain: Brain, controls: Controls, start: int) -> None:
+        """Replace the brain; all its states are 0.
 
         Args:
             brain: new brain, which fits the body.
-            width: of every network.
+            controls: brains of the arena.
             start: step of its first tick, until which commands are held and from
                 which its age counts.
         """
         self.encoded = encode_robot(Robot(self.body.robot.parts, brain))
-        self.network = pack(brain, width)
-        self.states: Floats = np.zeros(width.states)
+        self.packed = controls.pack(brain)
+        self.states = controls.rest()
         self.brain_start = start
 
     def judgement(self, step: int, settings: ArenaSettings) -> Judgement | Casualty:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
 from schema.experiment.document import body_space
-from schema.experiment.settings import lasting, read_evaluation_settings
+from schema.experiment.settings import lasting
 from schema.robot.results import Evaluation
 from schema.robot.robot import check_types
 from schema.wire.arena_codec import Live
@@ -17,6 +17,7 @@ from schema.wire.codec import (
 )
 from worker.arena.world import World
 from worker.robot.evaluation import evaluate
+from worker.serve.checks import checked_evaluation
 from worker.serve.shards import Shards
 
 
@@ -61,13 +62,13 @@ def answer(request: bytes) -> bytes:
 
     Raises:
         MalformedMessage: the bytes are no request.
-        ExperimentError: invalid settings, an unknown plug-in, or a sensor that has no
-            stimulus in the environment.
+        ExperimentError: invalid settings, a plug-in that is unknown or breaks its
+            contract, or a sensor that has no stimulus in the environment.
         InvalidRobot: a robot that breaks the rules of its body space.
     """
     start = time.perf_counter()
-    job = decode_request(request)
-    settings = read_evaluation_settings(job.settings)
+    job = decode_request(request, prepare=checked_evaluation)
+    settings = checked_evaluation(job.settings)
     check_types(job.robot, body_space(settings.space))
     result: Evaluation | str
     try:
