@@ -33,7 +33,7 @@ demo: $(STAMP)
 # Tests start hundreds of processes. Where Python is configured to write no bytecode,
 # each of them would compile all modules again.
 compiled: $(STAMP)
-	@$(BIN)/python -m compileall -q schema coordinator worker analyzer analysis revolve.py
+	@$(BIN)/python -m compileall -q schema coordinator worker analyzer analysis revolve
 
 # Unit tests, two at a time; then system tests, which start processes and often wait.
 test: compiled

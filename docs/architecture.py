@@ -147,10 +147,7 @@ def draw() -> str:
     return _document(canvas, (width, top + height))
 
 
-_COMPOSES = (
-    "revolve.py: the command; it calls the __main__ of a room, and only a __main__ "
-    "combines rooms"
-)
+_COMPOSES = "revolve/: the command and the Python API; it and a __main__ combine rooms"
 
 
 def _head(canvas: _Canvas, room: Room, corner: Point) -> None:

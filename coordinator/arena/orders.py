@@ -6,6 +6,7 @@ from math import isfinite
 from coordinator.arena.living import LivingRobots
 from coordinator.arena.rows import Moment, death_record
 from coordinator.evolution.breeding import Candidate
+from coordinator.evolution.encodings import IslandEncoding, encoding_of
 from coordinator.islands.events import (
     Commanded,
     Insert,
@@ -17,12 +18,10 @@ from coordinator.islands.events import (
     Resume,
 )
 from schema.errors import InvalidRobot
-from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import Experiment, body_space
+from schema.experiment.document import Experiment
 from schema.robot.brain import Brain
-from schema.robot.genome import develop, walk
 from schema.robot.ids import BirthId
-from schema.robot.robot import Robot, check_robot
+from schema.robot.robot import Robot
 
 
 class Orders:
@@ -40,6 +39,7 @@ class Orders:
         self.pending: list[Order] = []
         self.insertions: list[Insert] = []
         self._experiment = experiment
+        self._encoding = encoding_of(experiment)
         self._living = living
         self.ids: set[str] = set()
 
@@ -77,7 +77,7 @@ class Orders:
         """Return a robot with another brain; None if the brain does not fit it."""
         changed = replace(robot, brain=brain)
         try:
-            _check(changed, self._experiment)
+            self._encoding.check(changed)
         except InvalidRobot:
             return None
         return changed
@@ -93,29 +93,19 @@ def check_order(order: Order, experiment: Experiment) -> None:
             finite.
     """
     if isinstance(order, Insert):
-        inserted(order, BirthId(0, 0), experiment)
+        inserted(order, BirthId(0, 0), encoding_of(experiment))
         if order.place is not None and not all(map(isfinite, order.place)):
             raise InvalidRobot(f"place: must be finite, got {order.place}")
 
 
-def inserted(order: Insert, birth: BirthId, experiment: Experiment) -> Candidate:
+def inserted(order: Insert, birth: BirthId, encoding: IslandEncoding) -> Candidate:
     """Return the candidate, without parents, that an order inserts.
 
     Raises:
-        InvalidRobot: the genome fits no robot of these part and neuron types.
+        InvalidRobot: not a genome of this encoding, or its robot does not fit the
+            part types or the brain type.
     """
-    space = body_space(experiment.space)
-    for node, _, _ in walk(order.genome):
-        if node.kind not in space:
-            raise InvalidRobot(
-                f"genome: part types are {', '.join(space)}, got {node.kind!r}"
-            )
-    robot = develop(order.genome, space)
-    _check(robot, experiment)
-    return Candidate(birth, 0, None, order.genome, robot)
-
-
-def _check(robot: Robot, experiment: Experiment) -> None:
-    """Raise unless a robot is well formed in an experiment."""
-    space = experiment.space
-    check_robot(robot, body_space(space), neuron_kinds(experiment.brain, space))
+    genome = encoding.from_bytes(order.genome)
+    robot = encoding.develop(genome)
+    encoding.check(robot)
+    return Candidate(birth, 0, None, genome, robot)

@@ -9,24 +9,19 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf
 
-from coordinator.evolution.generation import generate
-from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
-from coordinator.evolution.selection import (
-    Couple,
-    Individual,
-    cull_population,
+from coordinator.evolution.encodings import encoding_of
+from coordinator.evolution.random_streams import Purpose, stream
+from coordinator.evolution.rules import (
+    parents_rule,
     select_parents,
     select_survivors,
+    survivors_rule,
 )
-from coordinator.evolution.variation import mate
-from schema.errors import ExperimentError
-from schema.experiment.document import Experiment, body_space
-from schema.robot.genome import Genome, develop
+from coordinator.evolution.selection import Couple, Individual, cull_population
+from schema.errors import ExperimentError, InvalidRobot
+from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-
-_NO_CHILD = "crossover found no fitting subtree, or the child had no motor"
-"""Reason why an attempt gives no candidate."""
 
 _COUPLES = 100
 """Number of couples that may fail at one birth before `Breeder` gives up."""
@@ -47,15 +42,23 @@ class Candidate:
     birth: BirthId
     attempt: int
     couple: Couple | None
-    genome: Genome
+    genome: object
     robot: Robot
 
     def individual(
         self, generation: int | None, fitness: float | None = 0.0
     ) -> Individual:
         """Return the individual; its fitness is None if its evaluation failed."""
-        rank = 1 + max((parent.rank for parent in self.couple or ()), default=0)
-        individual = Individual(self.birth, self.genome, 0.0, rank, generation)
+        parents = self.couple or ()
+        individual = Individual(
+            self.birth,
+            self.genome,
+            fitness=0.0,
+            rank=1 + max((parent.rank for parent in parents), default=0),
+            generation=generation,
+            parents=tuple(parent.birth for parent in parents),
+            size=len(self.robot.parts),
+        )
         return individual.evaluated(fitness)
 
 
@@ -64,7 +67,10 @@ class Breeder:
 
     def __init__(self, experiment: Experiment, seed: int, run: int) -> None:
         self._experiment = experiment
+        self._encoding = encoding_of(experiment)
         self._stream = partial(stream, seed, run)
+        self._parents_rule = parents_rule(experiment.selection)
+        self._survivors_rule = survivors_rule(experiment.selection)
 
     def candidate(
         self,
@@ -90,16 +96,21 @@ class Breeder:
             The candidate; None if no attempt before ``end`` gives one.
 
         Raises:
-            ExperimentError: (nearly) no robot meets the restrictions.
+            ExperimentError: (nearly) no robot meets the restrictions, or an
+                encoding's own code fails.
         """
         while attempt < end:
             self.check_attempts(birth, attempt, population, why)
             couple, genome = self.conceive(birth, attempt, population, couple)
+            why = self._encoding.no_child
             if genome is not None:
-                robot = develop(genome, body_space(self._experiment.space))
-                return Candidate(birth, attempt, couple, genome, robot)
+                try:
+                    robot = self._encoding.develop(genome)
+                except InvalidRobot as error:
+                    why = str(error)
+                else:
+                    return Candidate(birth, attempt, couple, genome, robot)
             attempt += 1
-            why = _NO_CHILD
         return None
 
     def conceive(
@@ -108,7 +119,7 @@ class Breeder:
         attempt: int,
         population: Sequence[Individual],
         couple: Couple | None,
-    ) -> tuple[Couple | None, Genome | None]:
+    ) -> tuple[Couple | None, object | None]:
         """Return the parents of one attempt and the genome of their child.
 
         Args:
@@ -122,18 +133,19 @@ class Breeder:
             failed. After ``max_mating_attempts`` new parents are selected.
 
         Raises:
-            ExperimentError: no random robot meets the restrictions.
+            ExperimentError: no random robot meets the restrictions, or the selection
+                of parents or an encoding's own code fails.
         """
         selection = self._experiment.selection
         if self._is_random(population):
             rng = self._stream(birth, attempt, Purpose.GENERATE)
-            return None, generate(rng, self._experiment, birth)
+            return None, self._encoding.random(rng, birth)
         if couple is None or attempt % selection.max_mating_attempts == 0:
-            draws = BufferedRng(self._stream(birth, attempt, Purpose.PARENTS))
-            couple = select_parents(population, draws, selection)
+            rng = self._stream(birth, attempt, Purpose.PARENTS)
+            couple = select_parents(population, rng, self._parents_rule)
         rng = self._stream(birth, attempt, Purpose.MATE)
         first, second = couple
-        return couple, mate(first.genome, second.genome, rng, self._experiment, birth)
+        return couple, self._encoding.mate(first.genome, second.genome, rng, birth)
 
     def check_attempts(
         self, birth: BirthId, attempts: int, population: Sequence[Individual], why: str
@@ -170,13 +182,17 @@ class Breeder:
         Args:
             parents: the population before.
             children: the brood, in birth order; at least one.
+
+        Raises:
+            ExperimentError: the selection of survivors fails.
         """
         selection = self._experiment.selection
         if selection.culling is not None:
             founders = selection.population
             return cull_population(parents, children, founders, selection.culling)
         rng = self._stream(children[-1].birth, 0, Purpose.SURVIVORS)
-        return select_survivors(parents, children, BufferedRng(rng), selection)
+        rule = self._survivors_rule
+        return select_survivors(parents, children, rng, selection, rule)
 
     def _is_random(self, population: Sequence[Individual]) -> bool:
         return not population or self._experiment.selection.parents == "none"

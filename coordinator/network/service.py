@@ -112,7 +112,9 @@ class _Queried:
     key: str
 
 
-_News = _Asked | _Stray | _Queried | zenoh.Sample
+_Told = _Asked | _Stray | _Queried | zenoh.Sample
+_News = _Told | None
+"""What ``receive`` waits for; None only ends its wait."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,7 +323,7 @@ class Network:
             news = self._inbox.get(timeout=timeout_s)
             # Limited: the runs must act even if messages never stop coming.
             for _ in range(_MOST_NEWS):
-                events += self._understand(news)
+                events += [] if news is None else self._understand(news)
                 if len(events) >= _MOST_EVENTS:
                     break
                 news = self._inbox.get_nowait()
@@ -349,7 +351,11 @@ class Network:
         """Publish news, best effort."""
         self._outlet.put(self._me.events, data)
 
-    def _understand(self, news: _News) -> Sequence[DispatchEvent]:
+    def wake(self) -> None:
+        """End the wait of ``receive``, now or next time; from any thread."""
+        self._inbox.put(None)
+
+    def _understand(self, news: _Told) -> Sequence[DispatchEvent]:
         """Return the dispatch events of a message, if any."""
         if isinstance(news, _Queried):
             self._queried(news.query, news.key)

@@ -22,11 +22,8 @@ from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from schema.errors import MalformedMessage, RevolveError
 from schema.experiment.brains import neuron_kinds
-from schema.experiment.document import body_space
 from schema.limits import LONGEST_REASON, printable
 from schema.robot.brain import check_neurons
-from schema.robot.inverse_development import genome_of
-from schema.robot.robot import check_robot
 from schema.wire.codec import decode_robot
 from schema.wire.operator import (
     GetStatus,
@@ -94,7 +91,8 @@ def _order(
 
     Raises:
         Refused: no living robot has the given birth number.
-        InvalidRobot: a robot that breaks the rules of the experiment.
+        InvalidRobot: a robot that breaks the rules of the experiment, or that its
+            encoding cannot describe.
     """
     space = arena.experiment.space
     kinds = neuron_kinds(arena.experiment.brain, space)
@@ -105,8 +103,10 @@ def _order(
             return Resume()
         case InsertRobot():
             robot = decode_robot(action.robot)
-            check_robot(robot, body_space(space), kinds)
-            insert = Insert(genome_of(robot), action.place)
+            encoding = arena.encoding
+            encoding.check(robot)
+            genome = encoding.to_bytes(encoding.from_robot(robot))
+            insert = Insert(genome, action.place)
             check_order(insert, arena.experiment)
             return insert
     living = [one.birth for one in arena.population]

@@ -54,7 +54,7 @@ def log_engine() -> None:
     """Start Zenoh's log, which the engine writes to descriptor 1, at level "warn".
 
     RUST_LOG has no effect: at lower levels the log shows secrets. Commands lead the
-    descriptor to standard error, see ``revolve.main``.
+    descriptor to standard error, see ``revolve.command.main``.
     """
     chosen = os.environ.pop("RUST_LOG", None)
     try:

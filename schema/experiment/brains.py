@@ -20,7 +20,7 @@ from schema.robot.neurons import BUILT_IN_NEURONS
 T = TypeVar("T")
 Half = TypeVar("Half")
 
-_NEURON_MEMBERS = ("name", "parameters", "states", "step")
+NEURON_MEMBERS = ("name", "parameters", "states", "step")
 _BRAIN_MEMBERS = ("neurons", "outputs", "grow", "prune", "vary", "pack", "bank")
 _TYPE = "brain.type"
 
@@ -67,7 +67,7 @@ def neuron_types(names: tuple[str, ...]) -> tuple[NeuronType, ...]:
         if isinstance(kind, type):
             kind = _made(kind, where)
         if ":" in path:
-            _require(kind, _NEURON_MEMBERS, where)
+            _require(kind, NEURON_MEMBERS, where)
             check_neuron_type(kind, where)
         if kind.name in types:
             raise ExperimentError(f"{where}: two types are named {kind.name!r}")

@@ -25,8 +25,13 @@ from schema.experiment.section import (
     Probability,
     Section,
 )
-from schema.parts import BodySpace, Parameter, PartType
+from schema.limits import MOST_MEASURES
+from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
+from schema.plugins.part_checks import check_part_type
+
+REVOLVE_ANGLE = "revolve-angle"
+"""Name of the encoding of the thesis."""
 
 
 class Space(Section, frozen=True):
@@ -126,6 +131,18 @@ class Variation(Section, frozen=True):
     check_min_parts: bool = True
 
 
+class Encoding(PluginSection, frozen=True):
+    """How genomes describe robots.
+
+    Attributes:
+        type: ``revolve-angle`` (thesis), ``cppn`` or ``module:attribute``.
+        parameters: of the encoding.
+    """
+
+    type: str = REVOLVE_ANGLE
+    parameters: Parameters = field(default_factory=dict)
+
+
 class Culling(Section, frozen=True):
     """Off-line survivor selection by the rule of an arena; the population varies.
 
@@ -166,16 +183,24 @@ class Reevaluation(Section, frozen=True):
     fitness: Literal["replace", "mean"] = "replace"
 
 
-class Selection(Section, frozen=True):
+PARENTS = ("tournament", "random", "none")
+SURVIVORS = ("best", "random")
+"""Names of the built-in rules of selection."""
+
+
+class Selection(PluginSection, frozen=True):
     """Parent and survivor selection (thesis section 5.3).
 
     Attributes:
         population: number of individuals; with ``culling``, number of founders.
         children: births per generation.
         window: births in flight at once; ``children`` if not given.
-        parents: selection of parents; ``none`` makes each child a random robot.
+        parents: selection of parents: ``tournament``, ``random``, ``none``, which makes
+            each child a random robot, or ``module:attribute``.
+        parents_parameters: of an own selection of parents.
         tournament_size: individuals per tournament.
-        survivors: the ``best`` or ``random`` ones survive.
+        survivors: the ``best`` or ``random`` ones survive, or ``module:attribute``.
+        survivors_parameters: of an own selection of survivors.
         keep_parents: parents compete with their children for survival.
         max_mating_attempts: attempts per birth before two new parents are chosen.
         culling: makes the population vary in size.
@@ -185,9 +210,11 @@ class Selection(Section, frozen=True):
     population: AtLeastOne = 15
     children: AtLeastOne = 15
     window: AtLeastOne | None = None
-    parents: Literal["tournament", "random", "none"] = "tournament"
+    parents: str = "tournament"
+    parents_parameters: Parameters = field(default_factory=dict)
     tournament_size: AtLeastOne = 4
-    survivors: Literal["best", "random"] = "best"
+    survivors: str = "best"
+    survivors_parameters: Parameters = field(default_factory=dict)
     keep_parents: bool = True
     max_mating_attempts: AtLeastOne = 5
     culling: Culling | None = None
@@ -196,8 +223,8 @@ class Selection(Section, frozen=True):
     @property
     def parents_needed(self) -> int:
         """Least population to choose two parents from; 0 if none are chosen."""
-        needs = {"tournament": self.tournament_size + 1, "random": 2, "none": 0}
-        return needs[self.parents]
+        needs = {"tournament": self.tournament_size + 1, "none": 0}
+        return needs.get(self.parents, 2)
 
 
 class Vetting(Section, frozen=True):
@@ -264,7 +291,7 @@ class Simulation(Section, frozen=True):
     actuator_noise: NoiseLevel = 0.0
 
 
-class Fitness(Section, frozen=True):
+class Fitness(PluginSection, frozen=True):
     """The function that evolution maximises.
 
     Attributes:
@@ -272,12 +299,34 @@ class Fitness(Section, frozen=True):
         path_weight, straight_weight: weights of the velocities along the path and
             between its ends.
         limit: greatest realistic fitness; above it, fitness is 0.
+        parameters: of a function with a Struct of its own.
     """
+
+    later: ClassVar = ("parameters",)
 
     function: str = "worker.fitness:thesis"
     path_weight: float = 1.0
     straight_weight: float = 5.0
     limit: Positive = 1.0
+    parameters: Parameters = field(default_factory=dict)
+
+
+class Measures(PluginSection, frozen=True):
+    """Numbers of a robot's life that are recorded beside its fitness.
+
+    Attributes:
+        names: short names of built-in measures, or ``module:attribute``.
+        parameters: a table for each measure that has parameters, by short name or
+            attribute.
+    """
+
+    names: Annotated[tuple[str, ...], Meta(max_length=MOST_MEASURES)] = ()
+    parameters: dict[str, Parameters] = field(default_factory=dict)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the measures in tables: short names and attributes."""
+        return tuple(name.rpartition(":")[2] for name in self.names)
 
 
 class Arena(Section, frozen=True):
@@ -304,7 +353,7 @@ class Arena(Section, frozen=True):
         drop_m: height above the ground at birth [m].
         wall_diameter_m: of the ring wall [m]; 0 is no wall.
         wall_segments, wall_height_m, wall_thickness_m: of the ring wall [m].
-        light: position of the light [m]; None is no light.
+        light: as ``environment.light``; only one of the two is needed.
         record_touches: write the table ``touches``.
         proximity_steps: physics steps between checks of distances.
         merge_distance_m: robots that may come nearer than this before the next check
@@ -366,6 +415,8 @@ class Experiment(Section, frozen=True):
         births: number of births on each island, the initial population included.
         islands: numbered from 0, in the order of the document; none is one island.
         migration: between the islands.
+        measures: of the robots of all islands.
+        encoding: of all islands.
         brain: of the robots of all islands.
     """
 
@@ -382,6 +433,8 @@ class Experiment(Section, frozen=True):
     arena: Arena | None = None
     islands: tuple[Islands, ...] = ()
     migration: Migration | None = None
+    measures: Measures = Measures()
+    encoding: Encoding = Encoding()
     brain: BrainSection = NETWORK
 
     @property
@@ -416,6 +469,12 @@ def island_experiment(experiment: Experiment, number: int) -> Experiment:
     return structs.replace(experiment, islands=(), **changes)
 
 
+def light_of(environment: Environment, arena: Arena | None) -> Vector | None:
+    """Return the position of the light of a world [m]; None is no light."""
+    own = None if arena is None else arena.light
+    return own or environment.light
+
+
 def with_births(experiment: Experiment, births: int) -> Experiment:
     """Return an experiment with another number of births on each island."""
     islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
@@ -423,13 +482,28 @@ def with_births(experiment: Experiment, births: int) -> Experiment:
 
 
 def references(experiment: Experiment) -> list[str]:
-    """Return the ``module:attribute`` of all plug-ins that a document names."""
+    """Return the ``module:attribute`` of all plug-ins that a document names.
+
+    Short names of built-in plug-ins are left out.
+    """
     own = [each.fitness for each in experiment.islands if each.fitness is not None]
     functions = [fitness.function for fitness in (experiment.fitness, *own)]
-    brains = (*experiment.space.neuron_types, experiment.brain.type)
-    # A short name is not that of a module.
-    own_brains = [path for path in brains if ":" in path]
-    return [*experiment.space.part_types, *functions, *own_brains]
+    islands = [each.selection for each in experiment.islands if each.selection]
+    rules = [
+        path
+        for selection in (experiment.selection, *islands)
+        for path in (selection.parents, selection.survivors)
+    ]
+    named = [
+        *experiment.space.part_types,
+        *experiment.space.neuron_types,
+        *functions,
+        *experiment.measures.names,
+        *rules,
+        experiment.encoding.type,
+        experiment.brain.type,
+    ]
+    return [path for path in named if ":" in path]
 
 
 @lru_cache(maxsize=64)
@@ -438,7 +512,8 @@ def body_space(space: Space) -> BodySpace:
 
     Raises:
         UnknownPlugin: no such module or attribute, or a module that is not allowed.
-        ExperimentError: not a part type, two of one name, or not exactly one core.
+        ExperimentError: not a part type, or one that ``check_part_type`` refuses; two
+            of one name, or not exactly one core.
     """
     types: dict[str, PartType] = {}
     for path in space.part_types:
@@ -448,6 +523,7 @@ def body_space(space: Space) -> BodySpace:
                 f"space.part_types: two part types are named {kind.name!r}"
             )
         types[kind.name] = kind if space.planar else _freed(kind)
+        check_part_type(types[kind.name], "space.part_types")
     cores = [name for name, kind in types.items() if kind.is_root]
     if len(cores) != 1:
         raise ExperimentError(

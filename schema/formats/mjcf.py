@@ -54,7 +54,10 @@ _SIDES = frozenset(map(str, range(1, MOST_PATCHES + 2)))
 _DIGITS = 1e-4
 """Relative difference that is greater than MJCF's rounding."""
 _LENGTH_M = 1e-6
-_COMPARED = ("body_mass", "geom_size", "geom_pos", "geom_quat", "jnt_range")
+_COMPARED = (
+    *("body_mass", "geom_type", "geom_size", "geom_pos", "geom_quat"),
+    *("jnt_type", "jnt_limited", "jnt_range"),
+)
 
 
 def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:

@@ -1,11 +1,14 @@
-"""Where plug-ins are defined, for messages."""
+"""Where plug-ins are defined, and where they raise, for messages."""
 
 import ast
 import inspect
 import sys
 from functools import partial
 from pathlib import Path
+from traceback import extract_tb
 from types import ModuleType
+
+_CONSTANTS = (bool, int, float, complex, str, bytes, tuple, frozenset, type(None))
 
 
 def where_defined(plugin: object) -> str:
@@ -39,11 +42,48 @@ def where_defined(plugin: object) -> str:
         return file
 
 
+def where_named(module: ModuleType, name: str) -> str:
+    """Return file and line of a name in a plug-in's module.
+
+    Args:
+        module: that was imported.
+        name: of one of its attributes, or one that is not there.
+
+    Returns:
+        As of ``where_defined``; without a line for a name that is not assigned at the
+        top of the module.
+    """
+    value = getattr(module, name, None)
+    if inspect.isclass(value) or inspect.isroutine(value):
+        return where_defined(value)
+    file = Path(str(module.__file__)).name
+    line = _assignment(module, name)
+    return f"{file}:{line}" if line else file
+
+
+def where_raised(error: BaseException, file: str) -> str:
+    """Return the line of a plug-in's file in which an error was raised; or empty.
+
+    Args:
+        error: with its traceback.
+        file: name of the file, without its folder.
+    """
+    lines = [
+        f"{file}:{frame.lineno}"
+        for frame in extract_tb(error.__traceback__)
+        if Path(frame.filename).name == file
+    ]
+    return lines[-1] if lines else ""
+
+
 def _where_assigned(value: object) -> str:
     """Return file and line of the assignment of a module's object; or empty."""
+    # Equal constants of different modules may be one object.
+    if isinstance(value, _CONSTANTS):
+        return ""
     for module in list(sys.modules.values()):
         # A snapshot: the import of another thread may change it.
-        names = dict(vars(module)) if isinstance(module, ModuleType) else {}
+        names = dict(getattr(module, "__dict__", {}))
         for name, each in names.items():
             if each is value and (line := _assignment(module, name)):
                 return f"{Path(str(module.__file__)).name}:{line}"

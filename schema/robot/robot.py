@@ -32,7 +32,7 @@ class Part(Struct, frozen=True, gc=False):
         slot: own slot by which it is attached; -1 for the core.
         orientation: rotation about the normal of its own slot [degrees].
         parameters: values in the order of its type's ``parameters``.
-        gene: identity that the part inherits from its ancestors.
+        gene: identity that the part inherits from its ancestors; 0 is none.
     """
 
     kind: str

@@ -83,6 +83,15 @@ from schema.wire.arena_codec import (
     encode_advance_request,
     encode_live,
 )
+from schema.wire.calls import (
+    Call,
+    call_settings,
+    decode_call_request,
+    encode_call_answer,
+    encode_call_request,
+    pack_value,
+    read_call_answer,
+)
 from schema.wire.codec import (
     Answer,
     decode_answer,
@@ -162,6 +171,7 @@ def targets() -> list[Target]:
         *_robots(),
         *_requests(rules, made[-1][1]),
         *_answers(made),
+        *_calls(),
         *_viewers(made),
         *_operators(),
         *_agents(),
@@ -327,6 +337,21 @@ def _operators() -> Iterator[Target]:
     yield Target("decode_operator_reply", decode_operator_reply, (reply,))
 
 
+def _calls() -> Iterator[Target]:
+    value = pack_value({"a": [1, 2.5, None, "é"]})
+    request = encode_call_request(
+        run="run",
+        epoch=JOB[0],
+        number=JOB[1],
+        settings=call_settings("lab:score"),
+        argument=value,
+        plugins="",
+    )
+    answer = encode_call_answer(Call(*JOB, "lab:score", None), 0.1, value)
+    yield Target("decode_call_request", decode_call_request, (request,))
+    yield Target("read_call_answer", partial(read_call_answer, expected=JOB), (answer,))
+
+
 def _agents() -> Iterator[Target]:
     info = pb.AgentInfo(
         agent=_WORKER.name,
@@ -362,7 +387,7 @@ def _journal(made: list[tuple[Advance, bytes, ExpectedAdvance]]) -> Iterator[Tar
         EvaluationFailed(BIRTH, "diverged", _SIGNED),
         Vetted(BIRTH, 0, VIABLE),
         Advanced(0, 1, advance, 9, _SIGNED),
-        Commanded(0, "id", 200, Insert(genome_of(ROBOT), (0.0, 1.0))),
+        Commanded(0, "id", 200, Insert(encode_genome(genome_of(ROBOT)), (0.0, 1.0))),
         Commanded(0, "id", 200, Remove(BIRTH)),
         Commanded(0, "id", 200, Pause()),
     )

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-import revolve
 from analysis.measures.load import read_run, read_runs
 from analysis.viewer.replay import read_news
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import Position, read_records
 from coordinator.storage.lock import read_holder
+from revolve import command as revolve
 from schema.errors import RunFolderError
 from schema.tables import segments
 from schema.tables.description import description_text, read_description, read_state

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-import revolve
+from revolve import command as revolve
 
 pytestmark = pytest.mark.system
 

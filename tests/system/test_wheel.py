@@ -9,6 +9,8 @@ from hatchling.builders.wheel import WheelBuilder
 ROOT = Path(__file__).parents[2]
 ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis")
 
+PACKAGES = ("revolve", *ROOMS)
+
 pytestmark = pytest.mark.system
 
 
@@ -24,17 +26,17 @@ def names(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
 def test_wheel_contains_every_file_of_the_rooms(names: set[str]) -> None:
     wanted = {
         path.relative_to(ROOT).as_posix()
-        for room in ROOMS
+        for room in PACKAGES
         for pattern in ("*.py", "*.pyi", "*.toml", "*.proto")
         for path in (ROOT / room).rglob(pattern)
     }
     assert wanted <= names
-    assert {"revolve.py", "schema/wire/revolve.proto"} <= names
+    assert {"revolve/py.typed", "schema/wire/revolve.proto"} <= names
     assert any(name.startswith("schema/experiment/shipped/") for name in names)
 
 
 def test_wheel_contains_no_other_files(names: set[str]) -> None:
     tops = {name.partition("/")[0] for name in names}
     (metadata,) = (top for top in tops if top.endswith(".dist-info"))
-    assert tops == {"revolve.py", *ROOMS, metadata}
+    assert tops == {*PACKAGES, metadata}
     assert f"{metadata}/entry_points.txt" in names

@@ -191,6 +191,8 @@ class BatchedIO:
         command = gain * (target - state[self._angles])
         np.maximum(command, -fastest, out=command)
         np.minimum(command, fastest, out=command)
+        if len(self._free):
+            command[self._free] = target[self._free]
         start = 0
         for controls in self._controls:
             end = start + len(controls)
@@ -220,6 +222,12 @@ class BatchedIO:
             for address, *limits in view.servos.motors
         ]
         table = np.array(motors, dtype=np.float64).reshape(-1, 5)
+        firsts = (ends - counts).tolist()
+        self._free: list[int] = [
+            start + index
+            for start, view in zip(firsts, views, strict=True)
+            for index in view.servos.free
+        ]
         self._motor_offsets = table[:, 0].astype(np.intp)
         self._motors = table.T[1:]
 

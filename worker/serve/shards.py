@@ -29,6 +29,7 @@ from schema.wire.arena_codec import (
     encode_advance_answer,
 )
 from worker.arena.births import possible
+from worker.serve.checks import checked_arena
 
 Key = tuple[str, int]
 """Name of a shard: its run and its number."""
@@ -110,13 +111,14 @@ class Shards:
 
         Raises:
             MalformedMessage: the bytes are no such request.
-            ExperimentError: invalid settings or an unknown plug-in.
+            ExperimentError: invalid settings, or a plug-in that is unknown or breaks
+                its contract.
             InvalidRobot: an insertion that breaks the rules of its body space.
             StateDiffers: the rebuilt state differs from the original one.
         """
         start = time.perf_counter()
-        job = decode_advance_request(request)
-        settings = read_arena_settings(job.settings)
+        job = decode_advance_request(request, checked_arena)
+        settings = checked_arena(job.settings)
         _check_robots(job.changes, settings)
         # Not kept while it changes, so that an error below leaves no broken shard.
         held, changes = self._taken(job), job.changes

@@ -1,5 +1,6 @@
 """File and line of a plug-in's code."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import pytest
 
 from schema.plugins import permission
 from schema.plugins.load import load_object
-from schema.plugins.origin import where_defined
+from schema.plugins.origin import where_defined, where_named, where_raised
 
 SOURCE = '''"""Plug-ins of a lab."""
 
@@ -29,6 +30,10 @@ class Rule:
 
 RULE = Rule()
 TYPED: Rule = Rule()
+
+
+def fails():
+    return 1 / 0
 '''
 
 
@@ -57,9 +62,31 @@ def test_object_without_a_name_is_found_by_its_class(lab: str) -> None:
 
 
 def test_partial_function_is_found_by_the_function_inside(lab: str) -> None:
-    judge = load_object(f"{lab}:judge", "key", {})
+    judge: Callable[..., float] = load_object(f"{lab}:judge", "key", {})
     assert where_defined(partial(judge, parameters=3)) == f"{lab}.py:6"
 
 
 def test_name_stands_for_what_has_no_file() -> None:
     assert where_defined(len) == "builtins:len"
+
+
+def test_constants_are_found_by_their_type() -> None:
+    assert where_defined(3) == "builtins:int"
+
+
+def test_line_of_a_name_in_a_module(lab: str) -> None:
+    module = permission.import_allowed(lab)
+    assert where_named(module, "RULE") == f"{lab}.py:19"
+    assert where_named(module, "judge") == f"{lab}.py:6"
+    assert where_named(module, "no_such") == f"{lab}.py"
+
+
+def test_line_that_raised(lab: str) -> None:
+    judge: Callable[..., float] = load_object(f"{lab}:judge", "key", {})
+    with pytest.raises(TypeError) as caught:
+        judge()
+    # The call failed, not the code.
+    assert where_raised(caught.value, f"{lab}.py") == ""
+    with pytest.raises(ZeroDivisionError) as caught_inside:
+        load_object(f"{lab}:fails", "key", dict[str, Callable[[], None]]())()
+    assert where_raised(caught_inside.value, f"{lab}.py") == f"{lab}.py:24"

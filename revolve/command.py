@@ -3,8 +3,10 @@
 import io
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from importlib import import_module
+
+from revolve.strangers import stranger
 
 _COORDINATOR = "coordinator.__main__"
 COMMANDS = {
@@ -18,6 +20,8 @@ COMMANDS = {
     "log": ("coordinator.cli.log", "print the journal of a run"),
     "arena": ("coordinator.cli.arena", "inspect and control a running arena"),
     "compare": (_COORDINATOR, "compare two runs that should be equal"),
+    "plugins": (_COORDINATOR, "list plug-ins, built-in or found"),
+    "check": (_COORDINATOR, "check plug-ins as a run does"),
     "worker": ("worker.__main__", "simulate robots for a coordinator"),
     "analyzer": ("analyzer.__main__", "vet robot bodies for a coordinator"),
     "robot": ("schema.__main__", "check, convert or show a robot file"),
@@ -36,20 +40,25 @@ take precedence over their first word; ``main`` gets them as one argument.
 """
 
 
-def main(arguments: list[str] | None = None) -> int:
+def main(
+    arguments: list[str] | None = None,
+    tell: Callable[[Exception], None] | None = None,
+) -> int:
     """Run one command and return its exit code.
 
     Args:
         arguments: without the program's name; default: those of the process.
+        tell: called with a user's error; default: writes it to standard error.
 
     Returns:
         The command's exit code; 1 if the reader closed standard output, 2 for a
         user's error or output that cannot be written (one line on stderr), 130 after
         Ctrl-C, SIGTERM, SIGHUP or SIGUSR1.
     """
-    if sys.stdout is None:
-        # The next file to be opened would get its descriptor, and all output.
-        print("revolve: standard output is closed", file=sys.stderr)
+    # Without standard output the next file to be opened would get its descriptor.
+    problem = "standard output is closed" if sys.stdout is None else stranger()
+    if problem:
+        print(f"revolve: {problem}", file=sys.stderr)
         return 2
     _ensure_buffer()
     stopping = None
@@ -59,7 +68,8 @@ def main(arguments: list[str] | None = None) -> int:
         stopping.prepare_stop(sys.argv[1:])
     try:
         try:
-            return _run(sys.argv[1:] if arguments is None else arguments)
+            words = sys.argv[1:] if arguments is None else arguments
+            return _run(words, tell or _tell)
         finally:
             _flush()
     except OSError:
@@ -83,7 +93,12 @@ def main(arguments: list[str] | None = None) -> int:
             stopping.finish_stop()
 
 
-def _run(words: list[str]) -> int:
+def _tell(error: Exception) -> None:
+    """Write a user's error to standard error."""
+    import_module("schema.agent.log").tell_error(f"revolve: {error}")
+
+
+def _run(words: list[str], tell: Callable[[Exception], None]) -> int:
     """Run the command that the words start with and return its exit code."""
     if not words or words[0] in ("-h", "--help"):
         print(_overview())
@@ -105,7 +120,7 @@ def _run(words: list[str]) -> int:
         room = import_module(COMMANDS[words[0]][0])
         return int(room.main(words))
     except error_type as error:
-        import_module("schema.agent.log").tell_error(f"revolve: {error}")
+        tell(error)
         return 2
     finally:
         if words[1:] in (["-h"], ["--help"]):
@@ -219,7 +234,3 @@ def _overview() -> str:
         f"{_lines(COMMANDS)}\n\n"
         "example: revolve run scenario1 --seed 1 --births 600"
     )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,0 +1,83 @@
+"""Evolve the bodies and brains of robots: the Python interface.
+
+    import revolve as rv
+
+    robot = rv.Robot.random("scenario1", seed=1)
+    result = rv.evaluate(robot, "scenario1")
+    run = rv.run("scenario1", seed=1, births=600)
+
+This module is the only one that other code imports. Importing it loads nothing else and
+changes no setting of the process; each name is loaded when it is first used. What
+computes runs in processes of its own, with the settings of the command ``revolve``, and
+gives the same results to the last bit. docs/python.md is the tutorial.
+"""
+
+from difflib import get_close_matches
+from importlib import import_module
+from typing import Any
+
+from revolve.strangers import stranger
+
+_HOMES = {
+    "Robot": "revolve.robot",
+    "Part": "schema.robot.robot",
+    "Brain": "schema.robot.brain",
+    "Neuron": "schema.robot.brain",
+    "Connection": "schema.robot.brain",
+    "Genome": "revolve.genome",
+    "Experiment": "revolve.experiment",
+    "Result": "revolve.evaluation",
+    "Trace": "revolve.trace",
+    "evaluate": "revolve.evaluation",
+    "simulate": "revolve.evaluation",
+    "Run": "revolve.runs",
+    "run": "revolve.runs",
+    "resume": "revolve.runs",
+    "read": "revolve.runs",
+    "Analysis": "revolve.reports",
+    "analyze": "revolve.reports",
+    "Fleet": "revolve.fleet",
+    "Parameter": "schema.parts",
+    "PartType": "schema.parts",
+    "Shape": "schema.parts",
+    "Box": "schema.parts",
+    "Slot": "schema.parts",
+    "Joint": "schema.parts",
+    "Motor": "schema.parts",
+    "Sensor": "schema.parts",
+    "RevolveError": "schema.errors",
+    "ExperimentError": "schema.errors",
+    "UnknownPlugin": "schema.errors",
+    "InvalidRobot": "schema.errors",
+    "RunFolderError": "schema.errors",
+    "NetworkError": "schema.errors",
+    "FitnessUndefined": "schema.errors",
+    "SimulationDiverged": "schema.errors",
+    "JobRefused": "schema.errors",
+}
+"""Module of each public name."""
+
+__all__ = list(_HOMES)
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - any public object
+    """Load a public name.
+
+    Raises:
+        AttributeError: there is no such name; the nearest is named.
+        ImportError: a module of another package is in the place of ours.
+    """
+    # Not public: console scripts of earlier installations call it.
+    home = "revolve.command" if name == "main" else _HOMES.get(name)
+    if home is None:
+        near = get_close_matches(name, __all__, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise AttributeError(f"module 'revolve' has no attribute {name!r}{hint}")
+    if line := stranger():
+        raise ImportError(line)
+    found = globals()[name] = getattr(import_module(home), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

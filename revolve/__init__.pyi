@@ -1,0 +1,74 @@
+from revolve.command import main as main
+from revolve.evaluation import Result as Result
+from revolve.evaluation import evaluate as evaluate
+from revolve.evaluation import simulate as simulate
+from revolve.experiment import Experiment as Experiment
+from revolve.fleet import Fleet as Fleet
+from revolve.genome import Genome as Genome
+from revolve.reports import Analysis as Analysis
+from revolve.reports import analyze as analyze
+from revolve.robot import Robot as Robot
+from revolve.runs import Run as Run
+from revolve.runs import read as read
+from revolve.runs import resume as resume
+from revolve.runs import run as run
+from revolve.trace import Trace as Trace
+from schema.errors import ExperimentError as ExperimentError
+from schema.errors import FitnessUndefined as FitnessUndefined
+from schema.errors import InvalidRobot as InvalidRobot
+from schema.errors import JobRefused as JobRefused
+from schema.errors import NetworkError as NetworkError
+from schema.errors import RevolveError as RevolveError
+from schema.errors import RunFolderError as RunFolderError
+from schema.errors import SimulationDiverged as SimulationDiverged
+from schema.errors import UnknownPlugin as UnknownPlugin
+from schema.parts import Box as Box
+from schema.parts import Joint as Joint
+from schema.parts import Motor as Motor
+from schema.parts import Parameter as Parameter
+from schema.parts import PartType as PartType
+from schema.parts import Sensor as Sensor
+from schema.parts import Shape as Shape
+from schema.parts import Slot as Slot
+from schema.robot.brain import Brain as Brain
+from schema.robot.brain import Connection as Connection
+from schema.robot.brain import Neuron as Neuron
+from schema.robot.robot import Part as Part
+
+__all__ = [
+    "Analysis",
+    "Box",
+    "Brain",
+    "Connection",
+    "Experiment",
+    "ExperimentError",
+    "FitnessUndefined",
+    "Fleet",
+    "Genome",
+    "InvalidRobot",
+    "JobRefused",
+    "Joint",
+    "Motor",
+    "NetworkError",
+    "Neuron",
+    "Parameter",
+    "Part",
+    "PartType",
+    "Result",
+    "RevolveError",
+    "Robot",
+    "Run",
+    "RunFolderError",
+    "Sensor",
+    "Shape",
+    "SimulationDiverged",
+    "Slot",
+    "Trace",
+    "UnknownPlugin",
+    "analyze",
+    "evaluate",
+    "read",
+    "resume",
+    "run",
+    "simulate",
+]

@@ -1,0 +1,187 @@
+"""Processes that the Python API starts, as its process sees them.
+
+They are started by ``subprocess``: nothing is forked, and the user's main module is not
+imported again. They end with this process, however it ends, and a Ctrl-C of the
+terminal does not reach them.
+"""
+
+import atexit
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Sequence
+from multiprocessing.connection import Connection, Pipe
+from pathlib import Path
+
+import msgspec
+
+from revolve.messages import Outcome, Problem, Task, error_of
+from schema.agent.supervision import crash_cause
+from schema.errors import RevolveError
+from schema.plugins.permission import allowed, source_of
+from schema.plugins.source import forget_digests, plugins_of
+
+_GRACE_S = 5.0
+_OUTCOMES = msgspec.msgpack.Decoder(Outcome)
+_PROBLEMS = msgspec.msgpack.Decoder(Problem)
+
+
+def environment() -> dict[str, str]:
+    """Return the environment of children, which import what this process can."""
+    paths = [str(Path(path).absolute()) for path in sys.path]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
+
+
+def plugins() -> tuple[str, ...]:
+    """Return the modules that children may import: those allowed here that exist."""
+    return tuple(
+        entry
+        for entry in allowed()
+        if (Path(entry).is_file() if entry.endswith(".py") else _is_module(entry))
+    )
+
+
+def _is_module(name: str) -> bool:
+    return bool(source_of(name.partition(".")[0]))
+
+
+class Child:
+    """Process that runs ``revolve.child``; ends with ``end``."""
+
+    def __init__(self, words: Sequence[str], *, is_quiet: bool = False) -> None:
+        """Start it.
+
+        Args:
+            words: ``simulate``, or ``command`` and the words of the command.
+            is_quiet: drop its standard output.
+        """
+        self.connection, theirs = Pipe()
+        with theirs:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "revolve.child", str(theirs.fileno()), *words],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL if is_quiet else None,
+                pass_fds=[theirs.fileno()],
+                env=environment(),
+                start_new_session=True,
+            )
+
+    def end(self) -> None:
+        """Close the process's input, so that it ends; kill it after a grace time."""
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        self.connection.close()
+        try:
+            self.process.wait(_GRACE_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+
+def run_command(words: Sequence[str], *, is_quiet: bool = True) -> int:
+    """Run a command of ``revolve`` in a process of its own; return its exit code.
+
+    Args:
+        words: of the command line.
+        is_quiet: drop the command's standard output.
+
+    Raises:
+        RevolveError: the command's error, of the same class.
+        KeyboardInterrupt: after Ctrl-C; the command has stopped as after its own.
+    """
+    child = Child(("command", *words), is_quiet=is_quiet)
+    try:
+        try:
+            code = child.process.wait()
+        except KeyboardInterrupt:
+            child.process.send_signal(signal.SIGINT)
+            child.process.wait()
+            raise
+        problem = _received(child.connection)
+    finally:
+        child.end()
+    if problem is not None:
+        raise error_of(_PROBLEMS.decode(problem))
+    if code not in (0, 1):
+        # Of a flag, for example: written to standard error.
+        raise RevolveError(f"revolve {words[0]} ended with exit code {code}")
+    return code
+
+
+def _received(connection: Connection) -> bytes | None:
+    """Return the message that an ended process has left."""
+    try:
+        return connection.recv_bytes() if connection.poll() else None
+    except (EOFError, ConnectionError):
+        return None
+
+
+class Simulator:
+    """The process that simulates single robots; started with the first task.
+
+    A process that was forked from this one starts its own. A plug-in whose source has
+    changed is imported again, in a new process.
+    """
+
+    def __init__(self) -> None:
+        self._child: Child | None = None
+        self._owner = 0
+        self._sources: dict[str, str] = {}
+        self._lock = threading.Lock()
+        atexit.register(self.end)
+
+    def do(self, task: Task) -> Outcome:
+        """Return the outcome of a task.
+
+        Raises:
+            RevolveError: the task cannot be done; of the class that the worker raises.
+        """
+        with self._lock:
+            self._note_sources(task.settings)
+            try:
+                child = self._running()
+                child.connection.send_bytes(msgspec.msgpack.encode(task))
+                outcome = _OUTCOMES.decode(child.connection.recv_bytes())
+            except (EOFError, ConnectionError):
+                return Outcome(failure=self._death())
+            except BaseException:
+                # Its answer to this task would be taken for that to the next one.
+                self.end()
+                raise
+        if outcome.problem is not None:
+            raise error_of(outcome.problem)
+        return outcome
+
+    def _note_sources(self, settings: bytes) -> None:
+        """End the process if it may have imported an earlier source of a plug-in."""
+        forget_digests()
+        for each in plugins_of(settings).split():
+            name, _, digest = each.partition("=")
+            if self._sources.setdefault(name, digest) != digest:
+                self.end()
+                self._sources = {name: digest}
+
+    def _running(self) -> Child:
+        if self._child is None or self._owner != os.getpid():
+            self._child, self._owner = Child(("simulate",)), os.getpid()
+        return self._child
+
+    def _death(self) -> str:
+        """Return why the process has ended, and forget it."""
+        assert self._child is not None
+        code = self._child.process.wait()
+        self._child.end()
+        self._child = None
+        return f"ended its own process, by {crash_cause(code) or 'a signal'}"
+
+    def end(self) -> None:
+        """End the process, if there is one."""
+        if self._child is not None and self._owner == os.getpid():
+            self._child.process.kill()
+            self._child.end()
+        self._child = None
+
+
+SIMULATOR = Simulator()

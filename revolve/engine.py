@@ -1,0 +1,235 @@
+"""The thread that sends the jobs of a fleet and receives their answers.
+
+It owns the network and the state machines of ``coordinator.dispatch``, as the main loop
+of a run does. Other threads pass orders by a queue and get futures.
+"""
+
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import dataclass, field
+from queue import Empty, SimpleQueue
+from typing import Any
+
+from coordinator.dispatch.events import Client, Deliver, Job, JobKind, Read, Withdrawn
+from coordinator.dispatch.fleet import Fleet
+from coordinator.network.service import Network
+from schema.agent.log import tell_user, warn_user
+from schema.agent.topics import unique_name
+from schema.errors import NetworkError, RevolveError
+
+_WAIT_S = 0.5
+_CHORES_S = 1.0
+_ALONE_S = 10.0
+"""Time without any worker after which the user is told [s]."""
+_EPOCH = 1
+_CLOSED = RevolveError("the fleet is closed")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Order:
+    """A job that is wanted.
+
+    Attributes:
+        kind: of the job.
+        encode: returns the request, given run, epoch and number of the job.
+        read: decodes and checks an answer, given epoch and number.
+        settle: returns the future's value for the end of the job, or raises.
+        future: gets the value or the exception.
+    """
+
+    kind: JobKind
+    encode: Callable[[str, int, int], bytes]
+    read: Callable[[tuple[int, int]], Read]
+    settle: Callable[[Deliver], Any]
+    future: "Future[Any]" = field(default_factory=Future)
+
+
+class Engine:
+    """Thread with a connection to agents; ``close`` ends it."""
+
+    def __init__(self, network: Network, find_fault: Callable[[], str]) -> None:
+        """Open the network and start the thread.
+
+        Args:
+            network: not yet open.
+            find_fault: returns why no worker can do a job any more, or "".
+
+        Raises:
+            NetworkError: there is no hub, or none can be opened.
+        """
+        self._network = network
+        self._find_fault = find_fault
+        self._orders: SimpleQueue[Order] = SimpleQueue()
+        self._cancelled: SimpleQueue[Future[Any]] = SimpleQueue()
+        self._client = Client(
+            unique_name(f"python-{socket.gethostname()[:40]}"), _EPOCH
+        )
+        self._open: dict[int, Order] = {}
+        self._fleet: Fleet | None = None
+        self._fault: RevolveError | None = None
+        self._is_closing = False
+        self._lock = threading.Lock()
+        self._is_open = threading.Event()
+        self._owner = os.getpid()
+        self._thread = threading.Thread(
+            target=self._run, name="revolve.Fleet", daemon=True
+        )
+        self._thread.start()
+        self._is_open.wait()
+        if self._fault is not None:
+            raise self._fault
+
+    @property
+    def workers(self) -> int:
+        """Number of workers that have joined."""
+        return 0 if self._fleet is None else self._fleet.dispatch.agents("worker")
+
+    def check(self) -> None:
+        """Raise if there can be no more jobs.
+
+        Raises:
+            RevolveError: the fleet is closed, or cannot do jobs any more.
+        """
+        if self._fault is not None:
+            raise type(self._fault)(*self._fault.args)
+
+    def refuse(self) -> None:
+        """Refuse further orders."""
+        with self._lock:
+            self._fault = self._fault or _CLOSED
+
+    def order(self, order: Order) -> None:
+        """Order a job; its future gets the outcome.
+
+        Raises:
+            RevolveError: the fleet is closed, or cannot do jobs any more.
+        """
+        with self._lock:
+            self.check()
+            self._orders.put(order)
+        order.future.add_done_callback(self._note_cancelled)
+        self._network.wake()
+
+    def close(self) -> None:
+        """Drop all jobs, close the network and end the thread."""
+        self._is_closing = True
+        if self._owner == os.getpid():
+            self._network.wake()
+            self._thread.join()
+
+    def _note_cancelled(self, future: "Future[Any]") -> None:
+        if future.cancelled():
+            self._cancelled.put(future)
+            self._network.wake()
+
+    def _run(self) -> None:
+        why = _CLOSED
+        try:
+            with self._network:
+                self._fleet = fleet = Fleet(
+                    self._network, warn=warn_user, faults=self._network.faults
+                )
+                self._is_open.set()
+                self._serve(fleet)
+                fleet.leave(self._client)
+        except RevolveError as error:
+            why = error
+        except Exception as error:  # noqa: BLE001 - else callers would wait for ever
+            why = RevolveError(f"{type(error).__name__}: {error}")
+        finally:
+            self._end(why)
+            self._is_open.set()
+
+    def _end(self, why: RevolveError) -> None:
+        """Refuse further orders and settle the open ones."""
+        with self._lock:
+            self._fault = self._fault or why
+        waiting = [*self._open.values(), *_all_of(self._orders)]
+        for order in waiting:
+            if self._is_closing:
+                order.future.cancel()
+            elif order.future.set_running_or_notify_cancel():
+                order.future.set_exception(why)
+        self._open.clear()
+
+    def _serve(self, fleet: Fleet) -> None:
+        """Pass on orders and answers until closed.
+
+        Raises:
+            RevolveError: no worker can do a job any more.
+        """
+        began_s = done_s = time.monotonic()
+        is_told = False
+        while not self._is_closing:
+            for order in _all_of(self._orders):
+                self._request(fleet, order)
+            self._withdraw(fleet)
+            ends = fleet.listen(_WAIT_S, time.monotonic())
+            for end in ends.get(self._client, ()):
+                assert isinstance(end, Deliver)
+                self._settle(end)
+            now_s = time.monotonic()
+            if now_s - done_s < _CHORES_S:
+                continue
+            done_s = now_s
+            self._do_chores(fleet)
+            if self._open and not self.workers and not is_told:
+                is_told = now_s - began_s >= _ALONE_S
+                if is_told:
+                    tell_user(f"no worker has joined at {self._network.address} yet")
+
+    def _do_chores(self, fleet: Fleet) -> None:
+        """Tell the user what is wrong with agents.
+
+        Raises:
+            RevolveError: no worker can do a job any more.
+        """
+        for fenced in fleet.fenced():
+            fleet.faults.note("fenced", fenced.agent, fenced.reason)
+        for line in fleet.faults.lines():
+            warn_user(line)
+        if fault := self._find_fault():
+            raise NetworkError(fault)
+
+    def _request(self, fleet: Fleet, order: Order) -> None:
+        if order.future.cancelled():
+            return
+        number = fleet.new_number()
+        payload = order.encode(*self._client, number)
+        read = order.read((_EPOCH, number))
+        self._open[number] = order
+        fleet.request(Job(number, order.kind, payload, -1, self._client, order, read))
+
+    def _withdraw(self, fleet: Fleet) -> None:
+        """Drop the jobs of cancelled futures."""
+        cancelled = set(map(id, _all_of(self._cancelled)))
+        if cancelled:
+            for number, order in list(self._open.items()):
+                if id(order.future) in cancelled:
+                    del self._open[number]
+                    fleet.tell(Withdrawn(number))
+
+    def _settle(self, end: Deliver) -> None:
+        order = self._open.pop(end.job.number, None)
+        if order is None or not order.future.set_running_or_notify_cancel():
+            return
+        try:
+            value = order.settle(end)
+        except Exception as error:  # noqa: BLE001 - the caller gets it
+            order.future.set_exception(error)
+        else:
+            order.future.set_result(value)
+
+
+def _all_of(queue: "SimpleQueue[Any]") -> list[Any]:
+    """Remove and return all entries of a queue."""
+    found = []
+    with suppress(Empty):
+        while True:
+            found.append(queue.get_nowait())
+    return found

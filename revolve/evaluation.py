@@ -1,0 +1,116 @@
+"""Simulation and evaluation of single robots."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from revolve.children import SIMULATOR
+from revolve.experiment import Experiment, document_of
+from revolve.robot import DEFAULT, Robot, plain, task_of
+from revolve.trace import Trace, unpack_trace
+from schema.errors import SimulationDiverged
+from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
+from schema.robot.results import Evaluation
+from schema.robot.robot import Robot as PlainRobot
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """Result of an evaluation, or the reason why there is none.
+
+    Attributes:
+        fitness: higher is better, finite; None if the evaluation failed.
+        path_velocity: path length over time in the ground plane [m/s].
+        straight_velocity: net distance over time in the ground plane [m/s].
+        simulated_s: simulated time [s].
+        measures: named numbers of the experiment.
+        failure: why there is no fitness; empty if there is one.
+        trace: recording of the robot; None from a fleet, or if the physics diverged.
+    """
+
+    fitness: float | None = None
+    path_velocity: float | None = None
+    straight_velocity: float | None = None
+    simulated_s: float | None = None
+    measures: Mapping[str, float] = field(default_factory=dict)
+    failure: str = ""
+    trace: Trace | None = field(default=None, compare=False, repr=False)
+
+
+def evaluate(
+    robot: Robot | PlainRobot, experiment: Experiment | str | Path | None = None
+) -> Result:
+    """Return the evaluation of a robot: a function of the arguments alone.
+
+    It runs in a process of its own, which is started with the first call and used
+    again. The result equals that of ``revolve robot simulate`` to the last bit.
+
+    Args:
+        robot: to evaluate.
+        experiment: whose simulation and fitness apply; None: the robot's own, else
+            ``scenario1``.
+
+    Returns:
+        The result. Diverged physics, an undefined fitness and a crash are results with
+        a failure.
+
+    Raises:
+        InvalidRobot: the robot is not well formed for this experiment.
+        ExperimentError: an invalid experiment or plug-in, or a sensor that has no
+            stimulus in its environment.
+    """
+    settings = settings_for(robot, experiment)
+    outcome = SIMULATOR.do(task_of(robot, settings, is_judged=True))
+    trace = unpack_trace(outcome.trace, plain(robot)) if outcome.trace else None
+    if outcome.failure:
+        return Result(failure=outcome.failure, trace=trace)
+    assert outcome.evaluation is not None
+    return result_of(outcome.evaluation, settings, trace)
+
+
+def simulate(
+    robot: Robot | PlainRobot, experiment: Experiment | str | Path | None = None
+) -> Trace:
+    """Return the recording of a robot that starts at the origin, alone.
+
+    Args:
+        robot: to simulate.
+        experiment: as for ``evaluate``; its fitness is not computed.
+
+    Raises:
+        SimulationDiverged: the physics diverged, or the process crashed.
+        InvalidRobot: as for ``evaluate``.
+        ExperimentError: as for ``evaluate``.
+    """
+    settings = settings_for(robot, experiment)
+    outcome = SIMULATOR.do(task_of(robot, settings))
+    if outcome.trace is None:
+        raise SimulationDiverged(outcome.failure)
+    return unpack_trace(outcome.trace, plain(robot))
+
+
+def settings_for(
+    robot: Robot | PlainRobot | None, experiment: Experiment | str | Path | None
+) -> EvaluationSettings:
+    """Return the settings of an evaluation.
+
+    Raises:
+        ExperimentError: no such experiment or file, or an invalid document.
+    """
+    own = robot.experiment if isinstance(robot, Robot) else None
+    return evaluation_settings_of(document_of(experiment or own or DEFAULT))
+
+
+def result_of(
+    evaluation: Evaluation, settings: EvaluationSettings, trace: Trace | None = None
+) -> Result:
+    """Return a worker's evaluation as a result."""
+    labels = settings.measures.labels
+    return Result(
+        evaluation.fitness,
+        evaluation.path_velocity,
+        evaluation.straight_velocity,
+        evaluation.simulated_s,
+        dict(zip(labels, evaluation.measures, strict=True)),
+        trace=trace,
+    )

@@ -1,0 +1,157 @@
+"""Experiments as the Python API has them."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Self
+
+import msgspec
+
+from schema.experiment.document import Experiment as Document
+from schema.experiment.file import (
+    experiment_from_tables,
+    parse_toml,
+    read_experiment,
+    source_text,
+)
+
+_GIVEN = "experiment"
+"""Name of a text without a file, in messages."""
+
+
+class Experiment:
+    """All settings that can change a birth.
+
+    ``Experiment.read("scenario1", births=600, selection={"children": 1})`` takes a
+    shipped experiment or a TOML file and changes some of its keys;
+    ``Experiment.from_toml(text)`` takes a text. Each key has a default; unknown keys
+    and values outside their ranges raise ``ExperimentError``.
+    """
+
+    __slots__ = ("_document",)
+
+    def __init__(self, document: Document) -> None:
+        """Wrap a checked document; use ``read`` or ``from_toml`` instead."""
+        self._document = document
+
+    @classmethod
+    def read(
+        cls,
+        source: str | Path,
+        **changes: Any,  # noqa: ANN401 - of any key
+    ) -> Self:
+        """Return a shipped experiment, or one from a TOML file.
+
+        Args:
+            source: a name such as ``scenario1``, or a path that ends in ``.toml``.
+            changes: values of keys; that of a section is a dict of some of its keys.
+
+        Raises:
+            ExperimentError: no such experiment or file, or an invalid document.
+        """
+        text, where = source_text(str(source))
+        return cls(_parsed(text, where, changes))
+
+    @classmethod
+    def from_toml(cls, text: str, **changes: Any) -> Self:  # noqa: ANN401 - as above
+        """Return the experiment of a TOML text; paths in it start here.
+
+        Raises:
+            ExperimentError: an invalid document.
+        """
+        return cls(_parsed(text, _GIVEN, changes))
+
+    def replace(self, **changes: Any) -> Self:  # noqa: ANN401 - as above
+        """Return the experiment with other values of some keys.
+
+        Raises:
+            ExperimentError: an unknown key, or a value that is not allowed.
+        """
+        tables = _merged(self.settings, changes)
+        return type(self)(experiment_from_tables(tables, _GIVEN))
+
+    @property
+    def name(self) -> str:
+        """Name, which names the run folder."""
+        return self._document.name
+
+    @property
+    def births(self) -> int:
+        """Number of births on each island."""
+        return self._document.births
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All keys with their values, sections as dicts; keys without value left out.
+
+        docs/experiments.md has their meaning.
+        """
+        found = _without_none(msgspec.to_builtins(self._document))
+        assert isinstance(found, dict)
+        return found
+
+    def to_toml(self) -> str:
+        """Return the experiment as a TOML text with all keys."""
+        lines = [f"{key} = {_toml(value)}" for key, value in self.settings.items()]
+        return "\n".join([*lines, ""])
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Experiment) and self._document == other._document
+
+    def __hash__(self) -> int:
+        return hash(self._document)
+
+    def __repr__(self) -> str:
+        return f"<Experiment {self.name}: {self.births} births>"
+
+
+def document_of(experiment: Experiment | str | Path) -> Document:
+    """Return the document of an experiment, or of its name or path.
+
+    Raises:
+        ExperimentError: no such experiment or file, or an invalid document.
+    """
+    if isinstance(experiment, Experiment):
+        return experiment._document  # noqa: SLF001 - of the class beside
+    return read_experiment(str(experiment))
+
+
+def _parsed(text: str, where: str, changes: Mapping[str, Any]) -> Document:
+    tables = _merged(parse_toml(text, where), changes)
+    return experiment_from_tables(tables, where)
+
+
+def _merged(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return tables with other values of some keys; None removes a key."""
+    merged = dict(tables)
+    for key, value in changes.items():
+        known = merged.get(key)
+        if value is None:
+            merged.pop(key, None)
+        elif isinstance(value, Mapping):
+            merged[key] = _merged(known if isinstance(known, Mapping) else {}, value)
+        else:
+            merged[key] = list(value) if isinstance(value, tuple) else value
+    return merged
+
+
+def _without_none(value: Any) -> Any:  # noqa: ANN401 - any tree of plain values
+    if isinstance(value, dict):
+        rest = {key: each for key, each in value.items() if each is not None}
+        return {key: _without_none(each) for key, each in rest.items()}
+    if isinstance(value, list | tuple):
+        return [_without_none(each) for each in value]
+    return value
+
+
+def _toml(value: Any) -> str:  # noqa: ANN401 - any tree of plain values
+    """Return a value in TOML, in one line."""
+    if isinstance(value, dict):
+        pairs = (f"{_toml(key)} = {_toml(each)}" for key, each in value.items())
+        return f"{{{', '.join(pairs)}}}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, str):
+        # The escapes of JSON are those of TOML, which also escapes this one.
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return json.dumps(value)

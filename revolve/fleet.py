@@ -1,0 +1,412 @@
+"""Fleets as the Python API has them: workers for a loop of the user's own."""
+
+import atexit
+import os
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future
+from functools import lru_cache, partial
+from itertools import islice
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import msgspec
+
+from coordinator.dispatch.events import Deliver
+from coordinator.network.service import Network
+from coordinator.run.answer_checks import read_evaluation
+from coordinator.run.requests import QUARANTINED
+from revolve.children import plugins as allowed_plugins
+from revolve.engine import Engine, Order
+from revolve.evaluation import Result, result_of, settings_for
+from revolve.experiment import Experiment
+from revolve.robot import Robot, checked
+from revolve.workers import Workers
+from schema.agent.address import hub_of
+from schema.agent.network import DEFAULT_FLEET, Tls
+from schema.agent.supervisor import cores
+from schema.agent.topics import unique_name
+from schema.errors import ExperimentError, JobRefused, RevolveError
+from schema.experiment.settings import EvaluationSettings
+from schema.plugins.load import load_function
+from schema.plugins.permission import allow, allow_references
+from schema.plugins.source import forget_digests, plugins_of
+from schema.robot.results import Evaluation
+from schema.robot.robot import Robot as PlainRobot
+from schema.wire.calls import (
+    Failed,
+    call_settings,
+    encode_call_request,
+    pack_value,
+    read_call_answer,
+)
+from schema.wire.codec import Answer, encode_request, encode_robot
+
+T = TypeVar("T")
+
+_LEAST_AHEAD = 256
+_AHEAD_PER_WORKER = 20
+
+
+class Fleet:
+    """Workers that evaluate robots, here or on other machines; use it in a ``with``.
+
+    It is to robots what ``concurrent.futures.Executor`` is to functions. Jobs are sent,
+    repeated and checked as those of runs: a worker that dies or falls silent costs
+    time, not results, and a result does not depend on which worker computed it.
+
+        with rv.Fleet(workers=4) as fleet:
+            for result in fleet.evaluate(robots, "scenario1"):
+                print(result.fitness)
+
+    Threads may share a fleet.
+    """
+
+    def __init__(
+        self,
+        workers: int | None = None,
+        *,
+        connect: str | None = None,
+        fleet: str = DEFAULT_FLEET,
+        tls: tuple[str, str, str] | None = None,
+        plugins: Iterable[str] = (),
+    ) -> None:
+        """Configure a fleet; ``with`` opens it.
+
+        Args:
+            workers: worker processes to start on this machine; None: one per core, or
+                none with ``connect``. They start with the first job.
+            connect: address of a hub whose workers do the jobs, or folder of an active
+                run; None: only the workers that this fleet starts.
+            fleet: name of the fleet at that hub.
+            tls: files of certificate authority, certificate and key, for ``tls/``.
+            plugins: modules or ``.py`` files that may be imported here and by the
+                workers that this fleet starts.
+
+        Raises:
+            ExperimentError: no such module or file, or a number of workers < 1.
+            NetworkError: an invalid address or name.
+        """
+        if workers is None:
+            workers = 0 if connect else cores()
+        if workers < (0 if connect else 1):
+            raise ExperimentError(f"workers: must be >= 1, got {workers}")
+        allow(plugins)
+        self._count = workers
+        files = Tls(*tls) if tls else None
+        address = hub_of(connect) if connect else ""
+        self._network = Network(
+            name=unique_name(_own_name(address, files)),
+            fleet=fleet,
+            connect=address,
+            tls=files,
+        )
+        self._engine: Engine | None = None
+        self._workers: list[Workers] = []
+        self._owner = os.getpid()
+        self._lock = threading.Lock()
+
+    def __enter__(self) -> Self:
+        """Open the fleet.
+
+        Raises:
+            NetworkError: no hub answers.
+        """
+        # Its workers import the sources as they are now.
+        forget_digests()
+        self._engine = Engine(self._network, self._fault)
+        atexit.register(self.close)
+        return self
+
+    def __exit__(
+        self,
+        _kind: type[BaseException] | None,
+        _error: BaseException | None,
+        _trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Drop all open jobs and end the workers that this fleet started."""
+        if self._engine is None or self._owner != os.getpid():
+            return
+        atexit.unregister(self.close)
+        self._engine.refuse()
+        with self._lock:
+            workers, self._workers = self._workers, []
+        for each in workers:
+            each.close()
+        # The hub last: workers that lose it say so.
+        for each in workers:
+            each.end()
+        self._engine.close()
+
+    @property
+    def workers(self) -> int:
+        """Number of workers that have joined."""
+        return self._opened.workers
+
+    def submit(
+        self,
+        robot: Robot | PlainRobot,
+        experiment: Experiment | str | Path | None = None,
+    ) -> "Future[Result]":
+        """Start the evaluation of a robot.
+
+        Args:
+            robot: to evaluate.
+            experiment: as for ``revolve.evaluate``.
+
+        Returns:
+            A future of the result, without trace; see ``revolve.evaluate``. A robot
+            that ends its process three times has a result with that failure. The
+            future raises ``RevolveError`` if several workers cannot do such a job, or
+            no worker is left.
+
+        Raises:
+            InvalidRobot: the robot is not well formed for this experiment.
+            ExperimentError: no such experiment or file, or an invalid document.
+            RevolveError: the fleet is closed.
+        """
+        return self._submit(robot, settings_for(robot, experiment))
+
+    def evaluate(
+        self,
+        robots: Iterable[Robot | PlainRobot],
+        experiment: Experiment | str | Path | None = None,
+    ) -> Iterator[Result]:
+        """Evaluate robots; return their results in the same order.
+
+        Robots are taken from the iterable as workers need them, some hundred ahead. The
+        rest is dropped if the iterator is closed.
+
+        Args:
+            robots: to evaluate.
+            experiment: as for ``revolve.evaluate``.
+
+        Raises:
+            InvalidRobot: as for ``submit``; from the iterator, too.
+            ExperimentError: as for ``submit``.
+            RevolveError: as for ``submit`` and its future.
+        """
+        if experiment is None:
+            return self._in_order(self.submit(robot) for robot in robots)
+        settings = settings_for(None, experiment)
+        return self._in_order(self._submit(robot, settings) for robot in robots)
+
+    def map(
+        self, function: str | Callable[[Any], Any], items: Iterable[object]
+    ) -> Iterator[Any]:
+        """Call a function with each item; return its values in the same order.
+
+        The function must be pure: a call may be repeated on another worker. Workers
+        import it by name. Those of this fleet may import its module from now on; those
+        at ``connect`` must have the same source, and their owner must allow it.
+
+            def score(numbers):  # in lab.py
+                return sum(numbers)
+
+            list(fleet.map("lab:score", [[1, 2], [3]]))  # [3, 3]
+
+        Args:
+            function: of one argument, as ``"module:function"`` or as an object that
+                has such a name. A module may be a file in the current folder.
+            items: plain: None, bool, int, float, str, bytes, list or dict of such, and
+                tuples, which become lists.
+
+        Raises:
+            UnknownPlugin: no such function.
+            ExperimentError: no function of one argument, or one of ``__main__``; from
+                the iterator, an item that is not plain.
+            RevolveError: from the iterator, if a call fails; as for ``submit``, too.
+        """
+        path = _path_of(function)
+        allow_references([path], Path.cwd())
+        load_function(path, "function", 1)
+        settings = call_settings(path)
+        return self._in_order(
+            self._call(settings, item, number) for number, item in enumerate(items)
+        )
+
+    def _call(self, settings: bytes, item: object, number: int) -> "Future[Any]":
+        try:
+            argument = pack_value(item)
+        except ExperimentError as error:
+            raise ExperimentError(f"item {number}: {error}") from None
+        order = Order(
+            "call",
+            partial(_encode_call, settings=settings, argument=argument),
+            lambda expected: partial(read_call_answer, expected=expected),
+            partial(_value, number=number),
+        )
+        return self._order(order)
+
+    def _submit(
+        self, robot: Robot | PlainRobot, settings: EvaluationSettings
+    ) -> "Future[Result]":
+        encoded = encode_robot(checked(robot, settings))
+        data, simulated_s = _job_of(settings)
+        order = Order(
+            "evaluate",
+            partial(_encode, settings=data, robot=encoded),
+            lambda expected: partial(
+                read_evaluation,
+                expected=expected,
+                simulated_s=simulated_s,
+                measures=len(settings.measures.names),
+            ),
+            partial(_settle, settings=settings),
+        )
+        return self._order(order)
+
+    def _order(self, order: Order) -> "Future[T]":
+        engine = self._opened
+        with self._lock:
+            engine.check()
+            self._start_workers()
+        engine.order(order)
+        return order.future
+
+    def _in_order(self, futures: Iterator["Future[T]"]) -> Iterator[T]:
+        """Return results in the order of futures, with some of them ahead."""
+        ahead = max(_LEAST_AHEAD, _AHEAD_PER_WORKER * self._count)
+        return _results(deque(islice(futures, ahead)), futures)
+
+    def _start_workers(self) -> None:
+        """Start the workers, or replace them by some that may import more plug-ins."""
+        plugins = allowed_plugins()
+        if not self._count or (self._workers and self._workers[-1].plugins == plugins):
+            return
+        for earlier in self._workers:
+            earlier.close()
+        self._workers.append(Workers(self._network.own_address, self._count, plugins))
+
+    def _fault(self) -> str:
+        """Return why no worker can do a job any more; empty if there is no reason."""
+        if not self._workers:
+            return ""
+        code = self._workers[-1].exit_code
+        return "" if code is None else f"the workers have ended with exit code {code}"
+
+    @property
+    def _opened(self) -> Engine:
+        if self._engine is None:
+            raise ExperimentError("the fleet is not open: use it in a 'with'")
+        return self._engine
+
+
+def _results(
+    waiting: "deque[Future[T]]", futures: Iterator["Future[T]"]
+) -> Iterator[T]:
+    """Yield the results of futures in order; cancel the rest when closed."""
+    try:
+        while waiting:
+            yield waiting[0].result()
+            waiting.popleft()
+            waiting.extend(islice(futures, 1))
+    finally:
+        for future in waiting:
+            future.cancel()
+
+
+@lru_cache(maxsize=64)
+def _job_of(settings: EvaluationSettings) -> tuple[bytes, float]:
+    """Return settings as JSON, and the length of an evaluation [s]."""
+    clock = settings.simulation
+    steps = clock.warmup_steps + clock.window_steps
+    return msgspec.json.encode(settings), steps * clock.timestep_s
+
+
+def _encode(
+    run: str, epoch: int, number: int, *, settings: bytes, robot: bytes
+) -> bytes:
+    """Return the request of an evaluation."""
+    return encode_request(
+        run=run,
+        epoch=epoch,
+        number=number,
+        settings=settings,
+        robot=robot,
+        plugins=plugins_of(settings),
+    )
+
+
+def _settle(end: Deliver, settings: EvaluationSettings) -> Result:
+    """Return the result that the end of an evaluation gives.
+
+    Raises:
+        JobRefused: several workers cannot do it.
+    """
+    if end.is_deadly:
+        return Result(failure=f"{QUARANTINED}{end.reason}")
+    if end.reason:
+        raise refusal(end)
+    assert isinstance(end.answer, Answer)
+    found = end.answer.result
+    if isinstance(found, Evaluation):
+        return result_of(found, settings)
+    return Result(failure=str(found))
+
+
+def _path_of(function: str | Callable[[Any], Any]) -> str:
+    """Return the name by which workers import a function.
+
+    Raises:
+        ExperimentError: it has no such name.
+    """
+    if isinstance(function, str):
+        return function
+    home = str(getattr(function, "__module__", None))
+    name = str(getattr(function, "__qualname__", None))
+    if home == "__main__" or not name.isidentifier():
+        raise ExperimentError(
+            f"workers cannot import {name} of {home}: put it into a file of its own, "
+            "outside of any other function"
+        )
+    return f"{home}:{name}"
+
+
+def _encode_call(
+    run: str, epoch: int, number: int, *, settings: bytes, argument: bytes
+) -> bytes:
+    """Return the request of a call."""
+    return encode_call_request(
+        run=run,
+        epoch=epoch,
+        number=number,
+        settings=settings,
+        argument=argument,
+        plugins=plugins_of(settings),
+    )
+
+
+def _value(end: Deliver, *, number: int) -> object:
+    """Return the value that the end of a call gives.
+
+    Raises:
+        JobRefused: several workers cannot do it, or it ends their processes.
+        RevolveError: the function has failed.
+    """
+    if end.reason:
+        raise refusal(end)
+    if isinstance(end.answer, Failed):
+        raise RevolveError(f"item {number}: {end.answer.reason}")
+    return end.answer
+
+
+def refusal(end: Deliver) -> JobRefused:
+    """Return the error of a job that several workers cannot do."""
+    return JobRefused(
+        f"several workers cannot do a job, the last of them {end.agent}: {end.reason}"
+    )
+
+
+def _own_name(address: str, tls: Tls | None) -> str:
+    """Return the name of this process: that of its certificate at a hub with TLS."""
+    if tls and address.startswith("tls/"):
+        from schema.agent.certificate import certificate_name  # noqa: PLC0415
+
+        return certificate_name(tls.certificate)
+    return "python"

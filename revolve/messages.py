@@ -1,0 +1,68 @@
+"""Messages between the Python API and the processes that it starts."""
+
+import msgspec
+
+import schema.errors
+from revolve.trace import PackedTrace
+from schema.errors import RevolveError
+from schema.robot.results import Evaluation
+
+
+class Problem(msgspec.Struct, frozen=True):
+    """Error: name of its class in ``schema.errors``, and its one line."""
+
+    kind: str
+    line: str
+
+
+class Task(msgspec.Struct, frozen=True):
+    """Task of the process that simulates single robots.
+
+    Attributes:
+        settings: JSON of ``EvaluationSettings``.
+        robot: encoded.
+        plugins: modules that may be imported.
+        is_judged: compute the fitness, too.
+        size: width and height of a picture [pixels], instead of a simulation.
+    """
+
+    settings: bytes
+    robot: bytes
+    plugins: tuple[str, ...]
+    is_judged: bool = False
+    size: tuple[int, int] | None = None
+
+
+class Outcome(msgspec.Struct, frozen=True):
+    """Outcome of a task.
+
+    Attributes:
+        trace: of a simulation.
+        evaluation: its numbers, if it was to be judged.
+        failure: why there is no evaluation, or no trace.
+        picture: PNG.
+        problem: why nothing could be done.
+    """
+
+    trace: PackedTrace | None = None
+    evaluation: Evaluation | None = None
+    failure: str = ""
+    picture: bytes = b""
+    problem: Problem | None = None
+
+
+def problem_of(error: Exception) -> Problem:
+    """Return an error as a message; one that is not ours with the name of its class."""
+    kind = type(error)
+    if kind.__module__ == "schema.errors":
+        return Problem(kind.__name__, str(error))
+    own = isinstance(error, RevolveError)
+    return Problem("RevolveError", str(error) if own else f"{kind.__name__}: {error}")
+
+
+def error_of(problem: Problem) -> RevolveError:
+    """Return the error of a message."""
+    kind = getattr(schema.errors, problem.kind, RevolveError)
+    found = kind(problem.line)
+    assert isinstance(found, RevolveError)
+    return found

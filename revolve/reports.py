@@ -1,0 +1,67 @@
+"""Analyses of runs as the Python API has them."""
+
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet
+
+from revolve.children import run_command
+from revolve.runs import Run
+from schema.errors import RunFolderError, nearest
+
+
+class Analysis:
+    """Folder that ``analyze`` has written: tables of measures, figures, a report.
+
+    Attributes:
+        folder: path of the folder.
+        report: path of the report, an HTML file with all figures.
+        names: of the tables of measures; docs/analysis.md has their meaning.
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        """Open the folder of an analysis.
+
+        Raises:
+            RunFolderError: there is no analysis.
+        """
+        self.folder = Path(folder)
+        self.report = self.folder / "report.html"
+        files = sorted((self.folder / "measures").glob("*.parquet"))
+        if not (files and self.report.is_file()):
+            raise RunFolderError(f"{folder}: no analysis is there")
+        self.names = tuple(file.stem for file in files)
+
+    def table(self, name: str) -> pa.Table:
+        """Return a table of measures.
+
+        Raises:
+            RunFolderError: no such table; the nearest is named.
+        """
+        if name not in self.names:
+            near = nearest(name, self.names)
+            allowed = ", ".join(self.names)
+            raise RunFolderError(f"no table {name!r}{near}; tables: {allowed}")
+        return pa.parquet.read_table(self.folder / "measures" / f"{name}.parquet")
+
+    def __repr__(self) -> str:
+        return f"<Analysis {self.folder}: {len(self.names)} tables, {self.report}>"
+
+
+def analyze(
+    *runs: Run | str | Path, out: str | Path = "report", progress: bool = False
+) -> Analysis:
+    """Measure runs, draw the figures and write a report, as ``revolve analyze`` does.
+
+    Args:
+        runs: runs, or folders that contain some.
+        out: folder to write to.
+        progress: show progress on standard error, and the findings.
+
+    Raises:
+        RunFolderError: no run is found, or the folder cannot be written.
+        RevolveError: a library is missing; the message says how to install it.
+    """
+    folders = [str(each.folder if isinstance(each, Run) else each) for each in runs]
+    run_command(["analyze", *folders, "--out", str(out)], is_quiet=not progress)
+    return Analysis(out)

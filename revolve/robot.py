@@ -1,0 +1,185 @@
+"""Robots as the Python API has them."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Self
+
+import msgspec
+
+from coordinator.evolution.breeding import Breeder
+from revolve.children import SIMULATOR, plugins
+from revolve.experiment import Experiment, document_of
+from revolve.messages import Task
+from schema.errors import RevolveError
+from schema.experiment.document import body_space
+from schema.experiment.settings import EvaluationSettings
+from schema.formats.files import read_robot, settings_of, write_robot
+from schema.robot.brain import Brain
+from schema.robot.ids import BirthId
+from schema.robot.robot import Part, check_number, check_robot
+from schema.robot.robot import Robot as PlainRobot
+from schema.wire.codec import encode_robot
+
+DEFAULT = "scenario1"
+"""Experiment of a robot that has no other one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A body and its brain.
+
+    In a notebook it shows its picture, if this machine can render
+    (``pip install 'revolve-islands[view]'``).
+
+    Attributes:
+        parts: of the body, in depth-first order; the first is the core.
+        brain: network of neurons.
+        experiment: whose part types and simulation apply; None: those of ``scenario1``
+            with all built-in part types.
+    """
+
+    parts: tuple[Part, ...]
+    brain: Brain = field(default_factory=Brain)
+    experiment: Experiment | None = field(default=None, compare=False)
+
+    @classmethod
+    def read(
+        cls, path: str | Path, experiment: Experiment | str | Path | None = None
+    ) -> Self:
+        """Return the robot of a file.
+
+        Args:
+            path: ends in .yaml, .yml, .pb, .xml, .txt or .json.
+            experiment: whose part types are allowed; None: the built-in ones.
+
+        Raises:
+            InvalidRobot: the file holds no robot that is well formed.
+            ExperimentError: no such experiment.
+        """
+        own = None if experiment is None else as_experiment(experiment)
+        found = read_robot(Path(path), body_space(_settings(own).space))
+        return cls(found.parts, found.brain, own)
+
+    @classmethod
+    def random(
+        cls,
+        experiment: Experiment | str | Path = DEFAULT,
+        *,
+        seed: int = 0,
+        number: int = 0,
+    ) -> Self:
+        """Return a random robot as evolution starts with; no analyzer vets it.
+
+        It equals file ``number`` of ``revolve robot random --seed SEED``.
+
+        Args:
+            experiment: whose restrictions it meets.
+            seed: random seed.
+            number: of the robot among those of the seed, from 0.
+
+        Raises:
+            ExperimentError: no such experiment, or it allows (nearly) no robot.
+        """
+        own = as_experiment(experiment)
+        breeder = Breeder(document_of(own), seed, run=0)
+        candidate = breeder.candidate(BirthId(0, number), 0, ())
+        assert candidate is not None
+        return cls(candidate.robot.parts, candidate.robot.brain, own)
+
+    def write(self, path: str | Path) -> None:
+        """Write the robot to a file.
+
+        Args:
+            path: ends in .yaml, .yml, .pb, .xml (MJCF) or .urdf.
+
+        Raises:
+            InvalidRobot: another ending, a robot that is not well formed, or a file
+                that cannot be written.
+        """
+        settings = _settings(self.experiment)
+        space = body_space(settings.space)
+        write_robot(plain(self), Path(path), space, settings)
+
+    def picture(self, width: int = 640, height: int = 480) -> bytes:
+        """Return a picture of the robot in neutral pose, as PNG.
+
+        Args:
+            width: of the picture [pixels].
+            height: of the picture [pixels].
+
+        Raises:
+            RevolveError: this machine cannot render.
+            InvalidRobot: the robot is not well formed.
+        """
+        task = task_of(self, _settings(self.experiment), size=(width, height))
+        outcome = SIMULATOR.do(task)
+        if outcome.failure:
+            raise RevolveError(f"the process that renders {outcome.failure}")
+        return outcome.picture
+
+    def _repr_png_(self) -> bytes | None:
+        """Return the picture that a notebook shows; None if there can be none."""
+        try:
+            return self.picture(480, 360)
+        except RevolveError:
+            return None
+
+    def __repr__(self) -> str:
+        neurons, edges = len(self.brain.neurons), len(self.brain.connections)
+        return (
+            f"<Robot: {len(self.parts)} parts, {neurons} neurons, {edges} connections>"
+        )
+
+
+def plain(robot: Robot | PlainRobot) -> PlainRobot:
+    """Return a robot as the rooms have it."""
+    return PlainRobot(robot.parts, robot.brain)
+
+
+def of_plain(robot: PlainRobot, experiment: Experiment | None) -> Robot:
+    """Return a robot of the rooms as the Python API has it."""
+    return Robot(robot.parts, robot.brain, experiment)
+
+
+def as_experiment(experiment: Experiment | str | Path) -> Experiment:
+    """Return an experiment, read if it is given by name or path.
+
+    Raises:
+        ExperimentError: no such experiment or file, or an invalid document.
+    """
+    if isinstance(experiment, Experiment):
+        return experiment
+    return Experiment.read(experiment)
+
+
+def checked(robot: Robot | PlainRobot, settings: EvaluationSettings) -> PlainRobot:
+    """Return a robot as the rooms have it.
+
+    Raises:
+        InvalidRobot: it is not well formed in these settings' body space.
+    """
+    found = plain(robot)
+    check_number(found)
+    check_robot(found, body_space(settings.space))
+    return found
+
+
+def task_of(
+    robot: Robot | PlainRobot,
+    settings: EvaluationSettings,
+    *,
+    is_judged: bool = False,
+    size: tuple[int, int] | None = None,
+) -> Task:
+    """Return a task of the process that simulates single robots; see ``Task``.
+
+    Raises:
+        InvalidRobot: the robot is not well formed.
+    """
+    encoded = encode_robot(checked(robot, settings))
+    data = msgspec.json.encode(settings)
+    return Task(data, encoded, plugins(), is_judged, size)
+
+
+def _settings(experiment: Experiment | None) -> EvaluationSettings:
+    return settings_of(None if experiment is None else document_of(experiment))

@@ -1,0 +1,312 @@
+"""Runs as the Python API has them: start, resume and read them."""
+
+import html
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from revolve.children import plugins as allowed_plugins
+from revolve.children import run_command
+from revolve.experiment import Experiment, document_of
+from revolve.robot import Robot, of_plain
+from schema.errors import RevolveError, RunFolderError
+from schema.experiment.document import island_experiment
+from schema.experiment.file import own_experiment
+from schema.tables.description import DETAILS, read_description, read_state
+from schema.tables.files import read_table
+from schema.wire.born import robot_of_birth
+
+Folder = str | Path
+
+
+class Run:
+    """A run folder: its description and its tables, as they are now.
+
+    Each table is read anew when it is asked for, so a run in progress can be watched.
+    docs/tables.md has the columns. In a notebook a run shows a summary.
+
+    Attributes:
+        folder: path of the folder.
+        name: of the experiment.
+        number: of the repeat, from 0.
+        seed: random seed.
+        experiment: all settings.
+    """
+
+    def __init__(self, folder: Folder) -> None:
+        """Open a run folder for reading.
+
+        Raises:
+            RunFolderError: there is no run, or its description is damaged.
+        """
+        self.folder = Path(folder)
+        details = _description(self.folder)
+        self.name, self.number, self.seed = details.name, details.run, details.seed
+        self.experiment = Experiment(own_experiment(details.document))
+
+    @property
+    def state(self) -> str:
+        """``finished``, ``stopped``, or ``running`` (also after a kill)."""
+        return read_state(self.folder)
+
+    @property
+    def births(self) -> pa.Table:
+        """One row per individual born."""
+        return self.table("births")
+
+    @property
+    def evaluations(self) -> pa.Table:
+        """One row per finished evaluation, off-line."""
+        return self.table("evaluations")
+
+    @property
+    def population(self) -> pa.Table:
+        """Members of each recorded population."""
+        return self.table("population")
+
+    @property
+    def fitness(self) -> pa.Table:
+        """One row per living robot and sample, on-line."""
+        return self.table("fitness")
+
+    @property
+    def poses(self) -> pa.Table:
+        """One row per living robot and pose, on-line."""
+        return self.table("poses")
+
+    @property
+    def deaths(self) -> pa.Table:
+        """One row per individual gone, on-line."""
+        return self.table("deaths")
+
+    @property
+    def touches(self) -> pa.Table:
+        """One row per pair of robots that touched, on-line, if recorded."""
+        return self.table("touches")
+
+    @property
+    def migrations(self) -> pa.Table:
+        """One row per migrant."""
+        return self.table("migrations")
+
+    @property
+    def audits(self) -> pa.Table:
+        """One row per evaluation that was repeated on a second worker."""
+        return self.table("audits")
+
+    @property
+    def drifts(self) -> pa.Table:
+        """One row per move of an arena to another platform."""
+        return self.table("drifts")
+
+    @property
+    def runs(self) -> pa.Table:
+        """One row about a finished run."""
+        return self.table("runs")
+
+    def table(self, name: str) -> pa.Table:
+        """Return a table.
+
+        Args:
+            name: such as ``births``.
+
+        Raises:
+            RunFolderError: the table is damaged or of another version.
+        """
+        return read_table(self.folder, name)
+
+    def robot(self, number: int, island: int = 0) -> Robot:
+        """Return the robot of a birth.
+
+        Args:
+            number: of the birth on its island, from 0.
+            island: where it was born.
+
+        Raises:
+            RunFolderError: there is no such birth.
+        """
+        births = self.births
+        own = pc.and_(
+            pc.equal(births["island"], island), pc.equal(births["birth"], number)
+        )
+        found = births.filter(own)
+        if not found.num_rows:
+            raise RunFolderError(
+                f"{self.folder}: has no birth {number} on island {island}"
+            )
+        return self.robots(found)[0]
+
+    def robots(self, births: pa.Table | None = None) -> list[Robot]:
+        """Return the robots of some births.
+
+        Args:
+            births: rows of the table ``births``; None: all of them.
+
+        Raises:
+            RunFolderError: the table is damaged.
+        """
+        rows = self.births if births is None else births
+        homes = rows["island"].to_pylist()
+        documents = {
+            island: island_experiment(document_of(self.experiment), island)
+            for island in set(homes)
+        }
+        own = {island: Experiment(each) for island, each in documents.items()}
+        columns = (rows[name].to_pylist() for name in ("genome", "robot"))
+        return [
+            of_plain(robot_of_birth(genome, stored, documents[island]), own[island])
+            for island, genome, stored in zip(homes, *columns, strict=True)
+        ]
+
+    def best(self, count: int = 1) -> list[Robot]:
+        """Return the robots with the highest fitness of all off-line evaluations.
+
+        Args:
+            count: number of robots; fewer if there are no more.
+
+        Raises:
+            RunFolderError: a table is damaged.
+        """
+        found = self.evaluations
+        found = found.filter(pc.is_valid(found["fitness"]))
+        rows = found.sort_by([("fitness", "descending"), ("record", "ascending")])
+        born: dict[tuple[int, int], None] = {}
+        for row in rows.select(["island", "birth_island", "birth"]).to_pylist():
+            home = row["birth_island"]
+            born[row["island"] if home is None else home, row["birth"]] = None
+            if len(born) == count:
+                break
+        return [self.robot(number, island) for island, number in born]
+
+    def __repr__(self) -> str:
+        return f"<Run {self.name}, seed {self.seed}: {self.state}, {self.folder}>"
+
+    def _repr_html_(self) -> str:
+        """Return the summary that a notebook shows."""
+        fitness = pc.max(self.evaluations["fitness"]).as_py()
+        rows: dict[str, Any] = {
+            "folder": self.folder,
+            "experiment": self.name,
+            "repeat": self.number,
+            "seed": self.seed,
+            "state": self.state,
+            "births": f"{self.births.num_rows} of {self.experiment.births} per island",
+            "best fitness": "-" if fitness is None else f"{fitness:.4f}",
+        }
+        cells = (
+            f"<tr><th>{key}</th><td>{html.escape(str(value))}</td></tr>"
+            for key, value in rows.items()
+        )
+        return f"<table>{''.join(cells)}</table>"
+
+
+def read(folder: Folder) -> Run:
+    """Return the run of a folder, finished or not.
+
+    Raises:
+        RunFolderError: there is no run, or its description is damaged.
+    """
+    return Run(folder)
+
+
+def run(
+    experiment: Experiment | Folder,
+    *,
+    seed: int = 0,
+    births: int | None = None,
+    out: Folder | None = None,
+    workers: int | None = None,
+    connect: str | None = None,
+    plugins: Iterable[str] = (),
+    progress: bool = False,
+) -> Run:
+    """Run an experiment to its end, as ``revolve run`` does, with the same births.
+
+    Args:
+        experiment: shipped name, path of a TOML file, or ``Experiment``.
+        seed: random seed.
+        births: number of births on each island; None: the experiment's.
+        out: run folder; None: ``runs/NAME-seedSEED``.
+        workers: worker processes; None: one per core. No result depends on it.
+        connect: address of a hub whose workers do the work.
+        plugins: modules or ``.py`` files that may be imported, beside those that the
+            experiment names.
+        progress: show progress on standard error, and the summary.
+
+    Raises:
+        ExperimentError: an invalid experiment.
+        RunFolderError: the folder is used, or the disk fails.
+        NetworkError: no hub answers.
+        KeyboardInterrupt: after Ctrl-C; ``resume`` continues the run.
+    """
+    document = document_of(experiment)
+    folder = Path(out or Path("runs") / f"{document.name}-seed{seed}")
+    words = ["--seed", str(seed), "--out", str(folder)]
+    for flag, value in (
+        ("--births", births), ("--workers", workers), ("--connect", connect)
+    ):  # fmt: skip
+        words += [] if value is None else [flag, str(value)]
+    words += _common(plugins, progress=progress)
+    if not isinstance(experiment, Experiment):
+        return _done(("run", str(experiment), *words), folder, progress=progress)
+    with tempfile.TemporaryDirectory() as place:
+        file = Path(place) / "experiment.toml"
+        file.write_text(experiment.to_toml(), encoding="utf-8")
+        return _done(("run", str(file), *words), folder, progress=progress)
+
+
+def resume(
+    folder: Folder,
+    *,
+    workers: int | None = None,
+    plugins: Iterable[str] = (),
+    progress: bool = False,
+) -> Run:
+    """Continue a run to its end, as ``revolve resume`` does.
+
+    Args:
+        folder: of the run.
+        workers: as for ``run``.
+        plugins: as for ``run``.
+        progress: as for ``run``.
+
+    Raises:
+        RunFolderError: there is no run, another process has it, or it is damaged.
+        KeyboardInterrupt: as for ``run``.
+    """
+    _description(Path(folder))
+    words = [] if workers is None else ["--workers", str(workers)]
+    words += _common(plugins, progress=progress)
+    return _done(("resume", str(folder), *words), Path(folder), progress=progress)
+
+
+def _common(plugins: Iterable[str], *, progress: bool) -> list[str]:
+    entries = dict.fromkeys((*allowed_plugins(), *plugins))
+    words = [word for entry in entries for word in ("--plugins", entry)]
+    return words if progress else [*words, "--quiet"]
+
+
+def _done(words: tuple[str, ...], folder: Path, *, progress: bool) -> Run:
+    """Run a command; return the run that it has finished."""
+    run_command(words, is_quiet=not progress)
+    found = Run(folder)
+    if found.state != "finished":
+        raise RevolveError(f"{folder}: not finished: revolve.resume continues it")
+    return found
+
+
+def _description(folder: Path) -> Any:  # noqa: ANN401 - of schema.tables
+    """Return the description of a run.
+
+    Raises:
+        RunFolderError: there is no run, or its description is damaged.
+    """
+    below = sorted(path.parent.name for path in folder.glob(f"*/{DETAILS}"))
+    if below and not (folder / DETAILS).exists():
+        names = ", ".join(below[:5])
+        raise RunFolderError(f"{folder}: holds several runs; read one of {names}")
+    return read_description(folder)

@@ -1,0 +1,71 @@
+"""Simulation, evaluation and pictures of single robots, in a process of their own."""
+
+import io
+from contextlib import suppress
+
+import msgspec
+
+from revolve.messages import Outcome, Task, problem_of
+from revolve.trace import pack_trace
+from schema.errors import FitnessUndefined, RevolveError, SimulationDiverged
+from schema.experiment.document import body_space
+from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
+from schema.plugins.permission import allow
+from schema.robot.robot import Robot, check_types
+from schema.wire.codec import decode_robot
+
+_TASKS = msgspec.msgpack.Decoder(Task)
+
+
+def outcome_of(data: bytes) -> bytes:
+    """Return the encoded outcome of an encoded task; no error passes."""
+    try:
+        found = _done(_TASKS.decode(data))
+    except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
+        found = Outcome(problem=problem_of(error))
+    return msgspec.msgpack.encode(found)
+
+
+def _done(task: Task) -> Outcome:
+    allow(task.plugins)
+    settings = read_evaluation_settings(task.settings)
+    robot = decode_robot(task.robot)
+    check_types(robot, body_space(settings.space))
+    if task.size is not None:
+        return Outcome(picture=_picture(robot, settings, task.size))
+    # Before MuJoCo is imported, in case that a later task is a picture.
+    with suppress(RevolveError, ImportError):
+        from analysis.render.picture import choose_engine  # noqa: PLC0415
+
+        choose_engine()
+    from worker.robot.evaluation import judge, simulate  # noqa: PLC0415
+
+    try:
+        trace = simulate(robot, settings)
+    except SimulationDiverged as error:
+        return Outcome(failure=str(error))
+    packed = pack_trace(trace)
+    if not task.is_judged:
+        return Outcome(packed)
+    try:
+        return Outcome(packed, judge(trace, settings))
+    except FitnessUndefined as error:
+        return Outcome(packed, failure=str(error))
+
+
+def _picture(
+    robot: Robot, settings: EvaluationSettings, size: tuple[int, int]
+) -> bytes:
+    """Return a picture of a robot in neutral pose, as PNG."""
+    try:
+        from PIL import Image  # noqa: PLC0415
+
+        from analysis.render.picture import RobotRenderer  # noqa: PLC0415
+    except ImportError as error:
+        raise RevolveError(
+            f"pictures need {error.name}: pip install 'revolve-islands[view]'"
+        ) from None
+    file = io.BytesIO()
+    with RobotRenderer(robot, settings, size=size) as renderer:
+        Image.fromarray(renderer.picture()).save(file, "PNG")
+    return file.getvalue()

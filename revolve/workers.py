@@ -1,0 +1,63 @@
+"""Worker processes of a fleet on this machine: the command ``revolve worker``."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+
+from revolve.children import environment
+
+_GRACE_S = 6.0
+"""Longer than the command itself waits for its processes."""
+
+
+class Workers:
+    """The command ``revolve worker``, which starts and restarts processes.
+
+    It ends when its standard input is closed: by ``close``, or with this process,
+    however it ends. A Ctrl-C of the terminal does not reach it.
+
+    Attributes:
+        plugins: modules that the workers may import.
+    """
+
+    def __init__(self, address: str, count: int, plugins: Sequence[str]) -> None:
+        """Start the command.
+
+        Args:
+            address: of the hub.
+            count: number of processes.
+            plugins: modules and files that they may import.
+        """
+        self.plugins = tuple(plugins)
+        words = [word for entry in plugins for word in ("--plugins", entry)]
+        self._process = subprocess.Popen(
+            [
+                *(sys.executable, "-m", "revolve", "worker", "--connect", address),
+                *("--processes", str(count), "--oversubscribe", "--until-closed"),
+                *words,
+            ],
+            stdin=subprocess.PIPE,
+            env=environment(),
+            start_new_session=True,
+        )
+
+    @property
+    def exit_code(self) -> int | None:
+        """Exit code; None while it runs."""
+        return self._process.poll()
+
+    def close(self) -> None:
+        """Tell it to end; its processes finish their jobs."""
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+
+    def end(self) -> None:
+        """Wait for its end; kill it and its processes after a grace time."""
+        self.close()
+        try:
+            self._process.wait(_GRACE_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()

@@ -1,0 +1,179 @@
+"""Robots, genomes and their evaluation, against the command's results."""
+
+import math
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import revolve as rv
+from revolve.experiment import document_of
+from revolve.robot import plain
+from schema.experiment.settings import evaluation_settings_of
+from worker.robot.evaluation import evaluate as evaluate_here
+
+TOP = Path(__file__).parents[2]
+pytestmark = pytest.mark.system
+
+_WIDE = """
+name = "wide"
+[space]
+max_hidden = 800
+[simulation]
+window_steps = 400
+"""
+
+
+def _wide_robot(experiment: rv.Experiment) -> rv.Robot:
+    """Return a robot whose network is so wide that BLAS would use several threads."""
+    robot = rv.Robot.random(experiment, seed=2)
+    rng = np.random.default_rng(3)
+    old = robot.brain.neurons
+    part = next(n.part for n in old if n.layer == "output")
+    added = tuple(rv.Neuron("hidden", "Simple", part, (0.0, 0.9)) for _ in range(780))
+    outputs = [i for i, n in enumerate(old) if n.layer == "output"]
+    kept = tuple(n for n in old if n.layer != "hidden")
+    first = len(kept)
+    edges = [
+        rv.Connection(source, first + index, float(rng.normal()))
+        for index in range(780)
+        for source in outputs
+    ]
+    edges += [
+        rv.Connection(first + index, target, float(rng.normal()))
+        for index in range(780)
+        for target in outputs
+    ]
+    return rv.Robot(robot.parts, rv.Brain((*kept, *added), tuple(edges)), experiment)
+
+
+def _by_command(robot: rv.Robot, experiment: rv.Experiment, folder: Path) -> float:
+    """Return the fitness that the command prints with all digits."""
+    robot.write(folder / "robot.yaml")
+    (folder / "mine.toml").write_text(experiment.to_toml())
+    words = ["robot", "simulate", "robot.yaml", "--experiment", "mine.toml"]
+    done = subprocess.run(
+        [sys.executable, "-m", "revolve", *words],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(TOP)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = re.search(r"^fitness: +(\S+)$", done.stdout, re.MULTILINE)
+    assert found
+    return float(found[1])
+
+
+def test_evaluation_equals_the_command_to_the_last_bit(tmp_path: Path) -> None:
+    # NumPy is loaded here already, with as many threads as it likes.
+    experiment = rv.Experiment.read("scenario1", simulation={"window_steps": 800})
+    robot = rv.Robot.random(experiment, seed=5)
+    result = rv.evaluate(robot)
+    assert result.fitness == _by_command(robot, experiment, tmp_path)
+    assert result.fitness
+    assert result.failure == ""
+
+
+def test_a_wide_network_gives_the_same_bits_as_the_command(tmp_path: Path) -> None:
+    experiment = rv.Experiment.from_toml(_WIDE)
+    robot = _wide_robot(experiment)
+    assert rv.evaluate(robot).fitness == _by_command(robot, experiment, tmp_path)
+
+
+def test_trace_gives_the_velocities_of_the_result() -> None:
+    robot = rv.Robot.random(seed=5)
+    result = rv.evaluate(robot, "scenario1")
+    trace = result.trace
+    assert trace is not None
+    ends = trace.core_position[[0, -1], :2]
+    duration_s = (len(trace.core_position) - 1) * trace.interval_s
+    assert duration_s == pytest.approx(12.0)
+    straight = math.dist(*ends) / duration_s
+    assert result.straight_velocity == pytest.approx(straight, rel=1e-12)
+    again = rv.simulate(robot, "scenario1")
+    assert np.array_equal(again.core_position, trace.core_position)
+
+
+def test_file_keeps_the_robot(tmp_path: Path) -> None:
+    robot = rv.Robot.random(seed=9, number=2)
+    for name in ("a.yaml", "a.pb", "a.xml"):
+        robot.write(tmp_path / name)
+        assert rv.Robot.read(tmp_path / name) == robot
+    assert rv.Robot.random(seed=9, number=3) != robot
+
+
+def test_invalid_robot_raises_before_anything_runs() -> None:
+    robot = rv.Robot.random(seed=1)
+    broken = rv.Robot(robot.parts[:1] + robot.parts, robot.brain)
+    with pytest.raises(rv.InvalidRobot, match="body"):
+        rv.evaluate(broken)
+    with pytest.raises(rv.InvalidRobot, match="must end in one of"):
+        rv.Robot.read("robot.doc")
+
+
+def test_failing_fitness_and_crash_are_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "odd_fitness.py").write_text(
+        "import os, signal\n"
+        "def undefined(track, fitness):\n    return float('nan')\n"
+        "def crash(track, fitness):\n    os.kill(os.getpid(), signal.SIGSEGV)\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    text = 'name = "odd"\n[simulation]\nwindow_steps = 40\n[fitness]\nfunction = '
+    robot = rv.Robot.random(seed=1)
+    for name, expected in (("undefined", "finite number"), ("crash", "SIGSEGV")):
+        (tmp_path / "odd.toml").write_text(f'{text}"odd_fitness:{name}"\n')
+        result = rv.evaluate(robot, "odd.toml")
+        assert result.fitness is None
+        assert expected in result.failure
+    # The next evaluation has a new process.
+    assert rv.evaluate(robot, "scenario1").failure == ""
+    missing = rv.Experiment.from_toml(f'{text}"odd_fitness:undefned"\n')
+    with pytest.raises(rv.UnknownPlugin, match="did you mean"):
+        rv.evaluate(robot, missing)
+
+
+def test_genomes_mate_repeatably_and_develop_into_valid_robots() -> None:
+    def child(seed: int) -> rv.Genome | None:
+        rng = np.random.default_rng(seed)
+        first, second = (rv.Genome.random(rng, "scenario1") for _ in range(2))
+        return first.mate(second, rng)
+
+    children = [child(seed) for seed in range(8)]
+    assert children == [child(seed) for seed in range(8)]
+    grown = [each for each in children if each is not None]
+    assert len(grown) > 4
+    for each in grown:
+        settings = evaluation_settings_of(document_of(each.experiment))
+        evaluate_here(plain(each.develop()), settings)
+        assert rv.Genome.from_bytes(each.to_bytes(), "scenario1") == each
+
+
+def test_picture_is_a_png() -> None:
+    robot = rv.Robot.random(seed=1)
+    try:
+        picture = robot.picture(64, 48)
+    except rv.RevolveError as error:
+        pytest.skip(str(error))
+    assert picture.startswith(b"\x89PNG")
+    assert robot._repr_png_() is not None
+
+
+def test_genomes_of_other_encodings() -> None:
+    patterns = rv.Experiment.read("scenario1", encoding={"type": "cppn"})
+    rng = np.random.default_rng(1)
+    first, second = (rv.Genome.random(rng, patterns) for _ in range(2))
+    children = [first.mate(second, rng) for _ in range(5)]
+    child = next(filter(None, children))
+    assert rv.Genome.from_bytes(child.to_bytes(), patterns) == child
+    assert child.develop().experiment == patterns
+    with pytest.raises(rv.InvalidRobot, match="not a genome of encoding 'revolve-ang"):
+        rv.Genome.from_bytes(child.to_bytes(), "scenario1")
+    again = (rv.Robot.random(patterns, seed=4) for _ in range(2))
+    assert next(again) == next(again) != rv.Robot.random("scenario1", seed=4)

@@ -1,0 +1,238 @@
+"""A fleet from Python: order, faults, cancellation, ends."""
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+import revolve as rv
+from coordinator.network.service import Network
+from revolve.workers import Workers
+from schema.plugins import permission
+from schema.wire.calls import call_settings
+
+TOP = Path(__file__).parents[2]
+pytestmark = pytest.mark.system
+
+SHORT = rv.Experiment.from_toml('name = "short"\n[simulation]\nwindow_steps = 400\n')
+
+
+def robots(count: int) -> list[rv.Robot]:
+    return [rv.Robot.random(SHORT, seed=3, number=number) for number in range(count)]
+
+
+def until(is_true: Callable[[], bool]) -> None:
+    """Wait until something is true; fail after half a minute."""
+    end_s = time.monotonic() + 30.0
+    while not is_true():
+        assert time.monotonic() < end_s
+        time.sleep(0.02)
+
+
+def below(process: int) -> list[int]:
+    """Return the processes that a process has started, but for Python's tracker."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            parent = (entry / "stat").read_text().rpartition(")")[2].split()[1]
+            words = (entry / "cmdline").read_text()
+            if int(parent) == process and "resource_tracker" not in words:
+                found.append(int(entry.name))
+    return found
+
+
+def workers_of(fleet: rv.Fleet) -> list[int]:
+    """Return the processes that do the jobs of a fleet's own workers."""
+    (command,) = (each._process.pid for each in fleet._workers)
+    return below(command)
+
+
+@pytest.fixture(scope="module")
+def fleet() -> Iterator[rv.Fleet]:
+    with rv.Fleet(workers=2) as opened:
+        yield opened
+
+
+def test_results_are_in_order_and_equal_those_of_one_process(fleet: rv.Fleet) -> None:
+    many = robots(12)
+    results = list(fleet.evaluate(many, SHORT))
+    assert results == [rv.evaluate(robot) for robot in many]
+    assert len({result.fitness for result in results}) > 6
+    # Their own experiment is the same one.
+    assert list(fleet.evaluate(many)) == results
+    assert list(fleet.evaluate(iter(()))) == []
+
+
+def test_submit_returns_a_future(fleet: rv.Fleet) -> None:
+    robot = robots(1)[0]
+    future = fleet.submit(robot, SHORT)
+    assert future.result(30) == rv.evaluate(robot)
+    assert future.done()
+
+
+def test_rest_is_dropped_when_the_iterator_is_closed(fleet: rv.Fleet) -> None:
+    found = fleet.evaluate(robots(40), SHORT)
+    next(found)
+    assert fleet._engine is not None
+    until(lambda: len(fleet._engine._open) > 10)  # type: ignore[union-attr]
+    found.close()  # type: ignore[attr-defined]
+    until(lambda: not fleet._engine._open)  # type: ignore[union-attr]
+    assert next(fleet.evaluate(robots(1))).failure == ""
+
+
+def test_invalid_robot_raises_at_once(fleet: rv.Fleet) -> None:
+    robot = robots(1)[0]
+    with pytest.raises(rv.InvalidRobot):
+        fleet.submit(rv.Robot(robot.parts[:1] * 2), SHORT)
+    with pytest.raises(rv.ExperimentError, match="no such experiment"):
+        fleet.evaluate([robot], "nothing")
+
+
+def test_killed_worker_costs_no_result() -> None:
+    many = robots(60)
+    with rv.Fleet(workers=2) as fleet:
+        results = fleet.evaluate(many, SHORT)
+        found = [next(results)]
+        until(lambda: len(workers_of(fleet)) == 2)
+        os.kill(workers_of(fleet)[0], signal.SIGKILL)
+        found += results
+    assert found == [rv.evaluate(robot) for robot in many]
+
+
+def test_own_modules_fail_as_results_and_are_quarantined(tmp_path: Path) -> None:
+    (tmp_path / "lab_fitness.py").write_text(
+        "import os, signal\n"
+        "def undefined(track, fitness):\n    return float('nan')\n"
+        "def crash(track, fitness):\n    os.kill(os.getpid(), signal.SIGSEGV)\n"
+    )
+    text = 'name = "lab"\n[simulation]\nwindow_steps = 40\n[fitness]\nfunction = '
+    with rv.Fleet(workers=1) as fleet:
+        # The workers have started before the module is known.
+        assert next(fleet.evaluate(robots(1), SHORT)).failure == ""
+        for name, expected in (
+            ("undefined", "finite number"),
+            ("crash", "quarantined: ended its own process 3 times, by SIGSEGV"),
+        ):
+            (tmp_path / "lab.toml").write_text(f'{text}"lab_fitness:{name}"\n')
+            (result,) = fleet.evaluate(robots(1), tmp_path / "lab.toml")
+            assert result.fitness is None
+            assert expected in result.failure
+
+
+def test_map_calls_a_function_by_name(
+    fleet: rv.Fleet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "lab_of_maps.py").write_text(
+        "import os\n"
+        "def size(text):\n    return [len(text), os.getpid()]\n"
+        "def inverse(number):\n    return 1 / number\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    items = ["a" * number for number in range(60)]
+    values = list(fleet.map("lab_of_maps:size", items))
+    assert [length for length, _ in values] == list(range(60))
+    assert os.getpid() not in {process for _, process in values}
+    found = fleet.map("lab_of_maps:inverse", [2, 0])
+    assert next(found) == 0.5
+    with pytest.raises(
+        rv.RevolveError, match="item 1: lab_of_maps:inverse raised Zero"
+    ):
+        next(found)
+    with pytest.raises(rv.ExperimentError, match="item 0: must be None, bool"):
+        next(fleet.map("lab_of_maps:inverse", [1j]))
+    with pytest.raises(rv.UnknownPlugin, match="did you mean 'lab_of_maps:size'"):
+        fleet.map("lab_of_maps:sizes", items)
+    with pytest.raises(rv.UnknownPlugin, match="not allowed"):
+        fleet.map(os.path.getsize, items)
+    with pytest.raises(rv.ExperimentError, match="workers cannot import"):
+        fleet.map(lambda item: item, items)
+
+
+def test_map_runs_only_what_the_owner_of_a_worker_allows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "lab_of_others.py").write_text("def f(item):\n    return item\n")
+    monkeypatch.chdir(tmp_path)
+    place = Path(tempfile.mkdtemp(prefix="rv-"))
+    listen = f"unixsock-stream/{place / 'hub'}"
+    with Network(name="hub", listen=(listen,)) as hub:
+        # A worker of another owner, who allows nothing.
+        stranger = Workers(hub.own_address, 1, ())
+        try:
+            with rv.Fleet(connect=hub.own_address) as fleet:
+                future = fleet.submit(robots(1)[0], SHORT)
+                assert future.result(60).failure == ""
+                permission.allow_references(["lab_of_others:f"], tmp_path)
+                call = fleet._call(call_settings("lab_of_others:f"), 1, 0)
+                until(lambda: fleet.workers == 0)
+                told = fleet._network.refused
+                assert any("lab_of_others" in why for why in told.values())
+            assert call.cancelled()
+        finally:
+            stranger.end()
+
+
+def test_closed_fleet_cancels_and_refuses() -> None:
+    with rv.Fleet(workers=1) as fleet:
+        future = fleet.submit(robots(1)[0], "scenario1")
+    with pytest.raises(CancelledError):
+        future.result(0)
+    with pytest.raises(rv.RevolveError, match="closed"):
+        fleet.submit(robots(1)[0])
+    with pytest.raises(rv.ExperimentError, match="use it in a 'with'"):
+        rv.Fleet(workers=1).submit(robots(1)[0])
+    with pytest.raises(rv.ExperimentError, match="workers: must be >= 1, got 0"):
+        rv.Fleet(workers=0)
+
+
+def test_workers_of_another_hub_do_the_jobs() -> None:
+    address = f"unixsock-stream/{tempfile.mkdtemp(prefix='rv-')}/hub"
+    with Network(name="hub", listen=(address,)) as hub:
+        with pytest.raises(rv.NetworkError, match="no hub at"):
+            rv.Fleet(connect=f"{address}x").__enter__()
+        with rv.Fleet(workers=1, connect=hub.own_address) as fleet:
+            many = robots(3)
+            found = list(fleet.evaluate(many, SHORT))
+            assert found == [rv.evaluate(robot) for robot in many]
+
+
+_LOOP = """
+import sys, revolve as rv
+robots = [rv.Robot.random(number=n) for n in range(400)]
+with rv.Fleet(workers=2) as fleet:
+    for result in fleet.evaluate(robots, "scenario1"):
+        print(fleet._workers[0]._process.pid, flush=True)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_no_worker_outlives_its_loop(number: signal.Signals) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", _LOOP],
+        env={**os.environ, "PYTHONPATH": str(TOP)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        command = int(process.stdout.readline())
+        started = [command, *below(command)]
+        assert len(started) == 3
+        process.send_signal(number)
+        process.communicate()
+    assert process.returncode == -number
+    until(lambda: not any(Path(f"/proc/{each}").exists() for each in started))
+
+
+def test_failed_results_have_no_number() -> None:
+    assert rv.Result(failure="diverged").fitness is None
+    assert math.isfinite(rv.Result(1.0).fitness or 0.0)

@@ -1,0 +1,115 @@
+"""The public names, their loading, and what importing them leaves alone."""
+
+import ast
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import revolve
+from revolve import strangers
+
+TOP = Path(__file__).parents[2]
+
+_STATE = """
+import json, os, signal, sys, time
+def state():
+    return [dict(os.environ), [str(signal.getsignal(n)) for n in range(1, 32)],
+            os.sched_getscheduler(0), os.getpriority(os.PRIO_PROCESS, 0)]
+before = state()
+began_s = time.perf_counter()
+import revolve
+took_s = time.perf_counter() - began_s
+loaded = [name for name in sys.modules if name.partition(".")[0] in
+          ("numpy", "mujoco", "zenoh", "pyarrow", "schema", "worker", "coordinator")]
+robot = revolve.Robot.random(seed=1)
+revolve.Experiment.read("scenario1")
+assert revolve.evaluate(robot).failure == ""
+with revolve.Fleet(workers=1) as fleet:
+    assert next(fleet.evaluate([robot])).failure == ""
+print(json.dumps([took_s, loaded, before == state()]))
+"""
+
+
+@pytest.mark.system
+def test_import_is_fast_and_leaves_the_process_as_it_is() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", _STATE],
+        env={**os.environ, "PYTHONPATH": str(TOP)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    took_s, loaded, is_same = json.loads(done.stdout)
+    assert took_s < 0.3
+    assert loaded == []
+    assert is_same
+
+
+def test_each_public_name_is_loaded_and_documented() -> None:
+    assert len(revolve.__all__) > 30
+    for name in revolve.__all__:
+        found = getattr(revolve, name)
+        assert getattr(found, "__doc__", None), name
+    assert dir(revolve) == sorted(revolve.__all__)
+
+
+def test_types_are_those_of_the_loaded_objects() -> None:
+    tree = ast.parse((TOP / "revolve" / "__init__.pyi").read_text("utf-8"))
+    typed = {
+        alias.asname: node.module
+        for node in tree.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert typed.pop("main") == "revolve.command"
+    assert typed == vars(revolve)["_HOMES"]
+    (names,) = (
+        ast.literal_eval(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign)
+    )
+    assert names == sorted(revolve.__all__)
+
+
+def test_a_misspelt_name_gets_the_nearest() -> None:
+    with pytest.raises(AttributeError, match="did you mean 'evaluate'"):
+        _ = revolve.evalute  # type: ignore[attr-defined]
+
+
+def test_our_modules_are_ours() -> None:
+    strangers.stranger.cache_clear()
+    assert strangers.stranger() == ""
+
+
+@pytest.mark.parametrize("how", ["before", "instead"])
+def test_a_stranger_called_schema_is_named_in_one_line(
+    how: str, tmp_path: Path
+) -> None:
+    # As PyPI's package: before ours on the path, or its files over ours.
+    place = tmp_path / "schema"
+    if how == "instead":
+        for name in ("revolve", *strangers.ROOMS):
+            (tmp_path / name).symlink_to(TOP / name)
+        place.unlink()
+    place.mkdir()
+    (place / "__init__.py").write_text('"""Validation."""\n\n__version__ = "0.7.8"\n')
+    search = [str(tmp_path)] if how == "instead" else [str(tmp_path), str(TOP)]
+    for words in (["-m", "revolve"], ["-c", "from revolve import Robot"]):
+        done = subprocess.run(
+            [sys.executable, *words],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(search)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        last = done.stderr.splitlines()[-1]
+        assert done.returncode
+        assert "'schema' is not that of Revolve Islands" in last
+        if "-m" in words:
+            assert (done.returncode, done.stderr.count("\n")) == (2, 1)

@@ -1,0 +1,88 @@
+"""Runs from Python against runs by the command."""
+
+import html
+from pathlib import Path
+
+import pyarrow.compute as pc
+import pytest
+
+import revolve as rv
+from coordinator.storage.compare import compare
+from revolve.command import main
+from schema.tables.columns import TABLES
+
+pytestmark = pytest.mark.system
+
+BIRTHS = 20
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> rv.Run:
+    """Return a finished run of an experiment with changes."""
+    experiment = rv.Experiment.read("scenario1", selection={"population": 5})
+    folder = tmp_path_factory.mktemp("runs") / "a"
+    return rv.run(experiment, seed=7, births=BIRTHS, out=folder, workers=1)
+
+
+def test_run_equals_that_of_the_command(done: rv.Run, tmp_path: Path) -> None:
+    file = tmp_path / "scenario1.toml"
+    file.write_text(done.experiment.to_toml())
+    words = ["run", str(file), "--seed", "7", "--in-process", "--quiet"]
+    assert main([*words, "--out", str(tmp_path / "b")]) == 0
+    assert compare(done.folder, tmp_path / "b") == []
+
+
+def test_run_has_every_table(done: rv.Run) -> None:
+    for name in TABLES:
+        table = getattr(done, name)
+        assert table.schema.names[0] == "record"
+        assert table.equals(done.table(name))
+    assert (done.births.num_rows, done.state, done.seed) == (BIRTHS, "finished", 7)
+
+
+def test_best_robot_has_the_best_fitness(done: rv.Run) -> None:
+    best = done.best(2)
+    assert len(best) == 2
+    greatest = pc.max(done.evaluations["fitness"]).as_py()
+    assert rv.evaluate(best[0]).fitness == greatest
+    assert rv.evaluate(best[1]).fitness <= greatest
+    assert done.robots()[3] == done.robot(done.births["birth"][3].as_py())
+    with pytest.raises(rv.RunFolderError, match="has no birth 999"):
+        done.robot(999)
+
+
+def test_notebook_gets_a_table(done: rv.Run) -> None:
+    shown = done._repr_html_()
+    assert f"<td>{BIRTHS} of {BIRTHS} per island</td>" in shown
+    assert html.escape(str(done.folder)) in shown
+
+
+def test_used_and_missing_folders_raise_the_line_of_the_command(
+    done: rv.Run, tmp_path: Path
+) -> None:
+    with pytest.raises(rv.RunFolderError, match="already holds a run"):
+        rv.run("scenario1", births=15, out=done.folder)
+    with pytest.raises(rv.RunFolderError, match="no run is there"):
+        rv.read(tmp_path)
+    with pytest.raises(rv.RunFolderError, match="no run is there"):
+        rv.resume(tmp_path / "missing")
+    with pytest.raises(rv.RunFolderError, match="holds several runs; read one of a"):
+        rv.read(done.folder.parent)
+    with pytest.raises(rv.ExperimentError, match="did you mean 'scenario1'"):
+        rv.run("scenario", births=3, out=tmp_path / "x")
+
+
+def test_finished_run_is_resumed_to_itself(done: rv.Run) -> None:
+    again = rv.resume(done.folder)
+    assert again.births.equals(done.births)
+
+
+@pytest.mark.slow
+def test_analysis_has_tables_and_a_report(done: rv.Run, tmp_path: Path) -> None:
+    found = rv.analyze(done, out=tmp_path / "report")
+    assert found.report.read_text().startswith("<!")
+    assert found.table("robots").num_rows > 0
+    with pytest.raises(rv.RunFolderError, match="did you mean 'robots'"):
+        found.table("robot")
+    with pytest.raises(rv.RunFolderError, match="no such folder"):
+        rv.analyze(tmp_path / "missing")
