@@ -15,6 +15,7 @@ from revolve.command import COMMANDS
 from schema.experiment.document import Arena
 from schema.experiment.file import parse_experiment
 from schema.experiment.settings import fitness_function
+from tests.own_brains import write_module
 from worker.fitness import check_fitness
 
 pytestmark = pytest.mark.system
@@ -136,6 +137,24 @@ def test_experiments_of_the_experiments_page_run(tmp_path: Path) -> None:
         assert done.returncode == 0, f"{document}\n{done.stderr}"
         if "my_parts" not in document:
             parse_experiment(document, str(tmp_path / page.name))
+
+
+def test_experiments_of_the_brains_page_run(tmp_path: Path) -> None:
+    """Each runs equally with one and two workers."""
+    write_module(tmp_path)
+    for document in _blocks(TOP / "docs" / "brains.md", "toml"):
+        (tmp_path / "mine.toml").write_text(document)
+        runs = []
+        for workers in ("1", "2"):
+            runs.append(f"out-{len(document)}-{workers}")
+            done = _python(
+                ("-m", "revolve", "run", "mine.toml", "--births", "20",
+                 "--workers", workers, "--quiet", "--out", runs[-1]),
+                tmp_path,
+            )  # fmt: skip
+            assert done.returncode == 0, f"{document}\n{done.stderr}"
+        done = _python(("-m", "revolve", "compare", *runs), tmp_path)
+        assert done.returncode == 0, done.stdout
 
 
 def test_parts_page_runs(tmp_path: Path) -> None:
