@@ -17,7 +17,6 @@ from schema.experiment.document import Experiment
 from schema.plugins.load import load_object
 from schema.plugins.origin import where_defined
 from schema.robot.ids import BirthId
-from schema.robot.robot import check_robot
 
 _GENOMES = 24
 _LONGEST_S = 10.0
@@ -111,7 +110,7 @@ class _Case:
             with self._timed("develop"):
                 robot = self._encoding.develop(genome)
             robots = [self._encoding.develop(each) for each in (genome, again, read)]
-            check_robot(robot, self._encoding.types)
+            self._encoding.check(robot)
         except InvalidRobot as error:
             raise self.broken("a robot within [space]", str(error)) from error
         if self._encoding.to_bytes(read) != data:

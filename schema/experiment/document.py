@@ -472,7 +472,10 @@ def with_births(experiment: Experiment, births: int) -> Experiment:
 
 
 def references(experiment: Experiment) -> list[str]:
-    """Return the ``module:attribute`` of all plug-ins that a document names."""
+    """Return the ``module:attribute`` of all plug-ins that a document names.
+
+    Short names of built-in plug-ins are left out.
+    """
     own = [each.fitness for each in experiment.islands if each.fitness is not None]
     functions = [fitness.function for fitness in (experiment.fitness, *own)]
     named = [
@@ -483,7 +486,6 @@ def references(experiment: Experiment) -> list[str]:
         experiment.encoding.type,
         experiment.brain.type,
     ]
-    # A short name is not that of a module.
     return [path for path in named if ":" in path]
 
 
