@@ -28,6 +28,7 @@ _HOMES = {
     "Experiment": "revolve.experiment",
     "Result": "revolve.evaluation",
     "Trace": "revolve.trace",
+    "needs": "schema.plugins.needs",
     "evaluate": "revolve.evaluation",
     "simulate": "revolve.evaluation",
     "Run": "revolve.runs",

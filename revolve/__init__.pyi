@@ -30,6 +30,7 @@ from schema.parts import PartType as PartType
 from schema.parts import Sensor as Sensor
 from schema.parts import Shape as Shape
 from schema.parts import Slot as Slot
+from schema.plugins.needs import needs as needs
 from schema.robot.brain import Brain as Brain
 from schema.robot.brain import Connection as Connection
 from schema.robot.brain import Neuron as Neuron
@@ -67,6 +68,7 @@ __all__ = [
     "UnknownPlugin",
     "analyze",
     "evaluate",
+    "needs",
     "read",
     "resume",
     "run",
