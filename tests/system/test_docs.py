@@ -15,6 +15,7 @@ from revolve.command import COMMANDS
 from schema.experiment.document import Arena
 from schema.experiment.file import parse_experiment
 from schema.experiment.settings import fitness_function
+from tests.own_brains import write_module
 from worker.fitness import check_fitness
 from worker.measures.functions import BUILT_IN, measures_of
 
@@ -130,7 +131,9 @@ def test_measures_page_runs_from_top_to_bottom(tmp_path: Path) -> None:
     # The message that the page quotes.
     (tmp_path / "gaits.py").write_text(module.replace('@rv.needs("contact")\n', "\n"))
     done = _python(("-m", "revolve", "check", "gaits.toml"), tmp_path)
-    (quoted,) = re.findall(r"^    (gaits\.py:.*)$", page.read_text(), re.MULTILINE)
+    (quoted,) = re.findall(
+        r"^    (measures\.names: .*)$", page.read_text(), re.MULTILINE
+    )
     assert done.returncode != 0
     assert quoted in done.stdout + done.stderr
 
@@ -165,6 +168,24 @@ def test_experiments_of_the_experiments_page_run(tmp_path: Path) -> None:
         assert done.returncode == 0, f"{document}\n{done.stderr}"
         if "my_parts" not in document:
             parse_experiment(document, str(tmp_path / page.name))
+
+
+def test_experiments_of_the_brains_page_run(tmp_path: Path) -> None:
+    """Each runs equally with one and two workers."""
+    write_module(tmp_path)
+    for document in _blocks(TOP / "docs" / "brains.md", "toml"):
+        (tmp_path / "mine.toml").write_text(document)
+        runs = []
+        for workers in ("1", "2"):
+            runs.append(f"out-{len(document)}-{workers}")
+            done = _python(
+                ("-m", "revolve", "run", "mine.toml", "--births", "20",
+                 "--workers", workers, "--quiet", "--out", runs[-1]),
+                tmp_path,
+            )  # fmt: skip
+            assert done.returncode == 0, f"{document}\n{done.stderr}"
+        done = _python(("-m", "revolve", "compare", *runs), tmp_path)
+        assert done.returncode == 0, done.stdout
 
 
 def test_parts_page_runs(tmp_path: Path) -> None:
