@@ -1,4 +1,4 @@
-"""Boxes of a body in the core's frame, joints at zero."""
+"""Boxes and cylinders of a body in the core's frame, joints at zero."""
 
 import math
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from schema.parts import IDENTITY, BodySpace, Shape, Vector
-from schema.robot.frames import place_parts, shapes_of
+from schema.robot.frames import place_parts, round_reach, shapes_of
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 
@@ -27,6 +27,7 @@ class Boxes:
         half: (N, 3) half of the lengths along the box's own axes [m].
         lower, upper: (N, 3) corners of each box's axis-aligned hull [m].
         mass: total mass [kg].
+        round: indices of those that are cylinders, ascending.
     """
 
     count: Indices
@@ -36,6 +37,7 @@ class Boxes:
     lower: Floats
     upper: Floats
     mass: float
+    round: tuple[int, ...] = ()
 
 
 def place_boxes(robot: Robot, space: BodySpace) -> Boxes:
@@ -57,15 +59,19 @@ def place_boxes(robot: Robot, space: BodySpace) -> Boxes:
     rotation = rotations.repeat(count, axis=0)
     centre = (rotation @ local[:, :, None])[:, :, 0]
     centre += positions.repeat(count, axis=0)
-    first = 0
+    first, cylinders = 0, []
     for table in tables:
         for index, tilt in table.tilts:
             rotation[first + index] = rotation[first + index].dot(tilt)
+        cylinders += [first + index for index in table.round]
         first += len(table.masses)
     reach = (np.abs(rotation) @ half[:, :, None])[:, :, 0]
+    for index in cylinders:
+        own = half[index].tolist()
+        reach[index] = [round_reach(row, own) for row in rotation[index].tolist()]
     mass = math.fsum(chain.from_iterable([table.masses for table in tables]))
     lower, upper = centre - reach, centre + reach
-    return Boxes(count, rotation, centre, half, lower, upper, mass)
+    return Boxes(count, rotation, centre, half, lower, upper, mass, tuple(cylinders))
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +82,13 @@ class _Table:
         lengths: (B, 6) size, then centre [m].
         masses: mass of each box [kg].
         tilts: index and (3, 3) rotation of each box that is rotated in its part.
+        round: indices of the cylinders.
     """
 
     lengths: Floats
     masses: list[float]
     tilts: list[tuple[int, Floats]]
+    round: list[int]
 
 
 @lru_cache(maxsize=1024)
@@ -94,6 +102,7 @@ def _table(shape: Shape) -> _Table:
             for index, box in enumerate(boxes)
             if box.rotation is not IDENTITY
         ],
+        [index for index, box in enumerate(boxes) if box.is_round],
     )
 
 

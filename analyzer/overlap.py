@@ -4,13 +4,18 @@ Two boxes are apart exactly if they are apart along one of 15 directions: the th
 axes of each box and the nine cross products of an axis of either. The least overlap
 along these directions is the depth of the intersection.
 
+Pairs with a cylinder are examined in ``analyzer.cylinders``.
+
 Source: Gottschalk, Lin, Manocha, *OBBTree*, 1996, section 5.
 """
+
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from analyzer.boxes import Boxes, Indices
+from analyzer.cylinders import round_separation
 from schema.experiment.document import Vetting
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
@@ -61,6 +66,10 @@ def intersecting_parts(
         hit = np.ones(one.size, dtype=bool)
         hit[tilted] = _is_hit(separation(boxes, one[tilted], other[tilted]), vetting)
         one, other = one[hit], other[hit]
+    if boxes.round:
+        # Boxes around cylinders meet; the cylinders may be apart all the same.
+        hit = _is_hit(_round_separations(boxes, one, other, vetting), vetting)
+        one, other = one[hit], other[hit]
     part = np.arange(len(boxes.count)).repeat(boxes.count)
     pairs = zip(part[one].tolist(), part[other].tolist(), strict=True)
     return tuple(sorted(set(pairs)))
@@ -106,6 +115,22 @@ def separation(boxes: Boxes, first: Indices, second: Indices) -> Floats:
     parts = (on_a, on_b, crossed.reshape(-1, 9))
     separations: Floats = np.concatenate(parts, axis=1).max(axis=1)
     return separations
+
+
+def _round_separations(
+    boxes: Boxes, first: Indices, second: Indices, vetting: Vetting
+) -> Floats:
+    """Return the separation of pairs whose boxes meet; bounds where they decide."""
+    curved = list(boxes.round)
+    half = boxes.half.copy()
+    half[curved, :2] *= 0.7
+    # Where boxes inside of the cylinders meet, no search is needed.
+    found = separation(replace(boxes, half=half), first, second)
+    is_round = np.isin(first, curved) | np.isin(second, curved)
+    for pair in np.flatnonzero(is_round & ~_is_hit(found, vetting)).tolist():
+        ends = int(first[pair]), int(second[pair])
+        found[pair] = round_separation(boxes, *ends, vetting.tolerance_m)
+    return np.where(is_round, found, -np.inf)
 
 
 def _is_hit(apart: Floats, vetting: Vetting) -> Mask:

@@ -29,13 +29,17 @@ def answer(request: bytes) -> bytes:
         InvalidRobot: the body space does not allow the body.
     """
     start = time.perf_counter()
-    decoded = decode_request(request, decode_body)
+    decoded = decode_request(request, decode_body, _body_space)
     settings = read_vetting_settings(decoded.settings)
-    space = body_space(settings.space)
+    space = _body_space(decoded.settings)
     check_body(decoded.robot.parts, space)
     report = analyze(decoded.robot, space, settings.vetting)
     wall_s = time.perf_counter() - start
     return encode_answer(Answer(decoded.epoch, decoded.number, wall_s, report))
+
+
+def _body_space(settings: bytes) -> BodySpace:
+    return body_space(read_vetting_settings(settings).space)
 
 
 def analyze(robot: Robot, space: BodySpace, vetting: Vetting) -> Report:

@@ -1,17 +1,25 @@
-"""Commands of the coordinator: run, coordinator, resume, compare, bench dispatch."""
+"""Commands of the coordinator: runs, their comparison, plug-ins, bench dispatch."""
 
 import argparse
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
+import schema.experiment.kinds
 from coordinator.cli.deployment import Deployment
 from coordinator.cli.execute import resume, start, start_campaign
 from coordinator.cli.flags import parser
 from coordinator.dispatch.events import AgentKind
+from coordinator.evolution.check_brain_genes import check_brain_genes
+from coordinator.evolution.check_encoding import check_encoding
+from coordinator.evolution.encodings import encoding_of
+from coordinator.plugins.checks import refuse_faulty
+from coordinator.plugins.command import check, list_plugins
 from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
     Campaign,
+    campaign_plugins,
     is_campaign,
     read_campaign,
     read_experiments,
@@ -38,9 +46,11 @@ from schema.experiment.document import (
     with_births,
 )
 from schema.experiment.file import experiment_from_text
-from schema.experiment.settings import fitness_function
+from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
+from schema.plugins.kept import allow_kept
 from schema.plugins.permission import allow, allow_references
+from schema.tables.description import allow_plugins_of
 
 
 def main(arguments: list[str]) -> int:
@@ -50,10 +60,14 @@ def main(arguments: list[str]) -> int:
         arguments: the command's name first.
 
     Returns:
-        0 for success; 1 if ``compare`` found a difference, a run of a campaign
-        failed, or all evaluations failed; 130 after Ctrl-C, SIGTERM, SIGHUP or SIGUSR1.
+        0 for success; 1 if ``compare`` found a difference, a plug-in is refused, a run
+        of a campaign failed, or all evaluations failed; 130 after Ctrl-C, SIGTERM,
+        SIGHUP or SIGUSR1.
     """
     command, words = arguments[0], arguments[1:]
+    if command in ("check", "plugins"):
+        about_plugins = check if command == "check" else list_plugins
+        return about_plugins(words, plugin_kinds())
     flags = parser(command)
     options = flags.parse_args(words)
     if command == "compare":
@@ -88,6 +102,13 @@ def main(arguments: list[str]) -> int:
     return _stoppable(folder, lambda: start_campaign(folder, campaign, deployment))
 
 
+def plugin_kinds() -> tuple[Kind, ...]:
+    """Return all kinds of plug-ins; imports the room of the worker."""
+    import worker.kinds
+
+    return (*schema.experiment.kinds.KINDS, *worker.kinds.KINDS)
+
+
 def _stoppable(folder: Path, execute: Callable[[], int]) -> int:
     """Execute a folder's runs; after Ctrl-C say how to resume them."""
     try:
@@ -103,7 +124,10 @@ def _stoppable(folder: Path, execute: Callable[[], int]) -> int:
 
 
 def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
-    """Return the experiments to run, checked as far as possible in advance."""
+    """Return the experiments to run, checked; imports the room of the worker."""
+    import worker.measures.functions
+
+    refuse_faulty(options.experiments)
     experiments = read_experiments(options.experiments)
     if options.births is not None:
         experiments = tuple(
@@ -111,19 +135,50 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
         )
     for experiment in experiments:
         check_experiment(experiment, "--births" if options.births else experiment.name)
-        for number in range(island_count(experiment)):
-            fitness_function(island_experiment(experiment, number).fitness)
+        worker.measures.functions.check_functions(experiment)
+        _check_own_brain(experiment)
+        _check_encodings(experiment)
     return experiments
+
+
+def _check_own_brain(experiment: Experiment) -> None:
+    """Raise unless both halves of a user's brain or neuron types keep their contract.
+
+    Raises:
+        ExperimentError: file, line, what was expected and what came.
+    """
+    names = (experiment.brain.type, *experiment.space.neuron_types)
+    if not any(":" in name for name in names):
+        return
+    from worker.robot.brains import controls_of
+
+    clock = experiment.simulation
+    tick_s = clock.brain_steps * clock.timestep_s
+    check_brain_genes(experiment)
+    # Its check runs when it is made.
+    controls_of(experiment.brain, experiment.space, tick_s)
+
+
+def _check_encodings(experiment: Experiment) -> None:
+    """Raise unless the encoding works with the settings of each island."""
+    numbers = range(island_count(experiment))
+    for own in dict.fromkeys(island_experiment(experiment, each) for each in numbers):
+        encoding_of(own)
+        if ":" in own.encoding.type:
+            check_encoding(own, time.monotonic)
 
 
 def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
     """Return the experiments of a run or campaign folder."""
     if is_campaign(folder):
+        allow_kept(folder, campaign_plugins(folder), is_resumed=True)
         experiments = read_campaign(folder).experiments
     else:
+        allow_plugins_of(folder, is_resumed=True)
         experiments = (experiment_from_text(read_details(folder).document),)
     for experiment in experiments:
         allow_references(references(experiment))
+        _check_encodings(experiment)
     return experiments
 
 

@@ -20,6 +20,8 @@ COMMANDS = {
     "log": ("coordinator.cli.log", "print the journal of a run"),
     "arena": ("coordinator.cli.arena", "inspect and control a running arena"),
     "compare": (_COORDINATOR, "compare two runs that should be equal"),
+    "plugins": (_COORDINATOR, "list plug-ins, built-in or found"),
+    "check": (_COORDINATOR, "check plug-ins as a run does"),
     "worker": ("worker.__main__", "simulate robots for a coordinator"),
     "analyzer": ("analyzer.__main__", "vet robot bodies for a coordinator"),
     "robot": ("schema.__main__", "check, convert or show a robot file"),

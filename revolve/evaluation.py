@@ -6,7 +6,7 @@ from pathlib import Path
 
 from revolve.children import SIMULATOR
 from revolve.experiment import Experiment, document_of
-from revolve.robot import DEFAULT, Robot, task_of
+from revolve.robot import DEFAULT, Robot, plain, task_of
 from revolve.trace import Trace, unpack_trace
 from schema.errors import SimulationDiverged
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
@@ -61,10 +61,11 @@ def evaluate(
     """
     settings = settings_for(robot, experiment)
     outcome = SIMULATOR.do(task_of(robot, settings, is_judged=True))
-    trace = None if outcome.trace is None else unpack_trace(outcome.trace)
+    trace = unpack_trace(outcome.trace, plain(robot)) if outcome.trace else None
     if outcome.failure:
         return Result(failure=outcome.failure, trace=trace)
-    return result_of(Evaluation(**outcome.numbers), trace)
+    assert outcome.evaluation is not None
+    return result_of(outcome.evaluation, settings, trace)
 
 
 def simulate(
@@ -81,10 +82,11 @@ def simulate(
         InvalidRobot: as for ``evaluate``.
         ExperimentError: as for ``evaluate``.
     """
-    outcome = SIMULATOR.do(task_of(robot, settings_for(robot, experiment)))
+    settings = settings_for(robot, experiment)
+    outcome = SIMULATOR.do(task_of(robot, settings))
     if outcome.trace is None:
         raise SimulationDiverged(outcome.failure)
-    return unpack_trace(outcome.trace)
+    return unpack_trace(outcome.trace, plain(robot))
 
 
 def settings_for(
@@ -99,12 +101,16 @@ def settings_for(
     return evaluation_settings_of(document_of(experiment or own or DEFAULT))
 
 
-def result_of(evaluation: Evaluation, trace: Trace | None = None) -> Result:
+def result_of(
+    evaluation: Evaluation, settings: EvaluationSettings, trace: Trace | None = None
+) -> Result:
     """Return a worker's evaluation as a result."""
+    labels = settings.measures.labels
     return Result(
         evaluation.fitness,
         evaluation.path_velocity,
         evaluation.straight_velocity,
         evaluation.simulated_s,
+        dict(zip(labels, evaluation.measures, strict=True)),
         trace=trace,
     )

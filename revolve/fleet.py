@@ -252,9 +252,12 @@ class Fleet:
             "evaluate",
             partial(_encode, settings=data, robot=encoded),
             lambda expected: partial(
-                read_evaluation, expected=expected, simulated_s=simulated_s
+                read_evaluation,
+                expected=expected,
+                simulated_s=simulated_s,
+                measures=len(settings.measures.names),
             ),
-            _settle,
+            partial(_settle, settings=settings),
         )
         return self._order(order)
 
@@ -330,7 +333,7 @@ def _encode(
     )
 
 
-def _settle(end: Deliver) -> Result:
+def _settle(end: Deliver, settings: EvaluationSettings) -> Result:
     """Return the result that the end of an evaluation gives.
 
     Raises:
@@ -343,7 +346,7 @@ def _settle(end: Deliver) -> Result:
     assert isinstance(end.answer, Answer)
     found = end.answer.result
     if isinstance(found, Evaluation):
-        return result_of(found)
+        return result_of(found, settings)
     return Result(failure=str(found))
 
 

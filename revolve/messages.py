@@ -5,6 +5,7 @@ import msgspec
 import schema.errors
 from revolve.trace import PackedTrace
 from schema.errors import RevolveError
+from schema.robot.results import Evaluation
 
 
 class Problem(msgspec.Struct, frozen=True):
@@ -37,14 +38,14 @@ class Outcome(msgspec.Struct, frozen=True):
 
     Attributes:
         trace: of a simulation.
-        numbers: fields of the evaluation, by name.
+        evaluation: its numbers, if it was to be judged.
         failure: why there is no evaluation, or no trace.
         picture: PNG.
         problem: why nothing could be done.
     """
 
     trace: PackedTrace | None = None
-    numbers: dict[str, float] = {}
+    evaluation: Evaluation | None = None
     failure: str = ""
     picture: bytes = b""
     problem: Problem | None = None

@@ -14,12 +14,11 @@ from revolve.children import run_command
 from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, of_plain
 from schema.errors import RevolveError, RunFolderError
-from schema.experiment.document import body_space, island_experiment
+from schema.experiment.document import island_experiment
 from schema.experiment.file import own_experiment
-from schema.robot.genome import develop
 from schema.tables.description import DETAILS, read_description, read_state
 from schema.tables.files import read_table
-from schema.wire.codec import decode_genome
+from schema.wire.born import robot_of_birth
 
 Folder = str | Path
 
@@ -157,12 +156,10 @@ class Run:
             for island in set(homes)
         }
         own = {island: Experiment(each) for island, each in documents.items()}
+        genomes, stored = (rows[name].to_pylist() for name in ("genome", "robot"))
         return [
-            of_plain(
-                develop(decode_genome(genome), body_space(documents[island].space)),
-                own[island],
-            )
-            for island, genome in zip(homes, rows["genome"].to_pylist(), strict=True)
+            of_plain(robot_of_birth(genome, robot, documents[island]), own[island])
+            for island, genome, robot in zip(homes, genomes, stored, strict=True)
         ]
 
     def best(self, count: int = 1) -> list[Robot]:

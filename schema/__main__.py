@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from schema.errors import RevolveError
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.flags import Flags, add_plugins
@@ -12,6 +13,7 @@ from schema.formats.files import read_robot, settings_of, write_robot
 from schema.parts import BUILT_IN, BodySpace
 from schema.plugins.permission import allow
 from schema.robot.brain import neuron_names
+from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.robot import Robot
 
 
@@ -31,12 +33,15 @@ def main(argv: list[str] | None = None) -> int:
     options = _parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
     allow(options.plugins)
     experiment = read_experiment(options.experiment) if options.experiment else None
-    space = body_space(experiment.space) if experiment else BUILT_IN
-    robot = read_robot(options.file, space)
+    space, kinds = BUILT_IN, BUILT_IN_KINDS
+    if experiment:
+        space = body_space(experiment.space)
+        kinds = neuron_kinds(experiment.brain, experiment.space)
+    robot = read_robot(options.file, space, kinds)
     if options.command == "check":
         print(f"{options.file}: well formed; {_summary(robot)}")
     elif options.command == "convert":
-        write_robot(robot, options.output, space, settings_of(experiment))
+        write_robot(robot, options.output, space, settings_of(experiment), kinds)
         print(f"{options.output}: written")
     else:
         _show(robot, space, options.file.name)

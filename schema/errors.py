@@ -78,6 +78,10 @@ class RunPaused(RevolveError):  # noqa: N818 - reads as what it says
     """A run stops and waits for its user; ``revolve resume`` continues it."""
 
 
+class SensorFailed(RevolveError):  # noqa: N818 - reads as what it says
+    """A sensor of a plug-in raised or gave wrong values: a failed result."""
+
+
 class SimulationDiverged(RevolveError):  # noqa: N818 - reads as what it says
     """The simulation diverged: a failed result."""
 
@@ -86,7 +90,7 @@ class StateDiffers(RevolveError):  # noqa: N818 - reads as what it says
     """A rebuilt arena has another state: this machine computes differently."""
 
 
-def one_line(error: Exception) -> str:
+def one_line(error: BaseException) -> str:
     """Return the message of an error as one line."""
     return " ".join(str(error).split())
 

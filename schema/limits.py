@@ -62,6 +62,8 @@ SNAPSHOT_ROBOT_BYTES = 256 * KIB
 """A robot in a snapshot, without its window."""
 SNAPSHOT_SAMPLE_BYTES = 32
 """A sample of a robot's window in a snapshot."""
+CHANNEL_NUMBERS = 8
+"""Numbers of such a sample's channels that are not of a part or a sensor."""
 
 # Counts
 
@@ -69,6 +71,10 @@ MOST_PARTS = 1000
 MOST_NEURONS = 10_000
 MOST_CONNECTIONS = 50_000
 """Parts, neurons and connections of a robot, or of a genome."""
+MOST_NEURON_PARAMETERS = 32
+"""Evolving parameters of a neuron."""
+MOST_NEURON_STATES = 16
+"""State variables of a neuron."""
 MOST_LIVE_ROWS = 500_000
 """Poses in a message to viewers."""
 UNCOUNTED_BYTES = 1 * MIB
@@ -77,6 +83,9 @@ MOST_SUBMESSAGES = 500_000
 """Submessages of a message; each takes some 100 bytes of memory."""
 MOST_FIELDS = 4_000_000
 """Fields of a message, those of submessages included."""
+
+MOST_MEASURES = 100
+"""Measures of an experiment; an answer has the number of each."""
 
 # Agents and what they say
 
@@ -155,6 +164,10 @@ MOST_COUNT = 2**63 - 1
 """Greatest whole number in an experiment."""
 MOST_GEOMS = 10_000
 """Geoms of scenery, replicated ones included."""
+MOST_OBJECTS = 100
+"""Objects of scenery that move, replicated ones included."""
+MOST_PLUGIN_BYTES = 4 * MIB
+"""Source of a plug-in file, which a run folder keeps."""
 MOST_PLUGIN_CHARACTERS = 10_000
 """Length of the list of plug-ins and digests in a request."""
 

@@ -8,9 +8,9 @@ these types follow the code, which produced the results.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal, Protocol
 
 from msgspec import Struct
 
@@ -23,15 +23,17 @@ BAR_KG_PER_M = 0.02
 
 
 class Box(Struct, frozen=True):
-    """Box of a part, of uniform density; it collides.
+    """Box or cylinder of a part, of uniform density; it collides.
 
     Attributes:
         name: unique within the part.
-        size: full lengths along its own x, y, z [m].
+        size: full lengths along its own x, y, z [m]; of a cylinder, its diameter
+            twice, and its length.
         position: centre in the part frame [m].
         mass: [kg].
         segment: 0 on the side of slot 0, 1 beyond the joint.
         rotation: box frame to part frame, rows first.
+        is_round: it is a cylinder about its own z axis; see ``cylinder``.
     """
 
     name: str
@@ -40,6 +42,33 @@ class Box(Struct, frozen=True):
     mass: float
     segment: int = 0
     rotation: Matrix = IDENTITY
+    is_round: bool = False
+
+
+def cylinder(
+    name: str,
+    radius: float,
+    length: float,
+    position: Vector,
+    mass: float,
+    *,
+    segment: int = 0,
+    rotation: Matrix = IDENTITY,
+) -> Box:
+    """Return a cylinder about its own z axis, for the boxes of a shape.
+
+    Args:
+        name: unique within the part.
+        radius: [m].
+        length: along the axis [m].
+        position: centre in the part frame [m].
+        mass: [kg].
+        segment: 0 on the side of slot 0, 1 beyond the joint.
+        rotation: cylinder frame to part frame, rows first; the default is an axis
+            along the part's z.
+    """
+    size = (2.0 * radius, 2.0 * radius, length)
+    return Box(name, size, position, mass, segment, rotation, is_round=True)
 
 
 class Slot(Struct, frozen=True, cache_hash=True):
@@ -52,35 +81,50 @@ class Slot(Struct, frozen=True, cache_hash=True):
 
 
 class Joint(Struct, frozen=True):
-    """Revolute joint between the two segments of a part.
+    """Joint between the two segments of a part.
+
+    A ``revolute`` joint turns within a limit, a ``continuous`` one turns freely, as
+    a wheel does, and a ``prismatic`` one slides within a limit.
 
     Attributes:
         anchor: a point of the axis in the part frame [m].
-        axis: a positive angle rotates segment 1 about it relative to segment 0.
-        limit: greatest absolute angle [rad].
+        axis: a positive angle rotates segment 1 about it relative to segment 0; a
+            positive displacement moves segment 1 along it.
+        limit: greatest absolute angle [rad] or displacement [m]; infinite if
+            continuous.
+        kind: of the joint, as in URDF.
     """
 
     anchor: Vector
     axis: Vector
-    limit: float
+    limit: float = math.inf
+    kind: Literal["revolute", "continuous", "prismatic"] = "revolute"
 
 
 @dataclass(frozen=True, slots=True)
 class Motor:
-    """Position servo that commands a velocity and holds it between brain ticks.
+    """Servo that commands a velocity and holds it between brain ticks.
 
-    Commanded velocity = gain * (target - angle) [rad/s], where target runs over
-    the joint's range as the network output runs over [0, 1].
+    The network output runs over [0, 1]. Control of ``position``: commanded velocity =
+    gain * (target - angle), where target runs over the joint's range. Control of
+    ``velocity``: the commanded velocity runs from -max_velocity to max_velocity.
+
+    Attributes:
+        gain: of a position control [1/s].
+        max_torque: greatest torque [N m]; of a slider, force [N].
+        max_velocity: greatest commanded velocity [rad/s]; of a slider [m/s].
+        control: ``position`` or ``velocity``; a continuous joint needs ``velocity``.
     """
 
     gain: float
     max_torque: float
     max_velocity: float
+    control: Literal["position", "velocity"] = "position"
 
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """Sensor: ``imu`` gives 6 inputs, ``touch`` and ``light`` one each.
+    """Built-in sensor: ``imu`` gives 6 inputs, ``touch`` and ``light`` one each.
 
     Attributes:
         kind: what it measures.
@@ -94,6 +138,17 @@ class Sensor:
     def inputs(self) -> int:
         """Number of network inputs."""
         return 6 if self.kind == "imu" else 1
+
+
+class OwnSensor(Protocol):
+    """Sensor of a plug-in; ``schema.plugins.protocols.SensorType`` explains it."""
+
+    @property
+    def inputs(self) -> int:
+        """Number of network inputs."""
+
+    def read(self, view: Any, /) -> Sequence[float]:  # noqa: ANN401 - a SensorView
+        """Return the values of the inputs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +188,7 @@ class PartType:
         arity: number of slots.
         shape: maps parameter values, in the order of ``parameters``, to geometry.
         own_parameters: parameters before the three colours.
-        sensors: in the order of their inputs.
+        sensors: built-in or own, in the order of their inputs.
         motor: drives the joint by one network output; None for no motor.
         is_root: it is a core, which is always and only the root of a tree.
         is_levelled: in planar bodies it is rotated into the plane of the core.
@@ -147,7 +202,7 @@ class PartType:
     arity: int
     shape: Callable[[tuple[float, ...]], Shape]
     own_parameters: tuple[Parameter, ...] = ()
-    sensors: tuple[Sensor, ...] = ()
+    sensors: tuple[Sensor | OwnSensor, ...] = ()
     motor: Motor | None = None
     is_root: bool = False
     is_levelled: bool = False

@@ -8,15 +8,29 @@ the thesis. An experiment names the types::
     [space]
     part_types = ["schema.robogen_parts:CORE", "schema.robogen_parts:FIXED_BRICK"]
 
-Source: the code of the original, and RoboGen's published sources for the gaps between
-boxes.
+The thesis's part set lacks wheels and the infrared sensor; they go with both sets.
+
+Source: the code of the original, with its wheels, and RoboGen's published sources for
+the gaps between boxes and for the infrared sensor.
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 from schema import parts
-from schema.parts import Box, Joint, Matrix, Shape, Slot, Vector
+from schema.parts import (
+    Box,
+    Joint,
+    Matrix,
+    Motor,
+    Parameter,
+    PartType,
+    Shape,
+    Slot,
+    Vector,
+    cylinder,
+)
 
 BAR_KG_PER_M = 0.137
 """Mass of a bar per metre: 1.37 g/cm."""
@@ -104,3 +118,101 @@ HINGE = replace(parts.HINGE, shape=parts.constant_shape(_HINGE))
 PARAMETRIC_BAR_JOINT = replace(parts.PARAMETRIC_BAR_JOINT, shape=_bar)
 TOUCH_SENSOR = replace(parts.TOUCH_SENSOR, shape=parts.constant_shape(_TOUCH))
 LIGHT_SENSOR = parts.LIGHT_SENSOR
+
+IR_RANGE_M = 0.5
+"""Range of the infrared sensor [m]; RoboGen's is 0.255 m."""
+_WHEEL_M = 0.003
+"""Thickness of wheels [m]."""
+_MINUS_Z: Vector = (0.0, 0.0, -1.0)
+_RADIUS = Parameter("radius", 40.0, 80.0, 60.0)
+"""In millimetres, as the lengths in the genome of the original."""
+WHEEL_MOTOR = Motor(gain=0.0, max_torque=0.3924, max_velocity=5.236, control="velocity")
+"""4 kg cm, 50 rpm; outputs from 0 to 1 command -50 to 50 rpm."""
+
+
+def _wheel(values: tuple[float, ...]) -> Shape:
+    """Return a free wheel: a block, and a disc that turns about it."""
+    size = (0.034, 0.034, 0.01075)
+    centre = (0.0, 0.0, 0.000625)
+    radius = values[0] / 1000.0
+    return Shape(
+        boxes=(
+            Box("block", size, (0.0, 0.0, 0.0), 0.0025),
+            cylinder("wheel", radius, _WHEEL_M, centre, 0.004, segment=1),
+        ),
+        slots=(Slot((0.0, 0.0, -0.005375), _MINUS_Z, parts.Y),),
+        joint=Joint(centre, _MINUS_Z, kind="continuous"),
+    )
+
+
+def _active_wheel(values: tuple[float, ...]) -> Shape:
+    """Return a driven wheel: a plate, a servo, and a disc at its end."""
+    plate, servo = (0.034, 0.034, 0.0015), (0.014, 0.014, 0.0338)
+    end = (0.0, 0.0, 0.0333)
+    radius = values[0] / 1000.0
+    return Shape(
+        boxes=(
+            Box("plate", plate, (0.0, 0.0, 0.0), 0.004),
+            Box("servo", servo, (0.0, 0.0, 0.0164), 0.009),
+            cylinder("wheel", radius, _WHEEL_M, end, 0.005, segment=1),
+        ),
+        slots=(Slot((0.0, 0.0, -0.00075), _MINUS_Z, parts.Y),),
+        joint=Joint(end, _MINUS_Z, kind="continuous"),
+    )
+
+
+class _Rays(Protocol):
+    """What the infrared sensor needs of ``schema.plugins.protocols.SensorView``."""
+
+    def distance(
+        self, box: str, direction: Vector, reach: float, start: Vector
+    ) -> float:
+        """Return how far a ray gets [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Infrared:
+    """Sensor that measures how near the first obstacle ahead of a box is.
+
+    It gives 1 - distance / range: 0 if nothing is within range, 1 at the sensor.
+
+    Attributes:
+        box: that sends the ray, along its x axis.
+        start: of the ray, in the frame of the box [m].
+        range_m: [m].
+        inputs: one.
+    """
+
+    box: str
+    start: Vector
+    range_m: float = IR_RANGE_M
+
+    @property
+    def inputs(self) -> int:
+        """Number of network inputs."""
+        return 1
+
+    def read(self, view: _Rays, /) -> tuple[float]:
+        """Return the nearness of the first obstacle."""
+        distance = view.distance(self.box, parts.X, self.range_m, self.start)
+        return (1.0 - distance / self.range_m,)
+
+
+_INFRARED = Shape(
+    boxes=(
+        Box("base", parts.PLATE, (0.0, 0.0, 0.0), 0.001),
+        Box("platform", (0.0055, 0.0233, 0.023), (0.0035, 0.0, 0.0), 0.001),
+    ),
+    slots=(parts.BASE_SLOT_Y,),
+)
+WHEEL = PartType("Wheel", 1, _wheel, own_parameters=(_RADIUS,))
+ACTIVE_WHEEL = PartType(
+    "ActiveWheel", 1, _active_wheel, own_parameters=(_RADIUS,), motor=WHEEL_MOTOR
+)
+IR_SENSOR = PartType(
+    "IrSensor",
+    1,
+    parts.constant_shape(_INFRARED),
+    # RoboGen's ray starts 6 mm from the centre of the base.
+    sensors=(Infrared("platform", (0.0025, 0.0, 0.0)),),
+)

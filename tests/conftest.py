@@ -4,11 +4,14 @@ import logging
 import os
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 from analysis.render.picture import NoPictures, choose_engine
+from schema.plugins import permission
+from tests.own_brains import write_module
 
 # MuJoCo selects its rendering engine when it is first imported, by whichever test comes
 # first. Processes that tests start select their own engine.
@@ -33,3 +36,10 @@ def _plain_log(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setenv("REVOLVE_LOG", "")
     yield
     logging.getLogger("revolve").handlers.clear()
+
+
+@pytest.fixture
+def _own_brains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Allow the module of docs/brains.md as the plug-in ``my_brains``."""
+    module = {"my_brains": write_module(tmp_path)}
+    monkeypatch.setattr(permission, "_allowed", {**permission._allowed, **module})

@@ -1,36 +1,42 @@
 """Fitness functions and the check of their contract.
 
-A fitness function is any ``module:attribute`` that takes a track and the
-experiment's fitness section and returns a finite number, higher is better.
+A fitness function is any ``module:attribute`` that takes a trace and its parameters
+and returns a finite number, higher is better. Its second argument is annotated with a
+msgspec Struct, which gets the table ``[fitness.parameters]``; without such an
+annotation it gets the experiment's fitness section.
 """
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from schema.errors import ExperimentError, FitnessUndefined
+from schema.errors import FitnessUndefined
 from schema.experiment.document import Fitness
-from schema.experiment.settings import fitness_function
-from schema.robot.results import Floats, Track
+from schema.experiment.settings import fitness_argument, fitness_function
+from schema.plugins.simple_traces import check_function
+from schema.robot.trace import Trace
 
-FitnessFunction = Callable[[Track, Fitness], float]
-"""Function that ``fitness.function`` names: fitness of a track; finite, maximised."""
+FitnessFunction = Callable[[Trace, Any], float]
+"""Function that ``fitness.function`` names: fitness of a trace; finite, maximised."""
 
 
-def fitness_of(track: Track, fitness: Fitness) -> float:
-    """Return the fitness of a track, by the experiment's function.
+def fitness_of(trace: Trace, fitness: Fitness) -> float:
+    """Return the fitness of a trace, by the experiment's function.
 
     Args:
-        track: (T, 3) positions; T >= 2.
-        fitness: names the function and its weights.
+        trace: of T samples with all channels that the function declares; T >= 2.
+        fitness: names the function and its parameters.
 
     Raises:
         FitnessUndefined: the function raised or gave no finite number.
+        ExperimentError: an unknown function, or parameters that it refuses.
     """
     function = fitness_function(fitness)
+    argument = fitness_argument(function, fitness)
     try:
-        value = float(function(track, fitness))
+        value = float(function(trace, argument))
     except Exception as error:
         raise FitnessUndefined(
             f"{fitness.function} raised {type(error).__name__}: {error}"
@@ -42,7 +48,7 @@ def fitness_of(track: Track, fitness: Fitness) -> float:
     return value
 
 
-def path_velocity(track: Track) -> float:
+def path_velocity(track: Trace) -> float:
     """Return path length over time in the ground plane [m/s].
 
     Args:
@@ -54,7 +60,7 @@ def path_velocity(track: Track) -> float:
     return length / _duration_s(track)
 
 
-def straight_velocity(track: Track) -> float:
+def straight_velocity(track: Trace) -> float:
     """Return net distance over time in the ground plane [m/s].
 
     Args:
@@ -64,11 +70,11 @@ def straight_velocity(track: Track) -> float:
     return math.hypot(x, y) / _duration_s(track)
 
 
-def _duration_s(track: Track) -> float:
+def _duration_s(track: Trace) -> float:
     return (len(track.core_position) - 1) * track.interval_s
 
 
-def thesis(track: Track, fitness: Fitness) -> float:
+def thesis(track: Trace, fitness: Fitness) -> float:
     """Return f = path_weight v + straight_weight s, or 0 above the limit.
 
     v is the path velocity, s the straight one. The limit is one of fitness, not
@@ -90,48 +96,15 @@ def thesis(track: Track, fitness: Fitness) -> float:
 
 
 def check_fitness(function: FitnessFunction, fitness: Fitness) -> None:
-    """Raise unless a fitness function keeps its contract on four simple tracks.
+    """Raise unless a fitness function keeps its contract on simple traces.
 
     Args:
         function: the function that an experiment would name.
         fitness: the experiment's section.
 
     Raises:
-        ExperimentError: it returns no number, a number that is not finite, different
-            numbers for one track, or writes to the track.
+        ExperimentError: as of ``schema.plugins.simple_traces.check_function``, or
+            parameters that it refuses.
     """
-    for name, positions in _simple_tracks().items():
-        track = Track(0.2, positions.copy())
-        values = [function(track, fitness) for _ in range(2)]
-        for value in values:
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise ExperimentError(
-                    f"fitness.function: must return a number, got {value!r} "
-                    f"for a {name} track"
-                )
-            if not math.isfinite(value):
-                raise ExperimentError(
-                    f"fitness.function: must return a finite number, got {value} "
-                    f"for a {name} track"
-                )
-        if values[0] != values[1]:
-            raise ExperimentError(
-                "fitness.function: must return the same for the same track, got "
-                f"{values[0]} and {values[1]} for a {name} track"
-            )
-        if not np.array_equal(track.core_position, positions):
-            raise ExperimentError(
-                f"fitness.function: must not write to the track, but changed a "
-                f"{name} one"
-            )
-
-
-def _simple_tracks() -> dict[str, Floats]:
-    along, zero = np.linspace(0.0, 0.6, 61), np.zeros(61)
-    turn = np.linspace(0.0, 2.0 * np.pi, 61)
-    return {
-        "still": np.zeros((61, 3)),
-        "straight": np.stack([along, zero, zero], axis=1),
-        "circular": np.stack([np.cos(turn), np.sin(turn), zero], axis=1),
-        "two-sample": np.array([(0.0, 0.0, 0.0), (0.01, 0.02, 0.03)]),
-    }
+    argument = fitness_argument(function, fitness)
+    check_function(function, (argument,), "fitness.function")

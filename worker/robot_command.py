@@ -4,6 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import EvaluationSettings
@@ -51,7 +52,8 @@ def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings
     if path.suffix.lower() == MJCF_ENDING and experiment is None:
         return read_mjcf(path)
     settings = settings_of(read_experiment(experiment) if experiment else None)
-    return read_robot(path, body_space(settings.space)), settings
+    kinds = neuron_kinds(settings.brain, settings.space)
+    return read_robot(path, body_space(settings.space), kinds), settings
 
 
 def _parser() -> argparse.ArgumentParser:

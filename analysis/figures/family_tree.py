@@ -106,8 +106,8 @@ def family(births: pa.Table, row: int, levels: int = LEVELS) -> Family:
     bodies = births["body"].combine_chunks()
 
     def genes(member: int) -> list[int]:
-        found: list[int] = bodies[member].values.field("gene").to_pylist()
-        return found
+        # 0 is no identity.
+        return list(filter(None, bodies[member].values.field("gene").to_pylist()))
 
     founder_of: dict[int, int] = {}
     for founder in (row for row, couple in enumerate(parents) if not couple):

@@ -20,6 +20,7 @@ from schema.errors import RevolveError
 from schema.experiment.file import own_experiment
 from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
+from schema.tables.description import allow_plugins_of
 from schema.tables.files import read_table
 
 _TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
@@ -139,6 +140,7 @@ def _robot_pictures(
     for name in bar.track(in_order(best), description="rendering robots"):
         run = runs[best[name].folder]
         try:
+            allow_plugins_of(run.folder)
             pictures[name] = robot_picture(
                 best[name],
                 read_table(run.folder, "births"),
@@ -167,7 +169,8 @@ def _add_gaits(
     caption = (
         "The fittest robot of each experiment's last populations, simulated alone and "
         "shown from the middle of its evaluation on. A part's colour shows the founder "
-        "that the part descends from; white parts were added by mutation."
+        "that the part descends from; white parts were added by mutation. Parts of "
+        "encodings that give them no identity keep their own colour."
     )
     title = "Gaits of the best robots"
     writer.add(Figure(number, title, caption, _SOURCE, lambda _: gaits(pictures)), {})
@@ -188,13 +191,20 @@ def _add_tree(writer: FigureWriter, one: RobotPicture, robots: pa.Table) -> None
     fitness = {
         BirthId(row["birth_island"], row["birth"]): row["fitness"] for row in known
     }
+    colours = (
+        "Above the dashed line are the founders whose parts survive in these robots; a "
+        "part has the colour of its founder, and white parts were added by mutation."
+    )
+    if not family.founders:
+        colours = (
+            "The encoding gives parts no identity that children inherit, so the "
+            "founders of parts are not known."
+        )
     caption = (
         f"Robot {best.birth} of {best.folder.name}, the fittest robot of the last "
         "populations, at the bottom, and its ancestors over five levels of "
         "reproduction: parents are drawn above their children. A dotted line leads to "
-        "a parent that is drawn on another level. Above the dashed line are the "
-        "founders whose parts survive in these robots; a part has the colour of its "
-        "founder, and white parts were added by mutation. The robot has "
+        f"a parent that is drawn on another level. {colours} The robot has "
         f"{one.lineage.num_rows - 1} ancestors in total."
     )
     title = f"Ancestry of the best robot of {label(best.experiment)}"

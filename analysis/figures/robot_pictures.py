@@ -13,14 +13,13 @@ from msgspec.structs import replace
 from analysis.figures.family_tree import Best, Family, family, lineage, row_of
 from analysis.render.picture import Picture, RobotRenderer, Simulate
 from schema.errors import RunFolderError
-from schema.experiment.document import Experiment, body_space, island_experiment
+from schema.experiment.document import Experiment, island_experiment
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
-from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
-from schema.wire.codec import decode_genome
+from schema.wire.born import robot_of_birth
 
 FRAMES = 6
 EVERY_S = 0.5
@@ -103,10 +102,12 @@ def robot_picture(
         return MUTATED if founder is None else paint.get(founder, FOUNDERS[-1])
 
     def painted(member: int) -> Robot:
-        genome = decode_genome(births["genome"][member].as_py())
-        robot = develop(genome, body_space(settings.space))
+        genome, stored = (births[name][member].as_py() for name in ("genome", "robot"))
+        robot = robot_of_birth(genome, stored, experiment)
         parts = tuple(
             replace(part, parameters=(*part.parameters[:-3], *colour(part.gene)))
+            if part.gene
+            else part
             for part in robot.parts
         )
         return Robot(parts, robot.brain)

@@ -16,11 +16,13 @@ from analysis.render.picture import (
     save_animation,
     save_picture,
 )
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Simulation, body_space
 from schema.experiment.file import read_experiment
 from schema.flags import Flags, add_plugins, whole_number
 from schema.formats.files import read_robot, settings_of
 from schema.plugins.permission import allow
+from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.results import Floats
 
 FILM_ENDING = ".gif"
@@ -57,7 +59,8 @@ def main(arguments: list[str], simulate: Simulate) -> int:
     settings = settings_of(read_experiment(named) if named else None)
     world = settings.simulation
     _check_gait(options.gait, world)
-    robot = read_robot(options.file, body_space(settings.space))
+    kinds = neuron_kinds(settings.brain, settings.space) if named else BUILT_IN_KINDS
+    robot = read_robot(options.file, body_space(settings.space), kinds)
     size = (options.width, options.width * 3 // 4)
     with RobotRenderer(robot, settings, size=size) as renderer:
         if not is_film and not options.gait:

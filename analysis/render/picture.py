@@ -18,8 +18,10 @@ from PIL import Image
 
 from schema.errors import RevolveError
 from schema.experiment.document import body_space
+from schema.experiment.environment import LIGHT_COLOUR, LIGHT_M
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
+from schema.parts import Vector
 from schema.robot.results import Floats, Track
 from schema.robot.robot import Robot
 
@@ -93,7 +95,7 @@ class RobotRenderer:
             body_space(settings.space),
             settings.simulation,
             settings.environment,
-            furnish=partial(_furnish, size),
+            furnish=partial(_furnish, size, settings.environment.light),
         ).compile()
         self._data = mujoco.MjData(self.model)
         try:
@@ -103,7 +105,8 @@ class RobotRenderer:
             engine = os.environ.get(_SETTING, "OpenGL")
             raise NoPictures(f"{engine} cannot render: {error}") from error
         mujoco.mj_forward(self.model, self._data)
-        geoms = self.model.geom_bodyid > 0
+        own = self.model.body("root").id
+        geoms = self.model.body_rootid[self.model.geom_bodyid] == own
         centres = self._data.geom_xpos[geoms]
         reaches = self.model.geom_rbound[geoms, np.newaxis]
         low, high = (centres - reaches).min(axis=0), (centres + reaches).max(axis=0)
@@ -141,9 +144,24 @@ class RobotRenderer:
         return np.array(self._renderer.render())
 
 
-def _furnish(size: tuple[int, int], spec: Any) -> None:  # noqa: ANN401 - imported late
-    """Add floor, light and sky to the specification of a model."""
+def _furnish(
+    size: tuple[int, int],
+    shown_light: Vector | None,
+    spec: Any,  # noqa: ANN401 - imported late
+) -> None:
+    """Add floor, light and sky to the specification of a model.
+
+    Args:
+        size: width and height of pictures [pixels].
+        shown_light: position of the light that robots read, shown as a ball [m].
+        spec: of the model.
+    """
     import mujoco  # noqa: PLC0415 - after its engine is chosen
+
+    if shown_light is not None:
+        ball = spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE)
+        ball.pos, ball.size[0], ball.rgba = shown_light, LIGHT_M, LIGHT_COLOUR
+        ball.contype = ball.conaffinity = 0
 
     spec.visual.global_.offwidth, spec.visual.global_.offheight = size
     spec.visual.global_.fovy = _FIELD_OF_VIEW

@@ -36,6 +36,7 @@ from schema.experiment.file import own_experiment
 from schema.flags import Flags, add_plugins, number
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
+from schema.tables.description import allow_plugins_of
 from schema.wire.codec import decode_body
 
 LAST_S = 600.0
@@ -81,6 +82,7 @@ def _replay(
     """Record a run from its tables, and keep serving the recording."""
     folder: Path = options.run
     run = shown_run(folder)
+    allow_plugins_of(folder)
     scene = scene_of(own_experiment(run.document))
     news = read_news(run)
     born = {one.birth for one in news.births}

@@ -1,4 +1,4 @@
-"""Rough ground and scenery as triangle meshes."""
+"""Rough ground, scenery and light as triangle meshes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,13 @@ import numpy as np
 
 from analysis.viewer.body import Float32s
 from schema.experiment.document import Simulation
-from schema.experiment.environment import Environment, relief
+from schema.experiment.environment import (
+    LIGHT_COLOUR,
+    LIGHT_M,
+    Environment,
+    relief,
+)
+from schema.parts import Vector
 from schema.robot.results import Floats
 
 _EARTH = (0.78, 0.76, 0.72, 1.0)
@@ -41,8 +47,15 @@ class Surface:
         return normals
 
 
-def surfaces(environment: Environment, simulation: Simulation) -> tuple[Surface, ...]:
-    """Return the surfaces of rough ground and scenery.
+def surfaces(
+    environment: Environment, simulation: Simulation, light: Vector | None = None
+) -> tuple[Surface, ...]:
+    """Return the surfaces of rough ground, scenery and the light.
+
+    Args:
+        environment: ground and scenery; objects that move are where they start.
+        simulation: of the scenery's defaults.
+        light: position of the light, a small ball [m].
 
     Raises:
         ExperimentError: the scenery is invalid.
@@ -58,6 +71,9 @@ def surfaces(environment: Environment, simulation: Simulation) -> tuple[Surface,
             corners = _solid(solid.shape, solid.size.tolist())
             placed = corners @ solid.rotation.T + solid.centre
             found.append(Surface(placed.astype(np.float32), solid.colour))
+    if light is not None:
+        ball = _solid("sphere", (LIGHT_M, 0.0, 0.0)) + light
+        found.append(Surface(ball.astype(np.float32), LIGHT_COLOUR))
     return tuple(found)
 
 

@@ -252,7 +252,7 @@ class LiveSource:
             return decode_live(message.data)
         news = decode_update(message.data)
         if news.is_whole and not message.asked:
-            raise MalformedMessage("update: nobody was asked for a complete state")
+            raise MalformedMessage("update: a complete state that was not requested")
         if not self._sequel.take(news):
             return None
         if news.is_whole:

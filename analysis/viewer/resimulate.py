@@ -16,7 +16,7 @@ from analysis.viewer.entities import name_of
 from analysis.viewer.motion import Motion
 from analysis.viewer.recording import ViewerError
 from schema.agent.platform_tag import platform_tag
-from schema.experiment.document import Experiment, body_space, island_experiment
+from schema.experiment.document import Experiment, island_experiment
 from schema.experiment.file import experiment_from_text
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import (
@@ -25,13 +25,12 @@ from schema.experiment.settings import (
     lasting,
     read_evaluation_settings,
 )
-from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
 from schema.tables.files import read_table
 from schema.wire.arena_codec import Rebuild
-from schema.wire.codec import decode_genome
+from schema.wire.born import robot_of_birth
 
 _TRACK = ("sim_time_s", "x", "y", "z", "qw", "qx", "qy", "qz", "angles")
 _COMPARED = ("fitness", "path_velocity", "straight_velocity", "simulated_s")
@@ -109,8 +108,9 @@ def _alone(run: Run, own: Experiment, birth: BirthId, simulators: Simulators) ->
     if recorded["simulated_s"] is not None:
         steps = round(recorded["simulated_s"] / settings.simulation.timestep_s)
         settings = lasting(settings, steps)
-    genome = _rows_of(run.folder, "births", birth)["genome"][0].as_py()
-    robot = develop(decode_genome(genome), body_space(own.space))
+    born = _rows_of(run.folder, "births", birth)
+    genome, stored = (born[name][0].as_py() for name in ("genome", "robot"))
+    robot = robot_of_birth(genome, stored, own)
     origin = Origin(seed=run.seed, run=run.number, island=birth.island)
     identity = Identity(origin, birth, recorded["trial"])
     evaluation, poses = simulators.alone(robot, settings, identity)

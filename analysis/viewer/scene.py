@@ -6,7 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.viewer.ground import Surface, surfaces
-from schema.experiment.document import Experiment, body_space, island_count
+from schema.experiment.document import (
+    Experiment,
+    body_space,
+    island_count,
+    light_of,
+)
 from schema.experiment.document import island_experiment as of_island
 from schema.mjcf.world import ring_wall
 from schema.parts import BodySpace
@@ -71,5 +76,12 @@ def scene_of(experiment: Experiment) -> Scene:
         max(reaches),
         body_space(experiment.space),
         tuple(ring_wall(arena) if arena else np.zeros((0, 10)) for arena in arenas),
-        tuple(surfaces(each.environment, each.simulation) for each in settings),
+        tuple(
+            surfaces(
+                each.environment,
+                each.simulation,
+                light_of(each.environment, each.arena),
+            )
+            for each in settings
+        ),
     )

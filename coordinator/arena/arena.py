@@ -13,6 +13,7 @@ from coordinator.arena.living import LivingRobots, Place
 from coordinator.arena.orders import Orders, inserted
 from coordinator.arena.rows import Moment, death_record, sample_records, touch_records
 from coordinator.evolution.breeding import Candidate
+from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import Purpose
 from coordinator.evolution.selection import Individual, select_culled
 from coordinator.islands.events import (
@@ -31,7 +32,7 @@ from coordinator.islands.events import (
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import birth_record, population_records
 from schema.errors import ExperimentError, UnexpectedEvent
-from schema.experiment.document import Experiment, body_space
+from schema.experiment.document import Experiment
 
 
 class Arena:
@@ -39,6 +40,7 @@ class Arena:
 
     Attributes:
         experiment: its settings.
+        encoding: of its robots.
         clock: its intervals.
         births: number of births, founders included.
         step: physics step of the last decision.
@@ -69,7 +71,7 @@ class Arena:
         self.experiment = experiment
         self._rules = rules
         self.clock = ArenaClock(rules, experiment.simulation)
-        self._space = body_space(experiment.space)
+        self.encoding = encoding_of(experiment)
         self._parents_needed = experiment.selection.parents_needed
         self._number = number
         self._vetting_queue = VettingQueue(experiment, seed, run, number)
@@ -181,7 +183,9 @@ class Arena:
             return [*self._insert(self._founders.pop()), *self._conclude()]
         commands: list[ArenaCommand] = []
         if self.step % self.clock.sample == 0:
-            commands += sample_records(self._living, self._moment)
+            commands += sample_records(
+                self._living, self._moment, self.experiment.measures.labels
+            )
         if self.step % self.clock.birth == 0:
             self.is_extinct = not self._orders.insertions and (
                 len(self._living) < self._parents_needed
@@ -214,7 +218,7 @@ class Arena:
         while orders.insertions and not self._founders and self._living.has_room:
             order = orders.insertions.pop(0)
             birth = self._vetting_queue.take_number()
-            commands += self._insert(inserted(order, birth, self._space), order.place)
+            commands += self._insert(inserted(order, birth, self.encoding), order.place)
         if self._migration is not None and not self._founders:
             commands += self._migration.exchange(self._moment)
             if self._migration.epochs.is_waiting:
@@ -269,7 +273,7 @@ class Arena:
         self.births += 1
         now_s = self.clock.seconds(self.step)
         born = birth_record(
-            candidate, individual, self._space, sim_time_s=now_s, place=place
+            candidate, individual, self.encoding, sim_time_s=now_s, place=place
         )
         fitness = [(one.birth, one.known_fitness) for one in self._living]
         return [born, *population_records(self._number, self.births, fitness)]

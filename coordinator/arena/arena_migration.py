@@ -4,13 +4,13 @@ from dataclasses import replace
 
 from coordinator.arena.living import LivingRobots
 from coordinator.arena.rows import Moment, death_record
+from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import Purpose
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Emigrate, Record
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import migration_records
-from schema.experiment.document import Experiment, body_space
-from schema.robot.genome import develop
+from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
 
 
@@ -34,7 +34,7 @@ class ArenaMigration:
         self.is_starving = self.is_extinct = False
         self._births = experiment.births
         self._stay = experiment.selection.parents_needed
-        self._space = body_space(experiment.space)
+        self._develop = encoding_of(experiment).develop
         self._floor = experiment.arena.population_floor
         self._living = living
         self._queue: list[Individual] = []
@@ -103,7 +103,7 @@ class ArenaMigration:
             name = BirthId(moment.island, self._settled)
             place = self._living.random_place(name, Purpose.IMMIGRANT_PLACE)
             immigrant = self._queue.pop(0)
-            robot = develop(immigrant.genome, self._space)
+            robot = self._develop(immigrant.genome)
             self._living.insert(immigrant, robot, place)
         return records
 

@@ -6,6 +6,7 @@ from math import isfinite
 from coordinator.arena.living import LivingRobots
 from coordinator.arena.rows import Moment, death_record
 from coordinator.evolution.breeding import Candidate
+from coordinator.evolution.encodings import IslandEncoding, encoding_of
 from coordinator.islands.events import (
     Commanded,
     Insert,
@@ -17,12 +18,10 @@ from coordinator.islands.events import (
     Resume,
 )
 from schema.errors import InvalidRobot
-from schema.experiment.document import Experiment, body_space
-from schema.parts import BodySpace
+from schema.experiment.document import Experiment
 from schema.robot.brain import Brain
-from schema.robot.genome import develop, walk
 from schema.robot.ids import BirthId
-from schema.robot.robot import Robot, check_robot
+from schema.robot.robot import Robot
 
 
 class Orders:
@@ -40,7 +39,7 @@ class Orders:
         self.pending: list[Order] = []
         self.insertions: list[Insert] = []
         self._experiment = experiment
-        self._space = body_space(experiment.space)
+        self._encoding = encoding_of(experiment)
         self._living = living
         self.ids: set[str] = set()
 
@@ -68,11 +67,20 @@ class Orders:
                     records.append(death_record(removed, "removed", moment))
                 case ReplaceBrain(birth=birth, brain=brain):
                     living = self._living.get(birth)
-                    robot = living and _with_brain(living.robot, brain, self._space)
+                    robot = living and self._with_brain(living.robot, brain)
                     if living and robot:
                         self._living.replace_brain(living, robot)
         self.pending = []
         return records
+
+    def _with_brain(self, robot: Robot, brain: Brain) -> Robot | None:
+        """Return a robot with another brain; None if the brain does not fit it."""
+        changed = replace(robot, brain=brain)
+        try:
+            self._encoding.check(changed)
+        except InvalidRobot:
+            return None
+        return changed
 
 
 def check_order(order: Order, experiment: Experiment) -> None:
@@ -85,32 +93,19 @@ def check_order(order: Order, experiment: Experiment) -> None:
             finite.
     """
     if isinstance(order, Insert):
-        inserted(order, BirthId(0, 0), body_space(experiment.space))
+        inserted(order, BirthId(0, 0), encoding_of(experiment))
         if order.place is not None and not all(map(isfinite, order.place)):
             raise InvalidRobot(f"place: must be finite, got {order.place}")
 
 
-def inserted(order: Insert, birth: BirthId, space: BodySpace) -> Candidate:
+def inserted(order: Insert, birth: BirthId, encoding: IslandEncoding) -> Candidate:
     """Return the candidate, without parents, that an order inserts.
 
     Raises:
-        InvalidRobot: the genome fits no robot of these part types.
+        InvalidRobot: not a genome of this encoding, or its robot does not fit the
+            part types or the brain type.
     """
-    for node, _, _ in walk(order.genome):
-        if node.kind not in space:
-            raise InvalidRobot(
-                f"genome: part types are {', '.join(space)}, got {node.kind!r}"
-            )
-    robot = develop(order.genome, space)
-    check_robot(robot, space)
-    return Candidate(birth, 0, None, order.genome, robot)
-
-
-def _with_brain(robot: Robot, brain: Brain, space: BodySpace) -> Robot | None:
-    """Return a robot with another brain; None if the brain does not fit its body."""
-    changed = replace(robot, brain=brain)
-    try:
-        check_robot(changed, space)
-    except InvalidRobot:
-        return None
-    return changed
+    genome = encoding.from_bytes(order.genome)
+    robot = encoding.develop(genome)
+    encoding.check(robot)
+    return Candidate(birth, 0, None, genome, robot)

@@ -1,11 +1,11 @@
 """Table rows of arenas, besides births and migrations."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from coordinator.arena.living import LivingRobot
 from coordinator.islands.events import Record
-from coordinator.islands.rows import named
+from coordinator.islands.rows import named, named_measures
 from schema.wire.arena import Casualty, Touch
 
 
@@ -23,8 +23,16 @@ class Moment(NamedTuple):
     sim_time_s: float
 
 
-def sample_records(living: Iterable[LivingRobot], moment: Moment) -> list[Record]:
-    """Return the fitness rows of a sample: all living robots with a report."""
+def sample_records(
+    living: Iterable[LivingRobot], moment: Moment, labels: Sequence[str] = ()
+) -> list[Record]:
+    """Return the fitness rows of a sample: all living robots with a report.
+
+    Args:
+        living: the robots.
+        moment: of the sample.
+        labels: names of their measures.
+    """
     return [
         Record(
             "fitness",
@@ -37,6 +45,7 @@ def sample_records(living: Iterable[LivingRobot], moment: Moment) -> list[Record
                 "straight_velocity": one.judgement.straight_velocity,
                 "fitness": one.judgement.fitness,
                 "is_mature": one.judgement.is_mature,
+                "measures": named_measures(labels, one.judgement.measures),
             },
         )
         for one in living

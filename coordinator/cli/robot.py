@@ -4,13 +4,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from coordinator.evolution.generation import generate
-from coordinator.evolution.random_streams import Purpose, stream
+from coordinator.evolution.breeding import Breeder
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.flags import Flags, add_count
 from schema.formats.files import settings_of, write_robot
-from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 
 
@@ -31,15 +30,17 @@ def main(arguments: list[str]) -> int:
     """
     options = _parser().parse_args(arguments[1:])
     experiment = read_experiment(options.experiment)
+    breeder = Breeder(experiment, options.seed, run=0)
     space = body_space(experiment.space)
+    kinds = neuron_kinds(experiment.brain, experiment.space)
     for number in range(options.count):
-        birth = BirthId(0, number)
-        rng = stream(options.seed, 0, birth, 0, Purpose.GENERATE)
-        robot = develop(generate(rng, experiment, birth), space)
+        candidate = breeder.candidate(BirthId(0, number), 0, ())
+        assert candidate is not None
+        robot = candidate.robot
         path: Path = options.file
         if options.count > 1:
             path = path.with_stem(f"{path.stem}-{number}")
-        write_robot(robot, path, space, settings_of(experiment))
+        write_robot(robot, path, space, settings_of(experiment), kinds)
         print(f"{path}: {len(robot.parts)} parts, {len(robot.brain.neurons)} neurons")
     return 0
 

@@ -8,12 +8,13 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from coordinator.arena.arena import Arena
+from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.selection import fittest_first
 from coordinator.run.session import RunSession
 from coordinator.storage.hints import command
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.formats.files import write_robot
-from schema.robot.genome import develop
 from schema.tables.files import read_table
 
 BEST = "best.yaml"
@@ -70,8 +71,9 @@ def _results(run: RunSession) -> list[str]:
     best = fittest_first(judged)[0]
     mean = sum(one.fitness for one in judged) / len(judged)
     space = body_space(run.experiment.space)
-    robot = develop(best.genome, space)
-    write_robot(robot, file, space)
+    kinds = neuron_kinds(run.experiment.brain, run.experiment.space)
+    robot = encoding_of(run.experiment).develop(best.genome)
+    write_robot(robot, file, space, kinds=kinds)
     motors = sum(space[part.kind].outputs for part in robot.parts)
     where = f" of island {best.birth.island}" if len(islands) > 1 else ""
     return [

@@ -9,13 +9,8 @@ mean.
 from collections.abc import Iterable, Iterator
 from math import ceil
 
-from coordinator.evolution.generation import (
-    pick_growth,
-    random_neuron,
-    random_part,
-    usable_types,
-    wire,
-)
+from coordinator.evolution.brains import brain_genes, brain_rules
+from coordinator.evolution.generation import pick_growth, random_part, usable_types
 from coordinator.evolution.mutable_genome import (
     MutableGenome,
     SizeCounts,
@@ -160,11 +155,7 @@ def _add_part(
     if growth is None:
         return
     (parent, slot), kind = growth
-    part = random_part(draws, kind, genes)
-    # A share of 0..max_hidden neurons, rounded half up.
-    share = (2 * draws.below(space.max_hidden + 1) + size.parts) // (2 * size.parts)
-    part.hidden = tuple(
-        random_neuron(draws) for _ in range(min(share, space.max_hidden - size.hidden))
-    )
+    brain = brain_genes(experiment)
+    part = random_part(draws, kind, genes, brain)
     parent.graft(part, slot)
-    wire(draws, [part], preorder(root), experiment.generation.p_connect_neurons)
+    brain.grow(draws, [part], preorder(root), brain_rules(experiment))

@@ -1,4 +1,4 @@
-"""Mutation of the brain, step by step; `variation` calls the steps in order.
+"""Mutation of a network, step by step; `network` calls the steps in order.
 
 Each step changes a tree in place and keeps every restriction. Source: Hupkes 2016,
 section 4.4.6; the code of the original. One of its errors is avoided: deleting a hidden
@@ -10,24 +10,22 @@ from decimal import Decimal
 
 from msgspec.structs import replace
 
-from coordinator.evolution.generation import connect, endpoints, random_neuron
-from coordinator.evolution.mutable_genome import MutableGenome, follow
-from coordinator.evolution.random_streams import BufferedRng
-from schema.experiment.document import Experiment
-from schema.robot.brain import NEURON_TYPES, Layer
+from coordinator.evolution.brain_generation import connect, endpoints, random_neuron
+from schema.plugins.protocols import BrainRules, Branch, Draws
+from schema.robot.brain import Layer, NeuronKinds
 from schema.robot.genome import ConnectionGene, NeuronGene
 
 _HALF = Decimal("0.5")
 
 
 def delete_hidden_neurons(
-    draws: BufferedRng, branches: Sequence[MutableGenome], probability: float
+    draws: Draws, branches: Sequence[Branch], probability: float
 ) -> None:
     """Delete each hidden neuron with a probability, and its connections.
 
     Connections of the remaining neurons keep their source and target.
     """
-    new_offsets: dict[MutableGenome, list[int | None]] = {}
+    new_offsets: dict[Branch, list[int | None]] = {}
     for branch in branches:
         stays = [not draws.chance(probability) for _ in branch.hidden]
         if not all(stays):
@@ -51,13 +49,13 @@ def delete_hidden_neurons(
 
 def _renumbered(
     gene: ConnectionGene,
-    owner: MutableGenome,
-    new_offsets: dict[MutableGenome, list[int | None]],
+    owner: Branch,
+    new_offsets: dict[Branch, list[int | None]],
 ) -> ConnectionGene | None:
     """Return a connection with new offsets; None if one of its neurons is deleted."""
     if "hidden" not in (gene.source[0], gene.target[0]):
         return gene
-    end = follow(owner, gene.path)
+    end = owner.along(gene.path)
     source = _moved(gene.source, new_offsets.get(owner))
     target = _moved(gene.target, new_offsets.get(end) if end else None)
     return replace(gene, source=source, target=target) if source and target else None
@@ -78,7 +76,7 @@ def _moved(
 
 
 def delete_connections(
-    draws: BufferedRng, branches: Sequence[MutableGenome], probability: float
+    draws: Draws, branches: Sequence[Branch], probability: float
 ) -> None:
     """Delete each connection with a probability."""
     for branch in branches:
@@ -89,22 +87,25 @@ def delete_connections(
 
 
 def vary_neurons(
-    draws: BufferedRng, branches: Sequence[MutableGenome], epsilon: float
+    draws: Draws, branches: Sequence[Branch], epsilon: float, kinds: NeuronKinds
 ) -> None:
     """Move the parameters of every neuron towards random values."""
     for branch in branches:
-        branch.outputs = _varied(draws, branch.outputs, epsilon)
-        branch.hidden = _varied(draws, branch.hidden, epsilon)
+        branch.outputs = _varied(draws, branch.outputs, epsilon, kinds)
+        branch.hidden = _varied(draws, branch.hidden, epsilon, kinds)
 
 
 def _varied(
-    draws: BufferedRng, neurons: tuple[NeuronGene, ...], epsilon: float
+    draws: Draws,
+    neurons: tuple[NeuronGene, ...],
+    epsilon: float,
+    kinds: NeuronKinds,
 ) -> tuple[NeuronGene, ...]:
     return tuple(
         [
             NeuronGene(
                 neuron.kind,
-                draws.nearby(NEURON_TYPES[neuron.kind], neuron.parameters, epsilon),
+                draws.nearby(kinds[neuron.kind], neuron.parameters, epsilon),
             )
             for neuron in neurons
         ]
@@ -112,10 +113,11 @@ def _varied(
 
 
 def add_hidden_neurons(
-    draws: BufferedRng,
-    branches: Sequence[MutableGenome],
+    draws: Draws,
+    branches: Sequence[Branch],
     before: int,
-    experiment: Experiment,
+    rules: BrainRules,
+    kinds: NeuronKinds,
 ) -> None:
     """Add as many hidden neurons as deletion removes on average.
 
@@ -123,23 +125,24 @@ def add_hidden_neurons(
         draws: source of all choices.
         branches: branches of the tree, depth first.
         before: number of hidden neurons before deletion.
-        experiment: probability of deletion, limit and rounding.
+        rules: probability of deletion, limit and rounding.
+        kinds: neuron types.
     """
-    variation = experiment.variation
-    if variation.hidden_rounding == "half-up":
-        wanted = _share(before, variation.p_delete_hidden_neuron)
+    if rules.hidden_rounding == "half-up":
+        wanted = _share(before, rules.p_delete_hidden_neuron)
     else:
-        wanted = draws.rounded(before * variation.p_delete_hidden_neuron)
-    room = experiment.space.max_hidden - sum(len(b.hidden) for b in branches)
+        wanted = draws.rounded(before * rules.p_delete_hidden_neuron)
+    types = tuple(kinds.items())
+    room = rules.max_hidden - sum(len(b.hidden) for b in branches)
     for _ in range(min(wanted, room)):
-        draws.pick(branches).hidden += (random_neuron(draws),)
+        draws.pick(branches).hidden += (random_neuron(draws, types),)
 
 
 def add_connections(
-    draws: BufferedRng,
-    branches: Sequence[MutableGenome],
+    draws: Draws,
+    branches: Sequence[Branch],
     before: int,
-    experiment: Experiment,
+    rules: BrainRules,
 ) -> None:
     """Add as many connections as deletion removes on average, rounded half up.
 
@@ -147,10 +150,9 @@ def add_connections(
         draws: source of all choices.
         branches: branches of the tree, depth first.
         before: number of connections before deletion.
-        experiment: probability of deletion.
+        rules: probability of deletion.
     """
-    probability = experiment.variation.p_remove_brain_connection
-    count = _share(before, probability)
+    count = _share(before, rules.p_remove_brain_connection)
     if not count:
         return
     sources = endpoints(branches, "input", "output", "hidden")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf
 
-from coordinator.evolution.generation import generate
+from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import (
     Couple,
@@ -18,15 +18,10 @@ from coordinator.evolution.selection import (
     select_parents,
     select_survivors,
 )
-from coordinator.evolution.variation import mate
-from schema.errors import ExperimentError
-from schema.experiment.document import Experiment, body_space
-from schema.robot.genome import Genome, develop
+from schema.errors import ExperimentError, InvalidRobot
+from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
-
-_NO_CHILD = "crossover found no fitting subtree, or the child had no motor"
-"""Reason why an attempt gives no candidate."""
 
 _COUPLES = 100
 """Number of couples that may fail at one birth before `Breeder` gives up."""
@@ -47,7 +42,7 @@ class Candidate:
     birth: BirthId
     attempt: int
     couple: Couple | None
-    genome: Genome
+    genome: object
     robot: Robot
 
     def individual(
@@ -64,6 +59,7 @@ class Breeder:
 
     def __init__(self, experiment: Experiment, seed: int, run: int) -> None:
         self._experiment = experiment
+        self._encoding = encoding_of(experiment)
         self._stream = partial(stream, seed, run)
 
     def candidate(
@@ -90,16 +86,21 @@ class Breeder:
             The candidate; None if no attempt before ``end`` gives one.
 
         Raises:
-            ExperimentError: (nearly) no robot meets the restrictions.
+            ExperimentError: (nearly) no robot meets the restrictions, or an
+                encoding's own code fails.
         """
         while attempt < end:
             self.check_attempts(birth, attempt, population, why)
             couple, genome = self.conceive(birth, attempt, population, couple)
+            why = self._encoding.no_child
             if genome is not None:
-                robot = develop(genome, body_space(self._experiment.space))
-                return Candidate(birth, attempt, couple, genome, robot)
+                try:
+                    robot = self._encoding.develop(genome)
+                except InvalidRobot as error:
+                    why = str(error)
+                else:
+                    return Candidate(birth, attempt, couple, genome, robot)
             attempt += 1
-            why = _NO_CHILD
         return None
 
     def conceive(
@@ -108,7 +109,7 @@ class Breeder:
         attempt: int,
         population: Sequence[Individual],
         couple: Couple | None,
-    ) -> tuple[Couple | None, Genome | None]:
+    ) -> tuple[Couple | None, object | None]:
         """Return the parents of one attempt and the genome of their child.
 
         Args:
@@ -122,18 +123,19 @@ class Breeder:
             failed. After ``max_mating_attempts`` new parents are selected.
 
         Raises:
-            ExperimentError: no random robot meets the restrictions.
+            ExperimentError: no random robot meets the restrictions, or an encoding's
+                own code fails.
         """
         selection = self._experiment.selection
         if self._is_random(population):
             rng = self._stream(birth, attempt, Purpose.GENERATE)
-            return None, generate(rng, self._experiment, birth)
+            return None, self._encoding.random(rng, birth)
         if couple is None or attempt % selection.max_mating_attempts == 0:
             draws = BufferedRng(self._stream(birth, attempt, Purpose.PARENTS))
             couple = select_parents(population, draws, selection)
         rng = self._stream(birth, attempt, Purpose.MATE)
         first, second = couple
-        return couple, mate(first.genome, second.genome, rng, self._experiment, birth)
+        return couple, self._encoding.mate(first.genome, second.genome, rng, birth)
 
     def check_attempts(
         self, birth: BirthId, attempts: int, population: Sequence[Individual], why: str

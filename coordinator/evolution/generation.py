@@ -1,20 +1,20 @@
-"""Random genomes, and the random parts, neurons and connections that mutation adds.
+"""Random genomes, and the random parts that mutation adds.
 
 Source: Hupkes 2016, section 4.4.2; the code of the original. Two of its errors are
 avoided: no robot has fewer parts than the experiment allows, and every part has its own
 identity beside the common colour.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
+from coordinator.evolution.brains import brain_genes, brain_rules
 from coordinator.evolution.mutable_genome import (
     MutableGenome,
     SizeCounts,
     gene_ids,
     level,
-    path_between,
     preorder,
     size_of,
     to_genome,
@@ -23,17 +23,13 @@ from coordinator.evolution.random_streams import BufferedRng
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import COLOURS, BodySpace, PartType
-from schema.robot.brain import NEURON_TYPES, Layer
-from schema.robot.genome import ConnectionGene, Genome, NeuronGene
+from schema.plugins.protocols import BrainGenes
+from schema.robot.genome import Genome
 from schema.robot.ids import BirthId
 from schema.robot.robot import ORIENTATIONS
 
 Place = tuple[MutableGenome, int]
 """A branch and one of its slots."""
-Endpoint = tuple[MutableGenome, tuple[Layer, int]]
-"""One end of a connection: a branch and one of its neurons."""
-
-_NEURONS = tuple(NEURON_TYPES.items())
 
 FIRST = BirthId(0, 0)
 MAX_TREES = 10_000
@@ -57,12 +53,13 @@ def generate(
     """
     draws = BufferedRng(rng)
     least = experiment.space.min_parts
+    brain = brain_genes(experiment)
     for _ in range(MAX_TREES):
-        root = _random_body(draws, experiment, gene_ids(birth))
+        root = _random_body(draws, experiment, gene_ids(birth), brain)
         branches = preorder(root)
         size = size_of(branches)
         if size.outputs and size.parts >= least:
-            _add_brain(draws, branches, experiment)
+            brain.grow(draws, branches, branches, brain_rules(experiment))
             if experiment.space.planar:
                 level(branches)
             return to_genome(branches)
@@ -74,7 +71,10 @@ def generate(
 
 
 def _random_body(
-    draws: BufferedRng, experiment: Experiment, genes: Iterator[int]
+    draws: BufferedRng,
+    experiment: Experiment,
+    genes: Iterator[int],
+    brain: BrainGenes,
 ) -> MutableGenome:
     """Return a random tree without hidden neurons, possibly without a motor."""
     space, shape = experiment.space, experiment.generation
@@ -82,7 +82,7 @@ def _random_body(
     drawn = int(draws.normal(shape.parts_mean, shape.parts_sd))
     target = min(max(drawn, space.min_parts), space.max_parts)
     core = next(kind for kind in types.values() if kind.is_root)
-    root = random_part(draws, core, genes)
+    root = random_part(draws, core, genes, brain)
     colour = root.parameters[-len(COLOURS) :]
     size = size_of([root])
     places: list[Place] = [(root, slot) for slot in range(core.arity)]
@@ -91,35 +91,18 @@ def _random_body(
         if growth is None:
             break
         (parent, slot), kind = growth
-        part = random_part(draws, kind, genes, colour)
+        part = random_part(draws, kind, genes, brain, colour)
         parent.graft(part, slot)
         size = size.plus(size_of([part]))
         places.extend((part, free) for free in part.free_slots())
     return root
 
 
-def _add_brain(
-    draws: BufferedRng, branches: Sequence[MutableGenome], experiment: Experiment
-) -> None:
-    """Add hidden neurons to a tree, and connections among all neurons."""
-    hosts = branches
-    if experiment.generation.hidden_on == "wired":
-        hosts = [b for b in branches if b.kind.inputs or b.outputs]
-    for _ in range(draws.below(experiment.space.max_hidden + 1)):
-        draws.pick(hosts).hidden += (random_neuron(draws),)
-    wire(draws, branches, branches, experiment.generation.p_connect_neurons)
-
-
-def random_neuron(draws: BufferedRng) -> NeuronGene:
-    """Return an output or hidden neuron of uniform type with uniform parameters."""
-    kind, parameters = draws.pick(_NEURONS)
-    return NeuronGene(kind, draws.values(parameters))
-
-
 def random_part(
     draws: BufferedRng,
     kind: PartType,
     genes: Iterator[int],
+    brain: BrainGenes,
     colour: tuple[float, ...] = (),
 ) -> MutableGenome:
     """Return a detached part without hidden neurons.
@@ -128,6 +111,7 @@ def random_part(
         draws: source of its slot, orientation, parameters and neurons.
         kind: its type; a root gets no slot and no orientation.
         genes: source of identities; the part gets the next one.
+        brain: gives its output neurons.
         colour: red, green, blue; empty for a random colour.
     """
     return MutableGenome(
@@ -136,7 +120,7 @@ def random_part(
         0 if kind.is_root else draws.pick(ORIENTATIONS),
         draws.values(kind.own_parameters) + (colour or draws.values(COLOURS)),
         next(genes),
-        tuple(random_neuron(draws) for _ in range(kind.outputs)),
+        brain.outputs(draws, kind),
     )
 
 
@@ -167,30 +151,3 @@ def pick_growth(
         if fitting := [kind for kind in usable if parent not in kind.not_on]:
             return place, draws.pick(fitting)
     return None
-
-
-def endpoints(branches: Iterable[MutableGenome], *layers: Layer) -> list[Endpoint]:
-    """Return all neurons of some layers as ends of connections."""
-    return [(branch, end) for branch in branches for end in branch.neurons(*layers)]
-
-
-def connect(draws: BufferedRng, source: Endpoint, target: Endpoint) -> ConnectionGene:
-    """Return a connection of random weight from one neuron to another."""
-    path = path_between(source[0], target[0])
-    return ConnectionGene(source[1], path, target[1], draws.number())
-
-
-def wire(
-    draws: BufferedRng,
-    sources: Iterable[MutableGenome],
-    targets: Iterable[MutableGenome],
-    probability: float,
-) -> None:
-    """Add connections between neurons of branches, each possible with a probability."""
-    ends = endpoints(targets, "output", "hidden")
-    for source in endpoints(sources, "input", "output", "hidden"):
-        source[0].connections += tuple(
-            connect(draws, source, target)
-            for target in ends
-            if draws.chance(probability)
-        )

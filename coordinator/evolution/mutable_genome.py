@@ -69,6 +69,14 @@ class MutableGenome:
                 found += [(layer, k) for k in range(count)]
         return found
 
+    def path_to(self, other: "MutableGenome") -> tuple[int, ...]:
+        """Return the path of a connection to another branch of its tree."""
+        return path_between(self, other)
+
+    def along(self, path: tuple[int, ...]) -> "MutableGenome | None":
+        """Return the branch at the end of a path; None if the path does not exist."""
+        return follow(self, path)
+
 
 def gene_ids(birth: BirthId) -> Iterator[int]:
     """Return the gene identities for the new parts of an individual.

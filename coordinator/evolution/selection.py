@@ -9,7 +9,6 @@ from math import fsum
 
 from coordinator.evolution.random_streams import BufferedRng
 from schema.experiment.document import Arena, Culling, Selection
-from schema.robot.genome import Genome
 from schema.robot.ids import BirthId
 
 Couple = tuple["Individual", "Individual"]
@@ -21,7 +20,7 @@ class Individual:
 
     Attributes:
         birth: its id.
-        genome: what its children inherit.
+        genome: what its children inherit, of the type that the encoding uses.
         fitness: always maximised; 0 where its evaluation failed.
         rank: 1 without parents, else 1 + the greatest of theirs (thesis eq. 6.1).
         generation: number of its brood; founders are 0; None on-line.
@@ -29,7 +28,7 @@ class Individual:
     """
 
     birth: BirthId
-    genome: Genome
+    genome: object
     fitness: float
     rank: int
     generation: int | None

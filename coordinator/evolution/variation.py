@@ -15,13 +15,7 @@ from coordinator.evolution.body_mutation import (
     swap_subtrees,
     vary_parts,
 )
-from coordinator.evolution.brain_mutation import (
-    add_connections,
-    add_hidden_neurons,
-    delete_connections,
-    delete_hidden_neurons,
-    vary_neurons,
-)
+from coordinator.evolution.brains import brain_genes, brain_rules
 from coordinator.evolution.mutable_genome import (
     MutableGenome,
     fitting_subtrees,
@@ -141,17 +135,12 @@ def mutate(
         genes: identities of added parts.
         experiment: restrictions and probabilities.
     """
-    variation = experiment.variation
+    brain, rules = brain_genes(experiment), brain_rules(experiment)
     delete_subtree(draws, root, experiment)
     duplicate_subtree(draws, root, experiment)
     swap_subtrees(draws, root, experiment)
     branches = preorder(root)
-    hidden = sum(len(branch.hidden) for branch in branches)
-    connections = sum(len(branch.connections) for branch in branches)
-    delete_hidden_neurons(draws, branches, variation.p_delete_hidden_neuron)
-    delete_connections(draws, branches, variation.p_remove_brain_connection)
-    vary_parts(draws, branches, variation.body_epsilon)
-    vary_neurons(draws, branches, variation.brain_epsilon)
-    add_hidden_neurons(draws, branches, hidden, experiment)
-    add_connections(draws, branches, connections, experiment)
+    pruned = brain.prune(draws, branches, rules)
+    vary_parts(draws, branches, experiment.variation.body_epsilon)
+    brain.vary(draws, branches, rules, pruned)
     add_parts(draws, root, genes, experiment)

@@ -10,7 +10,6 @@ from msgspec import Struct
 
 from coordinator.evolution.selection import Individual
 from schema.robot.brain import Brain
-from schema.robot.genome import Genome
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.robot.robot import Robot
@@ -131,11 +130,11 @@ class Insert(Message, frozen=True):
     """Insert a robot: a birth without parents that may mate like any other robot.
 
     Attributes:
-        genome: its genome.
+        genome: bytes of its genome, in the encoding of the experiment.
         place: point of the ground plane [m]; drawn as for any birth if None.
     """
 
-    genome: Genome
+    genome: bytes
     place: tuple[float, float] | None = None
 
 

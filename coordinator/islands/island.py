@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from math import isfinite
 
 from coordinator.evolution.breeding import Breeder, Candidate
+from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.selection import Couple, Individual
 from coordinator.islands.events import (
     Answered,
@@ -35,7 +36,7 @@ from coordinator.islands.rows import (
     population_records,
 )
 from schema.errors import UnexpectedEvent
-from schema.experiment.document import Experiment, body_space
+from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
 
 
@@ -86,7 +87,7 @@ class Island:
         self.population: tuple[Individual, ...] = ()
         self.experiment = experiment
         self._seed, self._run, self._number = seed, run, number
-        self._space = body_space(experiment.space)
+        self._encoding = encoding_of(experiment)
         self._breeder = Breeder(experiment, seed, run)
         self._reevaluations = (
             Reevaluations(experiment, number) if selection.reevaluation else None
@@ -224,8 +225,8 @@ class Island:
         individual = candidate.individual(self._generation, fitness_of(outcome))
         self._brood.append(individual)
         self.births += 1
-        born = birth_record(candidate, individual, self._space)
-        return [born, evaluation_record(outcome)]
+        born = birth_record(candidate, individual, self._encoding)
+        return [born, evaluation_record(outcome, self.experiment.measures.labels)]
 
     def _close_brood(self) -> list[IslandCommand]:
         """Select the survivors, and end the epoch of migration if it is due."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 
+from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import (
     Emigrate,
@@ -14,8 +15,7 @@ from coordinator.islands.events import (
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import evaluation_record, migration_records
 from schema.errors import UnexpectedEvent
-from schema.experiment.document import Experiment, body_space
-from schema.robot.genome import develop
+from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
 
 
@@ -33,7 +33,8 @@ class IslandMigration:
     def __init__(self, experiment: Experiment, epochs: MigrationEpochs) -> None:
         selection = experiment.selection
         self.epochs = epochs
-        self._space = body_space(experiment.space)
+        self._labels = experiment.measures.labels
+        self._develop = encoding_of(experiment).develop
         rules = selection.culling
         self._limit = rules.population_limit if rules else selection.population
         self._stay = selection.parents_needed
@@ -88,7 +89,7 @@ class IslandMigration:
             assert outcome is not None
             immigrant = self._immigrants[birth]
             self._immigrants[birth] = immigrant.evaluated(fitness_of(outcome))
-            commands.append(evaluation_record(outcome))
+            commands.append(evaluation_record(outcome, self._labels))
         settled = self._settle(population, self._immigrants.values())
         self._immigrants, self._outcomes = None, {}
         return commands, settled
@@ -101,7 +102,7 @@ class IslandMigration:
         evaluations = [
             Evaluate(
                 one.birth,
-                develop(one.genome, self._space),
+                self._develop(one.genome),
                 self.epochs.epoch,
                 requester=self.epochs.island,
             )

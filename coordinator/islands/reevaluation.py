@@ -11,6 +11,7 @@ from math import fsum
 
 from msgspec.structs import replace
 
+from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import (
@@ -22,8 +23,7 @@ from coordinator.islands.events import (
 )
 from coordinator.islands.rows import evaluation_record
 from schema.errors import UnexpectedEvent
-from schema.experiment.document import Experiment, Simulation, body_space, steps_of
-from schema.robot.genome import develop
+from schema.experiment.document import Experiment, Simulation, steps_of
 from schema.robot.ids import BirthId
 
 
@@ -51,7 +51,8 @@ class Reevaluations:
         rules = experiment.selection.reevaluation
         assert rules is not None
         self._rules = rules
-        self._space = body_space(experiment.space)
+        self._labels = experiment.measures.labels
+        self._develop = encoding_of(experiment).develop
         self._island = island
         self._founders = experiment.selection.population
         self._due_births = self._founders + rules.interval
@@ -85,7 +86,7 @@ class Reevaluations:
             trials = self._trials.setdefault(one.birth, [one.known_fitness])
             self._last_births[one.birth] = births
             self._outcomes[one.birth] = None
-            robot = develop(one.genome, self._space)
+            robot = self._develop(one.genome)
             commands.append(Evaluate(one.birth, robot, len(trials)))
         return commands
 
@@ -116,7 +117,7 @@ class Reevaluations:
         for birth, outcome in sorted(outcomes.items()):
             assert outcome is not None
             self._trials[birth].append(fitness_of(outcome))
-            records.append(evaluation_record(outcome))
+            records.append(evaluation_record(outcome, self._labels))
         evaluated = (
             self._evaluated(one) if one.birth in outcomes else one for one in population
         )

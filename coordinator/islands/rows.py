@@ -4,12 +4,11 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from coordinator.evolution.breeding import Candidate
+from coordinator.evolution.encodings import IslandEncoding
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Emigrate, Outcome, Record
-from schema.parts import BodySpace
 from schema.robot.ids import BirthId
 from schema.tables.columns import body_rows, sizes
-from schema.wire.codec import encode_genome
 
 
 def named(birth: BirthId, island: int) -> dict[str, int | None]:
@@ -24,7 +23,7 @@ def named(birth: BirthId, island: int) -> dict[str, int | None]:
 def birth_record(
     candidate: Candidate,
     individual: Individual,
-    space: BodySpace,
+    encoding: IslandEncoding,
     *,
     sim_time_s: float | None = None,
     place: tuple[float, float] | None = None,
@@ -34,7 +33,7 @@ def birth_record(
     Args:
         candidate: the candidate.
         individual: the individual that it becomes.
-        space: the part types.
+        encoding: of the island.
         sim_time_s: simulated time of its birth on-line [s].
         place: its place of birth in the ground plane [m].
     """
@@ -48,12 +47,13 @@ def birth_record(
         "generation": individual.generation,
         "rank": individual.rank,
         "attempts": candidate.attempt + 1,
-        "genome": encode_genome(candidate.genome),
+        "genome": encoding.to_bytes(candidate.genome),
         "body": body_rows(candidate.robot),
-        **sizes(candidate.robot, candidate.genome, space),
+        **sizes(candidate.robot, candidate.genome, encoding.types),
         "sim_time_s": sim_time_s,
         "x": place and place[0],
         "y": place and place[1],
+        "robot": encoding.stored_robot(candidate.robot),
     }
     return Record("births", row)
 
@@ -70,17 +70,31 @@ def outcome_columns(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def evaluation_record(outcome: Outcome) -> Record:
-    """Return the evaluations row of an outcome."""
+def named_measures(
+    labels: Sequence[str], measures: Sequence[float]
+) -> list[tuple[str, float]] | None:
+    """Return the column ``measures``; None if there are none."""
+    return list(zip(labels, measures, strict=True)) if measures else None
+
+
+def evaluation_record(outcome: Outcome, labels: Sequence[str] = ()) -> Record:
+    """Return the evaluations row of an outcome.
+
+    Args:
+        outcome: of the evaluation.
+        labels: names of its measures.
+    """
     island = outcome.birth.island if outcome.requester is None else outcome.requester
+    found = outcome.evaluation
     row = {
         **named(outcome.birth, island),
         "trial": outcome.trial,
-        "status": "ok" if outcome.evaluation else "failed",
+        "status": "ok" if found else "failed",
         **outcome_columns(outcome),
         "wall_s": outcome.provenance.wall_s,
         "worker": outcome.provenance.agent,
         "platform": outcome.provenance.platform,
+        "measures": found and named_measures(labels, found.measures),
     }
     return Record("evaluations", row)
 

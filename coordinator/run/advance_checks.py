@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from hashlib import sha256
 from itertools import pairwise
 
-from coordinator.run.answer_checks import check_velocities, impossible
+from coordinator.run.answer_checks import check_count, check_velocities, impossible
 from schema.experiment.document import Experiment
 from schema.limits import (
     ANGLE_BYTES,
+    CHANNEL_NUMBERS,
     COLUMNS_BYTES,
     GREATEST_COORDINATE,
     JUDGEMENT_BYTES,
@@ -96,11 +97,18 @@ class ExpectedAdvance:
         return COLUMNS_BYTES + len(self.samples) * a_sample
 
     @property
+    def _most_channel_bytes(self) -> int:
+        """Length of all channels of a trace in one sample of a window."""
+        space = self.experiment.space
+        return 8 * (CHANNEL_NUMBERS + 4 * space.max_parts + space.max_inputs)
+
+    @property
     def most_bytes(self) -> int:
         """Length of an answer."""
         robots, simulation = len(self.born), self.experiment.simulation
         window = simulation.window_steps // simulation.pose_steps + 2
-        robot_bytes = SNAPSHOT_ROBOT_BYTES + window * SNAPSHOT_SAMPLE_BYTES
+        sample_bytes = SNAPSHOT_SAMPLE_BYTES + self._most_channel_bytes
+        robot_bytes = SNAPSHOT_ROBOT_BYTES + window * sample_bytes
         return (
             self.most_pose_bytes
             + robots * JUDGEMENT_BYTES
@@ -184,6 +192,8 @@ def _check_judgement(one: Judgement, expected: ExpectedAdvance) -> None:
     if one.is_mature != is_mature:
         raise impossible(f"robot {name}: is_mature must be {is_mature}")
     check_velocities(one.path_velocity, one.straight_velocity)
+    if one.measures or is_mature:
+        check_count(one.measures, len(expected.experiment.measures.names))
     _check_place(one)
 
 

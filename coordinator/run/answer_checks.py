@@ -4,6 +4,7 @@ An answer that passes is one that a correct agent may give. A wrong value that i
 plausible is not found here; cross-checks find it.
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 from schema.errors import MalformedMessage
@@ -46,17 +47,20 @@ def read_vetting(
     return answer
 
 
-def read_evaluation(data: bytes, *, expected: Expected, simulated_s: float) -> Answer:
+def read_evaluation(
+    data: bytes, *, expected: Expected, simulated_s: float, measures: int = 0
+) -> Answer:
     """Return the decoded answer to an evaluation.
 
     Args:
         data: bytes of the answer.
         expected: epoch and number of the job.
         simulated_s: length of the evaluation [s].
+        measures: number of measures.
 
     Raises:
         MalformedMessage: not an answer, the answer to another request, another length
-            or velocities that are not possible.
+            or number of measures, or velocities that are not possible.
     """
     answer = decode_answer(data, 0)
     check_job(answer.epoch, answer.number, expected)
@@ -69,6 +73,7 @@ def read_evaluation(data: bytes, *, expected: Expected, simulated_s: float) -> A
                 f"evaluation: must take {simulated_s} s, got {found.simulated_s} s"
             )
         check_velocities(found.path_velocity, found.straight_velocity)
+        check_count(found.measures, measures)
     return answer
 
 
@@ -99,6 +104,16 @@ def check_velocities(path: float, straight: float) -> None:
         raise impossible(
             f"path velocity: must be <= {GREATEST_VELOCITY:g} m/s, got {path}"
         )
+
+
+def check_count(measures: Sequence[float], wanted: int) -> None:
+    """Raise unless there is one number for each measure of the experiment.
+
+    Raises:
+        MalformedMessage: another count.
+    """
+    if len(measures) != wanted:
+        raise impossible(f"measures: must be {wanted} numbers, got {len(measures)}")
 
 
 def _check_report(report: Report, robot: Robot, space: BodySpace) -> None:

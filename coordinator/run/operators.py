@@ -21,10 +21,9 @@ from coordinator.run.loop import Loop
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import RunSession
 from schema.errors import MalformedMessage, RevolveError
-from schema.experiment.document import body_space
+from schema.experiment.brains import neuron_kinds
 from schema.limits import LONGEST_REASON, printable
-from schema.robot.inverse_development import genome_of
-from schema.robot.robot import check_robot
+from schema.robot.brain import check_neurons
 from schema.wire.codec import decode_robot
 from schema.wire.operator import (
     GetStatus,
@@ -92,8 +91,11 @@ def _order(
 
     Raises:
         Refused: no living robot has the given birth number.
-        InvalidRobot: a robot that breaks the rules of the experiment.
+        InvalidRobot: a robot that breaks the rules of the experiment, or that its
+            encoding cannot describe.
     """
+    space = arena.experiment.space
+    kinds = neuron_kinds(arena.experiment.brain, space)
     match action:
         case PauseArena():
             return Pause()
@@ -101,8 +103,10 @@ def _order(
             return Resume()
         case InsertRobot():
             robot = decode_robot(action.robot)
-            check_robot(robot, body_space(arena.experiment.space))
-            insert = Insert(genome_of(robot), action.place)
+            encoding = arena.encoding
+            encoding.check(robot)
+            genome = encoding.to_bytes(encoding.from_robot(robot))
+            insert = Insert(genome, action.place)
             check_order(insert, arena.experiment)
             return insert
     living = [one.birth for one in arena.population]
@@ -112,7 +116,9 @@ def _order(
         raise Refused(f"birth {number}: is not alive; alive are {alive}")
     if isinstance(action, RemoveRobot):
         return Remove(action.birth)
-    return ReplaceBrain(action.birth, decode_robot(action.robot).brain)
+    brain = decode_robot(action.robot).brain
+    check_neurons(brain, kinds)
+    return ReplaceBrain(action.birth, brain)
 
 
 def _list(arena: Arena) -> str:

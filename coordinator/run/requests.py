@@ -107,10 +107,14 @@ class Requests:
                 robot=command.robot,
                 space=context.space,
             )
-        clock = context.experiments[requester_of(command)].simulation
+        own = context.experiments[requester_of(command)]
+        clock = own.simulation
         steps = command.steps or clock.warmup_steps + clock.window_steps
         return partial(
-            read_evaluation, expected=expected, simulated_s=steps * clock.timestep_s
+            read_evaluation,
+            expected=expected,
+            simulated_s=steps * clock.timestep_s,
+            measures=len(own.measures.names),
         )
 
     def _body(self, command: Vet) -> bytes:

@@ -5,8 +5,9 @@ alone is enough to resume it. Each run has an ordinary run folder below it, name
 experiment and repeat; a run that was made separately is used as it is.
 """
 
+import json
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from importlib import resources
@@ -17,7 +18,12 @@ import msgspec
 from msgspec.structs import replace
 
 from coordinator.storage.disk import replace_text
-from coordinator.storage.folder import RunDetails, holds_run
+from coordinator.storage.folder import (
+    RunDetails,
+    forget_plugins,
+    holds_run,
+    keep_plugins,
+)
 from coordinator.storage.hints import command
 from schema.errors import ExperimentError, RunFolderError
 from schema.experiment.document import Experiment
@@ -29,6 +35,7 @@ from schema.experiment.file import (
     shipped_experiments,
 )
 from schema.limits import MOST_DESCRIPTION, MOST_REPEATS, printable, printable_line
+from schema.plugins.kept import KeptPlugin
 from schema.tables.description import read_small
 
 CAMPAIGN = "campaign.toml"
@@ -142,13 +149,21 @@ def write_campaign(folder: Path, campaign: Campaign) -> None:
         experiment_text(experiment).replace("'", "\\u0027")
         for experiment in campaign.experiments
     ]
-    digest = _digest(campaign.seed, campaign.repeats, documents)
+    plugins: dict[str, KeptPlugin] = {}
+    for document in documents:
+        plugins |= keep_plugins(folder, document)
+    digest = _digest(campaign.seed, campaign.repeats, documents, plugins)
     lines = [
         f"# To resume it:  {printable_line(command('resume', folder))}",
         f'digest = "{digest}"',
         f"seed = {campaign.seed}",
         f"repeats = {campaign.repeats}",
     ]
+    for name, note in plugins.items():
+        lines += ["", f"[plugins.{name}]"]
+        # A text of JSON without other characters is one of TOML.
+        entries = msgspec.to_builtins(note).items()
+        lines += [f"{key} = {json.dumps(value)}" for key, value in entries]
     for document in documents:
         lines += ["", "[[experiments]]", f"document = '''\n{document}'''"]
     replace_text(folder / CAMPAIGN, "\n".join(lines) + "\n")
@@ -160,30 +175,54 @@ def read_campaign(folder: Path) -> Campaign:
     Raises:
         RunFolderError: there is no campaign, or its description is damaged.
     """
-    file = folder / CAMPAIGN
+    found = _read(folder)
+    documents = [each.document for each in found.experiments]
     try:
-        text = read_small(file, MOST_DESCRIPTION).decode("utf-8")
-        found = msgspec.convert(tomllib.loads(text), type=_Document)
-        documents = [each.document for each in found.experiments]
         experiments = tuple(map(experiment_from_text, documents))
         _check_names(experiments)
+    except ExperimentError as error:
+        raise _damaged(folder, str(error)) from None
+    return Campaign(experiments, found.repeats, found.seed)
+
+
+def campaign_plugins(folder: Path) -> dict[str, KeptPlugin]:
+    """Return the modules of the plug-ins of a folder's campaign, by name.
+
+    Raises:
+        RunFolderError: there is no campaign, or its description is damaged.
+    """
+    return _read(folder).plugins
+
+
+def _read(folder: Path) -> "_Document":
+    """Return the content of a folder's ``campaign.toml``.
+
+    Raises:
+        RunFolderError: there is no campaign, or its description is damaged.
+    """
+    try:
+        text = read_small(folder / CAMPAIGN, MOST_DESCRIPTION).decode("utf-8")
+        found = msgspec.convert(tomllib.loads(text), type=_Document)
     except FileNotFoundError:
         raise RunFolderError(f"{folder}: no campaign is there") from None
-    except (
-        ValueError, RecursionError, ExperimentError, msgspec.MsgspecError
-    ) as error:  # fmt: skip
-        why = printable(str(error), 200)
-        raise RunFolderError(
-            f"{file}: damaged: {why}; restore a copy of the file"
-        ) from None
+    except (ValueError, RecursionError, msgspec.MsgspecError) as error:
+        raise _damaged(folder, str(error)) from None
     if found.seed >> 64:
-        raise RunFolderError(f"{file}: damaged: seed must be < 2^64, got {found.seed}")
-    if found.digest not in ("", _digest(found.seed, found.repeats, documents)):
         raise RunFolderError(
-            f"{file}: damaged: its digest is not that of its content; restore a copy "
-            "of the file"
+            f"{folder / CAMPAIGN}: damaged: seed must be < 2^64, got {found.seed}"
         )
-    return Campaign(experiments, found.repeats, found.seed)
+    documents = [each.document for each in found.experiments]
+    digest = _digest(found.seed, found.repeats, documents, found.plugins)
+    if found.digest not in ("", digest):
+        raise _damaged(folder, "its digest is not that of its content")
+    return found
+
+
+def _damaged(folder: Path, why: str) -> RunFolderError:
+    return RunFolderError(
+        f"{folder / CAMPAIGN}: damaged: {printable(why, 200)}; restore a copy of the "
+        "file"
+    )
 
 
 class _Entry(msgspec.Struct, forbid_unknown_fields=True):
@@ -197,16 +236,25 @@ class _Document(msgspec.Struct, forbid_unknown_fields=True):
     repeats: Annotated[int, msgspec.Meta(ge=1, le=MOST_REPEATS)]
     experiments: Annotated[list[_Entry], msgspec.Meta(min_length=1)]
     digest: str = ""
+    plugins: dict[str, KeptPlugin] = {}
 
 
-def _digest(seed: int, repeats: int, documents: Sequence[str]) -> str:
-    """Return the SHA-256 of a campaign's seed, repeats and experiments."""
+def _digest(
+    seed: int,
+    repeats: int,
+    documents: Sequence[str],
+    plugins: Mapping[str, KeptPlugin],
+) -> str:
+    """Return the SHA-256 of a campaign's seed, repeats, experiments and plug-ins."""
     parts = [str(seed), str(repeats), *documents]
+    for name, note in sorted(plugins.items()):
+        parts += [name, *msgspec.structs.astuple(note)]
     return sha256("\n".join(parts).encode()).hexdigest()
 
 
 def forget_campaign(folder: Path) -> None:
     """Remove the description of a campaign from its folder."""
+    forget_plugins(folder, campaign_plugins(folder))
     (folder / CAMPAIGN).unlink(missing_ok=True)
 
 

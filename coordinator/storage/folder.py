@@ -5,12 +5,14 @@ part of every job: answers to an earlier coordinator of the run are recognised, 
 coordinator that was replaced while it was suspended notices it.
 """
 
+import contextlib
 import os
 import re
 import secrets
 import socket
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Self
 
@@ -24,6 +26,7 @@ from coordinator.storage.lock import LOCK, FolderLock
 from schema.errors import RunFolderError
 from schema.experiment.identity import Origin
 from schema.limits import MOST_MARK
+from schema.plugins.kept import PLUGINS, KeptPlugin, kept_file, plugins_to_keep
 from schema.tables.description import (
     DETAILS,
     STATE,
@@ -87,6 +90,7 @@ class RunFolder:
         Raises:
             RunFolderError: another coordinator has locked it (named), a new run's
                 folder is used, there is no run to open, or the disk fails.
+            ExperimentError: a plug-in file of a new run cannot be kept.
         """
         self.path = path
         self._is_new = details is not None
@@ -101,7 +105,10 @@ class RunFolder:
             if details is not None:
                 _refuse_used(path)
                 new = Description(
-                    **asdict(details), nonce=secrets.token_hex(4), checksums=True
+                    **asdict(details),
+                    nonce=secrets.token_hex(4),
+                    checksums=True,
+                    plugins=keep_plugins(path, details.document),
                 )
                 replace_text(path / DETAILS, description_text(new))
             self.details = read_details(path)
@@ -175,6 +182,7 @@ class RunFolder:
         The lock file stays: another process may already wait for this very file.
         """
         if self._is_new and not (self.path / JOURNAL).exists():
+            forget_plugins(self.path, read_description(self.path).plugins)
             for name in (EPOCH, DETAILS):
                 (self.path / name).unlink(missing_ok=True)
 
@@ -211,6 +219,42 @@ def read_details(path: Path) -> RunDetails:
     return RunDetails(found.name, found.run, found.seed, found.document)
 
 
+def keep_plugins(path: Path, document: str) -> dict[str, KeptPlugin]:
+    """Copy the plug-in files of an experiment to a folder; describe its plug-ins.
+
+    Args:
+        path: folder of a run or campaign.
+        document: the experiment as JSON.
+
+    Raises:
+        ExperimentError: a file cannot be read, or is too large.
+        RunFolderError: the disk is full or failed.
+    """
+    found = plugins_to_keep(document)
+    for name, (note, source) in found.items():
+        if note.file:
+            replace_durably(kept_file(path, name), partial(_write, source))
+    return {name: note for name, (note, _) in found.items()}
+
+
+def forget_plugins(path: Path, plugins: Iterable[str]) -> None:
+    """Remove the copies of plug-in files from a folder.
+
+    Args:
+        path: folder of a run or campaign.
+        plugins: names of the modules.
+    """
+    for name in plugins:
+        kept_file(path, name).unlink(missing_ok=True)
+    with contextlib.suppress(OSError):
+        # Not there, or with other files.
+        (path / PLUGINS).rmdir()
+
+
+def _write(data: bytes, path: Path) -> None:
+    path.write_bytes(data)
+
+
 def _refuse_used(path: Path) -> None:
     """Raise if a folder holds a run or a foreign file."""
     if holds_run(path):
@@ -225,7 +269,8 @@ def _refuse_foreign(path: Path) -> None:
     """Raise if a folder without a run holds a foreign file."""
     names = sorted(entry.name for entry in path.iterdir())
     # A kill between locking the folder and describing the run may leave these.
-    foreign = [name for name in names if name not in (LOCK, f".{DETAILS}.new")]
+    expected = (LOCK, f".{DETAILS}.new", PLUGINS)
+    foreign = [name for name in names if name not in expected]
     if foreign and DETAILS not in names:
         raise RunFolderError(
             f"{path}: not empty (contains {foreign[0]!r}): choose another folder"

@@ -1,7 +1,5 @@
 """Events of the journal as Protobuf bytes, and back."""
 
-from dataclasses import asdict
-
 from coordinator.islands.events import (
     Advanced,
     Audited,
@@ -42,8 +40,6 @@ from schema.wire.messages import (
     birth_from_message,
     birth_to_message,
     finite,
-    genome_from_message,
-    genome_to_message,
 )
 from schema.wire.parsing import parsed
 
@@ -93,7 +89,12 @@ def _entry(event: JournalledEvent) -> pb.Entry:
                 entry.evaluated.CopyFrom(evaluation_to_message(event.evaluation))
             else:
                 entry.evaluation_failed = event.reason
-    entry.provenance.CopyFrom(pb.Provenance(**asdict(event.provenance)))
+    provenance = event.provenance
+    entry.provenance.agent = provenance.agent
+    entry.provenance.platform = provenance.platform
+    entry.provenance.wall_s = provenance.wall_s
+    # Present also if all three have their defaults.
+    entry.provenance.SetInParent()
     return entry
 
 
@@ -108,7 +109,7 @@ def _command(event: Commanded) -> pb.Command:
         case Resume():
             command.resume.SetInParent()
         case Insert():
-            command.insert.genome.CopyFrom(genome_to_message(order.genome))
+            command.insert.genome = order.genome
             if order.place is not None:
                 command.insert.has_place = True
                 command.insert.x, command.insert.y = order.place
@@ -163,11 +164,10 @@ def _order(command: pb.Command) -> Order:
             return Resume()
         case "insert":
             insert = command.insert
-            genome = genome_from_message(insert.genome)
             if not insert.has_place:
-                return Insert(genome)
+                return Insert(insert.genome)
             place = finite(insert.x, "insert.x"), finite(insert.y, "insert.y")
-            return Insert(genome, place)
+            return Insert(insert.genome, place)
         case "remove":
             return Remove(birth_from_message(command.remove))
         case "replace_brain":

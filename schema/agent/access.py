@@ -67,7 +67,7 @@ def permissions(certificate: Certificate) -> list[Permission]:
             Permission("ingress", _OWN, (own,)),
             # Coordinators subscribe to the tokens of all agents of a role.
             Permission("egress", ("query", "put", "delete"), (own,)),
-            # Without these a publisher believes that nobody subscribes.
+            # Without these a publisher finds no subscriber.
             Permission(
                 "egress",
                 ("declare_subscriber", "declare_liveliness_subscriber"),

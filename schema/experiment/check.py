@@ -4,19 +4,21 @@ from collections.abc import Iterator
 from math import isclose, lcm
 from urllib.parse import quote
 
-from schema.errors import ExperimentError
+from schema.errors import ExperimentError, nearest, shown
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.check_migration import migration_problems
+from schema.experiment.check_world import world_problems
 from schema.experiment.document import (
     Arena,
     Culling,
     Experiment,
+    Measures,
     Selection,
     Simulation,
     body_space,
     island_experiment,
     steps_of,
 )
-from schema.experiment.environment import ground_problems
 
 # File systems hold names of 255 bytes, of which the run's folders need some.
 _LONGEST_NAME = 200
@@ -31,7 +33,8 @@ def check_experiment(experiment: Experiment, where: str) -> None:
             between two samples; an arena too small, or with intervals that are not
             multiples of its clocks; off-line keys in an arena; an extent that is
             not a whole number of patches; invalid scenery; an unknown plug-in; a
-            migration that can never happen.
+            migration that can never happen; measures that are named twice, or
+            parameters of a measure that is not named.
     """
     if problem := next(_problems(experiment), ""):
         raise ExperimentError(f"{where}: {problem}")
@@ -48,6 +51,7 @@ def _problems(experiment: Experiment) -> Iterator[str]:
         yield from _island_problems(experiment)
     yield from _name_problems(experiment.name)
     yield from migration_problems(experiment)
+    yield from _measures_problems(experiment.measures)
     types = body_space(experiment.space)
     core = next(kind for kind in types.values() if kind.is_root)
     if core.inputs > experiment.space.max_inputs:
@@ -57,6 +61,8 @@ def _problems(experiment: Experiment) -> Iterator[str]:
         )
     if not any(kind.outputs for kind in types.values()):
         yield "space.part_types: at least one type must have a motor"
+    # Loads and checks both; raises what is wrong.
+    neuron_kinds(experiment.brain, experiment.space)
 
 
 def _island_problems(experiment: Experiment) -> Iterator[str]:
@@ -67,10 +73,24 @@ def _island_problems(experiment: Experiment) -> Iterator[str]:
     yield from _reevaluation_problems(experiment)
     yield from _pose_problems(experiment.simulation, "window_steps")
     yield from _duration_problems(experiment)
-    yield from _environment_problems(experiment)
+    yield from world_problems(experiment)
     if experiment.arena is not None:
         yield from _arena_problems(experiment, experiment.arena)
         yield from _arena_clock_problems(experiment.arena, experiment.simulation)
+
+
+def _measures_problems(measures: Measures) -> Iterator[str]:
+    """Yield what is wrong with ``measures``; names are looked up elsewhere."""
+    labels = measures.labels
+    for label in labels:
+        if labels.count(label) > 1:
+            yield f"measures.names: two measures are named {shown(label)}"
+    for label in measures.parameters:
+        if label not in labels:
+            yield (
+                f"measures.parameters.{shown(label)}: is not in measures.names"
+                f"{nearest(label, labels)}"
+            )
 
 
 def _name_problems(name: str) -> Iterator[str]:
@@ -134,18 +154,6 @@ def _pose_problems(clock: Simulation, name: str) -> Iterator[str]:
             f"simulation.{name}: must be a multiple of simulation.pose_steps = "
             f"{clock.pose_steps}, got {steps}"
         )
-
-
-def _environment_problems(experiment: Experiment) -> Iterator[str]:
-    yield from ground_problems(experiment.environment)
-    if scenery := experiment.environment.scenery:
-        # MuJoCo is imported only if needed: it is slow to load.
-        from schema.experiment.scenery import scenery_model  # noqa: PLC0415
-
-        try:
-            scenery_model(scenery, experiment.simulation)
-        except ExperimentError as error:
-            yield str(error)
 
 
 def _arena_problems(experiment: Experiment, arena: Arena) -> Iterator[str]:

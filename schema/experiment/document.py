@@ -8,9 +8,9 @@ folders, addresses) are flags of the commands, not keys.
 from dataclasses import replace
 from functools import lru_cache
 from math import pi
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
-from msgspec import Meta, structs
+from msgspec import Meta, field, structs
 
 from schema.errors import ExperimentError
 from schema.experiment.environment import FLAT, Environment
@@ -19,12 +19,19 @@ from schema.experiment.section import (
     AtLeastOne,
     Count,
     NotNegative,
+    Parameters,
+    PluginSection,
     Positive,
     Probability,
     Section,
 )
-from schema.parts import BodySpace, Parameter, PartType
+from schema.limits import MOST_MEASURES
+from schema.parts import BodySpace, Parameter, PartType, Vector
 from schema.plugins.load import load_instance
+from schema.plugins.part_checks import check_part_type
+
+REVOLVE_ANGLE = "revolve-angle"
+"""Name of the encoding of the thesis."""
 
 
 class Space(Section, frozen=True):
@@ -35,7 +42,11 @@ class Space(Section, frozen=True):
         min_parts, max_parts: allowed number of parts, core included.
         max_inputs, max_outputs, max_hidden: allowed number of neurons.
         planar: keep all parts in the plane of the core.
+        neuron_types: types of output and hidden neurons: short names of built-in
+            types, or ``module:attribute``; each is equally likely.
     """
+
+    later: ClassVar = ("neuron_types",)
 
     part_types: tuple[str, ...] = (
         "schema.parts:CORE",
@@ -51,6 +62,25 @@ class Space(Section, frozen=True):
     max_outputs: AtLeastOne = 10
     max_hidden: Count = 10
     planar: bool = True
+    neuron_types: tuple[str, ...] = ("Simple", "Sigmoid", "Oscillator")
+
+
+class BrainSection(PluginSection, frozen=True):
+    """The type of all brains of an experiment.
+
+    Attributes:
+        type: short name of a built-in type, or ``module:attribute``: ``network`` is
+            the thesis's recurrent network of ``space.neuron_types``, ``cpg`` couples
+            an oscillator for each motor.
+        parameters: of the type.
+    """
+
+    type: str = "network"
+    parameters: Parameters = field(default_factory=dict)
+
+
+NETWORK = BrainSection()
+"""The thesis's brains."""
 
 
 class Generation(Section, frozen=True):
@@ -99,6 +129,18 @@ class Variation(Section, frozen=True):
     duplicable_size: Literal["mean", "sum"] = "mean"
     hidden_rounding: Literal["stochastic", "half-up"] = "stochastic"
     check_min_parts: bool = True
+
+
+class Encoding(PluginSection, frozen=True):
+    """How genomes describe robots.
+
+    Attributes:
+        type: ``revolve-angle`` (thesis), ``cppn`` or ``module:attribute``.
+        parameters: of the encoding.
+    """
+
+    type: str = REVOLVE_ANGLE
+    parameters: Parameters = field(default_factory=dict)
 
 
 class Culling(Section, frozen=True):
@@ -239,7 +281,7 @@ class Simulation(Section, frozen=True):
     actuator_noise: NoiseLevel = 0.0
 
 
-class Fitness(Section, frozen=True):
+class Fitness(PluginSection, frozen=True):
     """The function that evolution maximises.
 
     Attributes:
@@ -247,12 +289,34 @@ class Fitness(Section, frozen=True):
         path_weight, straight_weight: weights of the velocities along the path and
             between its ends.
         limit: greatest realistic fitness; above it, fitness is 0.
+        parameters: of a function with a Struct of its own.
     """
+
+    later: ClassVar = ("parameters",)
 
     function: str = "worker.fitness:thesis"
     path_weight: float = 1.0
     straight_weight: float = 5.0
     limit: Positive = 1.0
+    parameters: Parameters = field(default_factory=dict)
+
+
+class Measures(PluginSection, frozen=True):
+    """Numbers of a robot's life that are recorded beside its fitness.
+
+    Attributes:
+        names: short names of built-in measures, or ``module:attribute``.
+        parameters: a table for each measure that has parameters, by short name or
+            attribute.
+    """
+
+    names: Annotated[tuple[str, ...], Meta(max_length=MOST_MEASURES)] = ()
+    parameters: dict[str, Parameters] = field(default_factory=dict)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the measures in tables: short names and attributes."""
+        return tuple(name.rpartition(":")[2] for name in self.names)
 
 
 class Arena(Section, frozen=True):
@@ -279,7 +343,7 @@ class Arena(Section, frozen=True):
         drop_m: height above the ground at birth [m].
         wall_diameter_m: of the ring wall [m]; 0 is no wall.
         wall_segments, wall_height_m, wall_thickness_m: of the ring wall [m].
-        light: position of the light [m]; None is no light.
+        light: as ``environment.light``; only one of the two is needed.
         record_touches: write the table ``touches``.
         proximity_steps: physics steps between checks of distances.
         merge_distance_m: robots that may come nearer than this before the next check
@@ -341,6 +405,9 @@ class Experiment(Section, frozen=True):
         births: number of births on each island, the initial population included.
         islands: numbered from 0, in the order of the document; none is one island.
         migration: between the islands.
+        measures: of the robots of all islands.
+        encoding: of all islands.
+        brain: of the robots of all islands.
     """
 
     name: str
@@ -356,6 +423,9 @@ class Experiment(Section, frozen=True):
     arena: Arena | None = None
     islands: tuple[Islands, ...] = ()
     migration: Migration | None = None
+    measures: Measures = Measures()
+    encoding: Encoding = Encoding()
+    brain: BrainSection = NETWORK
 
     @property
     def window(self) -> int:
@@ -389,6 +459,12 @@ def island_experiment(experiment: Experiment, number: int) -> Experiment:
     return structs.replace(experiment, islands=(), **changes)
 
 
+def light_of(environment: Environment, arena: Arena | None) -> Vector | None:
+    """Return the position of the light of a world [m]; None is no light."""
+    own = None if arena is None else arena.light
+    return own or environment.light
+
+
 def with_births(experiment: Experiment, births: int) -> Experiment:
     """Return an experiment with another number of births on each island."""
     islands = tuple(structs.replace(each, births=None) for each in experiment.islands)
@@ -396,10 +472,21 @@ def with_births(experiment: Experiment, births: int) -> Experiment:
 
 
 def references(experiment: Experiment) -> list[str]:
-    """Return the ``module:attribute`` of all plug-ins that a document names."""
+    """Return the ``module:attribute`` of all plug-ins that a document names.
+
+    Short names of built-in plug-ins are left out.
+    """
     own = [each.fitness for each in experiment.islands if each.fitness is not None]
     functions = [fitness.function for fitness in (experiment.fitness, *own)]
-    return [*experiment.space.part_types, *functions]
+    named = [
+        *experiment.space.part_types,
+        *experiment.space.neuron_types,
+        *functions,
+        *experiment.measures.names,
+        experiment.encoding.type,
+        experiment.brain.type,
+    ]
+    return [path for path in named if ":" in path]
 
 
 @lru_cache(maxsize=64)
@@ -408,7 +495,8 @@ def body_space(space: Space) -> BodySpace:
 
     Raises:
         UnknownPlugin: no such module or attribute, or a module that is not allowed.
-        ExperimentError: not a part type, two of one name, or not exactly one core.
+        ExperimentError: not a part type, or one that ``check_part_type`` refuses; two
+            of one name, or not exactly one core.
     """
     types: dict[str, PartType] = {}
     for path in space.part_types:
@@ -418,6 +506,7 @@ def body_space(space: Space) -> BodySpace:
                 f"space.part_types: two part types are named {kind.name!r}"
             )
         types[kind.name] = kind if space.planar else _freed(kind)
+        check_part_type(types[kind.name], "space.part_types")
     cores = [name for name, kind in types.items() if kind.is_root]
     if len(cores) != 1:
         raise ExperimentError(

@@ -1,9 +1,9 @@
-"""The section ``[environment]``: slope, rough ground and scenery."""
+"""The section ``[environment]``: slope, rough ground, scenery and light."""
 
 from collections.abc import Iterator
 from functools import cached_property, lru_cache
 from math import cos, isclose, radians, sin
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from msgspec import Meta
@@ -16,6 +16,11 @@ MOST_PATCHES = 400
 """Most patches of rough ground per axis; each robot's model holds all of them."""
 TAPER = 0.2
 """Share of the extent over which rough ground descends to the plane."""
+LIGHT_M = 0.03
+LIGHT_COLOUR = (1.0, 0.85, 0.1, 1.0)
+"""Radius [m] and colour of the ball that shows the light."""
+MOST_IMPULSE = 1000.0
+"""Greatest impulse of a push [N s]."""
 
 
 class Environment(Section, frozen=True, dict=True):
@@ -33,7 +38,13 @@ class Environment(Section, frozen=True, dict=True):
         ground_seed: seed of the heights.
         scenery: MJCF of static objects; a document may give the path of a file,
             relative to itself.
+        light: position of the light [m]; None is no light.
+        push_impulse: horizontal impulse on the core at each push [N s], off-line; 0
+            is no pushes. Directions are drawn uniformly for each evaluation.
+        push_interval_s: time between pushes [s].
     """
+
+    later: ClassVar = ("light", "push_impulse", "push_interval_s")
 
     slope_deg: Annotated[float, Meta(ge=0, lt=45)] = 0.0
     roughness_m: NotNegative = 0.0
@@ -41,6 +52,9 @@ class Environment(Section, frozen=True, dict=True):
     extent_m: Positive = 5.0
     ground_seed: Count = 1
     scenery: str = ""
+    light: Vector | None = None
+    push_impulse: Annotated[float, Meta(ge=0, le=MOST_IMPULSE)] = 0.0
+    push_interval_s: Positive = 3.0
 
     @cached_property
     def is_even(self) -> bool:
@@ -91,6 +105,15 @@ def ground_problems(environment: Environment) -> Iterator[str]:
         yield (
             "environment.extent_m: must be a whole multiple of environment.patch_m = "
             f"{patch_m:g}, got {extent_m:g}"
+        )
+
+
+def arena_problems(environment: Environment) -> Iterator[str]:
+    """Yield what arenas do not support."""
+    if environment.push_impulse:
+        yield (
+            "environment.push_impulse: pushes are for off-line evaluations, not for "
+            "arenas; remove it"
         )
 
 

@@ -54,10 +54,7 @@ def source_text(source: str) -> tuple[str, str]:
         ExperimentError: no such experiment or file.
     """
     if source.endswith(".toml"):
-        try:
-            return read_bytes(Path(source)).decode(), source
-        except (OSError, UnicodeDecodeError) as error:
-            raise ExperimentError(f"{source}: cannot be read: {error}") from None
+        return _text(source), source
     check_source(source, shipped_experiments())
     folder = resources.files("schema.experiment") / "shipped"
     return (folder / f"{source}.toml").read_text(encoding="utf-8"), f"{source}.toml"
@@ -99,7 +96,7 @@ def parse_experiment(text: str, where: str) -> Experiment:
         ExperimentError: not TOML; an unknown key (the nearest is named); a value of a
             wrong type or outside its range; inconsistent values.
     """
-    return experiment_from_tables(parse_toml(text, where), where)
+    return _checked(_converted(parse_toml(text, where), where), where)
 
 
 def experiment_from_tables(document: dict[str, Any], where: str) -> Experiment:
@@ -112,14 +109,11 @@ def experiment_from_tables(document: dict[str, Any], where: str) -> Experiment:
     Raises:
         ExperimentError: as for ``parse_experiment``.
     """
-    _refuse_unknown(document, Experiment, where, "")
-    _refuse_many_islands(document, where)
-    _read_scenery(document, where)
-    _complete(document)
-    try:
-        experiment = msgspec.convert(document, type=Experiment)
-    except msgspec.ValidationError as error:
-        raise ExperimentError(f"{where}: {_explain(error, document)}") from None
+    return _checked(_converted(document, where), where)
+
+
+def _checked(experiment: Experiment, where: str) -> Experiment:
+    """Return an experiment after the checks across its keys."""
     allow_references(references(experiment), Path(where).parent)
     check_experiment(experiment, where)
     return experiment
@@ -136,6 +130,41 @@ def own_experiment(text: str) -> Experiment:
     experiment = experiment_from_text(text)
     allow_references(references(experiment))
     return experiment
+
+
+def own_references(source: str) -> list[str]:
+    """Return the ``module:attribute`` that an experiment names; nothing is imported.
+
+    Args:
+        source: as for ``read_experiment``; a shipped one has none of its own.
+
+    Raises:
+        ExperimentError: the file cannot be read, or has an unknown key or a value of a
+            wrong type.
+    """
+    if not source.endswith(".toml"):
+        return []
+    return references(_converted(parse_toml(_text(source), source), source))
+
+
+def _converted(document: dict[str, Any], where: str) -> Experiment:
+    """Return the experiment of tables before the checks across its keys."""
+    _refuse_unknown(document, Experiment, where, "")
+    _refuse_many_islands(document, where)
+    _read_scenery(document, where)
+    _complete(document)
+    try:
+        return msgspec.convert(document, type=Experiment)
+    except msgspec.ValidationError as error:
+        raise ExperimentError(f"{where}: {_explain(error, document)}") from None
+
+
+def _text(source: str) -> str:
+    """Return the text of a TOML file."""
+    try:
+        return read_bytes(Path(source)).decode()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ExperimentError(f"{source}: cannot be read: {error}") from None
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:

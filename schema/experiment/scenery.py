@@ -1,7 +1,7 @@
-"""Scenery: a user's MJCF, read as static geoms.
+"""Scenery: a user's MJCF, read as static geoms and as objects that move freely.
 
-All geoms are added to the world body, so that a model's bodies and joints are those
-of robots only.
+All static geoms are added to the world body. Each body with a free joint becomes an
+object, a body after those of the robot. In arenas there are no objects.
 """
 
 from dataclasses import dataclass
@@ -15,14 +15,15 @@ import numpy as np
 from schema.errors import ExperimentError, one_line, shown
 from schema.experiment.bounded import parse_xml
 from schema.experiment.document import Simulation
-from schema.limits import MOST_GEOMS, MOST_OTHERS, MOST_SCENERY_DEPTH
+from schema.experiment.environment import Environment
+from schema.limits import MOST_GEOMS, MOST_OBJECTS, MOST_OTHERS, MOST_SCENERY_DEPTH
 from schema.robot.results import Floats
 
 _ALLOWED = (
     *("mujoco", "compiler", "default", "worldbody"),
-    *("body", "frame", "replicate", "geom"),
+    *("body", "frame", "replicate", "geom", "freejoint"),
 )
-"""MJCF elements that are allowed: none of them moves."""
+"""MJCF elements that are allowed."""
 _SHAPES = {
     mujoco.mjtGeom.mjGEOM_SPHERE: "sphere",
     mujoco.mjtGeom.mjGEOM_CAPSULE: "capsule",
@@ -81,10 +82,10 @@ def solids(scenery: str, simulation: Simulation) -> list[Solid]:
 
 
 def add_scenery(spec: mujoco.MjSpec, scenery: str, simulation: Simulation) -> None:
-    """Add the geoms of scenery to a world, named ``scenery/{k}``.
+    """Add the geoms and objects of scenery to a world, both named ``scenery/{k}``.
 
     Args:
-        spec: of the world.
+        spec: of the world; objects come after the bodies that it has.
         scenery: MJCF.
         simulation: default friction and contact of its geoms.
 
@@ -94,14 +95,61 @@ def add_scenery(spec: mujoco.MjSpec, scenery: str, simulation: Simulation) -> No
     model = scenery_model(scenery, simulation)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
+    moving = {
+        body: _add_object(spec, model, data, body) for body in _object_bodies(model)
+    }
     for index in range(model.ngeom):
-        geom = spec.worldbody.add_geom(name=f"scenery/{index}")
+        body = int(model.geom_bodyid[index])
+        geom = moving.get(body, spec.worldbody).add_geom(name=f"scenery/{index}")
         for key in _COPIED:
             setattr(geom, key, getattr(model, f"geom_{key}")[index])
+        if body in moving:
+            geom.pos, geom.quat = model.geom_pos[index], model.geom_quat[index]
+            continue
         quaternion = np.empty(4)
-        body = int(model.geom_bodyid[index])
         mujoco.mju_mulQuat(quaternion, data.xquat[body], model.geom_quat[index])
         geom.pos, geom.quat = data.geom_xpos[index], quaternion
+
+
+def object_count(environment: Environment, simulation: Simulation) -> int:
+    """Return the number of objects of an environment's scenery.
+
+    Raises:
+        ExperimentError: the text is not valid scenery.
+    """
+    if not environment.scenery:
+        return 0
+    return int(scenery_model(environment.scenery, simulation).njnt)
+
+
+def refuse_objects(environment: Environment, simulation: Simulation) -> None:
+    """Raise if the scenery of an arena has objects.
+
+    Raises:
+        ExperimentError: it has some, or is not valid.
+    """
+    if count := object_count(environment, simulation):
+        raise _invalid(
+            f"arenas have no objects that move, got {count} <freejoint>; remove them"
+        )
+
+
+def _object_bodies(model: mujoco.MjModel) -> list[int]:
+    return [int(body) for body in model.jnt_bodyid]
+
+
+def _add_object(
+    spec: mujoco.MjSpec, model: mujoco.MjModel, data: mujoco.MjData, body: int
+) -> mujoco.MjsBody:
+    """Add an object without geoms; return its body."""
+    made = spec.worldbody.add_body(name=f"scenery/{body}")
+    made.pos, made.quat = data.xpos[body], data.xquat[body]
+    # No alignment: the geoms' poses are in the frame that the compiler chose already.
+    made.add_freejoint(name=f"scenery/{body}", align=0)
+    made.explicitinertial = 1
+    made.mass, made.inertia = model.body_mass[body], model.body_inertia[body]
+    made.ipos, made.iquat = model.body_ipos[body], model.body_iquat[body]
+    return made
 
 
 @lru_cache(maxsize=16)
@@ -113,8 +161,9 @@ def scenery_model(scenery: str, simulation: Simulation) -> mujoco.MjModel:
         simulation: default friction and contact of its geoms.
 
     Raises:
-        ExperimentError: not XML, not MJCF, no geom or too many, an element that moves
-            or refers to another file, or a shape that is not supported.
+        ExperimentError: not XML, not MJCF, no geom or too many, too many objects, an
+            element that moves otherwise or refers to another file, or a shape that is
+            not supported.
     """
     try:
         root = parse_xml(scenery, most_depth=MOST_SCENERY_DEPTH)
@@ -138,6 +187,7 @@ def scenery_model(scenery: str, simulation: Simulation) -> mujoco.MjModel:
     except ValueError as error:
         raise _invalid(f"not valid MJCF: {one_line(error)}") from None
     _check_shapes(model)
+    _check_objects(model)
     return model
 
 
@@ -151,8 +201,8 @@ def _check_elements(root: ET.Element) -> None:
     for element in root.iter():
         if element.tag not in _ALLOWED:
             raise _invalid(
-                f"<{element.tag}> is not allowed, because scenery "
-                f"does not move; allowed: {', '.join(_ALLOWED)}"
+                f"<{element.tag}> is not allowed in scenery; "
+                f"allowed: {', '.join(_ALLOWED)}"
             )
         for key, value in element.items():
             if key == "user":
@@ -162,7 +212,7 @@ def _check_elements(root: ET.Element) -> None:
         if element.get("mocap", "false") != "false":
             name = element.get("name", "")
             raise _invalid(
-                f"<body name={name!r}> must not be mocap, because scenery does not move"
+                f"<body name={name!r}> must not be mocap: nothing would move it"
             )
 
 
@@ -210,4 +260,16 @@ def _check_shapes(model: mujoco.MjModel) -> None:
             raise _invalid(
                 f"geom {index} {model.geom(index).name!r} must be "
                 f"one of {', '.join(_SHAPES.values())}, got {shape}"
+            )
+
+
+def _check_objects(model: mujoco.MjModel) -> None:
+    if model.njnt > MOST_OBJECTS:
+        raise _invalid(f"must have <= {MOST_OBJECTS} <freejoint>, got {model.njnt}")
+    inside = set(range(1, model.nbody)).difference(_object_bodies(model))
+    for body in sorted(inside):
+        if model.body_weldid[body]:
+            raise _invalid(
+                f"<body name={model.body(body).name!r}> must not be inside a body with "
+                "<freejoint>: use <frame>"
             )

@@ -2,27 +2,48 @@
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import msgspec
 from msgspec.structs import replace
 
 from schema.errors import ExperimentError
 from schema.experiment.document import (
+    NETWORK,
     Arena,
+    BrainSection,
     Experiment,
     Fitness,
+    Measures,
     Simulation,
     Space,
     Vetting,
+    light_of,
 )
-from schema.experiment.environment import FLAT, Environment, ground_problems
+from schema.experiment.environment import (
+    FLAT,
+    Environment,
+    arena_problems,
+    ground_problems,
+)
 from schema.experiment.identity import Origin
 from schema.experiment.section import Section
 from schema.limits import MOST_SETTINGS_BYTES
-from schema.plugins.load import load_function
+from schema.parts import Vector
+from schema.plugins.load import full_name, load_function
+from schema.plugins.parameters import parameters_type, read_parameters
 
 T = TypeVar("T")
+
+FITNESS = {
+    "locomotion": "worker.fitness:thesis",
+    "directed-locomotion": "worker.tasks:directed_locomotion",
+    "target": "worker.tasks:target",
+    "light": "worker.tasks:light",
+    "turning": "worker.tasks:turning",
+    "balance": "worker.tasks:balance",
+}
+"""Fitness functions that come with the toolkit, by short name."""
 
 
 class VettingSettings(Section, frozen=True):
@@ -35,14 +56,25 @@ class VettingSettings(Section, frozen=True):
 class EvaluationSettings(Section, frozen=True):
     """Settings of an evaluation request."""
 
+    later: ClassVar = ("measures", "brain")
+
     space: Space
     simulation: Simulation
     fitness: Fitness
     environment: Environment = FLAT
+    measures: Measures = Measures()
+    brain: BrainSection = NETWORK
+
+    @property
+    def light(self) -> Vector | None:
+        """Position of the light [m]; None is no light."""
+        return self.environment.light
 
 
 class ArenaSettings(Section, frozen=True):
     """Settings of a request to advance an arena."""
+
+    later: ClassVar = ("measures", "brain")
 
     space: Space
     simulation: Simulation
@@ -50,6 +82,13 @@ class ArenaSettings(Section, frozen=True):
     arena: Arena
     environment: Environment = FLAT
     origin: Origin = Origin()
+    measures: Measures = Measures()
+    brain: BrainSection = NETWORK
+
+    @property
+    def light(self) -> Vector | None:
+        """Position of the light [m]; None is no light."""
+        return light_of(self.environment, self.arena)
 
 
 def vetting_settings(experiment: Experiment) -> bytes:
@@ -138,7 +177,10 @@ def _from_json(settings: bytes, kind: type[T]) -> T:
     except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
         raise ExperimentError(f"{where}: {error}") from None
     environment = getattr(found, "environment", FLAT)
-    for problem in ground_problems(environment):
+    problems = list(ground_problems(environment))
+    if isinstance(found, ArenaSettings):
+        problems += arena_problems(environment)
+    for problem in problems:
         raise ExperimentError(f"{where}: {problem}")
     return found
 
@@ -173,6 +215,33 @@ def fitness_function(fitness: Fitness) -> Callable[..., float]:
 
     Raises:
         UnknownPlugin: no such module or attribute, or a module that is not allowed.
-        ExperimentError: not a function of a track and a fitness section.
+        ExperimentError: not a function of a trace and its parameters.
     """
-    return load_function(fitness.function, "fitness.function", 2)
+    where = "fitness.function"
+    return load_function(full_name(fitness.function, where, FITNESS), where, 2)
+
+
+@lru_cache(maxsize=64)
+def fitness_argument(
+    function: Callable[..., float], fitness: Fitness
+) -> Fitness | msgspec.Struct:
+    """Return the second argument of a fitness function.
+
+    Args:
+        function: annotated with a Struct of its own, which gets the table
+            ``fitness.parameters``; any other function gets the section.
+        fitness: the section.
+
+    Raises:
+        ExperimentError: parameters that the Struct refuses, or without a Struct.
+    """
+    where = "fitness.parameters"
+    kind = parameters_type(function, "fitness.function")
+    if kind is not None and not issubclass(kind, Fitness):
+        return read_parameters(fitness.parameters, kind, where)
+    if fitness.parameters:
+        raise ExperimentError(
+            f"{where}: {fitness.function} has no parameters of its own; it must "
+            "annotate its second argument with a msgspec Struct"
+        )
+    return fitness

@@ -18,17 +18,22 @@ from schema.formats.yaml_2016 import RevolveReader, is_of_revolve
 from schema.formats.yaml_node import compose
 from schema.limits import MOST_TEXT_BYTES
 from schema.parts import BUILT_IN, BodySpace
+from schema.robot.brain import NeuronKinds
+from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.robot import Robot, check_number, check_robot
 from schema.wire.codec import decode_robot, encode_robot
 
 
-def robot_from_yaml(text: str, file: str, space: BodySpace) -> Robot:
+def robot_from_yaml(
+    text: str, file: str, space: BodySpace, kinds: NeuronKinds = BUILT_IN_KINDS
+) -> Robot:
     """Return the robot of a YAML text, in the current form or that of Revolve (2016).
 
     Args:
         text: the document.
         file: its name, for messages.
         space: the allowed part types.
+        kinds: the allowed neuron types.
 
     Raises:
         InvalidRobot: not YAML; an unknown or missing key, part type or name; a value
@@ -37,17 +42,13 @@ def robot_from_yaml(text: str, file: str, space: BodySpace) -> Robot:
     """
     document = compose(text, file)
     reader = RevolveReader if is_of_revolve(document) else Reader
-    return reader(space, file).read(document)
+    return reader(space, file, kinds).read(document)
 
 
 MJCF_ENDING = ".xml"
-_TEXTS = {
-    ".yaml": robot_from_yaml,
-    ".yml": robot_from_yaml,
-    ".txt": robot_from_robogen_text,
-    ".json": robot_from_robogen_json,
-}
-_READ = (*_TEXTS, ".pb", MJCF_ENDING)
+_YAML = (".yaml", ".yml")
+_ROBOGEN = {".txt": robot_from_robogen_text, ".json": robot_from_robogen_json}
+_READ = (*_YAML, *_ROBOGEN, ".pb", MJCF_ENDING)
 _WRITTEN = (".yaml", ".yml", ".pb", MJCF_ENDING, ".urdf")
 _ANY_BUILT_IN = Space(part_types=(*Space().part_types, "schema.parts:LIGHT_SENSOR"))
 
@@ -65,12 +66,15 @@ def settings_of(experiment: Experiment | None) -> EvaluationSettings:
     return evaluation_settings_of(experiment)
 
 
-def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
+def read_robot(
+    path: Path, space: BodySpace = BUILT_IN, kinds: NeuronKinds = BUILT_IN_KINDS
+) -> Robot:
     """Return the robot of a file.
 
     Args:
         path: ends in .yaml, .yml, .pb, .xml, .txt or .json.
         space: the allowed part types.
+        kinds: the allowed neuron types.
 
     Raises:
         InvalidRobot: another ending, a file that cannot be read, a text that is not
@@ -78,9 +82,11 @@ def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
         MalformedMessage: a .pb file that does not hold a robot.
     """
     ending = _ending(path, _READ)
-    if ending in _TEXTS:
-        return _TEXTS[ending](read_text(path), str(path), space)
-    if ending == MJCF_ENDING:
+    if ending in _YAML:
+        return robot_from_yaml(read_text(path), str(path), space, kinds)
+    if ending in _ROBOGEN:
+        robot = _ROBOGEN[ending](read_text(path), str(path), space)
+    elif ending == MJCF_ENDING:
         # MuJoCo is imported only if needed: it is slow to load.
         from schema.formats.mjcf import read_mjcf  # noqa: PLC0415
 
@@ -92,7 +98,7 @@ def read_robot(path: Path, space: BodySpace = BUILT_IN) -> Robot:
             raise MalformedMessage(f"{path}: {error}") from None
     try:
         check_number(robot)
-        check_robot(robot, space)
+        check_robot(robot, space, kinds)
     except InvalidRobot as error:
         raise InvalidRobot(f"{path}: {error}") from None
     return robot
@@ -126,6 +132,7 @@ def write_robot(
     path: Path,
     space: BodySpace = BUILT_IN,
     settings: EvaluationSettings | None = None,
+    kinds: NeuronKinds = BUILT_IN_KINDS,
 ) -> None:
     """Write a robot to a file.
 
@@ -134,6 +141,7 @@ def write_robot(
         path: ends in .yaml, .yml, .pb, .xml or .urdf.
         space: its part types.
         settings: stored in MJCF; the default values if None.
+        kinds: the allowed neuron types.
 
     Raises:
         InvalidRobot: another ending, a robot that is not well formed in this body
@@ -141,10 +149,10 @@ def write_robot(
     """
     ending = _ending(path, _WRITTEN)
     settings = settings or settings_of(None)
-    if ending in (".yaml", ".yml"):
-        data = robot_to_yaml(robot, space).encode()
+    if ending in _YAML:
+        data = robot_to_yaml(robot, space, kinds).encode()
     elif ending == ".pb":
-        check_robot(robot, space)
+        check_robot(robot, space, kinds)
         data = encode_robot(robot)
     elif ending == MJCF_ENDING:
         from schema.formats.mjcf import robot_to_mjcf  # noqa: PLC0415
@@ -153,6 +161,7 @@ def write_robot(
     else:
         from schema.formats.urdf import robot_to_urdf  # noqa: PLC0415
 
+        check_robot(robot, space, kinds)
         data = robot_to_urdf(robot, space, settings.simulation).encode()
     try:
         path.write_bytes(data)

@@ -24,6 +24,7 @@ from schema.errors import (
     shown,
 )
 from schema.experiment.bounded import parse_xml
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.environment import MOST_PATCHES
 from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
@@ -53,7 +54,10 @@ _SIDES = frozenset(map(str, range(1, MOST_PATCHES + 2)))
 _DIGITS = 1e-4
 """Relative difference that is greater than MJCF's rounding."""
 _LENGTH_M = 1e-6
-_COMPARED = ("body_mass", "geom_size", "geom_pos", "geom_quat", "jnt_range")
+_COMPARED = (
+    *("body_mass", "geom_type", "geom_size", "geom_pos", "geom_quat"),
+    *("jnt_type", "jnt_limited", "jnt_range"),
+)
 
 
 def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
@@ -67,7 +71,7 @@ def robot_to_mjcf(robot: Robot, settings: EvaluationSettings) -> str:
         InvalidRobot: the robot is not well formed in the settings' body space.
     """
     space = body_space(settings.space)
-    check_robot(robot, space)
+    check_robot(robot, space, neuron_kinds(settings.brain, settings.space))
     spec = solo_spec(robot, space, settings.simulation, settings.environment)
     spec.modelname = "robot"
     for name, data in (
@@ -102,7 +106,7 @@ def robot_from_mjcf(text: str, where: str) -> tuple[Robot, EvaluationSettings]:
         settings = read_evaluation_settings(_bytes(held, SETTINGS))
         space = body_space(settings.space)
         check_number(robot)
-        check_robot(robot, space)
+        check_robot(robot, space, neuron_kinds(settings.brain, settings.space))
         built = solo_spec(
             robot, space, settings.simulation, settings.environment
         ).compile()

@@ -1,7 +1,7 @@
 """Writer of a robot's body as URDF, for other tools.
 
-Links are the rigid segments of the robot, with the names of its MuJoCo bodies; joints
-are revolute. URDF has no elements for brains and servos, which are left out.
+Links are the rigid segments of the robot, with the names of its MuJoCo bodies. URDF has
+no elements for brains and servos, which are left out.
 """
 
 import math
@@ -14,10 +14,11 @@ from schema.experiment.document import Simulation
 from schema.mjcf.model import robot_spec
 from schema.parts import BodySpace
 from schema.robot.results import Floats
-from schema.robot.robot import Robot, check_robot
+from schema.robot.robot import Robot, check_body, check_tree
 
 _FREE = (0.0, 1e6)
-"""Effort [N m] and velocity [rad/s] of a hinge without a motor; URDF needs both."""
+"""Effort [N m] and velocity [rad/s] of a joint without a motor, or [N] and [m/s] of a
+slider; URDF needs both."""
 
 
 def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str:
@@ -29,9 +30,10 @@ def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str
         simulation: gives the damping of the joints.
 
     Raises:
-        InvalidRobot: the robot is not well formed in this body space.
+        InvalidRobot: the body is not well formed in this body space.
     """
-    check_robot(robot, space)
+    check_tree(robot.parts)
+    check_body(robot.parts, space)
     model = robot_spec(robot, space, simulation).spec.compile()
     root = ET.Element("robot", name="robot")
     for body in range(1, model.nbody):
@@ -46,7 +48,7 @@ def robot_to_urdf(robot: Robot, space: BodySpace, simulation: Simulation) -> str
 
 
 def _link(model: mujoco.MjModel, body: int) -> ET.Element:
-    """Return the link of a body: its mass and boxes."""
+    """Return the link of a body: its mass, boxes and cylinders."""
     link = ET.Element("link", name=model.body(body).name)
     inertial = ET.SubElement(link, "inertial")
     inertial.append(_origin(model.body_ipos[body], model.body_iquat[body]))
@@ -60,31 +62,51 @@ def _link(model: mujoco.MjModel, body: int) -> ET.Element:
         for role in ("visual", "collision"):
             shown = ET.SubElement(link, role, name=name)
             shown.append(_origin(model.geom_pos[geom], model.geom_quat[geom]))
-            box = ET.SubElement(shown, "geometry")
-            ET.SubElement(box, "box", size=_numbers(2.0 * model.geom_size[geom]))
+            shown.append(_geometry(model, geom))
             if role == "visual":
                 material = ET.SubElement(shown, "material", name=name)
                 ET.SubElement(material, "color", rgba=_numbers(model.geom_rgba[geom]))
     return link
 
 
+def _geometry(model: mujoco.MjModel, geom: int) -> ET.Element:
+    """Return the shape of a geom."""
+    made = ET.Element("geometry")
+    size = 2.0 * model.geom_size[geom]
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        radius, length = repr(float(model.geom_size[geom][0])), repr(float(size[1]))
+        ET.SubElement(made, "cylinder", radius=radius, length=length)
+    else:
+        ET.SubElement(made, "box", size=_numbers(size))
+    return made
+
+
 def _joint(
     model: mujoco.MjModel, joint: int, effort: float, velocity: float
 ) -> ET.Element:
-    """Return the hinge between a body and its parent."""
+    """Return the joint between a body and its parent."""
     body = int(model.jnt_bodyid[joint])
     parent = model.body(int(model.body_parentid[body])).name
-    made = ET.Element("joint", name=model.joint(joint).name, type="revolute")
+    made = ET.Element("joint", name=model.joint(joint).name, type=_kind(model, joint))
     made.append(_origin(model.body_pos[body], model.body_quat[body]))
     ET.SubElement(made, "parent", link=parent)
     ET.SubElement(made, "child", link=model.body(body).name)
     ET.SubElement(made, "axis", xyz=_numbers(model.jnt_axis[joint]))
     low, high = map(float, model.jnt_range[joint])
     limits = {"lower": low, "upper": high, "effort": effort, "velocity": velocity}
+    if not model.jnt_limited[joint]:
+        del limits["lower"], limits["upper"]
     ET.SubElement(made, "limit", {name: repr(value) for name, value in limits.items()})
     damping = float(model.dof_damping[model.jnt_dofadr[joint]])
     ET.SubElement(made, "dynamics", damping=repr(damping))
     return made
+
+
+def _kind(model: mujoco.MjModel, joint: int) -> str:
+    """Return URDF's type of a joint."""
+    if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE:
+        return "prismatic"
+    return "revolute" if model.jnt_limited[joint] else "continuous"
 
 
 def _origin(position: Floats, quaternion: Floats) -> ET.Element:

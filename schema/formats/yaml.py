@@ -37,13 +37,14 @@ from schema.parts import BodySpace, Parameter
 from schema.robot.brain import (
     INPUT,
     LAYERS,
-    NEURON_TYPES,
     Brain,
     Connection,
     Layer,
     Neuron,
+    NeuronKinds,
     neuron_names,
 )
+from schema.robot.cpg import BUILT_IN_KINDS
 from schema.robot.robot import Part, Robot, check_number, check_robot
 
 VERSION = 1
@@ -51,13 +52,16 @@ _WRITTEN: tuple[Layer, ...] = ("output", "hidden")
 _INDEXED = re.compile(r"(?:body\.parts|brain\.(?:neurons|connections))\[\d+\](\.\w+)?")
 
 
-def robot_to_yaml(robot: Robot, space: BodySpace) -> str:
+def robot_to_yaml(
+    robot: Robot, space: BodySpace, kinds: NeuronKinds = BUILT_IN_KINDS
+) -> str:
     """Return the YAML text of a robot.
 
     Raises:
-        InvalidRobot: the robot is not well formed in this body space.
+        InvalidRobot: the robot is not well formed in this body space, or has neurons
+            of other kinds.
     """
-    check_robot(robot, space)
+    check_robot(robot, space, kinds)
     entries: list[dict[str, Any]] = []
     for index, part in enumerate(robot.parts):
         entries.append(_part_entry(part, index, space))
@@ -75,7 +79,7 @@ def robot_to_yaml(robot: Robot, space: BodySpace) -> str:
                     "part": entries[neuron.part]["id"],
                     "layer": neuron.layer,
                     "type": neuron.kind,
-                    "params": _named(NEURON_TYPES[neuron.kind], neuron.parameters),
+                    "params": _named(kinds[neuron.kind], neuron.parameters),
                 }
                 for name, neuron in zip(names, robot.brain.neurons, strict=True)
                 if neuron.layer != "input"
@@ -129,14 +133,18 @@ class Reader:
         "id", "type", "orientation", "gene", "params", "children",
     )  # fmt: skip
 
-    def __init__(self, space: BodySpace, file: str) -> None:
+    def __init__(
+        self, space: BodySpace, file: str, kinds: NeuronKinds = BUILT_IN_KINDS
+    ) -> None:
         """Initialise for a document.
 
         Args:
             space: the allowed part types.
             file: name of the document, for messages.
+            kinds: the allowed neuron types.
         """
         self.space = space
+        self._kinds = kinds
         self._file = file
         self.parts: list[Part] = []
         self.part_index: dict[str, int] = {}
@@ -160,7 +168,7 @@ class Reader:
         robot = Robot(tuple(self.parts), self.brain(brain))
         try:
             check_number(robot)
-            check_robot(robot, self.space)
+            check_robot(robot, self.space, self._kinds)
         except InvalidRobot as error:
             raise InvalidRobot(f"{self._place(str(error))}: {error}") from None
         return robot
@@ -246,9 +254,9 @@ class Reader:
         layer: Layer = (
             "output" if table.word("layer", _WRITTEN) == "output" else "hidden"
         )
-        kind = table.word("type", NEURON_TYPES)
+        kind = table.word("type", self._kinds)
         part = self.part_index[table.word("part", self.part_index)]
-        values = _values(table, NEURON_TYPES[kind])
+        values = _values(table, self._kinds[kind])
         return Neuron(layer, kind, part, values), table
 
     def connections(

@@ -1,8 +1,8 @@
 """Height at which a robot stands on rough ground and scenery.
 
-Each box of a robot is replaced by a column that extends upwards from its lowest
-point. The robot is lifted until no column intersects ground or scenery, so a robot
-that is born at an obstacle stands on top of it.
+Each box or cylinder of a robot is replaced by a column that extends upwards from its
+lowest point. The robot is lifted until no column intersects ground or scenery, so a
+robot that is born at an obstacle stands on top of it.
 """
 
 import copy
@@ -16,6 +16,7 @@ import numpy as np
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment, relief
 from schema.experiment.scenery import add_scenery
+from schema.robot.frames import round_reach
 from schema.robot.results import Floats
 
 _FINE_M = 1e-5
@@ -33,6 +34,8 @@ _ABOVE_M = 0.1
 @dataclass(frozen=True, slots=True)
 class Footprint:
     """Boxes of a robot at neutral pose as upright columns, in the core's frame.
+
+    The column of a cylinder encloses it.
 
     Attributes:
         centres: (N, 3) [m].
@@ -58,6 +61,10 @@ def footprint(model: mujoco.MjModel) -> Footprint:
     turns = np.arctan2(along[:, 1], along[:, 0])
     level = _turned(axes, -turns)
     halves = (np.abs(level) @ model.geom_size[own][:, :, None])[:, :, 0]
+    for index in np.flatnonzero(model.geom_type[own] == mujoco.mjtGeom.mjGEOM_CYLINDER):
+        radius, half, _ = model.geom_size[own][index].tolist()
+        rows: list[list[float]] = level[index].tolist()
+        halves[index] = [round_reach(row, (radius, radius, half)) for row in rows]
     return Footprint(data.geom_xpos[own], turns, halves)
 
 
@@ -135,10 +142,12 @@ def _highest(
 
 @lru_cache(maxsize=16)
 def _probe(scenery: str, simulation: Simulation) -> mujoco.MjModel:
-    """Return scenery with a box for a column as last geom; do not change it."""
+    """Return scenery with a box named ``column``; do not change it."""
     spec = mujoco.MjSpec()
     add_scenery(spec, scenery, simulation)
-    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=(1.0, 1.0, 1.0))
+    spec.worldbody.add_geom(
+        name="column", type=mujoco.mjtGeom.mjGEOM_BOX, size=(1.0, 1.0, 1.0)
+    )
     return spec.compile()
 
 
@@ -156,10 +165,11 @@ class _Obstacles:
         self._model = copy.copy(_probe(scenery, simulation))
         self._data = mujoco.MjData(self._model)
         mujoco.mj_kinematics(self._model, self._data)
-        self._column = self._model.ngeom - 1
+        self._column = int(self._model.geom("column").id)
         model = self._model
         is_solid = (model.geom_contype | model.geom_conaffinity) & _ROBOTS
-        self._solid = is_solid[: self._column].nonzero()[0]
+        is_solid[self._column] = 0
+        self._solid = is_solid.nonzero()[0]
 
     def move(self, spot: Floats, turn: float, half: Floats) -> None:
         """Move the column.

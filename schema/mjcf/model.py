@@ -20,10 +20,11 @@ import numpy as np
 
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
+from schema.experiment.scenery import object_count
 from schema.mjcf.footing import footprint, standing_height
 from schema.mjcf.world import add_ground, set_contacts, set_options
-from schema.parts import IDENTITY, BodySpace, Joint, PartType
-from schema.robot.frames import place_parts, shapes_of
+from schema.parts import IDENTITY, BodySpace, Joint, PartType, Sensor
+from schema.robot.frames import place_parts, round_reach, shapes_of
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 
@@ -31,6 +32,15 @@ MEMORY_BYTES = 1 << 20
 """Size of the memory arena of one robot's MjData.
 
 A pile of 30 parts needs about 120 KB, on rough ground of 5 mm patches 270 KB.
+"""
+
+OBJECT_BYTES = 1 << 16
+"""Size of the memory arena for each movable object of scenery."""
+LEVER_M = 0.1
+"""Lever at which a servo moves a slider [m].
+
+It turns rotor inertia [kg m2], damping and stiffness [N m s/rad] of the settings into
+mass [kg] and [N s/m].
 """
 
 _Segment = tuple[mujoco.MjsBody, list[float]]
@@ -99,7 +109,8 @@ def solo_spec(
     add_ground(spec, simulation, environment)
     if furnish is not None:
         furnish(spec)
-    spec.memory = MEMORY_BYTES
+    objects = object_count(environment, simulation)
+    spec.memory = MEMORY_BYTES + OBJECT_BYTES * objects
     spec.body("root").pos = (0.0, 0.0, height + simulation.drop_m)
     return spec
 
@@ -191,22 +202,32 @@ class _Builder:
         axis = rotation @ joint.axis
         made = body.add_joint()
         made.name, made.axis = f"joint{index}", axis if own == 0 else -axis
-        made.range = (-joint.limit, joint.limit)
+        simulation, share = self.simulation, 1.0
+        if joint.kind == "continuous":
+            made.limited = 0
+        else:
+            made.range = (-joint.limit, joint.limit)
+        if joint.kind == "prismatic":
+            share = LEVER_M**-2
+            made.type = mujoco.mjtJoint.mjJNT_SLIDE
+            made.armature = share * simulation.armature
+            made.damping[0] = share * simulation.damping
         motor = self.types[index].motor
         if motor is not None:
-            made.armature = self.simulation.servo_armature
+            made.armature = share * simulation.servo_armature
             actuator = self.spec.add_actuator()
             actuator.name = actuator.target = f"joint{index}"
             actuator.trntype = mujoco.mjtTrn.mjTRN_JOINT
             actuator.forcelimited = 1
             actuator.forcerange = (-motor.max_torque, motor.max_torque)
-            actuator.set_to_velocity(kv=self.simulation.servo_stiffness)
+            actuator.set_to_velocity(kv=share * simulation.servo_stiffness)
         return body, anchor.tolist()
 
     def _add_boxes(self, index: int, pair: list[_Segment]) -> None:
         """Add the boxes of a part to its segments, and imu sites to their boxes."""
         boxes, rotation = self.shapes[index].boxes, self.rotations[index]
-        imus = {s.box for s in self.types[index].sensors if s.kind == "imu"}
+        sensors = self.types[index].sensors
+        imus = {s.box for s in sensors if isinstance(s, Sensor) and s.kind == "imu"}
         # Arrays, shared by the boxes, are faster than tuples; colours are float32.
         colour = np.array((*self.robot.parts[index].parameters[-3:], 1.0), np.float32)
         upright = quaternion(rotation)
@@ -226,6 +247,9 @@ class _Builder:
             if box.rotation is not IDENTITY:
                 turned = rotation @ np.asarray(box.rotation)
                 attitude, below = quaternion(turned), float(abs(turned[2]) @ half)
+            if box.is_round:
+                turned = rotation @ np.asarray(box.rotation)
+                below = round_reach(turned[2].tolist(), half)
             body, origin = pair[box.segment]
             place = (
                 centre[0] - origin[0],
@@ -234,6 +258,9 @@ class _Builder:
             )
             geom = body.add_geom()
             geom.name = f"{index}/{box.name}"
+            if box.is_round:
+                geom.type = mujoco.mjtGeom.mjGEOM_CYLINDER
+                half = (half[0], half[2], 0.0)
             geom.size, geom.pos, geom.quat = half, place, attitude
             geom.mass, geom.rgba = box.mass, colour
             if box.name in imus:

@@ -9,10 +9,17 @@ import inspect
 from collections.abc import Callable, Mapping
 from difflib import get_close_matches
 from functools import lru_cache
+from types import ModuleType
 from typing import Any, TypeVar, cast
 
 from schema.errors import ExperimentError, UnknownPlugin, nearest, shown
-from schema.plugins.permission import how_to_allow, import_allowed, is_allowed
+from schema.plugins.origin import where_named, where_raised
+from schema.plugins.permission import (
+    how_to_allow,
+    import_allowed,
+    is_allowed,
+    source_of,
+)
 
 T = TypeVar("T")
 
@@ -33,7 +40,10 @@ def load_instance(path: str, where: str, kind: type[T]) -> T:
     """
     found = _load(path, where)
     if not isinstance(found, kind):
-        raise ExperimentError(f"{where}: {path!r} is not a {kind.__name__}")
+        raise ExperimentError(
+            f"{where}: {place_of(path)}: {path!r} is not a {kind.__name__}, but a "
+            f"{type(found).__name__}"
+        )
     return found
 
 
@@ -63,8 +73,31 @@ def load_object(
     found = _load(path, where)
     for member in members:
         if not hasattr(found, member):
-            raise ExperimentError(f"{where}: {path!r} has no {member!r}")
+            raise ExperimentError(
+                f"{where}: {place_of(path)}: {path!r} has no {member!r}"
+            )
     return cast("T", found)
+
+
+def full_name(path: str, where: str, built_in: Mapping[str, str]) -> str:
+    """Return the dotted path of a built-in object, or of a user's own.
+
+    Args:
+        path: the short name of a built-in object, or ``module:attribute``.
+        where: the key that holds it, for messages.
+        built_in: dotted paths by short name.
+
+    Raises:
+        UnknownPlugin: no such built-in object (the nearest is named).
+    """
+    if ":" in path:
+        return path
+    if path not in built_in:
+        raise UnknownPlugin(
+            f"{where}: must be one of {', '.join(built_in)} or 'module:attribute', "
+            f"got {shown(path)}{nearest(path, built_in)}"
+        )
+    return built_in[path]
 
 
 def load_function(path: str, where: str, arguments: int) -> Callable[..., Any]:
@@ -83,7 +116,7 @@ def load_function(path: str, where: str, arguments: int) -> Callable[..., Any]:
     """
     found = _load(path, where)
     if not callable(found) or isinstance(found, type):
-        raise ExperimentError(f"{where}: {path!r} is not a function")
+        raise ExperimentError(f"{where}: {place_of(path)}: {path!r} is not a function")
     # A module that imports a function of another one does not offer it.
     home = str(getattr(found, "__module__", None))
     if not is_allowed(home):
@@ -95,7 +128,8 @@ def load_function(path: str, where: str, arguments: int) -> Callable[..., Any]:
         inspect.signature(found).bind(*range(arguments))
     except (TypeError, ValueError) as error:
         raise ExperimentError(
-            f"{where}: {path!r} must take {arguments} arguments: {error}"
+            f"{where}: {place_of(path)}: {path!r} must take {arguments} arguments: "
+            f"{error}"
         ) from None
     return found
 
@@ -119,17 +153,54 @@ def _load(path: str, where: str) -> object:
 
 @lru_cache(maxsize=256)
 def _loaded(module_name: str, attribute: str, where: str) -> object:
-    path = f"{module_name}:{attribute}"
-    try:
-        module = import_allowed(module_name)
-    except ImportError as error:
-        raise UnknownPlugin(f"{where}: {path!r}: {error}") from None
-    except Exception as error:
-        story = f"{type(error).__name__}: {error}"
-        raise ExperimentError(f"{where}: {path!r}: {story}") from error
+    module = _imported(module_name, where, f"{module_name}:{attribute}")
     if not hasattr(module, attribute):
         names = [name for name in vars(module) if not name.startswith("_")]
         near = get_close_matches(attribute, names, n=1)
         hint = f"; did you mean '{module_name}:{near[0]}'?" if near else ""
-        raise UnknownPlugin(f"{where}: {module_name} has no {attribute!r}{hint}")
+        place = where_named(module, attribute)
+        raise UnknownPlugin(
+            f"{where}: {place}: {module_name} has no {attribute!r}{hint}"
+        )
     return getattr(module, attribute)
+
+
+def load_module(name: str, where: str) -> ModuleType:
+    """Return a module that is allowed.
+
+    Args:
+        name: of the module.
+        where: what needs it, for messages.
+
+    Raises:
+        UnknownPlugin: it is not there.
+        ExperimentError: its import raises another error.
+    """
+    return _imported(name, where, name)
+
+
+def _imported(name: str, where: str, path: str) -> ModuleType:
+    try:
+        return import_allowed(name)
+    except ImportError as error:
+        raise UnknownPlugin(
+            f"{where}: {_line_of(error, name)}{path!r}: {error}"
+        ) from None
+    # A module may call exit().
+    except (Exception, SystemExit) as error:
+        story = f"{type(error).__name__}: {error}"
+        place = _line_of(error, name)
+        raise ExperimentError(f"{where}: {place}{path!r}: {story}") from error
+
+
+def place_of(path: str) -> str:
+    """Return file and line of a ``module:attribute`` that was loaded."""
+    module_name, _, attribute = path.partition(":")
+    return where_named(import_allowed(module_name), attribute)
+
+
+def _line_of(error: BaseException, module_name: str) -> str:
+    """Return the line of a module that failed at its import, and a colon; or empty."""
+    names = [source.name for source in source_of(module_name.partition(".")[0])]
+    line = next(filter(None, (where_raised(error, name) for name in names)), "")
+    return f"{line}: " if line else ""

@@ -1,7 +1,8 @@
 """Parameters of plug-ins: tables of an experiment, read as the plug-in's own Struct."""
 
+import inspect
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 import msgspec
@@ -40,6 +41,32 @@ def read_parameters(table: Mapping[str, Any], kind: type[T], where: str) -> T:
         raise ExperimentError(
             f"{where}{'.' if path else ''}{path.rstrip('`')}: {message}"
         ) from None
+
+
+def parameters_type(
+    function: Callable[..., Any], where: str
+) -> type[msgspec.Struct] | None:
+    """Return the Struct with which a function's second argument is annotated.
+
+    Args:
+        function: a fitness function or measure.
+        where: the key that names it, for messages.
+
+    Returns:
+        The Struct; None if there is no second argument, or no Struct as annotation.
+
+    Raises:
+        ExperimentError: the annotation is a text that names nothing.
+    """
+    try:
+        arguments = inspect.signature(function, eval_str=True).parameters
+    except NameError as error:
+        raise ExperimentError(f"{where}: annotation: {error}") from None
+    if len(arguments) < 2:  # noqa: PLR2004 - trace and parameters
+        return None
+    kind = list(arguments.values())[1].annotation
+    is_struct = isinstance(kind, type) and issubclass(kind, msgspec.Struct)
+    return kind if is_struct else None
 
 
 def _not_finite(value: object) -> str:

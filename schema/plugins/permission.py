@@ -12,6 +12,7 @@ it to the processes that they start.
 
 import sys
 from collections.abc import Iterable
+from filecmp import cmp
 from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -21,7 +22,7 @@ from types import ModuleType
 
 from schema.errors import ExperimentError, UnknownPlugin, shown
 
-BUILT_IN = ("schema.parts", "schema.robogen_parts", "worker.fitness")
+BUILT_IN = ("schema.parts", "schema.robogen_parts", "worker.fitness", "worker.tasks")
 ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis", "revolve")
 GROUP = "revolve.plugins"
 FLAG = "--plugins"
@@ -66,15 +67,30 @@ def allow_references(paths: Iterable[str], folder: Path | None = None) -> None:
         ExperimentError: a file in the folder has the name of another module.
     """
     for path in paths:
-        module = path.partition(":")[0]
-        if not _may_be_plugin(module):
+        module, colon, _ = path.partition(":")
+        if not colon or not _may_be_plugin(module):
             continue
         file = (folder / f"{module}.py").resolve() if folder else None
         if file is not None and "." not in module and file.is_file():
-            _check_file(file, "space.part_types or fitness.function")
+            _check_file(file, "a plug-in of the experiment")
             _allowed[module] = file
         elif not is_allowed(module):
             _allowed[module] = None
+
+
+def allow_file(module: str, file: Path) -> None:
+    """Allow a module of a file that was checked already."""
+    _allowed[module] = file.resolve()
+
+
+def allowed_file(module: str) -> Path | None:
+    """Return the file of an allowed module; None if it is not loaded from a file."""
+    return _allowed.get(module)
+
+
+def is_named(module: str) -> bool:
+    """Return whether the user named a module on the command line, or a document did."""
+    return module in _allowed
 
 
 def allowed() -> tuple[str, ...]:
@@ -99,6 +115,12 @@ def allows_any_of(top: str) -> bool:
     return _may_be_plugin(top) and any(
         _top(name) == top for name in (*_allowed, *_installed_modules())
     )
+
+
+def is_own(path: str) -> bool:
+    """Return whether a ``module:attribute`` names code outside of this project."""
+    module, colon, _ = path.partition(":")
+    return bool(colon) and _top(module) not in ROOMS
 
 
 def how_to_allow(module: str) -> str:
@@ -167,7 +189,9 @@ def _check_file(file: Path, where: str) -> None:
     _check_name(file.stem)
     named, found = _allowed.get(file.stem), _source(file.stem)
     others = [named] if named else [each.resolve() for each in found or ()]
-    if file not in others and (named or found is not None):
+    # A copy, as a run folder keeps it, is no other module.
+    is_same = any(one.is_file() and cmp(file, one, shallow=False) for one in others)
+    if not is_same and (named or found is not None):
         other = others[0] if others else "a built-in module"
         raise ExperimentError(
             f"{where}: {file} has the name of another module, {other}: rename the file"

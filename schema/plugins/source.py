@@ -31,9 +31,13 @@ def plugins_of(settings: bytes) -> str:
     Returns:
         ``module=digest`` for each top-level module, by name, with a space between.
     """
-    named = set(_PATH.findall(settings.decode(errors="replace")))
-    modules = sorted(named.difference(ROOMS))
-    return " ".join(f"{name}={_digest(name)}" for name in modules)
+    return " ".join(f"{name}={_digest(name)}" for name in modules_named(settings))
+
+
+def modules_named(document: bytes) -> list[str]:
+    """Return the top-level modules of the plug-ins that JSON names, sorted."""
+    named = set(_PATH.findall(document.decode(errors="replace")))
+    return sorted(named.difference(ROOMS))
 
 
 @lru_cache(maxsize=64)
@@ -75,6 +79,16 @@ def forget_digests() -> None:
     """Read the sources again next time: their owner may have changed them."""
     for cached in (plugins_of, check_plugins, _digest):
         cached.cache_clear()
+
+
+def digest_of(module: str) -> str:
+    """Return the digest of a plug-in module's source now; empty if it is not there."""
+    return _digest.__wrapped__(module.partition(".")[0])
+
+
+def digest_of_bytes(source: bytes) -> str:
+    """Return the digest of a module of one file."""
+    return sha256(source).hexdigest()[:_DIGITS]
 
 
 @lru_cache(maxsize=64)

@@ -1,7 +1,7 @@
-"""Recurrent neural networks as data: neuron types, neurons, connections.
+"""Brains as data: neuron types, neurons, connections.
 
-Formulas (a = weighted sum of inputs and of the previous states; from the code
-of the original):
+Formulas of the thesis's network (a = weighted sum of inputs and of the previous
+states; from the code of the original):
 
 * ``Simple``: gain * (a - bias)
 * ``Sigmoid``: 1 / (1 + exp(-gain * (a - bias)))
@@ -10,16 +10,20 @@ of the original):
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 from msgspec import Struct
 
-from schema.errors import InvalidRobot
+from schema.errors import InvalidRobot, shown
 from schema.parts import Parameter
 
 Layer = Literal["input", "output", "hidden"]
 LAYERS: tuple[Layer, ...] = ("input", "output", "hidden")
+
+NeuronKinds = Mapping[str, tuple[Parameter, ...]]
+"""Types of output and hidden neurons by name, with their parameters."""
 
 _WEIGHTED = (Parameter("bias", -1.0, 1.0, 0.0), Parameter("gain", 0.0, 1.0, 0.5))
 NEURON_TYPES: dict[str, tuple[Parameter, ...]] = {
@@ -31,12 +35,25 @@ NEURON_TYPES: dict[str, tuple[Parameter, ...]] = {
         Parameter("amplitude", 0.0, 2.0, 1.0),
     ),
 }
-"""Types of output and hidden neurons, with their parameters."""
+"""The thesis's types of output and hidden neurons, with their parameters."""
 
 INPUT = "Input"
 """Type of all input neurons; it has no parameters."""
 _SHORT: dict[Layer, str] = {"input": "in", "output": "out", "hidden": "hidden"}
-_INPUT_TYPES: dict[str, tuple[Parameter, ...]] = {INPUT: ()}
+
+
+@dataclass(frozen=True, slots=True)
+class Widths:
+    """Greatest numbers of input, output and hidden neurons in an experiment."""
+
+    inputs: int
+    outputs: int
+    hidden: int
+
+    @property
+    def states(self) -> int:
+        """Number of output and hidden neurons."""
+        return self.outputs + self.hidden
 
 
 class Neuron(Struct, frozen=True, gc=False):
@@ -74,16 +91,18 @@ class Brain:
 
 
 def check_brain(brain: Brain, part_count: int) -> None:
-    """Raise unless a brain keeps the rules that do not depend on part types.
+    """Raise unless a brain keeps the rules that depend on no plug-in.
+
+    ``check_neurons`` checks the types of its neurons.
 
     Args:
         brain: the brain.
         part_count: number of parts of its robot.
 
     Raises:
-        InvalidRobot: neurons out of order, of unknown type, on a part that does not
-            exist, with a wrong number of parameters or one that is not finite; a
-            connection to an input, to or from a missing neuron, or given twice.
+        InvalidRobot: neurons out of order, on a part that does not exist, or with a
+            parameter that is not finite; an input of another type or with parameters;
+            a connection to an input, to or from a missing neuron, or given twice.
     """
     order = [(LAYERS.index(neuron.layer), neuron.part) for neuron in brain.neurons]
     if order != sorted(order):
@@ -111,18 +130,57 @@ def _neuron_problem(neuron: Neuron, part_count: int) -> str:
     """Return what is wrong with a neuron, or nothing."""
     if not 0 <= neuron.part < part_count:
         return f".part: must be 0..{part_count - 1}, got {neuron.part}"
-    types = _INPUT_TYPES if neuron.layer == "input" else NEURON_TYPES
-    parameters = types.get(neuron.kind)
-    if parameters is None:
-        return f".kind: must be one of {', '.join(types)}, got {neuron.kind!r}"
-    if len(neuron.parameters) != len(parameters):
-        return (
-            f".parameters: {neuron.kind} takes {len(parameters)}, "
-            f"got {len(neuron.parameters)}"
-        )
+    if neuron.layer == "input" and neuron.kind != INPUT:
+        return f".kind: must be one of {INPUT}, got {shown(neuron.kind)}"
+    if neuron.layer == "input" and neuron.parameters:
+        return f".parameters: {INPUT} takes 0, got {len(neuron.parameters)}"
     if not all(map(math.isfinite, neuron.parameters)):
         return ".parameters: must be finite"
     return ""
+
+
+def check_neurons(brain: Brain, kinds: NeuronKinds) -> None:
+    """Raise unless the output and hidden neurons of a brain are of known types.
+
+    Args:
+        brain: the brain.
+        kinds: the types that an experiment allows.
+
+    Raises:
+        InvalidRobot: a neuron of another type, or a wrong number of parameters.
+    """
+    for index, neuron in enumerate(brain.neurons):
+        if neuron.layer == "input":
+            continue
+        parameters = kinds.get(neuron.kind)
+        if parameters is None:
+            raise InvalidRobot(
+                f"brain.neurons[{index}].kind: must be one of {', '.join(kinds)}, "
+                f"got {shown(neuron.kind)}"
+            )
+        if len(neuron.parameters) != len(parameters):
+            raise InvalidRobot(
+                f"brain.neurons[{index}].parameters: {neuron.kind} takes "
+                f"{len(parameters)}, got {len(neuron.parameters)}"
+            )
+
+
+def check_widths(brain: Brain, width: Widths) -> None:
+    """Raise if a brain has more neurons than an experiment allows.
+
+    Raises:
+        InvalidRobot: more input, output or hidden neurons.
+    """
+    limits: dict[Layer, int] = {
+        "input": width.inputs,
+        "output": width.outputs,
+        "hidden": width.hidden,
+    }
+    for layer, limit in limits.items():
+        if (count := brain.count(layer)) > limit:
+            raise InvalidRobot(
+                f"brain: {layer} neurons must be <= {limit}, got {count}"
+            )
 
 
 def neuron_names(brain: Brain, part_ids: list[str]) -> list[str]:

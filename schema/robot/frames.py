@@ -23,6 +23,16 @@ def shapes_of(robot: Robot, space: BodySpace) -> list[Shape]:
     return [space[part.kind].shape(part.parameters) for part in robot.parts]
 
 
+def round_reach(along: Sequence[float], half: Sequence[float]) -> float:
+    """Return how far a cylinder reaches from its centre along a direction [m].
+
+    Args:
+        along: unit vector in the cylinder's frame, whose z is the axis.
+        half: radius, radius, half of the length [m].
+    """
+    return math.hypot(along[0], along[1]) * half[0] + abs(along[2]) * half[2]
+
+
 def place_parts(robot: Robot, shapes: Sequence[Shape]) -> tuple[Floats, Floats]:
     """Return each part's frame in the core's frame, joints at zero.
 

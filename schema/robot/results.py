@@ -6,22 +6,13 @@ import numpy as np
 import numpy.typing as npt
 
 from schema.parts import Vector
+from schema.robot.trace import Trace
 
 Floats = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class Track:
-    """Trajectory of a robot's core, the argument of fitness functions.
-
-    Attributes:
-        interval_s: time between two samples [s].
-        core_position: (T, 3) centre of the core, world frame, z up [m]; sample 0
-            is the start of the window, T >= 2.
-    """
-
-    interval_s: float
-    core_position: Floats
+Track = Trace
+"""Former name of ``Trace``, which fitness functions of users import."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,12 +24,14 @@ class Evaluation:
         path_velocity: path length over time in the ground plane [m/s].
         straight_velocity: net distance over time in the ground plane [m/s].
         simulated_s: simulated time [s].
+        measures: finite, in the order of the experiment's ``measures.names``.
     """
 
     fitness: float
     path_velocity: float
     straight_velocity: float
     simulated_s: float
+    measures: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

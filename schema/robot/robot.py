@@ -13,7 +13,8 @@ from msgspec import Struct
 from schema.errors import InvalidRobot, shown
 from schema.limits import MOST_NEURONS, MOST_PARTS
 from schema.parts import BodySpace, PartType
-from schema.robot.brain import Brain, check_brain
+from schema.robot.brain import Brain, NeuronKinds, check_brain, check_neurons
+from schema.robot.cpg import BUILT_IN_KINDS
 
 ORIENTATIONS = (0, 90, 180, 270)
 GENES = 2**64
@@ -31,7 +32,7 @@ class Part(Struct, frozen=True, gc=False):
         slot: own slot by which it is attached; -1 for the core.
         orientation: rotation about the normal of its own slot [degrees].
         parameters: values in the order of its type's ``parameters``.
-        gene: identity that the part inherits from its ancestors.
+        gene: identity that the part inherits from its ancestors; 0 is none.
     """
 
     kind: str
@@ -109,7 +110,9 @@ def _value_problem(part: Part) -> str:
     return ""
 
 
-def check_robot(robot: Robot, space: BodySpace) -> None:
+def check_robot(
+    robot: Robot, space: BodySpace, kinds: NeuronKinds = BUILT_IN_KINDS
+) -> None:
     """Raise unless a robot is well formed in a body space.
 
     The analyzer checks intersections of parts.
@@ -117,6 +120,7 @@ def check_robot(robot: Robot, space: BodySpace) -> None:
     Args:
         robot: the robot.
         space: the allowed part types.
+        kinds: the allowed neuron types.
 
     Raises:
         InvalidRobot: parts that are not a tree (``check_tree``); no core or several;
@@ -126,6 +130,7 @@ def check_robot(robot: Robot, space: BodySpace) -> None:
     """
     check_tree(robot.parts)
     check_brain(robot.brain, len(robot.parts))
+    check_neurons(robot.brain, kinds)
     check_types(robot, space)
 
 
@@ -147,7 +152,7 @@ def check_number(robot: Robot) -> None:
 
 
 def check_types(robot: Robot, space: BodySpace) -> None:
-    """Raise unless a robot fits a body space.
+    """Raise unless a robot fits a body space; its neuron types are not checked.
 
     Args:
         robot: a tree of parts with a valid brain, as decoding gives it.

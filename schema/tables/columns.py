@@ -16,6 +16,8 @@ Columns of several tables:
 - ``path_velocity``, ``straight_velocity``: length of the path of the core, and
   distance between its ends, per second of the fitness window [m/s].
 - ``fitness``: higher is better.
+- ``measures``: numbers of ``measures.names`` by name; null if the experiment has none,
+  if the evaluation failed, or if the robot has no fitness yet.
 """
 
 from itertools import chain
@@ -25,7 +27,7 @@ import pyarrow as pa
 
 from schema.errors import MalformedMessage
 from schema.parts import BodySpace
-from schema.robot.genome import Genome, walk
+from schema.robot.genome import Node, walk
 from schema.robot.robot import Robot
 
 VERSION = 2
@@ -96,6 +98,12 @@ PART = pa.struct(
 )
 """Part of a body; the fields are those of ``schema.robot.robot.Part``."""
 
+MEASURES = pa.map_(
+    pa.field("key", pa.string(), nullable=False),
+    pa.field("value", pa.float64(), nullable=False),
+)
+"""Measures of a robot by name: short names of ``measures.names``, or attributes."""
+
 _ISLAND = _columns("island", pa.int32())
 _INDIVIDUAL = [
     *_ISLAND,
@@ -121,6 +129,7 @@ BIRTHS = _table(
     _columns("inputs outputs hidden connections", pa.int32()),
     _columns("sim_time_s", pa.float64(), "s", is_nullable=True),
     _columns("x y", pa.float64(), "m", is_nullable=True),
+    _columns("robot", pa.binary(), is_repeatable=False, is_nullable=True),
 )
 """One row per individual born.
 
@@ -128,10 +137,14 @@ BIRTHS = _table(
 - ``generation``: number of the brood; null on-line.
 - ``rank``: 1 for founders, otherwise one more than the greatest rank of the parents.
 - ``attempts``: matings that this birth took.
-- ``genome``, ``body``: Protobuf bytes of the genome; the parts, core first.
+- ``genome``: bytes of the genome, Protobuf in runs of the encoding
+  ``revolve-angle``, otherwise as the experiment's encoding writes them.
+- ``body``: the parts, core first.
 - ``parts``, ``joints``, ``motors``, ``extremities``, ``inputs``, ``outputs``,
   ``hidden``, ``connections``: counts, see ``sizes``.
 - ``sim_time_s``, ``x``, ``y``: time and place of birth, world frame; null off-line.
+- ``robot``: Protobuf bytes of the robot; null in runs of ``revolve-angle``, whose
+  genomes are enough, and in runs that are older than this column.
 """
 
 EVALUATIONS = _table(
@@ -142,6 +155,7 @@ EVALUATIONS = _table(
     _OUTCOME,
     _columns("wall_s", pa.float64(), "s", is_repeatable=False),
     _columns("worker platform", pa.string(), is_repeatable=False),
+    _columns("measures", MEASURES, "by measure", is_nullable=True),
 )
 """One row per finished evaluation.
 
@@ -175,6 +189,7 @@ FITNESS = _table(
     _columns("path_velocity straight_velocity", pa.float64(), "m/s"),
     _columns("fitness", pa.float64()),
     _columns("is_mature", pa.bool_()),
+    _columns("measures", MEASURES, "by measure", is_nullable=True),
 )
 """One row per living robot and sample of an arena, mature or not.
 
@@ -196,7 +211,8 @@ POSES = _table(
 
 - ``x``, ``y``, ``z``: centre of the core, world frame [m].
 - ``qw``, ``qx``, ``qy``, ``qz``: attitude of the core as a unit quaternion.
-- ``angles``: angle of every joint, driven or not, by ascending part [rad].
+- ``angles``: angle of every joint, driven or not, by ascending part [rad]; of a slider
+  its displacement [m].
 """
 
 DEATHS = _table(
@@ -387,7 +403,7 @@ def body_rows(robot: Robot) -> list[Row]:
     ]
 
 
-def sizes(robot: Robot, genome: Genome, space: BodySpace) -> dict[str, int]:
+def sizes(robot: Robot, genome: object, space: BodySpace) -> dict[str, int]:
     """Return the counts of a births row.
 
     Args:
@@ -398,12 +414,16 @@ def sizes(robot: Robot, genome: Genome, space: BodySpace) -> dict[str, int]:
     Returns:
         ``parts``, ``joints`` (driven or not), ``motors`` (driven), ``extremities``
         (parts without children; a lone core counts 1), ``inputs``, ``outputs``,
-        ``hidden``, and ``connections`` of the genome, including unresolved ones.
+        ``hidden``, and ``connections`` of a genome of ``revolve-angle``, including
+        unresolved ones; of another genome's robot.
 
     Source: thesis section 6.3; the code of the original.
     """
     kinds = [space[part.kind] for part in robot.parts]
     brain = robot.brain
+    connections = len(brain.connections)
+    if isinstance(genome, Node):
+        connections = sum(len(node.connections) for node, _, _ in walk(genome))
     # Includes -1, the parent of the core.
     parents = {part.parent for part in robot.parts}
     return {
@@ -417,5 +437,5 @@ def sizes(robot: Robot, genome: Genome, space: BodySpace) -> dict[str, int]:
         "inputs": brain.count("input"),
         "outputs": brain.count("output"),
         "hidden": brain.count("hidden"),
-        "connections": sum(len(node.connections) for node, _, _ in walk(genome)),
+        "connections": connections,
     }

@@ -14,6 +14,7 @@ import msgspec
 
 from schema.errors import RunFolderError
 from schema.limits import MOST_DESCRIPTION, MOST_MARK, MOST_NAME, printable
+from schema.plugins.kept import KeptPlugin, allow_kept
 
 DETAILS = "run.json"
 STATE = "state"
@@ -33,6 +34,7 @@ class Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         nonce: distinguishes runs that were made in the same folder.
         checksums: all segments have checksums.
         digests: SHA-256 of each finished table in hexadecimal, by name of the table.
+        plugins: modules of the experiment's plug-ins, by name.
         digest: SHA-256 of the other fields in hexadecimal; empty in older runs.
     """
 
@@ -43,12 +45,16 @@ class Description(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     nonce: str = ""
     checksums: bool = False
     digests: dict[str, str] = {}
+    plugins: dict[str, KeptPlugin] = {}
     digest: str = ""
 
 
 def description_text(description: Description) -> str:
     """Return the text of ``run.json``, with its digest."""
     entries = msgspec.to_builtins(description)
+    if not description.plugins:
+        # Older versions know no such entry.
+        del entries["plugins"]
     entries["digest"] = _digest(entries)
     return msgspec.json.format(msgspec.json.encode(entries), indent=1).decode()
 
@@ -77,6 +83,21 @@ def read_description(folder: Path) -> Description:
             f"{file}: damaged: {printable(why, 200)}; restore a copy of the file"
         )
     return found
+
+
+def allow_plugins_of(folder: Path, *, is_resumed: bool = False) -> None:
+    """Allow the plug-ins of a run that the user named on the command line.
+
+    Args:
+        folder: of the run; without a description, nothing more is allowed.
+        is_resumed: the run continues.
+
+    Raises:
+        RunFolderError: the description is damaged.
+        ExperimentError: as of ``allow_kept``.
+    """
+    if (folder / DETAILS).exists():
+        allow_kept(folder, read_description(folder).plugins, is_resumed=is_resumed)
 
 
 def _fault(found: Description, data: bytes) -> str:

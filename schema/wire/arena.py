@@ -58,6 +58,8 @@ class Judgement:
         fitness: of the window; 0 before a quarter of the window.
         is_mature: its age is at least the warm-up and a whole window.
         place: centre of the core, world frame [m].
+        measures: of the window, in the order of the experiment's ``measures.names``;
+            empty before a quarter of the window.
     """
 
     birth: BirthId
@@ -67,6 +69,7 @@ class Judgement:
     fitness: float
     is_mature: bool
     place: Vector
+    measures: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

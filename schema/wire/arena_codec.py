@@ -1,5 +1,6 @@
 """Protobuf bytes of requests to advance arena shards, and of their answers."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from schema.errors import MalformedMessage
@@ -149,15 +150,25 @@ def encode_advance_request(request: AdvanceRequest, plugins: str = "") -> bytes:
     return message.SerializeToString(deterministic=True)
 
 
-def decode_advance_request(data: bytes) -> AdvanceRequest:
+def decode_advance_request(
+    data: bytes, prepare: Callable[[bytes], object] | None = None
+) -> AdvanceRequest:
     """Return the request of some bytes.
+
+    Args:
+        data: the bytes.
+        prepare: as for ``decode_request``.
 
     Raises:
         MalformedMessage: not a request's bytes, a robot or a brain that breaks its
             rules, a digest of wrong length, an end before the start, a number that
             is not finite.
+        RevolveError: raised by ``prepare``.
     """
-    return _request(parsed(data, pb.AdvanceRequest(), ADVANCE_REQUEST_BYTES))
+    message = parsed(data, pb.AdvanceRequest(), ADVANCE_REQUEST_BYTES)
+    if prepare is not None:
+        prepare(message.settings)
+    return _request(message)
 
 
 def encode_advance_answer(answer: AdvanceAnswer) -> bytes:

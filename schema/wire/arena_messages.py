@@ -90,6 +90,7 @@ def advance_to_message(advance: Advance) -> pb.Advance:
             fitness=one.fitness,
             is_mature=one.is_mature,
             place=vector_to_message(one.place),
+            measures=one.measures,
         )
     for fallen in advance.casualties:
         message.casualties.add(
@@ -156,6 +157,7 @@ def _judgement(message: pb.Judgement) -> Judgement:
         fitness=finite(message.fitness, "judgement.fitness"),
         is_mature=message.is_mature,
         place=vector_from_message(message.place, "judgement.place"),
+        measures=tuple(finite(each, "judgement.measures") for each in message.measures),
     )
 
 

@@ -2,11 +2,11 @@
 
 Encoding is deterministic: equal values give equal bytes. Decoding checks the type and
 the rules of a message and raises ``MalformedMessage`` otherwise. Rules that need the
-part types are checked by ``schema.robot.robot.check_robot``.
+part types or neuron types are checked by ``schema.robot.robot.check_robot``.
 """
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 from schema.errors import MalformedMessage
 from schema.experiment.identity import NO_IDENTITY, Identity
@@ -132,7 +132,7 @@ def decode_genome(data: bytes) -> Genome:
 
     Raises:
         MalformedMessage: not a genome's bytes, nodes that are not a tree, an unknown
-            neuron type or layer, a number that is not finite.
+            layer, a number that is not finite.
     """
     return genome_from_message(parsed(data, pb.Genome(), ROBOT_BYTES))
 
@@ -168,18 +168,25 @@ def encode_request(
 
 
 def decode_request(
-    data: bytes, read: Callable[[bytes], Robot] = decode_robot
+    data: bytes,
+    read: Callable[[bytes], Robot] = decode_robot,
+    prepare: Callable[[bytes], object] | None = None,
 ) -> Request:
     """Return the request of some bytes.
 
     Args:
         data: the bytes.
         read: decodes its robot; ``decode_body`` skips the brain.
+        prepare: called with the settings before the robot is decoded, to load the
+            plug-ins that they name.
 
     Raises:
         MalformedMessage: not a request's bytes, or its robot is malformed.
+        RevolveError: raised by ``prepare``.
     """
     message = parsed(data, pb.Request(), REQUEST_BYTES)
+    if prepare is not None:
+        prepare(message.settings)
     has_identity = message.HasField("identity")
     return Request(
         run=message.run,
@@ -300,7 +307,14 @@ def report_from_message(message: pb.Report) -> Report:
 
 def evaluation_to_message(evaluation: Evaluation) -> pb.Evaluation:
     """Return an evaluation as a message."""
-    return pb.Evaluation(**asdict(evaluation))
+    # Not by ``asdict``: it copies each value, at a tenth of an evaluation's cost here.
+    return pb.Evaluation(
+        fitness=evaluation.fitness,
+        path_velocity=evaluation.path_velocity,
+        straight_velocity=evaluation.straight_velocity,
+        simulated_s=evaluation.simulated_s,
+        measures=evaluation.measures,
+    )
 
 
 def evaluation_from_message(message: pb.Evaluation) -> Evaluation:
@@ -309,6 +323,10 @@ def evaluation_from_message(message: pb.Evaluation) -> Evaluation:
     Raises:
         MalformedMessage: a number that is not finite.
     """
-    names = [field.name for field in fields(Evaluation)]
-    numbers = (finite(getattr(message, name), f"evaluation.{name}") for name in names)
-    return Evaluation(*numbers)
+    return Evaluation(
+        finite(message.fitness, "evaluation.fitness"),
+        finite(message.path_velocity, "evaluation.path_velocity"),
+        finite(message.straight_velocity, "evaluation.straight_velocity"),
+        finite(message.simulated_s, "evaluation.simulated_s"),
+        tuple(finite(each, "evaluation.measures") for each in message.measures),
+    )

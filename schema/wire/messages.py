@@ -10,14 +10,7 @@ from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.identity import Identity, Origin
 from schema.limits import MOST_CONNECTIONS, MOST_NEURONS, MOST_PARTS
 from schema.parts import Vector
-from schema.robot.brain import (
-    NEURON_TYPES,
-    Brain,
-    Connection,
-    Layer,
-    Neuron,
-    check_brain,
-)
+from schema.robot.brain import Brain, Connection, Layer, Neuron, check_brain
 from schema.robot.genome import (
     ConnectionGene,
     Genes,
@@ -159,7 +152,7 @@ def genome_from_message(message: pb.Genome) -> Genome:
 
     Raises:
         MalformedMessage: nodes that are not a tree, too many nodes, neurons or
-            connections, an unknown neuron type or layer, a number that is not finite.
+            connections, an unknown layer, a number that is not finite.
     """
     nodes = message.nodes
     require_most(len(nodes), MOST_PARTS, "Genome.nodes")
@@ -249,16 +242,9 @@ def _require_tree(parts: Sequence[Part], name: str) -> None:
 
 
 def _neuron_gene(message: pb.NeuronGene) -> NeuronGene:
-    if message.kind not in NEURON_TYPES:
-        raise MalformedMessage(
-            f"neuron: must be one of {', '.join(NEURON_TYPES)}, got {message.kind!r}"
-        )
     parameters = tuple(message.parameters[:])
-    expected = len(NEURON_TYPES[message.kind])
-    if len(parameters) != expected or not all(map(math.isfinite, parameters)):
-        raise MalformedMessage(
-            f"neuron: {message.kind} takes {expected} finite numbers, got {parameters}"
-        )
+    if not all(map(math.isfinite, parameters)):
+        raise MalformedMessage("neuron.parameters: must be finite")
     return NeuronGene(message.kind, parameters)
 
 

@@ -189,16 +189,18 @@ class Report(_message.Message):
     def __init__(self, is_viable: _Optional[bool] = ..., reason: _Optional[str] = ..., intersections: _Optional[_Iterable[_Union[Intersection, _Mapping]]] = ..., lower: _Optional[_Union[Vector, _Mapping]] = ..., upper: _Optional[_Union[Vector, _Mapping]] = ..., mass: _Optional[float] = ..., motors: _Optional[int] = ...) -> None: ...
 
 class Evaluation(_message.Message):
-    __slots__ = ("fitness", "path_velocity", "straight_velocity", "simulated_s")
+    __slots__ = ("fitness", "path_velocity", "straight_velocity", "simulated_s", "measures")
     FITNESS_FIELD_NUMBER: _ClassVar[int]
     PATH_VELOCITY_FIELD_NUMBER: _ClassVar[int]
     STRAIGHT_VELOCITY_FIELD_NUMBER: _ClassVar[int]
     SIMULATED_S_FIELD_NUMBER: _ClassVar[int]
+    MEASURES_FIELD_NUMBER: _ClassVar[int]
     fitness: float
     path_velocity: float
     straight_velocity: float
     simulated_s: float
-    def __init__(self, fitness: _Optional[float] = ..., path_velocity: _Optional[float] = ..., straight_velocity: _Optional[float] = ..., simulated_s: _Optional[float] = ...) -> None: ...
+    measures: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, fitness: _Optional[float] = ..., path_velocity: _Optional[float] = ..., straight_velocity: _Optional[float] = ..., simulated_s: _Optional[float] = ..., measures: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Answer(_message.Message):
     __slots__ = ("epoch", "number", "wall_s", "report", "evaluation", "failure", "value")
@@ -309,7 +311,7 @@ class Changes(_message.Message):
     def __init__(self, removals: _Optional[_Iterable[_Union[BirthName, _Mapping]]] = ..., insertions: _Optional[_Iterable[_Union[Insertion, _Mapping]]] = ..., brains: _Optional[_Iterable[_Union[BrainChange, _Mapping]]] = ...) -> None: ...
 
 class Judgement(_message.Message):
-    __slots__ = ("birth", "age_s", "path_velocity", "straight_velocity", "fitness", "is_mature", "place")
+    __slots__ = ("birth", "age_s", "path_velocity", "straight_velocity", "fitness", "is_mature", "place", "measures")
     BIRTH_FIELD_NUMBER: _ClassVar[int]
     AGE_S_FIELD_NUMBER: _ClassVar[int]
     PATH_VELOCITY_FIELD_NUMBER: _ClassVar[int]
@@ -317,6 +319,7 @@ class Judgement(_message.Message):
     FITNESS_FIELD_NUMBER: _ClassVar[int]
     IS_MATURE_FIELD_NUMBER: _ClassVar[int]
     PLACE_FIELD_NUMBER: _ClassVar[int]
+    MEASURES_FIELD_NUMBER: _ClassVar[int]
     birth: BirthName
     age_s: float
     path_velocity: float
@@ -324,7 +327,8 @@ class Judgement(_message.Message):
     fitness: float
     is_mature: bool
     place: Vector
-    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., age_s: _Optional[float] = ..., path_velocity: _Optional[float] = ..., straight_velocity: _Optional[float] = ..., fitness: _Optional[float] = ..., is_mature: _Optional[bool] = ..., place: _Optional[_Union[Vector, _Mapping]] = ...) -> None: ...
+    measures: _containers.RepeatedScalarFieldContainer[float]
+    def __init__(self, birth: _Optional[_Union[BirthName, _Mapping]] = ..., age_s: _Optional[float] = ..., path_velocity: _Optional[float] = ..., straight_velocity: _Optional[float] = ..., fitness: _Optional[float] = ..., is_mature: _Optional[bool] = ..., place: _Optional[_Union[Vector, _Mapping]] = ..., measures: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Casualty(_message.Message):
     __slots__ = ("birth", "step", "reason", "place")
@@ -436,11 +440,11 @@ class InsertOrder(_message.Message):
     HAS_PLACE_FIELD_NUMBER: _ClassVar[int]
     X_FIELD_NUMBER: _ClassVar[int]
     Y_FIELD_NUMBER: _ClassVar[int]
-    genome: Genome
+    genome: bytes
     has_place: bool
     x: float
     y: float
-    def __init__(self, genome: _Optional[_Union[Genome, _Mapping]] = ..., has_place: _Optional[bool] = ..., x: _Optional[float] = ..., y: _Optional[float] = ...) -> None: ...
+    def __init__(self, genome: _Optional[bytes] = ..., has_place: _Optional[bool] = ..., x: _Optional[float] = ..., y: _Optional[float] = ...) -> None: ...
 
 class Command(_message.Message):
     __slots__ = ("command_id", "step", "pause", "resume", "insert", "remove", "replace_brain")

@@ -45,7 +45,7 @@ def birth_row(number: int) -> dict[str, Any]:
         **dict.fromkeys(counts, number % 4),
         "hidden": 0,
         "connections": 3,
-        **dict.fromkeys(("sim_time_s", "x", "y")),
+        **dict.fromkeys(("sim_time_s", "x", "y", "robot")),
     }
 
 
@@ -67,6 +67,7 @@ def evaluation_row(number: int, worker: str, platform: str) -> dict[str, Any]:
         "wall_s": 0.5,
         "worker": worker,
         "platform": platform,
+        "measures": None if is_failed else [("height", value), ("turning", 0.5)],
     }
 
 

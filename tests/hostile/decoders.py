@@ -387,7 +387,7 @@ def _journal(made: list[tuple[Advance, bytes, ExpectedAdvance]]) -> Iterator[Tar
         EvaluationFailed(BIRTH, "diverged", _SIGNED),
         Vetted(BIRTH, 0, VIABLE),
         Advanced(0, 1, advance, 9, _SIGNED),
-        Commanded(0, "id", 200, Insert(genome_of(ROBOT), (0.0, 1.0))),
+        Commanded(0, "id", 200, Insert(encode_genome(genome_of(ROBOT)), (0.0, 1.0))),
         Commanded(0, "id", 200, Remove(BIRTH)),
         Commanded(0, "id", 200, Pause()),
     )

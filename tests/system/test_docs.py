@@ -97,6 +97,28 @@ def test_experiments_of_the_experiments_page_run(tmp_path: Path) -> None:
             parse_experiment(document, str(tmp_path / page.name))
 
 
+def test_parts_page_runs(tmp_path: Path) -> None:
+    page = TOP / "docs" / "parts.md"
+    (module,) = _blocks(page, "python")
+    (document,) = _blocks(page, "toml")
+    (tmp_path / "my_parts.py").write_text(module)
+    (tmp_path / "mine.toml").write_text(document)
+    words = "run mine.toml --births 20 --in-process --quiet --out out"
+    done = _python(("-m", "revolve", *words.split()), tmp_path)
+    assert done.returncode == 0, done.stderr
+    # The message that the page quotes.
+    wrong = module.replace(
+        "length, 0.0, 0.0), (1.0, 0.0, 0.0), (", "length, 0.0, 0.0), (2.0, 0.0, 0.0), ("
+    )
+    (tmp_path / "my_parts.py").write_text(wrong)
+    done = _python(("-m", "revolve", *words.split()), tmp_path)
+    (quoted,) = re.findall(
+        r"^    (space\.part_types: .*)$", page.read_text(), re.MULTILINE
+    )
+    assert done.returncode != 0
+    assert quoted in done.stderr
+
+
 def test_arenas_page_lists_all_keys_with_their_defaults() -> None:
     page = (TOP / "docs" / "arenas.md").read_text()
     listed = re.findall(r"^\| `(\w+)` \| (\S+) \|", page, re.MULTILINE)

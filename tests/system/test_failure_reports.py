@@ -56,11 +56,14 @@ from worker.fitness import thesis
 
 def few(track, settings):
     value = thesis(track, settings)
-    if value > 0.005:
+    # The check before the run has traces on the ground.
+    if value > 0.005 and track.core_position[0, 2] > 0.0:
         raise ValueError("too fast to see")
     return value
 
 def none(track, settings):
+    if not track.core_position[0, 2]:
+        return 0.0
     raise ValueError("nobody looked")
 """
 

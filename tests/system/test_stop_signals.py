@@ -50,6 +50,14 @@ ADVICE = dict.fromkeys(
 )
 
 
+@pytest.fixture(autouse=True)
+def signals_by_default() -> Iterator[None]:
+    """Let the commands heed hangups, also if the tests were started under nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    yield
+    signal.signal(signal.SIGHUP, before)
+
+
 def family(process: int) -> set[int]:
     """Return the processes of a session, by its leader."""
     found = set()

@@ -4,11 +4,13 @@ from typing import cast
 
 import numpy as np
 import pytest
+from msgspec import Struct
 
 from schema.errors import ExperimentError
 from schema.experiment.document import Experiment, Fitness
-from schema.experiment.settings import fitness_function
+from schema.experiment.settings import fitness_argument, fitness_function
 from schema.robot.results import Track
+from schema.robot.trace import Trace
 from worker.fitness import (
     FitnessFunction,
     check_fitness,
@@ -95,13 +97,64 @@ def _counts_calls() -> FitnessFunction:
     return count
 
 
+def _always_raises(_track: Track, _fitness: Fitness) -> float:
+    raise ZeroDivisionError("by nothing")
+
+
+def _undeclared(trace: Trace, _fitness: Fitness) -> float:
+    return float(trace.energy[-1])
+
+
+class Light(Struct, frozen=True):
+    """Parameters of a fitness of a test."""
+
+    reach_m: float
+    power: int = 2
+
+
+def _seeks(trace: Trace, parameters: Light) -> float:
+    return parameters.reach_m**parameters.power + float(trace.core_position[-1, 0])
+
+
+def test_own_parameters_are_read_as_the_struct_of_the_second_argument() -> None:
+    fitness = Fitness(parameters={"reach_m": 3.0})
+    assert fitness_argument(_seeks, fitness) == Light(3.0, 2)
+    check_fitness(_seeks, fitness)
+    with pytest.raises(ExperimentError, match=r"fitness.parameters: Object missing"):
+        check_fitness(_seeks, Fitness())
+    with pytest.raises(ExperimentError, match=r"fitness.parameters.'reach': no such"):
+        check_fitness(_seeks, Fitness(parameters={"reach": 3.0}))
+
+
+def test_parameters_of_a_function_without_a_struct_are_refused() -> None:
+    with pytest.raises(ExperimentError, match="thesis has no parameters of its own"):
+        check_fitness(thesis, Fitness(parameters={"reach_m": 3.0}))
+
+
+def test_message_names_file_and_line_that_raised() -> None:
+    code = _always_raises.__code__
+    line = f"test_fitness.py:{code.co_firstlineno + 1}: must return a number, raised"
+    with pytest.raises(ExperimentError, match=line):
+        check_fitness(_always_raises, WEIGHTS)
+
+
+def test_function_may_raise_for_some_traces() -> None:
+    def picky(trace: Trace, _fitness: Fitness) -> float:
+        if len(trace.core_position) == 2:
+            raise ValueError("too short")
+        return 0.0
+
+    check_fitness(picky, WEIGHTS)
+
+
 @pytest.mark.parametrize(
     ("function", "message"),
     [
-        (_writes, "must not write to the track"),
+        (_undeclared, r"trace.energy is not recorded: declare it with @needs"),
+        (_writes, "must not write to the trace"),
         (_is_text, "must return a number, got 'fast'"),
         (_is_endless, "must return a finite number, got inf"),
-        (_counts_calls(), "must return the same for the same track"),
+        (_counts_calls(), "must return the same twice"),
     ],
 )
 def test_function_that_breaks_the_contract_is_rejected(

@@ -11,35 +11,43 @@ import numpy as np
 
 from schema.experiment.document import Simulation
 from schema.parts import Vector
+from schema.plugins.protocols import Bank
+from schema.robot.brain import Widths
 from schema.robot.results import Floats
 from worker.clusters.bounds import Indices
 from worker.clusters.cluster import EngineView
 from worker.clusters.columns import Layout
 from worker.clusters.robot import ArenaRobot
-from worker.robot.controller import Bank, Widths
+from worker.robot.brains import Controls
 from worker.robot.motors import HIGHEST_OUTPUT, LOWEST_OUTPUT
 from worker.robot.noise import Noise, NoiseSource
 from worker.robot.sensors import into_frame
 
 
 class BatchedControllers:
-    """One bank of networks, a row per robot, by birth.
+    """One bank of brains, a row per robot, by birth.
 
     A robot's first tick is at its birth, as off-line. Births fall on ticks of the
-    arena, so from then on all networks tick together.
+    arena, so from then on all brains tick together.
+
+    Attributes:
+        broken: rows of robots whose brain is no longer finite after the last tick;
+            only code of users can do that.
     """
 
-    def __init__(self, source: NoiseSource) -> None:
+    def __init__(self, source: NoiseSource, controls: Controls) -> None:
         """Initialise without robots.
 
         Args:
-            source: parameters of noise, width of every network, and clocks.
+            source: parameters of noise, width of every brain, and clocks.
+            controls: brains of the arena.
         """
         simulation = source.simulation
         self._source = source
+        self._controls = controls
         self._is_noisy = bool(simulation.sensor_noise or simulation.actuator_noise)
         self._tick_steps = simulation.brain_steps
-        self._tick_s = simulation.brain_steps * simulation.timestep_s
+        self.broken: list[int] = []
         self.gather(())
 
     def gather(self, robots: Sequence[ArenaRobot]) -> None:
@@ -52,7 +60,7 @@ class BatchedControllers:
         self._starts = np.array(starts, dtype=np.float64)[:, None]
 
     def tick(self, step: int, readings: Floats) -> Floats:
-        """Update all networks with the latest readings and return their outputs.
+        """Update all brains with the latest readings and return their outputs.
 
         Args:
             step: of the arena.
@@ -62,24 +70,38 @@ class BatchedControllers:
             (R, O) unclipped; may be a view that the next tick overwrites.
         """
         ages = (step - self._starts) // self._tick_steps
-        return self._outputs(self._bank, self._noise, step, readings, ages)
+        outputs = self._outputs(self._bank, self._noise, step, readings, ages)
+        self.broken = self._not_finite(self._bank, outputs)
+        return outputs
 
-    def first_tick(self, step: int, robot: ArenaRobot) -> None:
-        """Update a newborn's network alone and command its motors.
+    def first_tick(self, step: int, robot: ArenaRobot) -> bool:
+        """Update a newborn's brain alone and command its motors.
 
         Args:
             step: of the arena.
             robot: the newborn, not yet in the bank.
+
+        Returns:
+            Whether its brain is finite.
         """
         bank, noise = self._rows_of([robot])
         readings = robot.view.sensors.readings
-        robot.view.servos.drive(self._outputs(bank, noise, step, readings, 0.0)[0])
+        outputs = self._outputs(bank, noise, step, readings, 0.0)
+        robot.view.servos.drive(outputs[0])
         robot.states = bank.states[0]
+        return not self._not_finite(bank, outputs)
+
+    def _not_finite(self, bank: Bank, outputs: Floats) -> list[int]:
+        """Return the rows with a state or output that is not finite."""
+        if not self._controls.is_checked:
+            return []
+        is_finite = np.isfinite(bank.states).all(axis=1)
+        is_finite &= np.isfinite(outputs).all(axis=1)
+        return np.flatnonzero(~is_finite).tolist()
 
     def _rows_of(self, robots: Sequence[ArenaRobot]) -> tuple[Bank, Noise | None]:
         """Return a bank at rest and the noise of some robots."""
-        networks = [robot.network for robot in robots]
-        bank = Bank(networks, self._source.width, self._tick_s)
+        bank = self._controls.bank([robot.packed for robot in robots])
         if not self._is_noisy:
             return bank, None
         return bank, Noise(self._source, [robot.birth for robot in robots])
@@ -169,6 +191,8 @@ class BatchedIO:
         command = gain * (target - state[self._angles])
         np.maximum(command, -fastest, out=command)
         np.minimum(command, fastest, out=command)
+        if len(self._free):
+            command[self._free] = target[self._free]
         start = 0
         for controls in self._controls:
             end = start + len(controls)
@@ -198,6 +222,12 @@ class BatchedIO:
             for address, *limits in view.servos.motors
         ]
         table = np.array(motors, dtype=np.float64).reshape(-1, 5)
+        firsts = (ends - counts).tolist()
+        self._free: list[int] = [
+            start + index
+            for start, view in zip(firsts, views, strict=True)
+            for index in view.servos.free
+        ]
         self._motor_offsets = table[:, 0].astype(np.intp)
         self._motors = table.T[1:]
 

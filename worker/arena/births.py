@@ -6,13 +6,13 @@ import mujoco
 import numpy as np
 
 from schema.errors import UnexpectedEvent, one_line
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot, check_robot
 from schema.wire.arena import Casualty, Changes, Insertion
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot, Window
-from worker.robot.controller import pack
 
 
 def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> None:
@@ -37,7 +37,8 @@ def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> N
     for birth in new:
         if birth in population and birth not in gone:
             raise UnexpectedEvent(f"apply: {birth} lives here already")
-    tick = population.model_cache.settings.simulation.brain_steps
+    settings = population.model_cache.settings
+    tick = settings.simulation.brain_steps
     if new and step % tick:
         raise UnexpectedEvent(
             "apply: births must fall on multiples of simulation.brain_steps = "
@@ -50,9 +51,10 @@ def check_changes(changes: Changes, population: ArenaPopulation, step: int) -> N
             raise UnexpectedEvent(f"apply: {birth} does not live here")
         body = robots[birth] if birth in new else population.find(birth).body.robot
         robots[birth] = Robot(body.parts, change.brain)
+    kinds = neuron_kinds(settings.brain, settings.space)
     for robot in robots.values():
-        check_robot(robot, body_space(population.model_cache.settings.space))
-        pack(robot.brain, population.model_cache.width)
+        check_robot(robot, body_space(settings.space), kinds)
+        population.model_cache.controls.pack(robot.brain)
 
 
 def _distinct(births: tuple[BirthId, ...]) -> tuple[BirthId, ...]:
@@ -86,6 +88,8 @@ def newborn(
 ) -> ArenaRobot | Casualty:
     """Return a robot at its place with its first readings, or a casualty.
 
+    The caller adds the first sample to its window.
+
     Args:
         insertion: birth, robot, place and heading.
         population: that it is to join.
@@ -111,5 +115,4 @@ def newborn(
         reason = f"physics diverged: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, place)
     window = Window(cache.settings.simulation, step)
-    window.add(step, place)
-    return ArenaRobot(insertion.birth, body, cache.width, window, place)
+    return ArenaRobot(insertion.birth, body, cache.controls, window, place)

@@ -1,31 +1,14 @@
-"""Light sensors in an arena that has a light.
-
-The light is a point. A sensor faces along its part's x axis from the face of its
-box and reads cos(theta) min(1, (1 m / d)^2): theta is the angle between its axis
-and the direction of the light, d the distance of the light. It reads 0 if the light
-is behind it or hidden by a robot or a wall. Source: own; the fall with distance is
-that of the original's PointIntensity sensor. No camera is used,
-so births and deaths do not disturb the readings.
-"""
+"""Light sensors of an arena; ``worker.robot.light`` has the formula."""
 
 from collections.abc import Sequence
 
-import mujoco
-import numpy as np
-
 from schema.parts import Vector
-from schema.robot.results import Floats
-from worker.clusters.cluster import Cluster, EngineView
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot
-
-FULL_WITHIN_M = 1.0
-"""Distance within which the light has full brightness."""
-_OUTSIDE_M = 1e-6
-"""Distance from a sensor's face at which its ray starts."""
+from worker.robot.light import read_light
 
 
-def read_light(
+def read_lights(
     light: Vector, population: ArenaPopulation, robots: Sequence[ArenaRobot]
 ) -> None:
     """Write the readings of some robots' light sensors.
@@ -39,35 +22,6 @@ def read_light(
     if not views:
         return
     population.kinematics()
+    worlds = [(cluster.model, cluster.data) for cluster in population.clusters]
     for view in views:
-        for geom, place in view.sensors.lights:
-            view.sensors.readings[0, place] = _brightness(
-                light, population.clusters, view, geom
-            )
-
-
-def _brightness(
-    light: Vector, clusters: Sequence[Cluster], view: EngineView, geom: int
-) -> float:
-    model, data = view.model, view.data
-    outward = data.geom_xmat[geom].reshape(3, 3)[:, 0]
-    face = float(model.geom_size[geom][0]) + _OUTSIDE_M
-    start = data.geom_xpos[geom] + face * outward
-    ray = np.array(light) - start
-    distance = float(np.sqrt(ray @ ray))
-    if distance == 0.0:
-        return 1.0
-    slope = float(ray @ outward) / distance
-    if slope <= 0.0 or _is_hidden(clusters, start, ray):
-        return 0.0
-    return slope * min(1.0, (FULL_WITHIN_M / distance) ** 2)
-
-
-def _is_hidden(clusters: Sequence[Cluster], start: Floats, ray: Floats) -> bool:
-    """Return whether a geom lies between a sensor's face and the end of its ray."""
-    hit = np.zeros(1, dtype=np.int32)
-    for cluster in clusters:
-        share = mujoco.mj_ray(cluster.model, cluster.data, start, ray, None, 1, -1, hit)
-        if 0.0 <= share < 1.0:
-            return True
-    return False
+        read_light(light, view.sensors, (view.model, view.data), worlds)

@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 
 from schema.experiment.identity import Identity
+from schema.experiment.scenery import object_count
 from schema.experiment.settings import EvaluationSettings, read_arena_settings
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Floats
@@ -67,13 +68,15 @@ def alone(
 
     simulate(robot, settings, identity=identity, watch=watch)
     count, qpos = len(times), np.array(positions)
+    objects = object_count(settings.environment, settings.simulation)
+    joints = qpos.shape[1] - 7 * (1 + objects)
     rows = pose_batch(
         islands=np.full(count, identity.birth.island, dtype=np.int32),
         numbers=np.full(count, identity.birth.number, dtype=np.int64),
         times_s=np.array(times),
         roots=qpos[:, :7],
-        joint_counts=np.full(count, qpos.shape[1] - 7, dtype=np.int32),
-        angles=qpos[:, 7:].ravel(),
+        joint_counts=np.full(count, joints, dtype=np.int32),
+        angles=qpos[:, 7 : 7 + joints].ravel(),
     )
     return evaluate(robot, settings, identity), pa.Table.from_batches([rows])
 

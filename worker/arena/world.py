@@ -14,6 +14,7 @@ from functools import partial
 from typing import Self
 
 from schema.errors import UnexpectedEvent
+from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
@@ -21,8 +22,10 @@ from schema.wire.arena import Advance, Casualty, Changes, Insertion, Judgement
 from worker.arena.batched_control import BatchedControllers, BatchedIO
 from worker.arena.births import check_changes, newborn
 from worker.arena.divergence import diverged
-from worker.arena.light import read_light
+from worker.arena.light import read_lights
+from worker.arena.own_sensors import has_own_sensors, read_own_sensors
 from worker.arena.records import Contacts, Poses
+from worker.arena.samples import Samples
 from worker.arena.snapshot import read_snapshot, write_snapshot
 from worker.arena.threads import Pool
 from worker.clusters.population import ArenaPopulation
@@ -58,14 +61,16 @@ class World:
         self._settings = settings
         self._schedule = Schedule(settings)
         self._pool = Pool(threads)
-        width = self.population.model_cache.width
-        noise = NoiseSource(clock, width, settings.origin)
-        self._controllers = BatchedControllers(noise)
+        controls = self.population.model_cache.controls
+        noise = NoiseSource(clock, controls.width, settings.origin)
+        self._controllers = BatchedControllers(noise, controls)
         gravity = settings.environment.gravity_vector(clock.gravity)
-        self._io = BatchedIO(width, clock, gravity)
+        self._io = BatchedIO(controls.width, clock, gravity)
         self._casualties: list[Casualty] = []
         self._contacts = Contacts(settings) if settings.arena.record_touches else None
         self._poses = Poses(clock.timestep_s)
+        self._has_own_sensors = has_own_sensors(body_space(settings.space))
+        self._samples = Samples(settings, self.population)
 
     def close(self) -> None:
         """Stop the threads; the world cannot be advanced any more."""
@@ -105,8 +110,7 @@ class World:
         for change in changes.brains:
             robot = self.population.find(change.birth)
             start = self._schedule.next_tick(self.step)
-            width = self.population.model_cache.width
-            robot.set_brain(change.brain, width, start)
+            robot.set_brain(change.brain, self.population.model_cache.controls, start)
         if changes.removals or changes.insertions or changes.brains:
             self._controllers.gather(self.population.robots)
 
@@ -190,7 +194,7 @@ class World:
             diverged(self.population, rollout, step, reads_warnings=reads_warnings)
         )
         if is_tick:
-            self._tick(rollout.state)
+            self._tick(rollout)
         if is_sample:
             self._sample(rollout.state)
         if is_merge:
@@ -198,23 +202,31 @@ class World:
                 self._contacts.count(self.population.clusters, rollout.moment)
             self.population.merge()
 
-    def _tick(self, state: Floats) -> None:
+    def _tick(self, rollout: Rollout) -> None:
+        state = rollout.state
         self._io.settle(self.population.layout)
         self._io.read(state)
         self._read_light(self.population.robots)
+        if self._has_own_sensors:
+            failed = read_own_sensors(
+                self.population, self.population.robots, self.step, self._settings
+            )
+            self._remove(failed)
+            self._io.settle(self.population.layout)
+            state = rollout.state
         outputs = self._controllers.tick(self.step, self._io.readings)
         self._io.drive(state, outputs)
+        if self._controllers.broken:
+            robots = self.population.robots
+            self._remove_broken([robots[row] for row in self._controllers.broken])
 
     def _read_light(self, robots: Sequence[ArenaRobot]) -> None:
-        if self._settings.arena.light is not None:
-            read_light(self._settings.arena.light, self.population, robots)
+        if self._settings.light is not None:
+            read_lights(self._settings.light, self.population, robots)
 
     def _sample(self, state: Floats) -> None:
         layout = self.population.layout
-        places = state[layout.roots[:, :3]].tolist()
-        for robot, (x, y, z) in zip(self.population.robots, places, strict=True):
-            robot.place = (x, y, z)
-            robot.window.add(self.step, robot.place)
+        self._samples.add(self.step, state)
         self._poses.add(self.step, layout, state)
 
     # --- births and deaths ------------------------------------------------------
@@ -229,8 +241,18 @@ class World:
                 robots.append(robot)
         self.population.add(robots)
         self._read_light(robots)
+        if self._has_own_sensors:
+            failed = read_own_sensors(
+                self.population, robots, self.step, self._settings
+            )
+            self._casualties += failed
+            self.population.remove([each.birth for each in failed])
+            robots = [robot for robot in robots if robot.birth in self.population]
+        first_tick = partial(self._controllers.first_tick, self.step)
+        self._remove_broken([robot for robot in robots if not first_tick(robot)])
         for robot in robots:
-            self._controllers.first_tick(self.step, robot)
+            if robot.birth in self.population:
+                self._samples.first(self.step, robot)
         self.population.kinematics()
         self.population.merge()
 
@@ -240,6 +262,10 @@ class World:
         if casualties:
             self.population.remove([casualty.birth for casualty in casualties])
             self._controllers.gather(self.population.robots)
+
+    def _remove_broken(self, robots: Sequence[ArenaRobot]) -> None:
+        reason = "brain diverged: state not finite"
+        self._remove([Casualty(r.birth, self.step, reason, r.place) for r in robots])
 
     def _report(self) -> Advance:
         found = [r.judgement(self.step, self._settings) for r in self.population.robots]

@@ -11,15 +11,19 @@ from pathlib import Path
 import numpy as np
 from msgspec.structs import replace
 
-from schema.errors import ExperimentError, RunFolderError, SimulationDiverged
-from schema.experiment.document import Experiment, Simulation, body_space
+from schema.errors import (
+    ExperimentError,
+    RunFolderError,
+    SensorFailed,
+    SimulationDiverged,
+)
+from schema.experiment.document import Experiment, Simulation
 from schema.experiment.file import own_experiment
 from schema.formats.files import settings_of
-from schema.robot.genome import develop
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from schema.tables.files import read_table
-from schema.wire.codec import decode_genome
+from schema.wire.born import robot_of_birth
 from worker.robot.evaluation import evaluate
 
 THIRDS = 3
@@ -49,19 +53,17 @@ def read_population(folder: Path) -> Population:
     if not runs.num_rows:
         raise RunFolderError(f"{folder}: no run is there, or none that has begun")
     experiment = own_experiment(runs["document"][0].as_py())
-    space = body_space(experiment.space)
-    births = read_table(folder, "births").select(["island", "birth", "genome"])
-    genomes = {
-        (row["island"], row["birth"]): row["genome"] for row in births.to_pylist()
-    }
+    names = ["island", "birth", "genome", "robot"]
+    births = read_table(folder, "births").select(names).to_pylist()
+    born = {(row["island"], row["birth"]): row for row in births}
     evaluations = read_table(folder, "evaluations")
     columns = ["island", "birth", "fitness"]
     evaluated = evaluations.select(columns).drop_null().to_pylist()
     return Population(
         experiment,
         tuple(
-            develop(decode_genome(genomes[row["island"], row["birth"]]), space)
-            for row in evaluated
+            robot_of_birth(one["genome"], one["robot"], experiment)
+            for one in (born[row["island"], row["birth"]] for row in evaluated)
         ),
         np.array([row["fitness"] for row in evaluated]),
     )
@@ -130,7 +132,7 @@ def _fitness(robot: Robot, experiment: Experiment, world: Simulation) -> float:
     settings = replace(settings_of(experiment), simulation=world)
     try:
         return evaluate(robot, settings).fitness
-    except SimulationDiverged:
+    except (SimulationDiverged, SensorFailed):
         return 0.0
 
 

@@ -1,7 +1,8 @@
 """Bounding spheres of a robot and bounds on the speed of its points.
 
-A few spheres, each fixed to one body, cover a robot's boxes. With bounds that hold
-at any joint angle they give a lower bound on the distance of two robots.
+A few spheres, each fixed to one body, cover a robot's boxes, and the boxes around its
+cylinders. With bounds that hold at any joint angle they give a lower bound on the
+distance of two robots.
 """
 
 import math
@@ -22,6 +23,9 @@ GROWTH = 1.2
 """Two spheres merge into one of at most this many times the larger radius."""
 WIDE_M = 0.06
 """Flat boxes wider than this are divided in four [m]."""
+
+OVERSHOOT = 1.1
+"""Greatest displacement of a slider, as a share of its soft limit."""
 
 _Sphere = tuple[Floats, float]
 """Centre and radius [m]."""
@@ -67,13 +71,14 @@ def bounding_spheres(model: mujoco.MjModel) -> BoundingSpheres:
     far = [max((_length(c) + r for c, r in cover), default=0.0) for cover in covers]
     for body in range(model.nbody - 1, root, -1):
         parent = int(model.body_parentid[body]) - root
-        arm = _length(model.body_pos[body])
+        arm = _length(model.body_pos[body]) + _travel(model, body)
         far[parent] = max(far[parent], arm + far[body - root])
     weights = np.empty(model.nv)
     weights[:3], weights[3:6] = 1.0, far[0]
     for joint in range(1, model.njnt):
         body = int(model.jnt_bodyid[joint]) - root
-        weights[int(model.jnt_dofadr[joint])] = far[body]
+        is_slider = model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_SLIDE
+        weights[int(model.jnt_dofadr[joint])] = 1.0 if is_slider else far[body]
     counts = [len(cover) for cover in covers]
     spheres = [sphere for cover in covers for sphere in cover]
     return BoundingSpheres(
@@ -83,6 +88,14 @@ def bounding_spheres(model: mujoco.MjModel) -> BoundingSpheres:
         np.array([_hull(cover) for cover in covers]),
         weights,
     )
+
+
+def _travel(model: mujoco.MjModel, body: int) -> float:
+    """Return how far a body's joint moves its origin, soft limit included [m]."""
+    joint = int(model.body_jntadr[body])
+    if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_SLIDE:
+        return 0.0
+    return OVERSHOOT * float(model.jnt_range[joint, 1])
 
 
 def _hull(cover: list[_Sphere]) -> list[float]:
@@ -96,8 +109,10 @@ def _hull(cover: list[_Sphere]) -> list[float]:
 
 
 def _box_cover(model: mujoco.MjModel, geom: int) -> list[_Sphere]:
-    """Return spheres that cover a box, in its body's frame."""
+    """Return spheres that cover a box or cylinder, in its body's frame."""
     size = 2.0 * model.geom_size[geom]
+    if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        size = size[[0, 0, 1]]
     middle = sorted(size.tolist())[1]
     pieces = [max(1, math.ceil(edge / (SLENDERNESS * middle))) for edge in size]
     if min(pieces) == max(pieces) == 1 and float(np.min(size)) * 2 <= middle * 1.01:

@@ -9,6 +9,7 @@ import mujoco
 from msgspec.structs import replace
 
 from schema.experiment.document import body_space
+from schema.experiment.scenery import refuse_objects
 from schema.experiment.settings import ArenaSettings
 from schema.mjcf.footing import footprint, standing_height
 from schema.mjcf.model import robot_spec, shared_model, solo_spec
@@ -17,7 +18,8 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from worker.clusters.bounds import BoundingSpheres, bounding_spheres
 from worker.clusters.cluster import Cluster, Member
-from worker.robot.controller import widths
+from worker.robot.brains import controls_of
+from worker.robot.recording import Channels
 
 CACHE_SIZE = 64
 """Shared clusters that are cached in case their members meet again."""
@@ -31,11 +33,13 @@ class Body:
         robot: its parts, and its brain at birth or in the snapshot.
         bounds: bounding spheres.
         solo: the cluster in which it is alone.
+        channels: of its trace.
     """
 
     robot: Robot
     bounds: BoundingSpheres
     solo: Cluster
+    channels: Channels
 
 
 class ModelCache:
@@ -43,14 +47,20 @@ class ModelCache:
 
     Attributes:
         settings: of the arena.
-        width: of every network.
+        controls: brains of the arena.
     """
 
     def __init__(self, settings: ArenaSettings) -> None:
-        """Initialise an empty cache."""
+        """Initialise an empty cache.
+
+        Raises:
+            ExperimentError: scenery that is invalid, or has objects that move.
+        """
+        refuse_objects(settings.environment, settings.simulation)
         self.settings = settings
         self._simulation = replace(settings.simulation, drop_m=settings.arena.drop_m)
-        self.width = widths(settings.space)
+        tick_s = settings.simulation.brain_steps * settings.simulation.timestep_s
+        self.controls = controls_of(settings.brain, settings.space, tick_s)
         self._types = body_space(settings.space)
         self._furnish = partial(add_ring_wall, arena=settings.arena)
         self._clusters: OrderedDict[tuple[BirthId, ...], Cluster] = OrderedDict()
@@ -71,7 +81,8 @@ class ModelCache:
             furnish=self._furnish,
         ).compile()
         solo = Cluster((birth,), [Member("", robot, model)], model, self.settings)
-        return Body(robot, bounding_spheres(model), solo)
+        channels = Channels(robot, model, self.settings)
+        return Body(robot, bounding_spheres(model), solo, channels)
 
     def height(self, body: Body, place: tuple[float, float], heading: float) -> float:
         """Return the height of a robot's core when the arena drops it [m].

@@ -6,100 +6,83 @@ equal to the last bit alone, in any batch and at any place in it
 (tests/worker/robot/test_controller.py). Formulas: ``schema.robot.brain``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
 
 import numpy as np
 import numpy.typing as npt
 
-from schema.errors import InvalidRobot
-from schema.experiment.document import Space
-from schema.robot.brain import Brain, Neuron
+from schema.plugins.protocols import NeuronType
+from schema.robot.brain import Brain, Neuron, Widths
+from schema.robot.neurons import BUILT_IN_NEURONS, SHORTEST_PERIOD_S
 from schema.robot.results import Floats
+from worker.robot.own_neurons import STATE_LIMIT, OwnNeuron, OwnNeurons
 
 Mask = npt.NDArray[np.bool_]
 
-STATE_LIMIT = 1e6
-"""Bound on the states of linear neurons, which may feed back on themselves."""
-SHORTEST_PERIOD_S = 1e-6
-"""Least period of an oscillator, against a division by zero."""
 _LOWEST, _HIGHEST = np.array(-STATE_LIMIT), np.array(STATE_LIMIT)
 _NUMBER_LIMIT = 1e100
 """Bound on weights and parameters, so that no sum of products overflows."""
 
 
 @dataclass(frozen=True, slots=True)
-class Widths:
-    """Numbers of input, output and hidden neurons of every network's arrays."""
-
-    inputs: int
-    outputs: int
-    hidden: int
-
-    @property
-    def states(self) -> int:
-        """Number of neurons that have a state."""
-        return self.outputs + self.hidden
-
-
-def widths(space: Space) -> Widths:
-    """Return the widths of an experiment's limits."""
-    return Widths(space.max_inputs, space.max_outputs, space.max_hidden)
-
-
-@dataclass(frozen=True, slots=True)
 class Network:
     """Brain as arrays: S states (outputs, then hidden), I inputs.
 
-    A neuron's next state is scale * f(weights . sources + frequency * age - shift)
-    + offset, where f is tanh for a sigmoid, sine for an oscillator and the identity
-    for a linear neuron; gains are multiplied into the weights.
+    The next state of a neuron of the thesis's types is
+    scale * f(weights . sources + frequency * age - shift) + offset, where f is tanh
+    for a sigmoid, sine for an oscillator and the identity for a linear neuron; gains
+    are multiplied into the weights. That of a neuron of a user's type depends on
+    weights . sources.
 
     Attributes:
         weights: (S, I + S), from inputs and previous states to each neuron.
         numbers: (4, S): frequency [rad/s], shift, scale, offset.
         kinds: (2, S): whether it is a sigmoid, whether it is an oscillator.
+        own: neurons of users' types.
     """
 
     weights: Floats
     numbers: Floats
     kinds: Mask
+    own: tuple[OwnNeuron, ...] = ()
 
 
-def pack(brain: Brain, width: Widths) -> Network:
+def pack(
+    brain: Brain,
+    width: Widths,
+    types: Mapping[str, NeuronType] = BUILT_IN_NEURONS,
+) -> Network:
     """Return a brain as arrays of fixed width.
 
     Args:
-        brain: a checked brain.
+        brain: a checked brain that fits the widths.
         width: of the arrays.
-
-    Raises:
-        InvalidRobot: more inputs, outputs or hidden neurons than the widths.
+        types: neuron types by name.
     """
-    limits = {"input": width.inputs, "output": width.outputs, "hidden": width.hidden}
     first = {"input": 0, "output": width.inputs, "hidden": width.inputs + width.outputs}
     following = dict(first)
     places: list[int] = []
     for neuron in brain.neurons:
         places.append(following[neuron.layer])
         following[neuron.layer] += 1
-    for layer, limit in limits.items():
-        count = following[layer] - first[layer]
-        if count > limit:
-            raise InvalidRobot(
-                f"brain: {layer} neurons must be <= {limit}, got {count}"
-            )
     weights = np.zeros((width.states, width.inputs + width.states))
     numbers = np.zeros((4, width.states))
     kinds = np.zeros((2, width.states), dtype=np.bool_)
     for edge in brain.connections:
         row = places[edge.target] - width.inputs
         weights[row, places[edge.source]] = _bounded(edge.weight)
+    own: list[OwnNeuron] = []
     for place, neuron in zip(places, brain.neurons, strict=True):
-        if neuron.layer != "input":
-            _set_neuron(neuron, place - width.inputs, (weights, numbers, kinds))
-    return Network(weights, numbers, kinds)
+        if neuron.layer == "input":
+            continue
+        kind, row = types[neuron.kind], place - width.inputs
+        if kind is BUILT_IN_NEURONS.get(neuron.kind):
+            _set_neuron(neuron, row, (weights, numbers, kinds))
+        else:
+            own.append(OwnNeuron(kind, row, tuple(map(_bounded, neuron.parameters))))
+    return Network(weights, numbers, kinds, tuple(own))
 
 
 def _set_neuron(neuron: Neuron, row: int, arrays: tuple[Floats, Floats, Mask]) -> None:
@@ -132,12 +115,17 @@ class Bank:
     """R networks that are updated together; row r belongs to robot r.
 
     Attributes:
-        states: (R, S) outputs and hidden states after the last tick; may be
-            copied and written to save, move and restore robots.
+        states: (R, K S) outputs and hidden states after the last tick, then the other
+            states of neurons of users' types; may be copied and written to save, move
+            and restore robots.
     """
 
     def __init__(
-        self, networks: Sequence[Network], width: Widths, tick_s: float
+        self,
+        networks: Sequence[Network],
+        width: Widths,
+        tick_s: float,
+        values: int = 1,
     ) -> None:
         """Start all networks at state 0.
 
@@ -145,6 +133,7 @@ class Bank:
             networks: packed with ``width``.
             width: of the arrays.
             tick_s: time between two ticks [s].
+            values: greatest number of states of a neuron, K.
         """
         count, states = len(networks), width.states
         self._tick_s = tick_s
@@ -160,9 +149,14 @@ class Bank:
         self._has_sigmoids = bool(kinds[0].any())
         self._has_oscillators = bool(kinds[1].any())
         # Inputs and previous states side by side, as the weights expect them.
-        self._sources = np.zeros((count, width.inputs + states, 1))
-        self._readings = self._sources[:, : width.inputs, 0]
-        self.states = self._sources[:, width.inputs :, 0]
+        memory = np.zeros((count, width.inputs + values * states, 1))
+        self._sources = memory[:, : width.inputs + states]
+        self._readings = memory[:, : width.inputs, 0]
+        self.states = memory[:, width.inputs :, 0]
+        self._first_states = self.states[:, :states]
+        self._own: OwnNeurons | None = None
+        if any(network.own for network in networks):
+            self._own = OwnNeurons([network.own for network in networks], states)
         self._sums = np.empty((count, states, 1))
         self._next = self._sums[:, :, 0]
         self._other = np.empty((count, states))
@@ -182,6 +176,8 @@ class Bank:
         new, other = self._next, self._other
         self._readings[...] = readings
         np.matmul(self._weights, self._sources, out=self._sums)
+        if self._own is not None:
+            self._own.update(new, self.states, age_ticks, self._tick_s)
         # Without oscillators, all frequencies are 0.
         if self._has_oscillators:
             np.multiply(self._frequency, age_ticks * self._tick_s, out=other)
@@ -195,13 +191,15 @@ class Bank:
             np.putmask(new, self._is_oscillator, other)
         np.multiply(new, self._scale, out=new)
         np.add(new, self._offset, out=new)
+        if self._own is not None:
+            self._own.write(new, self.states)
         np.maximum(new, _LOWEST, out=new)
-        np.minimum(new, _HIGHEST, out=self.states)
+        np.minimum(new, _HIGHEST, out=self._first_states)
         return self._outputs
 
 
 class SoloNetwork:
-    """One network that is updated from birth on, with a known maximum of ticks.
+    """One network of the thesis's neuron types, with a known maximum of ticks.
 
     The same arithmetic as ``Bank``, equal to the last bit
     (tests/worker/robot/test_solo_network.py), at less than half of the cost of a

@@ -16,12 +16,18 @@ from schema.experiment.document import body_space
 from schema.experiment.identity import NO_IDENTITY, Identity
 from schema.experiment.settings import EvaluationSettings
 from schema.mjcf.model import solo_spec
-from schema.robot.results import Evaluation, Track
+from schema.robot.results import Evaluation
 from schema.robot.robot import Robot
+from schema.robot.trace import Trace
 from worker.fitness import fitness_of, path_velocity, straight_velocity
-from worker.robot.controller import SoloNetwork, pack, widths
+from worker.measures.functions import measures_of
+from worker.robot.brains import controls_of
+from worker.robot.light import read_light
 from worker.robot.motors import Servos
 from worker.robot.noise import Noise, NoiseSource
+from worker.robot.own_sensors import Surroundings
+from worker.robot.pushes import Pushes
+from worker.robot.recording import Channels, Recorder
 from worker.robot.sensors import Sensors
 
 Watch = Callable[[mujoco.MjData], None]
@@ -34,36 +40,40 @@ def evaluate(
 
     Args:
         robot: a robot that passes ``check_robot`` in the settings' body space.
-        settings: body space, simulation, environment and fitness.
-        identity: of the evaluation; only noise depends on it.
+        settings: body space, simulation, environment, fitness and measures.
+        identity: of the evaluation; noise and pushes depend on it.
 
     Raises:
         SimulationDiverged: the physics diverged; with reason and simulated time.
-        FitnessUndefined: the fitness function raised or gave no finite number.
+        SensorFailed: a sensor of a plug-in raised or gave wrong values.
+        FitnessUndefined: the fitness function or a measure raised or gave no finite
+            number.
         ExperimentError: a sensor that has no stimulus in this environment, or an
-            unknown fitness function.
+            unknown fitness function or measure.
         InvalidRobot: more neurons than the limits.
     """
     return judge(simulate(robot, settings, identity=identity), settings)
 
 
-def judge(track: Track, settings: EvaluationSettings) -> Evaluation:
-    """Return the evaluation of a track.
+def judge(trace: Trace, settings: EvaluationSettings) -> Evaluation:
+    """Return the evaluation of a trace.
 
     Args:
-        track: that ``simulate`` returned for these settings.
-        settings: simulation and fitness.
+        trace: that ``simulate`` returned for these settings.
+        settings: simulation, fitness and measures.
 
     Raises:
-        FitnessUndefined: the fitness function raised or gave no finite number.
-        ExperimentError: an unknown fitness function.
+        FitnessUndefined: the fitness function or a measure raised or gave no finite
+            number.
+        ExperimentError: an unknown fitness function or measure.
     """
     clock = settings.simulation
     return Evaluation(
-        fitness_of(track, settings.fitness),
-        path_velocity(track),
-        straight_velocity(track),
+        fitness_of(trace, settings.fitness),
+        path_velocity(trace),
+        straight_velocity(trace),
         (clock.warmup_steps + clock.window_steps) * clock.timestep_s,
+        tuple(each.value(trace) for each in measures_of(settings.measures)),
     )
 
 
@@ -73,23 +83,27 @@ def simulate(
     *,
     watch: Watch | None = None,
     identity: Identity = NO_IDENTITY,
-) -> Track:
-    """Return the track of a robot that starts at the origin, alone.
+) -> Trace:
+    """Return the trace of a robot that starts at the origin, alone.
 
     Sensors, controller and commands are updated every ``brain_steps`` from step 0
     on. The position of the core's centre is sampled every ``pose_steps`` of the
-    window, both ends included.
+    window, both ends included, and so are the channels that fitness and measures
+    declare.
 
     Args:
         robot: a checked robot.
-        settings: body space, simulation and environment; fitness does not count.
+        settings: body space, simulation and environment; of fitness and measures only
+            the channels that they declare.
         watch: called with the state after each tick, before the steps that follow.
-        identity: of the evaluation; only noise depends on it.
+        identity: of the evaluation; noise and pushes depend on it.
 
     Raises:
         SimulationDiverged: the state is not finite, the engine warned or failed, or
             it cannot build the robot.
-        ExperimentError: a sensor that has no stimulus in this environment.
+        SensorFailed: a sensor of a plug-in raised or gave wrong values.
+        ExperimentError: a sensor that has no stimulus in this environment, or an
+            unknown fitness function or measure.
         InvalidRobot: more neurons than the limits.
     """
     silence_engine()
@@ -122,36 +136,55 @@ class _ControlLoop:
         model: mujoco.MjModel,
         identity: Identity,
     ) -> None:
-        types, width = body_space(settings.space), widths(settings.space)
-        simulation = settings.simulation
+        types, simulation = body_space(settings.space), settings.simulation
         self._model, self.data = model, mujoco.MjData(model)
         self._velocities = self.data.qvel.data
         self._simulation = simulation
         self._tick_s = simulation.brain_steps * simulation.timestep_s
-        self._sensors = Sensors(robot, types, model, self.data, width=width.inputs)
+        controls = controls_of(settings.brain, settings.space, self._tick_s)
+        width = controls.width
+        self._light = settings.environment.light
+        self._sensors = Sensors(
+            robot,
+            types,
+            model,
+            self.data,
+            width=width.inputs,
+            has_light=self._light is not None,
+        )
         self._servos = Servos(robot, types, model, self.data)
         steps = simulation.warmup_steps + simulation.window_steps
         ticks = steps // simulation.brain_steps + 1
-        network = pack(robot.brain, width)
-        self._controller = SoloNetwork(network, width, self._tick_s, ticks)
+        self._controller = controls.solo(robot.brain, ticks)
         self._sensors.write_to(self._controller.readings)
         self._noise: Noise | None = None
         if simulation.sensor_noise or simulation.actuator_noise:
             source = NoiseSource(simulation, width, identity.origin)
             self._noise = Noise(source, (identity.birth,), identity.trial)
+        self._pushes: Pushes | None = None
+        if settings.environment.push_impulse:
+            environment = settings.environment
+            self._pushes = Pushes(environment, simulation, identity, model, self.data)
         inputs = sum(neuron.layer == "input" for neuron in robot.brain.neurons)
         self._inputs = self._controller.readings[:, :inputs]
+        self._channels = Channels(robot, model, settings)
+        self._recorder: Recorder | None = None
+        if self._channels.names:
+            self._recorder = Recorder(self._channels, robot, model, self.data)
+            self._recorder.readings = self._inputs
 
-    def run(self, watch: Watch | None) -> Track:
-        """Step warm-up and window, and return the track of the window."""
+    def run(self, watch: Watch | None) -> Trace:
+        """Step warm-up and window, and return the trace of the window."""
         model, data, simulation = self._model, self.data, self._simulation
         core = data.qpos[:3].data
         start = simulation.warmup_steps
         end = start + simulation.window_steps
         positions: list[float] = []
+        recorder = self._recorder
         step, next_tick, next_sample = 0, 0, start
         while True:
-            if step == next_sample:
+            is_sample = step == next_sample
+            if is_sample:
                 positions += core.tolist()
                 next_sample += simulation.pose_steps
             if step == end:
@@ -162,15 +195,27 @@ class _ControlLoop:
                 if watch is not None:
                     watch(data)
             until = min(next_tick, next_sample)
-            mujoco.mj_step(model, data, until - step)
+            if recorder is None:
+                mujoco.mj_step(model, data, until - step)
+            else:
+                # After the tick, as in an arena: a sample has the readings of its step.
+                if is_sample:
+                    recorder.sample()
+                recorder.step(until - step)
             step = until
+        if recorder is not None:
+            self._sensors.read(self._tick_s)
+            self._read_light()
+            recorder.readings = self._sensors.readings
+            recorder.sample()
         if data.warning.number.any() or not math.isfinite(
             data.qvel.sum() + data.qpos.sum()
         ):
             _raise_diverged(data, end * simulation.timestep_s)
-        return Track(
+        return self._channels.trace(
             simulation.pose_steps * simulation.timestep_s,
             np.array(positions).reshape(-1, 3),
+            recorder.rows if recorder is not None else (),
         )
 
     def _tick(self, step: int) -> None:
@@ -183,13 +228,30 @@ class _ControlLoop:
             self._sensors.read(self._tick_s)
         else:
             self._sensors.start()
+        self._read_light()
+        if self._sensors.own is not None:
+            # Frames are those of the state before the last step.
+            mujoco.mj_kinematics(self._model, self.data)
+            age_s = step * self._simulation.timestep_s
+            around = Surroundings(age_s, self._sensors.touching(), light=self._light)
+            self._sensors.own.read(self._sensors.readings[0], around)
         tick = step // self._simulation.brain_steps
+        if self._pushes is not None:
+            self._pushes.apply(tick)
         if self._noise is None:
             self._servos.drive(self._controller.step(tick))
             return
+        if self._recorder is not None:
+            self._recorder.readings = self._inputs.copy()
         self._inputs[:] = self._noise.perturb_readings(tick, self._inputs)
         outputs = self._controller.step(tick)[np.newaxis]
         self._servos.drive(self._noise.perturb_outputs(tick, outputs)[0])
+
+    def _read_light(self) -> None:
+        if self._light is not None:
+            mujoco.mj_kinematics(self._model, self.data)
+            world = self._model, self.data
+            read_light(self._light, self._sensors, world, (world,))
 
 
 def _raise_diverged(data: mujoco.MjData, time_s: float) -> None:

@@ -17,7 +17,9 @@ class Servos:
     Attributes:
         actuators: indices of its actuators in the model, contiguous.
         motors: of each, the address of its joint's angle in the model, lowest target,
-            range of the targets, gain and greatest velocity.
+            range of the targets, gain and greatest velocity. Of a motor that controls
+            the velocity, targets are velocities, and the gain is 0.
+        free: indices in ``motors`` of those that control the velocity.
     """
 
     def __init__(
@@ -39,6 +41,7 @@ class Servos:
             prefix: of the robot's names in the model.
         """
         self.motors: list[tuple[int, float, float, float, float]] = []
+        self.free: list[int] = []
         found: list[int] = []
         for index, part in enumerate(robot.parts):
             motor = space[part.kind].motor
@@ -50,6 +53,10 @@ class Servos:
             low, high = model.jnt_range[joint].tolist()
             address = int(model.jnt_qposadr[joint])
             limits = (low, high - low, motor.gain, motor.max_velocity)
+            if motor.control == "velocity":
+                fastest = motor.max_velocity
+                limits = (-fastest, 2.0 * fastest, 0.0, fastest)
+                self.free.append(len(self.motors))
             self.motors.append((address, *limits))
         first = found[0] if found else 0
         self.actuators = slice(first, first + len(found))
@@ -61,7 +68,7 @@ class Servos:
     def drive(self, outputs: Floats) -> None:
         """Command each joint towards its target, until the next tick.
 
-        Writes the state's ``ctrl`` [rad/s].
+        Writes the state's ``ctrl`` [rad/s], of sliders [m/s].
 
         Args:
             outputs: (O,) of the network, unclipped; O may exceed the motors.
@@ -82,3 +89,7 @@ class Servos:
             elif command > fastest:
                 command = fastest
             commands[index] = command
+        for index in self.free:
+            share = min(max(float(outputs[index]), LOWEST_OUTPUT), HIGHEST_OUTPUT)
+            _, low, span, _, _ = self.motors[index]
+            commands[index] = low + share * span

@@ -8,20 +8,18 @@ no state of the generator.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from schema.experiment.document import Simulation
 from schema.experiment.identity import Origin
+from schema.robot.brain import Widths
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
-from worker.robot.controller import Widths
+from worker.robot.random_streams import Purpose, stream
 
 BLOCK_TICKS = 64
 """Ticks that are drawn at once, because starting a generator costs more than a draw."""
-_PURPOSE = 11
-"""Differs from every ``coordinator.evolution.random_streams.Purpose``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,34 +98,9 @@ class Noise:
         inputs, outputs = source.width.inputs, source.width.outputs
         numbers = np.empty((BLOCK_TICKS, len(self._births), inputs + outputs))
         for row, birth in enumerate(self._births):
-            rng = _stream(source.origin, birth, self._trial, block)
+            rng = stream(Purpose.NOISE, source.origin, birth, self._trial, block)
             numbers[:, row] = rng.standard_normal((BLOCK_TICKS, inputs + outputs))
         on_readings = numbers[:, :, :inputs] * clock.sensor_noise
         on_outputs = numbers[:, :, inputs:] * clock.actuator_noise
         self._drawn = list(zip(on_readings, on_outputs, strict=True))
         self._block = block
-
-
-def _stream(
-    origin: Origin, birth: BirthId, trial: int, block: int
-) -> np.random.Generator:
-    """Return the stream of one robot's block of ticks.
-
-    The origin is the key of a counter-based generator. Birth, trial and block are the
-    start of its counter; the counter's lowest word belongs to the draws.
-
-    Source: Salmon et al., Parallel random numbers: as easy as 1, 2, 3, 2011.
-    """
-    start = np.array(
-        [0, block, birth.number, birth.island << 32 | trial], dtype=np.uint64
-    )
-    return np.random.Generator(np.random.Philox(key=_key(origin), counter=start))
-
-
-@lru_cache(maxsize=64)
-def _key(origin: Origin) -> int:
-    """Return an origin's key, of 128 bits."""
-    name = (origin.run, origin.island, 0, 0, _PURPOSE)
-    words = np.random.SeedSequence(origin.seed, spawn_key=name)
-    low, high = map(int, words.generate_state(2, np.uint64))
-    return low | high << 64

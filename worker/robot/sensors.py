@@ -12,9 +12,10 @@ import mujoco
 import numpy as np
 
 from schema.errors import ExperimentError
-from schema.parts import BodySpace
+from schema.parts import BodySpace, Sensor
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from worker.robot.own_sensors import OwnSensors
 
 _Velocity = tuple[float, float, float]
 _Number = TypeVar("_Number", float, Floats)
@@ -35,6 +36,7 @@ class Sensors:
         lights: (geom, index in the readings) of each light sensor.
         pads: the same of each touch sensor.
         core_imu: index in the readings of the imu at the core's centre, or -1.
+        own: sensors of plug-ins, which the caller reads; None if there are none.
     """
 
     def __init__(
@@ -74,9 +76,13 @@ class Sensors:
         self._motion = _cells(data.qvel[qvel : qvel + 6])
         gx, gy, gz = model.opt.gravity.tolist()
         self._gravity = (gx, gy, gz)
-        place = 0
+        place, own = 0, []
         for index, part in enumerate(robot.parts):
             for sensor in space[part.kind].sensors:
+                if not isinstance(sensor, Sensor):
+                    own.append((index, part.kind, sensor, place))
+                    place += sensor.inputs
+                    continue
                 if sensor.kind == "light" and not has_light:
                     raise ExperimentError(
                         f"body.parts[{index}]: {part.kind}: no light in this world"
@@ -89,6 +95,7 @@ class Sensors:
                     kind = self.lights if sensor.kind == "light" else self.pads
                     kind.append((geom, place))
                 place += sensor.inputs
+        self.own = OwnSensors(own, (model, data), prefix) if own else None
         self.readings: Floats = np.zeros((1, width))
         self.write_to(self.readings)
 
@@ -125,7 +132,7 @@ class Sensors:
         return self.read(1.0)
 
     def read(self, interval_s: float) -> Floats:
-        """Read all sensors but light sensors.
+        """Read all sensors but light sensors and own ones.
 
         Args:
             interval_s: since the last reading [s].
@@ -139,10 +146,14 @@ class Sensors:
             self._read_sites(interval_s)
         if self.pads:
             # No ravel: a copy of rows that lie apart costs more than the chain.
-            touching = set(chain.from_iterable(self._data.contact.geom.tolist()))
+            touching = self.touching()
             for geom, place in self.pads:
                 self._cells[place] = float(geom in touching)
         return self.readings
+
+    def touching(self) -> set[int]:
+        """Return the geoms in contact in the last step."""
+        return set(chain.from_iterable(self._data.contact.geom.tolist()))
 
     def _read_core(self, interval_s: float) -> None:
         """Read the imu of the core from the free joint's state.

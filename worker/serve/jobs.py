@@ -3,9 +3,9 @@
 import time
 from collections.abc import Callable
 
-from schema.errors import FitnessUndefined, SimulationDiverged
+from schema.errors import FitnessUndefined, SensorFailed, SimulationDiverged
 from schema.experiment.document import body_space
-from schema.experiment.settings import lasting, read_evaluation_settings
+from schema.experiment.settings import lasting
 from schema.robot.results import Evaluation
 from schema.robot.robot import check_types
 from schema.wire.arena_codec import Live
@@ -19,6 +19,7 @@ from schema.wire.codec import (
 from worker.arena.world import World
 from worker.robot.evaluation import evaluate
 from worker.serve.calls import answer_call
+from worker.serve.checks import checked_evaluation
 from worker.serve.shards import Shards
 
 
@@ -60,22 +61,23 @@ def answer(request: bytes) -> bytes:
     """Return the encoded answer to an encoded evaluation request.
 
     A function of the request but for ``wall_s``, which affects nothing. Diverged
-    physics and an undefined fitness are results, answered with the reason.
+    physics, a failed sensor and an undefined fitness are results, answered with the
+    reason.
 
     Raises:
         MalformedMessage: the bytes are no request.
-        ExperimentError: invalid settings, an unknown plug-in, or a sensor that has no
-            stimulus in the environment.
+        ExperimentError: invalid settings, a plug-in that is unknown or breaks its
+            contract, or a sensor that has no stimulus in the environment.
         InvalidRobot: a robot that breaks the rules of its body space.
     """
     start = time.perf_counter()
-    job = decode_request(request)
-    settings = read_evaluation_settings(job.settings)
+    job = decode_request(request, prepare=checked_evaluation)
+    settings = checked_evaluation(job.settings)
     check_types(job.robot, body_space(settings.space))
     result: Evaluation | str
     try:
         result = evaluate(job.robot, lasting(settings, job.steps), job.identity)
-    except (SimulationDiverged, FitnessUndefined) as error:
+    except (SimulationDiverged, SensorFailed, FitnessUndefined) as error:
         result = str(error)
     wall_s = time.perf_counter() - start
     return encode_answer(Answer(job.epoch, job.number, wall_s, result))

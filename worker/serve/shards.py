@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Protocol, Self
 
 from schema.errors import StateDiffers
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.settings import ArenaSettings, read_arena_settings
 from schema.robot.ids import BirthId
@@ -28,6 +29,7 @@ from schema.wire.arena_codec import (
     encode_advance_answer,
 )
 from worker.arena.births import possible
+from worker.serve.checks import checked_arena
 
 Key = tuple[str, int]
 """Name of a shard: its run and its number."""
@@ -109,13 +111,14 @@ class Shards:
 
         Raises:
             MalformedMessage: the bytes are no such request.
-            ExperimentError: invalid settings or an unknown plug-in.
+            ExperimentError: invalid settings, or a plug-in that is unknown or breaks
+                its contract.
             InvalidRobot: an insertion that breaks the rules of its body space.
             StateDiffers: the rebuilt state differs from the original one.
         """
         start = time.perf_counter()
-        job = decode_advance_request(request)
-        settings = read_arena_settings(job.settings)
+        job = decode_advance_request(request, checked_arena)
+        settings = checked_arena(job.settings)
         _check_robots(job.changes, settings)
         # Not kept while it changes, so that an error below leaves no broken shard.
         held, changes = self._taken(job), job.changes
@@ -193,8 +196,9 @@ def _closed_on_error(world: World) -> Iterator[World]:
 
 def _check_robots(changes: Changes, settings: ArenaSettings) -> None:
     space = body_space(settings.space)
+    kinds = neuron_kinds(settings.brain, settings.space)
     for insertion in changes.insertions:
-        check_robot(insertion.robot, space)
+        check_robot(insertion.robot, space, kinds)
 
 
 def _repeat(world: World, history: Sequence[PastAdvance]) -> None:

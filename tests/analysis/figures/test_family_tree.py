@@ -66,6 +66,15 @@ def test_founders_are_robots_without_parents_whose_parts_survive(
     assert found.founder_of == {10: 0, 20: 1, 21: 1, 30: 2}
 
 
+def test_parts_without_identity_have_no_founder() -> None:
+    zero, one = (0, 0), (0, 1)
+    bodies = [body(0, 0), body(0, 7), body(0, 7)]
+    born = births((zero, []), (one, []), ((0, 2), [zero, one]), body=bodies)
+    found = family(born, 2)
+    assert found.founders == (1,)
+    assert found.founder_of == {7: 1}
+
+
 def test_lineage_is_all_ancestors_parents_first(members: pa.Table) -> None:
     found = lineage(members, "x", 4)
     assert found["order"].to_pylist() == [0, 1, 3, 4]

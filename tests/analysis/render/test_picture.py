@@ -6,6 +6,7 @@ from typing import NoReturn
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from PIL import Image
 
 from analysis.render.command import main
@@ -17,6 +18,7 @@ from analysis.render.picture import (
     save_animation,
     save_picture,
 )
+from schema.experiment.environment import Environment
 from schema.formats.files import settings_of, write_robot
 from schema.parts import BUILT_IN
 from schema.robot.brain import INPUT, Brain, Neuron
@@ -65,6 +67,37 @@ def test_parts_are_rendered_at_their_places_in_their_colours(
     seen = np.vstack([red, blue])
     assert seen.min(axis=0).min() > 2
     assert (seen.max(axis=0) < (117, 157)).all()
+
+
+def test_objects_and_the_light_are_rendered_and_do_not_move_the_camera(
+    renderer: RobotRenderer,
+) -> None:
+    """A green box that moves freely far away, and the light close by."""
+    box = '<geom type="box" size=".1 .1 .1" rgba="0 1 0 1"/>'
+    body = f'<body pos="5 0 0.1"><freejoint/>{box}</body>'
+    environment = Environment(
+        light=(-0.15, 0.0, 0.05),
+        scenery=f"<mujoco><worldbody>{body}</worldbody></mujoco>",
+    )
+    settings = replace(settings_of(None), environment=environment)
+    with RobotRenderer(ROBOT, settings, size=(160, 120)) as wild:
+        pose = np.array([0, 0, 0.0225, 1, 0, 0, 0, 5, 0, 0.1, 1, 0, 0, 0], float)
+        assert pose.shape == (wild.model.nq,)
+        far = wild.picture(pose)
+        pose[7:9] = 0.15, 0.15
+        near = wild.picture(pose)
+    plain = renderer.picture(pose[:7])
+    assert len(mostly(far, 1)) == 0
+    assert len(mostly(near, 1)) > 40
+    red, moved = mostly(plain, 0), mostly(far, 0)
+    assert moved.mean(axis=0) == pytest.approx(red.mean(axis=0), abs=3.0)
+    # Yellow: red and green, no blue.
+    yellow = [
+        ((image[..., :2] > 120).all(axis=2) & (image[..., 2] < 90)).sum()
+        for image in (plain, far)
+    ]
+    assert yellow[0] == 0
+    assert yellow[1] > 20
 
 
 def test_a_pose_moves_the_robot_before_a_fixed_camera(

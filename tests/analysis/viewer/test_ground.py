@@ -76,6 +76,22 @@ def test_scenery_has_its_place_and_colour() -> None:
     assert 0.5 * (high - low) == pytest.approx([wide, deep, 0.1], abs=1e-6)
 
 
+def test_the_light_is_a_ball_at_its_place() -> None:
+    (ball,) = surfaces(FLAT, WORLD, (1.0, 2.0, 3.0))
+    low, high = ball.corners.min(axis=(0, 1)), ball.corners.max(axis=(0, 1))
+    assert 0.5 * (low + high) == pytest.approx([1.0, 2.0, 3.0], abs=1e-3)
+    assert 0.5 * (high - low) == pytest.approx([0.03] * 3, abs=1e-3)
+    place = (1.0, 0.0, 0.5)
+    lit = Environment(light=place)
+    scenes = [
+        scene_of(Experiment(name="alone", environment=lit)),
+        scene_of(Experiment(name="arena", arena=Arena(light=place))),
+        scene_of(Experiment(name="dark")),
+    ]
+    counts = [len(each.surfaces[0]) for each in scenes]
+    assert counts == [1, 1, 0]
+
+
 def test_rough_ground_is_drawn_node_by_node() -> None:
     environment = Environment(roughness_m=0.1, patch_m=0.5, extent_m=1.0)
     (drawn,) = surfaces(environment, WORLD)

@@ -18,8 +18,9 @@ from coordinator.islands.events import (
 )
 from schema.errors import InvalidRobot, UnexpectedEvent
 from schema.robot.brain import Brain
-from schema.robot.genome import Genome, Node
+from schema.robot.genome import Node
 from schema.robot.ids import BirthId
+from schema.wire.codec import encode_genome
 from tests.coordinator.arena_world import (
     DT,
     ArenaRun,
@@ -41,8 +42,8 @@ def order(lived: ArenaRun, wanted: Order, name: str = "") -> list[ArenaCommand]:
     return lived.tell(Commanded(0, identity, lived.arena.next_step, wanted))
 
 
-def genome(lived: ArenaRun) -> Genome:
-    return lived.arena.population[0].genome
+def genome(lived: ArenaRun) -> bytes:
+    return lived.arena.encoding.to_bytes(lived.arena.population[0].genome)
 
 
 def test_an_order_takes_effect_at_the_next_decision() -> None:
@@ -114,7 +115,7 @@ def numbers_of(lived: ArenaRun) -> list[int]:
 
 def test_inserted_robots_await_the_founders() -> None:
     lived = life().live(3)
-    order(lived, Insert(lived.arena.population[0].genome))
+    order(lived, Insert(genome(lived)))
     lived.live(16)
     times = [row["sim_time_s"] for row in lived.rows("births")]
     assert times == [float(second) for second in range(15)] + [14.0]
@@ -187,9 +188,10 @@ def test_an_order_for_another_step_or_island_raises(island: int, off: int) -> No
 @pytest.mark.parametrize(
     "wanted",
     [
-        Insert(Node("Wheel", -1, 0, ())),
-        Insert(Node("FixedBrick", -1, 0, ())),
-        Insert(Node("Core", -1, 0, ()), (float("nan"), 0.0)),
+        Insert(encode_genome(Node("Wheel", -1, 0, ()))),
+        Insert(encode_genome(Node("FixedBrick", -1, 0, ()))),
+        Insert(encode_genome(Node("Core", -1, 0, ())), (float("nan"), 0.0)),
+        Insert(b"\xff no genome"),
     ],
 )
 def test_an_invalid_robot_is_rejected(wanted: Insert) -> None:

@@ -28,7 +28,6 @@ from coordinator.islands.events import (
 )
 from coordinator.storage.journal import NAME, Journal
 from revolve.command import main as revolve
-from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.wire.arena import Advance, Casualty, Judgement, Touch
@@ -63,7 +62,7 @@ EVENTS: list[JournalledEvent] = [
     Evaluated(BirthId(0, 0), GOOD, WORKER),
     FAILED,
     Advanced(0, 17, ADVANCE, 120, WORKER),
-    Commanded(0, "x", 6200, Insert(Node("Core", -1, 0, ()), (0.5, -1.0))),
+    Commanded(0, "x", 6200, Insert(b"", (0.5, -1.0))),
     Commanded(0, "y", 6400, Remove(BirthId(0, 3))),
     Audited(FAILED, Evaluated(BirthId(0, 1), GOOD, OTHER, 2, 1)),
 ]

@@ -15,6 +15,7 @@ from coordinator.evolution.brain_mutation import (
     delete_hidden_neurons,
     vary_neurons,
 )
+from coordinator.evolution.brains import brain_rules
 from coordinator.evolution.generation import generate
 from coordinator.evolution.mutable_genome import preorder, to_genome, to_mutable
 from coordinator.evolution.random_streams import BufferedRng
@@ -152,7 +153,7 @@ def test_neuron_parameters_move_by_their_share_and_types_stay() -> None:
     moved = []
     for seed in range(N):
         root = to_mutable(CORE, TYPES)
-        vary_neurons(draws(seed), preorder(root), 0.1)
+        vary_neurons(draws(seed), preorder(root), 0.1, NEURON_TYPES)
         hinge = preorder(root)[1]
         moved.append(hinge.outputs[0].parameters)
         assert hinge.connections == HINGE.connections, "weights never mutate"
@@ -177,12 +178,12 @@ def test_neuron_parameters_move_by_their_share_and_types_stay() -> None:
 def test_how_many_hidden_neurons_are_added(
     option: str, before: int, expected: float
 ) -> None:
-    setting = experiment(hidden_rounding=option)
+    rules = brain_rules(experiment(hidden_rounding=option))
     found = []
     kinds: Counter[str] = Counter()
     for seed in range(N):
         root = to_mutable(CORE, TYPES)
-        add_hidden_neurons(draws(seed), preorder(root), before, setting)
+        add_hidden_neurons(draws(seed), preorder(root), before, rules, NEURON_TYPES)
         core, hinge = preorder(root)
         found.append(len(core.hidden) + len(hinge.hidden) - 3)
         kinds.update(one.kind for one in (*core.hidden, *hinge.hidden[3:]))
@@ -199,8 +200,9 @@ def test_hidden_neurons_are_added_up_to_the_limit() -> None:
         space=Space(max_hidden=5),
         variation=Variation(p_delete_hidden_neuron=1.0),
     )
+    rules = brain_rules(setting)
     root = to_mutable(CORE, TYPES)
-    add_hidden_neurons(draws(), preorder(root), 9, setting)
+    add_hidden_neurons(draws(), preorder(root), 9, rules, NEURON_TYPES)
     assert sum(len(branch.hidden) for branch in preorder(root)) == 5
 
 
@@ -209,7 +211,7 @@ def test_hidden_neurons_are_added_up_to_the_limit() -> None:
 )
 def test_how_many_connections_are_added(before: int, count: int) -> None:
     root = to_mutable(CORE, TYPES)
-    add_connections(draws(), preorder(root), before, experiment())
+    add_connections(draws(), preorder(root), before, brain_rules(experiment()))
     assert sum(len(branch.connections) for branch in preorder(root)) == 10 + count
 
 
@@ -236,7 +238,7 @@ def test_added_connections_join_any_neuron_with_any_output_or_hidden() -> None:
     found: Counter[tuple[int, int]] = Counter()
     for seed in range(N):
         root = to_mutable(bare, TYPES)
-        add_connections(draws(seed), preorder(root), 10, experiment())
+        add_connections(draws(seed), preorder(root), 10, brain_rules(experiment()))
         (made,) = develop(to_genome(preorder(root)), TYPES).brain.connections
         found[made.source, made.target] += 1
         assert 0.0 <= made.weight < 1.0
@@ -248,5 +250,5 @@ def test_added_connections_join_any_neuron_with_any_output_or_hidden() -> None:
 def test_no_connection_is_added_without_a_target() -> None:
     lone = Node("Core", -1, 0, GREY, children=((0, Node("Hinge", 0, 0, GREY)),))
     root = to_mutable(lone, TYPES)
-    add_connections(draws(), preorder(root), 40, experiment())
+    add_connections(draws(), preorder(root), 40, brain_rules(experiment()))
     assert to_genome(preorder(root)) == lone

@@ -1,5 +1,6 @@
 """Candidates of a birth, attempt by attempt, and survivors."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +10,7 @@ from coordinator.evolution.breeding import Breeder
 from coordinator.evolution.selection import Individual
 from schema.errors import ExperimentError
 from schema.experiment.document import Culling, Experiment, Selection, Space
-from schema.robot.genome import Genome, NeuronGene, Node
+from schema.robot.genome import NeuronGene, Node
 from schema.robot.ids import BirthId
 
 GREY = (0.5, 0.5, 0.5)
@@ -23,7 +24,7 @@ def breeder(space: Space | None = None, **selection: Any) -> Breeder:  # noqa: A
     return Breeder(experiment, 1, 0)
 
 
-def individuals(genomes: list[Genome]) -> list[Individual]:
+def individuals(genomes: Sequence[object]) -> list[Individual]:
     return [
         Individual(BirthId(0, number), genome, number / 10, rank=1, generation=0)
         for number, genome in enumerate(genomes)

@@ -29,8 +29,6 @@ from coordinator.storage.recorder import Recorder
 from coordinator.storage.snapshots import Snapshots
 from schema.errors import JobRefused, RunFolderError
 from schema.experiment.file import experiment_text
-from schema.parts import BUILT_IN
-from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
 from schema.tables.files import read_table
@@ -268,7 +266,8 @@ def ordered(path: Path, point: Point) -> list[str]:
                 # By what the arena has come to, so that all runs order alike.
                 living = [each.birth for each in one.arena.population]
                 if one.arena.step == 12000 and not one.arena.is_paused:
-                    guest = develop(one.arena.population[1].genome, BUILT_IN)
+                    genome = one.arena.population[1].genome
+                    guest = one.arena.encoding.develop(genome)
                     said.append(one.ask(RemoveRobot(living[0]), "remove"))
                     said.append(
                         one.ask(InsertRobot(encode_robot(guest), (0.5, 1.5)), "insert")

@@ -37,6 +37,7 @@ from schema.robot.genome import Node
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Provenance, Report
 from schema.wire.arena import Advance, Casualty, Judgement, Touch
+from schema.wire.codec import encode_genome
 
 FullBeyond = Callable[[int], AbstractContextManager[None]]
 REFUSED = Report(
@@ -48,7 +49,7 @@ REFUSED = Report(
     mass=0.1234,
     motors=2,
 )
-CORE = Node("Core", -1, 0, ())
+CORE = encode_genome(Node("Core", -1, 0, ()))
 JUDGED = Judgement(
     BirthId(0, 3), 15.0, 0.1, 1 / 3, 0.1, is_mature=True, place=(0.1, -0.2, 0.02)
 )

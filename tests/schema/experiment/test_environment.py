@@ -3,8 +3,10 @@
 import math
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
+from msgspec import structs
 
 from schema.errors import ExperimentError
 from schema.experiment.document import island_experiment
@@ -16,6 +18,7 @@ from schema.experiment.file import (
     read_experiment,
 )
 from schema.experiment.identity import Origin
+from schema.experiment.section import stable_json
 from schema.experiment.settings import (
     arena_settings,
     evaluation_settings,
@@ -40,6 +43,68 @@ def test_ground_is_flat_by_default() -> None:
     assert FLAT.is_even
     # Not -0.0: it would change the sign of zeros in what robots feel.
     assert repr(FLAT.gravity_vector(9.81)) == "(0.0, 0.0, -9.81)"
+
+
+def test_light_is_a_place_of_the_world_off_line_and_in_arenas() -> None:
+    text = "[environment]\nlight = [1.0, 0.0, 0.5]\n"
+    alone = parse_experiment(HEAD + text, "mine.toml")
+    assert alone.environment.light == (1.0, 0.0, 0.5)
+    both = text + "[arena]\nlight = [1.0, 0.0, 0.5]\n"
+    found = read_arena_settings(
+        arena_settings(parse_experiment(HEAD + both, "mine.toml"), Origin())
+    )
+    assert found.light == (1.0, 0.0, 0.5)
+    here = parse_experiment(HEAD + text + "[arena]\n", "mine.toml")
+    assert read_arena_settings(arena_settings(here, Origin())).light == (1.0, 0.0, 0.5)
+    other = text + "[arena]\nlight = [2.0, 0.0, 0.5]\n"
+    assert refused(other) == (
+        "mine.toml: arena.light: differs from environment.light = [1.0, 0.0, 0.5], "
+        "got [2.0, 0.0, 0.5]; remove one of the two"
+    )
+
+
+def test_the_task_light_needs_a_light() -> None:
+    text = '[fitness]\nfunction = "light"\n'
+    assert refused(text) == (
+        "mine.toml: fitness.function: 'light' needs environment.light = [x, y, z], got "
+        "none"
+    )
+    for table in ("environment", "arena"):
+        lit = f"{text}[{table}]\nlight = [1.0, 0.0, 0.5]\n"
+        assert parse_experiment(HEAD + lit, "it").fitness.function == "light"
+
+
+def test_pushes_are_off_line_and_begin_at_ticks() -> None:
+    text = "[environment]\npush_impulse = 0.1\n"
+    assert parse_experiment(HEAD + text, "it").environment.push_interval_s == 3.0
+    assert refused(text + "push_interval_s = 0.3\n") == (
+        "mine.toml: environment.push_interval_s: must be a whole multiple of 0.125 s, "
+        "the time between brain ticks, got 0.3"
+    )
+    assert "must be a whole multiple" in refused(text + "push_interval_s = 0.01\n")
+    message = (
+        "environment.push_impulse: pushes are for off-line evaluations, not for "
+        "arenas; remove it"
+    )
+    assert refused(text + "[arena]\n") == f"mine.toml: {message}"
+    arena = parse_experiment(HEAD + "[arena]\n", "mine.toml")
+    pushed = structs.replace(arena, environment=Environment(push_impulse=0.1))
+    with pytest.raises(ExperimentError, match=message):
+        read_arena_settings(arena_settings(pushed, Origin()))
+
+
+def test_later_keys_count_in_stable_json_only_if_they_are_set() -> None:
+    plain = msgspec.json.decode(stable_json(FLAT))
+    assert plain == {
+        "slope_deg": 0.0,
+        "roughness_m": 0.0,
+        "patch_m": 0.1,
+        "extent_m": 5.0,
+        "ground_seed": 1,
+        "scenery": "",
+    }
+    lit = Environment(light=(1.0, 0.0, 0.5))
+    assert msgspec.json.decode(stable_json(lit)) == plain | {"light": [1.0, 0.0, 0.5]}
 
 
 def test_gravity_pulls_downhill() -> None:

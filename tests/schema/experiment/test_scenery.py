@@ -7,6 +7,7 @@ from schema.errors import ExperimentError
 from schema.experiment.document import Simulation
 from schema.experiment.environment import Environment
 from schema.experiment.file import parse_experiment
+from schema.experiment.scenery import object_count
 from schema.mjcf.model import solo_spec
 from schema.parts import BUILT_IN
 from schema.robot.robot import Part, Robot
@@ -69,6 +70,64 @@ def test_rotated_geoms_keep_their_rotation() -> None:
 
 
 BOX = '<geom type="box" size="1 1 1"/>'
+OBJECTS = scene(
+    '<geom type="box" size="1 0.1 0.1" pos="3 0 0.1"/>'
+    '<body pos="1 2 0.5" euler="0 0 90"><freejoint/>'
+    '<geom type="box" size="0.1 0.2 0.3" density="500"/></body>'
+    '<body pos="-1 0 0.1"><freejoint align="true"/>'
+    '<geom type="sphere" size="0.1" mass="0.2"/>'
+    '<frame pos="1 0 0"><geom type="sphere" size="0.1" mass="0.6"/></frame></body>'
+)
+"""A beam that stays, a box of 24 kg, and a dumbbell."""
+
+
+def test_a_body_with_a_free_joint_becomes_an_object_after_the_robot() -> None:
+    simulation = Simulation(friction=0.7)
+    empty = solo_spec(CORE, BUILT_IN, simulation, Environment()).compile()
+    environment = Environment(scenery=OBJECTS)
+    model = solo_spec(CORE, BUILT_IN, simulation, environment).compile()
+    assert object_count(environment, simulation) == 2
+    assert (model.nbody, model.nq) == (empty.nbody + 2, empty.nq + 14)
+    assert model.jnt_qposadr.tolist() == [0, 7, 14]
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    box, dumbbell = model.body("scenery/1"), data.body("scenery/2")
+    assert box.mass.item() == pytest.approx(8 * 0.1 * 0.2 * 0.3 * 500.0)
+    # m (b^2 + c^2) / 3 about the first axis.
+    assert sorted(box.inertia) == pytest.approx(
+        [24.0 * each / 3.0 for each in (0.01 + 0.04, 0.01 + 0.09, 0.04 + 0.09)]
+    )
+    assert data.qpos[7:14] == pytest.approx([1.0, 2.0, 0.5, 0.5**0.5, 0, 0, 0.5**0.5])
+    # The centre of mass is three quarters of the way to the heavier ball.
+    assert dumbbell.xipos.tolist() == pytest.approx([-0.25, 0.0, 0.1])
+    balls = [data.geom(f"scenery/{index}").xpos.tolist() for index in (2, 3)]
+    assert balls[0] == pytest.approx([-1.0, 0.0, 0.1])
+    assert balls[1] == pytest.approx([0.0, 0.0, 0.1])
+    assert model.geom("scenery/1").friction.tolist() == [0.7, 0.0, 0.0]
+    # Joints of robots have damping, objects none.
+    assert not model.dof_damping[6:].any()
+    mujoco.mj_step(model, data, 400)
+    # The box has fallen onto its base, the rest stays.
+    assert data.body("scenery/1").xpos[2] == pytest.approx(0.3, abs=2e-3)
+    assert data.geom("scenery/0").xpos.tolist() == [3.0, 0.0, 0.1]
+
+
+def test_objects_are_refused_in_arenas() -> None:
+    document = f"name = 'mine'\n[environment]\nscenery = '''{OBJECTS}'''\n"
+    assert parse_experiment(document, "mine.toml").arena is None
+    with pytest.raises(ExperimentError) as raised:
+        parse_experiment(document + "[arena]\n", "mine.toml")
+    assert str(raised.value) == (
+        "mine.toml: environment.scenery: arenas have no objects that move, got 2 "
+        "<freejoint>; remove them"
+    )
+
+
+def test_a_robot_starts_on_an_object_that_lies_where_it_is_born() -> None:
+    slab = '<body pos="0 0 .05"><freejoint/><geom type="box" size=".3 .3 .05"/></body>'
+    environment = Environment(scenery=scene(BOX.replace("/>", ' pos="3 0 0"/>') + slab))
+    model = solo_spec(CORE, BUILT_IN, Simulation(), environment).compile()
+    assert model.qpos0[2] == pytest.approx(0.1 + 0.0225, abs=3e-5)
 
 
 @pytest.mark.parametrize(
@@ -77,7 +136,17 @@ BOX = '<geom type="box" size="1 1 1"/>'
         ("<mujoco><worldbody>", "not valid XML: "),
         ("<sdf/>", "must be <mujoco>, got <sdf>"),
         (scene(""), "must have a <geom>, got none"),
-        (scene(f"<body><freejoint/>{BOX}</body>"), "<freejoint> is not allowed"),
+        (scene(f"<freejoint/>{BOX}"), "not valid MJCF: "),
+        (scene(f"<body><body><freejoint/>{BOX}</body></body>"), "not valid MJCF: "),
+        (scene("<body><freejoint/></body>" + BOX), "not valid MJCF: "),
+        (
+            scene(f"<body><freejoint/>{BOX}<body name='a'>{BOX}</body></body>"),
+            "<body name='a'> must not be inside a body with <freejoint>: use <frame>",
+        ),
+        (
+            scene(f"<replicate count='101'><body><freejoint/>{BOX}</body></replicate>"),
+            "must have <= 100 <freejoint>, got 101",
+        ),
         (scene(f"<body><joint type='hinge'/>{BOX}</body>"), "<joint> is not allowed"),
         (scene(BOX, "<actuator><motor/></actuator>"), "<actuator> is not allowed"),
         (scene(BOX, "<option gravity='0 0 0'/>"), "<option> is not allowed"),

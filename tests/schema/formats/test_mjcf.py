@@ -66,6 +66,18 @@ def test_mjcf_holds_the_environment() -> None:
     assert model.geom("scenery/0").pos.tolist() == [0.5, 0.0, 0.1]
 
 
+def test_mjcf_holds_objects_that_move() -> None:
+    box = '<geom type="box" size="0.1 0.1 0.1" pos="0.02 0 0"/>'
+    body = f'<body pos="0.5 0 0.1"><freejoint/>{box}</body>'
+    scenery = f"<mujoco><worldbody>{body}</worldbody></mujoco>"
+    light = (1.0, 2.0, 3.0)
+    wild = replace(SETTINGS, environment=Environment(scenery=scenery, light=light))
+    text = robot_to_mjcf(ARM, wild)
+    assert robot_from_mjcf(text, "it") == (ARM, wild)
+    model = mujoco.MjModel.from_xml_string(text)
+    assert model.body("scenery/1").mass.item() == pytest.approx(8.0)
+
+
 def test_edited_body_is_refused() -> None:
     text = robot_to_mjcf(ARM, SETTINGS)
     heavier = text.replace('mass="0.0102"', 'mass="0.0104"')

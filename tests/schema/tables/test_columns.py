@@ -20,7 +20,7 @@ from schema.tables.columns import (
     repeatable,
     sizes,
 )
-from schema.wire.codec import decode_genome, encode_genome
+from schema.wire.codec import decode_genome, encode_genome, encode_robot
 
 NodeMaker = Callable[..., Node]
 HIDDEN = NeuronGene("Simple", (0.0, 0.5))
@@ -42,6 +42,7 @@ def birth(genome: Genome, record: int) -> dict[str, object]:
         "sim_time_s": None if record else 15.0,
         "x": None if record else -1.5,
         "y": None if record else 0.0,
+        "robot": encode_robot(robot) if record else None,
     }
 
 
@@ -62,7 +63,7 @@ def test_every_column_has_unit_and_repeatable_metadata(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "others"),
     [
-        ("births", set()),
+        ("births", {"robot"}),
         ("evaluations", {"wall_s", "worker", "platform"}),
         ("population", set()),
         ("fitness", set()),
@@ -102,6 +103,15 @@ def test_sizes_of_a_small_robot(node: NodeMaker) -> None:
         "hidden": 3,
         "connections": 2,
     }
+
+
+def test_connections_of_other_genomes_are_those_of_the_robot(node: NodeMaker) -> None:
+    loop = ConnectionGene(("output", 0), (), ("output", 0), 1.0)
+    robot = develop(
+        node("Core", children=((0, node("ActiveHinge", connections=(loop,))),)),
+        BUILT_IN,
+    )
+    assert sizes(robot, "a genome of another type", BUILT_IN)["connections"] == 1
 
 
 @pytest.mark.parametrize("length", [0, 1, 3])

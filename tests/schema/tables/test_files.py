@@ -29,6 +29,7 @@ ROW = {
     "wall_s": 0.1,
     "worker": "w",
     "platform": "p",
+    "measures": [("height", 0.1), ("turning", 2.0)],
 }
 
 

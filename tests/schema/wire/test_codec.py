@@ -10,14 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
-from schema.errors import MalformedMessage
+from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.limits import LONGEST_REASON, printable
 from schema.parts import BUILT_IN
 from schema.robot.genome import Genome, Node, develop
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Report
-from schema.robot.robot import Robot
+from schema.robot.robot import Robot, check_robot
 from schema.wire import revolve_pb2 as pb
 from schema.wire.codec import (
     Answer,
@@ -54,7 +54,8 @@ IDENTITIES = st.just(NO_IDENTITY) | st.builds(
 )
 NUMBER = st.floats(allow_nan=False, allow_infinity=False)
 VECTOR = st.tuples(NUMBER, NUMBER, NUMBER)
-EVALUATIONS = st.builds(Evaluation, NUMBER, NUMBER, NUMBER, NUMBER)
+MEASURES = st.lists(NUMBER, max_size=4).map(tuple)
+EVALUATIONS = st.builds(Evaluation, NUMBER, NUMBER, NUMBER, NUMBER, MEASURES)
 PAIRS = st.lists(st.tuples(U32, U32), max_size=4).map(tuple)
 REASON = st.text(max_size=2000).map(lambda text: printable(text, LONGEST_REASON))
 REPORTS = st.builds(
@@ -218,6 +219,7 @@ def test_failure_with_empty_reason_round_trip() -> None:
         Evaluation(0.0, math.inf, 0.0, 12.0),
         Evaluation(0.0, 0.0, -math.inf, 12.0),
         Evaluation(0.0, 0.0, 0.0, math.nan),
+        Evaluation(0.0, 0.0, 0.0, 12.0, (1.0, math.nan)),
         replace(REPORT, mass=math.inf),
         replace(REPORT, lower=(0.0, math.nan, 0.0)),
         replace(REPORT, reason="it is viable all the same"),
@@ -253,18 +255,23 @@ def test_an_unknown_layer_is_malformed(node: NodeMaker) -> None:
         decode_robot(message.SerializeToString())
 
 
-@pytest.mark.parametrize("parameters", [(0.0,), (0.0, math.nan)])
-def test_a_neuron_gene_has_its_parameters(
-    node: NodeMaker, parameters: tuple[float, ...]
-) -> None:
+def test_parameters_of_a_neuron_gene_are_finite(node: NodeMaker) -> None:
     message = pb.Genome()
     message.ParseFromString(encode_genome(node("Core")))
-    message.nodes[0].hidden.add(kind="Simple", parameters=parameters)
-    with pytest.raises(MalformedMessage, match="Simple takes 2 finite numbers"):
+    message.nodes[0].hidden.add(kind="Simple", parameters=(0.0, math.nan))
+    with pytest.raises(MalformedMessage, match=r"neuron\.parameters: must be finite"):
         decode_genome(message.SerializeToString())
-    message.nodes[0].hidden[0].kind = "Cosine"
-    with pytest.raises(MalformedMessage, match="got 'Cosine'"):
-        decode_genome(message.SerializeToString())
+
+
+def test_neuron_types_are_checked_after_decoding(node: NodeMaker) -> None:
+    """They may be those of a plug-in."""
+    message = pb.Genome()
+    message.ParseFromString(encode_genome(node("Core")))
+    message.nodes[0].hidden.add(kind="Cosine", parameters=(0.0,))
+    robot = develop(decode_genome(message.SerializeToString()), BUILT_IN)
+    assert decode_robot(encode_robot(robot)) == robot
+    with pytest.raises(InvalidRobot, match=r"must be one of Simple, .* got 'Cosine'"):
+        check_robot(robot, BUILT_IN)
 
 
 def test_unknown_fields_are_ignored(node: NodeMaker) -> None:

@@ -34,7 +34,8 @@ def _brick(height: float, mass: float) -> Callable[[tuple[float, ...]], Shape]:
 
 
 HEAVY = changed(parts.FIXED_BRICK, name="Heavy", shape=_brick(0.0355, 1e40))
-NOTHING = changed(parts.FIXED_BRICK, name="Nothing", shape=_brick(0.0, 0.01))
+NOTHING = changed(parts.FIXED_BRICK, name="Nothing", shape=_brick(5e-324, 0.01))
+"""Half of its height is rounded to 0, which MuJoCo refuses."""
 SPACE = replace(
     SETTINGS.space,
     part_types=(

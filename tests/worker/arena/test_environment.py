@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from schema.errors import ExperimentError
 from schema.experiment.document import Fitness, Simulation, Space
 from schema.experiment.environment import Environment
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
@@ -219,3 +220,29 @@ def test_scenery_hides_the_light() -> None:
         world.advance(SECOND)
         found.append(float(world.population.find(A).view.sensors.readings[0, 6]))
     assert found == [pytest.approx((1.0 / 1.95) ** 2, abs=0.02), 0.0]
+
+
+def rolled(x: float) -> float:
+    """Return how far a ball rolls that lies at x, while a core stands at 0 [m]."""
+    ball = '<geom type="sphere" size="0.03" mass="0.01"/>'
+    scenery = scene(f'<body pos="{x} 0 0.03"><freejoint/>{ball}</body>')
+    places: list[float] = []
+    simulate(
+        BOX,
+        alone(Simulation(window_steps=2 * SECOND), Environment(scenery=scenery)),
+        watch=lambda data: places.append(float(data.qpos[7])),
+    )
+    return places[-1] - x
+
+
+def test_a_robot_moves_the_objects_that_it_touches() -> None:
+    """A core falls off a ball below its edge; another ball is out of reach."""
+    assert abs(rolled(0.04)) > 0.01
+    assert rolled(0.3) == pytest.approx(0.0, abs=1e-4)
+
+
+def test_objects_are_refused_by_arenas_in_one_line() -> None:
+    body = '<body pos="1 0 1"><freejoint/><geom type="sphere" size="0.1"/></body>'
+    with pytest.raises(ExperimentError, match="arenas have no objects") as raised:
+        World(arena(Environment(scenery=scene(body))))
+    assert "\n" not in str(raised.value)

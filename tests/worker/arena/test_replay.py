@@ -2,15 +2,23 @@
 
 from collections.abc import Callable, Sequence
 
+from msgspec.structs import replace
+
+from schema.experiment.document import Fitness, Simulation, Space
+from schema.experiment.environment import FLAT, Environment
 from schema.experiment.file import read_experiment
-from schema.experiment.identity import Origin
-from schema.experiment.settings import arena_settings, read_arena_settings
+from schema.experiment.identity import NO_IDENTITY, Origin
+from schema.experiment.settings import (
+    EvaluationSettings,
+    arena_settings,
+    read_arena_settings,
+)
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.wire.arena import BrainChange, Changes
 from schema.wire.arena_codec import PastAdvance, Rebuild
 from tests.worker.arena_cases import crowd
-from worker.arena.replay import Scene, together
+from worker.arena.replay import Scene, alone, together
 from worker.arena.world import World
 
 Robots = Callable[[int], Robot]
@@ -59,3 +67,20 @@ def test_replay_of_a_drift_is_an_approximation_and_says_so(
     found = scenes(history, A)
     assert [scene.is_equal for scene in found] == [True, False, False]
     assert [scene.motion.num_rows for scene in found] == [TICKS] * 3
+
+
+def test_poses_of_an_evaluation_leave_out_the_objects(turtle: Robot) -> None:
+    box = '<geom type="box" size=".1 .1 .1"/>'
+    body = f'<body pos="2 0 0.1"><freejoint/>{box}</body>'
+    settings = EvaluationSettings(
+        space=Space(),
+        simulation=Simulation(window_steps=80),
+        fitness=Fitness(),
+        environment=Environment(
+            scenery=f"<mujoco><worldbody>{body}</worldbody></mujoco>"
+        ),
+    )
+    _, plain = alone(turtle, replace(settings, environment=FLAT), NO_IDENTITY)
+    _, poses = alone(turtle, settings, NO_IDENTITY)
+    lengths = [len(angles) for angles in poses["angles"].to_pylist()]
+    assert lengths == [len(angles) for angles in plain["angles"].to_pylist()] == [2] * 4

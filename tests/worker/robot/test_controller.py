@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 
 from schema.errors import InvalidRobot
+from schema.experiment.brains import widths
 from schema.experiment.document import Space
-from schema.robot.brain import INPUT, Brain, Connection, Neuron
+from schema.robot.brain import INPUT, Brain, Connection, Neuron, Widths, check_widths
 from schema.robot.robot import Robot
-from worker.robot.controller import STATE_LIMIT, Bank, Network, Widths, pack, widths
+from worker.robot.controller import Bank, Network, pack
+from worker.robot.own_neurons import STATE_LIMIT
 
 WIDTH = widths(Space())
 TICK_S = 0.125
@@ -99,7 +101,7 @@ def test_tiny_period_gives_finite_outputs(period: float) -> None:
 def test_more_neurons_than_the_limit_are_rejected() -> None:
     brain = Brain(tuple(Neuron("hidden", "Simple", 0, (0.0, 1.0)) for _ in range(11)))
     with pytest.raises(InvalidRobot, match="hidden neurons must be <= 10, got 11"):
-        pack(brain, WIDTH)
+        check_widths(brain, WIDTH)
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from schema.errors import MalformedMessage
+from schema.experiment.brains import widths
 from schema.experiment.document import Fitness, Simulation, Space
 from schema.experiment.identity import NO_IDENTITY, Identity, Origin
 from schema.experiment.settings import ArenaSettings, EvaluationSettings
@@ -26,7 +27,6 @@ from tests.worker.arena_cases import (
 )
 from worker.arena.replay import alone
 from worker.arena.world import World
-from worker.robot.controller import widths
 from worker.robot.evaluation import evaluate, simulate
 from worker.robot.motors import HIGHEST_OUTPUT, LOWEST_OUTPUT
 from worker.robot.noise import BLOCK_TICKS, Noise, NoiseSource

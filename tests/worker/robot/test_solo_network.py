@@ -5,10 +5,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from schema.experiment.brains import widths
 from schema.experiment.document import Space
 from schema.robot.brain import Brain, Connection, Neuron
 from schema.robot.robot import Robot
-from worker.robot.controller import STATE_LIMIT, Bank, SoloNetwork, pack, widths
+from worker.robot.controller import Bank, SoloNetwork, pack
+from worker.robot.own_neurons import STATE_LIMIT
 
 WIDTH = widths(Space())
 TICK_S = 0.125

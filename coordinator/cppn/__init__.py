@@ -1,0 +1,1 @@
+"""Encoding ``cppn``: networks that describe body and brain by patterns in space."""

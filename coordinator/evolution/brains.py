@@ -1,0 +1,45 @@
+"""Brain types in the coordinator: the half of each type that makes genes."""
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import Any
+
+from coordinator.evolution.cpg import CpgGenes
+from coordinator.evolution.network import NetworkGenes
+from schema.experiment.brains import brain_half
+from schema.experiment.document import BrainSection, Experiment
+from schema.plugins.protocols import BrainGenes, BrainRules, NeuronType
+
+BUILT_IN: Mapping[str, Callable[[Any, tuple[NeuronType, ...]], BrainGenes]] = {
+    "network": NetworkGenes,
+    "cpg": CpgGenes,
+}
+
+
+def brain_genes(experiment: Experiment) -> BrainGenes:
+    """Return the brain type of an experiment.
+
+    Raises:
+        UnknownPlugin: no such brain type or neuron type.
+        ExperimentError: one that breaks its contract, or wrong parameters.
+    """
+    return _brain_genes(experiment.brain, experiment.space.neuron_types)
+
+
+@lru_cache(maxsize=64)
+def _brain_genes(brain: BrainSection, names: tuple[str, ...]) -> BrainGenes:
+    return brain_half(brain, names, BUILT_IN)
+
+
+def brain_rules(experiment: Experiment) -> BrainRules:
+    """Return the settings of an experiment that brains keep."""
+    variation = experiment.variation
+    return BrainRules(
+        max_hidden=experiment.space.max_hidden,
+        p_connect_neurons=experiment.generation.p_connect_neurons,
+        hidden_on=experiment.generation.hidden_on,
+        p_delete_hidden_neuron=variation.p_delete_hidden_neuron,
+        p_remove_brain_connection=variation.p_remove_brain_connection,
+        epsilon=variation.brain_epsilon,
+        hidden_rounding=variation.hidden_rounding,
+    )

@@ -1,0 +1,72 @@
+"""Check of the half of a brain type that makes genes, before the first birth."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from coordinator.evolution.brains import brain_genes
+from coordinator.evolution.generation import generate
+from coordinator.evolution.variation import mate
+from schema.errors import ExperimentError, InvalidRobot, RevolveError, one_line
+from schema.experiment.brains import widths
+from schema.experiment.document import Experiment, body_space
+from schema.plugins.origin import where_defined
+from schema.robot.brain import check_widths
+from schema.robot.genome import Genome, develop
+from schema.robot.ids import BirthId
+from schema.robot.robot import check_robot
+
+_FOUNDERS = 6
+_CHILDREN = 20
+
+
+def check_brain_genes(experiment: Experiment) -> None:
+    """Raise unless a brain type makes valid robots, and equal ones of equal streams.
+
+    A few random robots are made and mated, twice.
+
+    Args:
+        experiment: names the brain type.
+
+    Raises:
+        ExperimentError: the brain type raises, makes a robot that breaks the rules or
+            has too many hidden neurons, or depends on more than its arguments.
+    """
+    genes = brain_genes(experiment)
+    place = f"brain.type: {where_defined(type(genes))}"
+    try:
+        first, second = _genomes(experiment), _genomes(experiment)
+        for genome in first:
+            robot = develop(genome, body_space(experiment.space))
+            check_robot(robot, body_space(experiment.space), genes.neurons)
+            check_widths(robot.brain, widths(experiment.space))
+    except InvalidRobot as error:
+        raise ExperimentError(f"{place}: expected valid robots, got {error}") from None
+    except RevolveError:
+        raise
+    except Exception as error:
+        raise ExperimentError(
+            f"{place}: expected outputs, grow, prune and vary to make genes, got "
+            f"{type(error).__name__}: {one_line(error)}"
+        ) from error
+    if first != second:
+        raise ExperimentError(
+            f"{place}: expected equal robots from equal random numbers, got different "
+            "ones: draw from `draws` only and keep no state"
+        )
+
+
+def _genomes(experiment: Experiment) -> list[Genome]:
+    """Return random genomes and children of them."""
+    found = [
+        generate(np.random.default_rng(seed), experiment, BirthId(0, seed))
+        for seed in range(_FOUNDERS)
+    ]
+    for seed in range(_CHILDREN):
+        for first, second in pairwise(found[-_FOUNDERS:]):
+            rng = np.random.default_rng((seed, len(found)))
+            birth = BirthId(0, len(found))
+            if child := mate(first, second, rng, experiment, birth):
+                found.append(child)
+                break
+    return found

@@ -1,0 +1,263 @@
+"""The encoding of an island: loading, and checks of what it returns."""
+
+from collections.abc import Callable
+from functools import lru_cache
+from traceback import extract_tb
+from types import TracebackType
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from coordinator.cppn.encoding import Cppn
+from coordinator.evolution.revolve_angle import RevolveAngle
+from schema.errors import ExperimentError, InvalidRobot, RevolveError, one_line, shown
+from schema.experiment.brains import neuron_kinds
+from schema.experiment.document import (
+    REVOLVE_ANGLE,
+    Experiment,
+    Space,
+    body_space,
+)
+from schema.limits import ROBOT_BYTES
+from schema.parts import BodySpace
+from schema.plugins.load import load_object
+from schema.plugins.parameters import read_parameters
+from schema.plugins.protocols import Encoding, OneStepMating, RobotEncoding
+from schema.robot.brain import Brain
+from schema.robot.ids import BirthId
+from schema.robot.robot import Robot, check_robot
+from schema.wire.codec import encode_robot
+
+WHERE = "encoding.type"
+BUILT_IN: dict[str, Callable[..., Encoding[Any]]] = {
+    REVOLVE_ANGLE: RevolveAngle,
+    "cppn": Cppn,
+}
+"""Built-in encodings by their short names."""
+
+_METHODS = ("random", "develop", "crossover", "mutate", "to_bytes", "from_bytes")
+
+
+class _NoParameters(msgspec.Struct, frozen=True):
+    """Parameters of an encoding that declares none."""
+
+
+@lru_cache(maxsize=64)
+def encoding_of(experiment: Experiment) -> "IslandEncoding":
+    """Return the encoding of one island.
+
+    Args:
+        experiment: settings of the island.
+
+    Raises:
+        UnknownPlugin: no such encoding, or a module that is not allowed.
+        ExperimentError: a class without the methods of an encoding, invalid
+            parameters, or an error when the class is called.
+    """
+    name = experiment.encoding.type
+    found = load_object(name, WHERE, BUILT_IN, _METHODS)
+    if not callable(found):
+        raise ExperimentError(f"{WHERE}: {name!r} must be a class, not an object")
+    kind = getattr(found, "Parameters", None)
+    table = experiment.encoding.parameters
+    parameters = read_parameters(table, kind or _NoParameters, "encoding.parameters")
+    types = body_space(experiment.space)
+    with _Guard(name, "the class"):
+        made = found(experiment, types, parameters if kind else None)
+    return IslandEncoding(made, experiment)
+
+
+class IslandEncoding:
+    """Encoding as an island uses it.
+
+    An error of its code becomes one line. Robots of all encodings but the thesis's
+    are checked at each birth.
+
+    Attributes:
+        name: of the experiment's key ``encoding.type``.
+        types: part types by name.
+        no_child: reason of a failed attempt at which it gave no genome.
+    """
+
+    def __init__(self, encoding: Encoding[Any], experiment: Experiment) -> None:
+        self.name = experiment.encoding.type
+        self.types: BodySpace = body_space(experiment.space)
+        self._kinds = neuron_kinds(experiment.brain, experiment.space)
+        self._encoding = encoding
+        self._mates = encoding if isinstance(encoding, OneStepMating) else None
+        self._space = experiment.space
+        self._is_thesis = self.name == REVOLVE_ANGLE
+        self._guards = {
+            method: _Guard(self.name, method) for method in (*_METHODS, "mate")
+        }
+        self.no_child = "its parents' genomes gave no child"
+        if self._is_thesis:
+            self.no_child = (
+                "crossover found no fitting subtree, or the child had no motor"
+            )
+
+    def random(self, rng: np.random.Generator, birth: BirthId) -> object:
+        """Return the genome of a random robot.
+
+        Raises:
+            ExperimentError: the method raises, or no robot meets the restrictions.
+        """
+        with self._guards["random"]:
+            return self._encoding.random(rng, birth)
+
+    def mate(
+        self, first: object, second: object, rng: np.random.Generator, birth: BirthId
+    ) -> object | None:
+        """Return the genome of a child, None if the attempt fails.
+
+        Raises:
+            ExperimentError: a method raises.
+        """
+        if self._mates is not None:
+            with self._guards["mate"]:
+                return self._mates.mate(first, second, rng, birth)
+        with self._guards["crossover"]:
+            child = self._encoding.crossover(first, second, rng)
+        if child is None:
+            return None
+        with self._guards["mutate"]:
+            return self._encoding.mutate(child, rng, birth)
+
+    def develop(self, genome: object) -> Robot:
+        """Return the robot that a genome describes.
+
+        Raises:
+            InvalidRobot: the robot is not well formed, or breaks a limit of
+                ``[space]``; never of the thesis's encoding.
+            ExperimentError: the method raises.
+        """
+        if self._is_thesis:
+            return self._encoding.develop(genome)
+        with self._guards["develop"]:
+            found: object = self._encoding.develop(genome)
+            parts, brain = (getattr(found, each, None) for each in ("parts", "brain"))
+            if not isinstance(parts, tuple | list) or not isinstance(brain, Brain):
+                raise ExperimentError(
+                    f"{WHERE}: {self.name!r}: develop must return a Robot, "
+                    f"got {shown(found)}"
+                )
+            # The Python API has a class of its own.
+            robot = Robot(tuple(parts), brain)
+            self.check(robot)
+        if problem := outside_limits(robot, self._space, self.types):
+            raise InvalidRobot(f"{WHERE}: {self.name!r}: {problem}")
+        return robot
+
+    def check(self, robot: Robot) -> None:
+        """Raise unless a robot has the part types and a brain of the experiment.
+
+        Raises:
+            InvalidRobot: it does not.
+        """
+        check_robot(robot, self.types, self._kinds)
+
+    def to_bytes(self, genome: object) -> bytes:
+        """Return a genome as bytes.
+
+        Raises:
+            ExperimentError: the method raises, or returns no or too many bytes.
+        """
+        with self._guards["to_bytes"]:
+            data: object = self._encoding.to_bytes(genome)
+        if not isinstance(data, bytes) or len(data) > ROBOT_BYTES:
+            raise ExperimentError(
+                f"{WHERE}: {self.name!r}: to_bytes must return <= {ROBOT_BYTES} "
+                f"bytes, got {shown(data)}"
+            )
+        return data
+
+    def from_bytes(self, data: bytes) -> object:
+        """Return the genome of some bytes.
+
+        Raises:
+            InvalidRobot: other bytes.
+        """
+        try:
+            return self._encoding.from_bytes(data)
+        except Exception as error:
+            raise InvalidRobot(
+                f"not a genome of encoding {self.name!r}: {one_line(error)}"
+            ) from error
+
+    def from_robot(self, robot: Robot) -> object:
+        """Return a genome of a robot.
+
+        Raises:
+            InvalidRobot: the encoding cannot describe this robot, or none at all.
+        """
+        if not isinstance(self._encoding, RobotEncoding):
+            raise InvalidRobot(
+                f"encoding {self.name!r} makes no genome of a given robot, so a "
+                "robot's file cannot join this experiment"
+            )
+        try:
+            return self._encoding.from_robot(robot)
+        except ValueError as error:
+            raise InvalidRobot(
+                f"encoding {self.name!r} cannot describe this robot: {error}"
+            ) from error
+
+    def stored_robot(self, robot: Robot) -> bytes | None:
+        """Return the column ``robot`` of births; None if the genome is enough."""
+        return None if self._is_thesis else encode_robot(robot)
+
+
+def outside_limits(robot: Robot, space: Space, types: BodySpace) -> str:
+    """Return which limit of ``[space]`` a well-formed robot breaks; or nothing."""
+    brain = robot.brain
+    for name, count, least, most in (
+        ("parts", len(robot.parts), space.min_parts, space.max_parts),
+        ("inputs", brain.count("input"), 0, space.max_inputs),
+        ("outputs", brain.count("output"), 0, space.max_outputs),
+        ("hidden", brain.count("hidden"), 0, space.max_hidden),
+    ):
+        if not least <= count <= most:
+            limits = f"space.max_{name} = {most}"
+            if least:
+                limits = f"space.min_{name} = {least} and {limits}"
+            return f"the robot has {count} {name}, outside {limits}"
+    turns: list[int] = []
+    for index, part in enumerate(robot.parts if space.planar else ()):
+        turn = part.orientation + (turns[part.parent] if index else 0)
+        if turn % 360 and types[part.kind].is_levelled:
+            return (
+                f"part {index}, a {part.kind}, is rotated by {turn % 360} degrees out "
+                "of the core's plane, but space.planar is true"
+            )
+        turns.append(turn)
+    return ""
+
+
+class _Guard:
+    """Context that turns errors of an encoding's own code into one line."""
+
+    __slots__ = ("_method", "_name")
+
+    def __init__(self, name: str, method: str) -> None:
+        self._name, self._method = name, method
+
+    def __enter__(self) -> None:
+        return None
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Raise an ExperimentError for any error but those of this project."""
+        if error is None or isinstance(error, RevolveError):
+            return
+        if isinstance(error, Exception | SystemExit):
+            frame = extract_tb(trace)[-1]
+            file = frame.filename.replace("\\", "/").rpartition("/")[2]
+            raise ExperimentError(
+                f"{WHERE}: {self._name!r}: {self._method} failed in "
+                f"{file}:{frame.lineno}: {type(error).__name__}: {one_line(error)}"
+            ) from error

@@ -1,0 +1,1 @@
+"""Commands that list and check plug-ins, and the check before a run."""

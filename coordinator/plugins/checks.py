@@ -1,0 +1,176 @@
+"""Checks of plug-ins in a process of their own, with a time limit.
+
+A plug-in is other people's code: it may run without end, or end its process. The check
+before a run, and ``revolve check``, therefore start a process that reports each step as
+a line of JSON and ends when a check takes too long.
+"""
+
+import faulthandler
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+from typing import IO
+
+from schema.errors import ExperimentError, RevolveError, UnknownPlugin, one_line
+from schema.experiment.file import own_references, read_experiment
+from schema.experiment.kinds import Kind, Use, check_use, kind_of
+from schema.plugins.load import load_object, place_of
+from schema.plugins.permission import FLAG, allow, allow_references, allowed, is_own
+
+LIMIT_S = 30.0
+"""Time for the import, and for the check, of one plug-in [s]."""
+HERE = "--here"
+"""Flag of ``revolve check`` in the process that does the checks, with their limit."""
+# What ``faulthandler`` writes for each thread when time is up; the main one is last.
+_LATE = re.compile(r'^Thread .* first\):\n *File "([^"]*)", line (\d+)', re.MULTILINE)
+
+
+def refuse_faulty(sources: Iterable[str]) -> None:
+    """Check the plug-ins of experiments before a run, in a process of their own.
+
+    Built-in plug-ins are not checked: the tests of this project do that.
+
+    Args:
+        sources: as for ``read_experiment``.
+
+    Raises:
+        ExperimentError: one cannot be loaded, breaks its contract, takes too long or
+            ends its process; an experiment that is invalid.
+    """
+    own = [source for source in sources if any(map(is_own, own_references(source)))]
+    if own and (problems := check_apart(own)):
+        raise ExperimentError(problems[0])
+
+
+def check_apart(
+    words: Sequence[str],
+    tell: Callable[[str], None] = lambda _: None,
+    limit_s: float = LIMIT_S,
+) -> list[str]:
+    """Check plug-ins in a process of their own; return a line for each faulty one.
+
+    Args:
+        words: arguments of ``revolve check``.
+        tell: called with a line for each plug-in that is in order.
+        limit_s: time for the import, and for the check, of one plug-in [s].
+    """
+    flags = [HERE, str(limit_s)]
+    for entry in allowed():
+        flags += [FLAG, entry]
+    child = subprocess.run(  # noqa: S603 - our own interpreter
+        [sys.executable, "-m", "revolve", "check", *words, *flags],
+        capture_output=True, text=True, errors="replace", check=False,
+    )  # fmt: skip
+    problems: list[str] = []
+    begun = ""
+    for line in child.stdout.splitlines():
+        step, text = json.loads(line)
+        begun = text if step == "begin" else ""
+        if step == "fine":
+            tell(text)
+        elif step == "fault":
+            problems.append(text)
+    if not begun and child.returncode in (0, 1):
+        return problems
+    if threads := _LATE.findall(child.stderr):
+        file, line = threads[-1]
+        place = f"{Path(file).name}:{line}"
+        why = f"must take at most {limit_s:g} s, but was still at {place}"
+    elif begun:
+        why = f"must not end its process, but did, with status {child.returncode}"
+    else:
+        why = child.stderr.strip()[-200:] or f"exit status {child.returncode}"
+    return [*problems, f"{begun or 'revolve check'}: {why}"]
+
+
+def check_here(
+    words: Sequence[str],
+    kinds: Sequence[Kind],
+    kind: str | None,
+    output: IO[str],
+    limit_s: float,
+) -> bool:
+    """Check plug-ins in this process; return whether all are in order.
+
+    Args:
+        words: ``MODULE:NAME``, ``FILE.py:NAME``, or experiments.
+        kinds: all kinds.
+        kind: name of the kind that the words are of; None: found out.
+        output: gets the steps as lines of JSON.
+        limit_s: time after which an import or a check ends this process [s].
+    """
+    is_fine = True
+
+    def say(step: str, text: str) -> None:
+        output.write(f"{json.dumps([step, text])}\n")
+        output.flush()
+
+    def check(name: str, use: Use) -> None:
+        say("begin", f"{use.key}: {use.path}")
+        with _time_limit(limit_s):
+            where = check_use(use, lambda place: say("begin", f"{use.key}: {place}"))
+        say("fine", f"{use.path}: {name} at {where}: in order")
+
+    # A plug-in may print.
+    with redirect_stdout(sys.stderr):
+        for word in words:
+            try:
+                say("begin", word)
+                with _time_limit(limit_s):
+                    uses = list(_uses(word, kinds, kind))
+                for name, use in uses:
+                    check(name, use)
+            except RevolveError as error:
+                is_fine = False
+                say("fault", one_line(error))
+    return is_fine
+
+
+@contextmanager
+def _time_limit(limit_s: float) -> Iterator[None]:
+    """End this process if the block takes too long."""
+    # By a thread that needs no interpreter: a plug-in may be in foreign code.
+    faulthandler.dump_traceback_later(limit_s, exit=True)
+    try:
+        yield
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+
+
+def _uses(
+    word: str, kinds: Sequence[Kind], kind: str | None
+) -> Iterator[tuple[str, Use]]:
+    """Yield the plug-ins that a word of the command line means, with their kinds.
+
+    Raises:
+        ExperimentError: it cannot be loaded, or is of no kind.
+    """
+    place, colon, attribute = word.rpartition(":")
+    if not colon:
+        experiment = read_experiment(word)
+        for each in kinds:
+            for use in each.used(experiment):
+                if is_own(use.path):
+                    yield each.name, use
+        return
+    path = word
+    if place.endswith(".py"):
+        allow([place])
+        path = f"{Path(place).stem}:{attribute}"
+    allow_references([path], Path())
+    plugin: object = load_object(path, "revolve check", {})
+    if kind is None:
+        found = kind_of(plugin, kinds)
+    else:
+        found = next(each for each in kinds if each.name == kind)
+    if found is None:
+        names = ", ".join(each.name for each in kinds)
+        raise UnknownPlugin(
+            f"{path}: {place_of(path)}: must be of one of the kinds {names}, got a "
+            f"{type(plugin).__name__}; --kind says which"
+        )
+    yield found.name, found.by_hand(path)

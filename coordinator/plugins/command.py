@@ -1,0 +1,144 @@
+"""Commands ``revolve check`` and ``revolve plugins``."""
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import entry_points
+
+from coordinator.plugins.checks import HERE, check_apart, check_here
+from schema.errors import RevolveError, one_line
+from schema.experiment.kinds import Kind, offered
+from schema.flags import Flags, add_plugins, positive_number
+from schema.plugins.load import load_module
+from schema.plugins.origin import where_defined, where_named
+from schema.plugins.permission import GROUP, allow, allowed
+from schema.plugins.source import digest_of
+
+BUILT_IN = "built-in"
+
+
+@dataclass(frozen=True, slots=True)
+class Listed:
+    """A plug-in of the list.
+
+    Attributes:
+        kind: of plug-in; empty for a module that cannot be loaded.
+        name: as experiments give it.
+        defined: file and line, or why the module cannot be loaded.
+        digest: of the module's source; "built-in" for one that ships.
+    """
+
+    kind: str
+    name: str
+    defined: str
+    digest: str
+
+
+def check(arguments: list[str], kinds: Sequence[Kind]) -> int:
+    """Run ``revolve check``; return 0 if all plug-ins are in order, else 1.
+
+    Args:
+        arguments: after the command's name.
+        kinds: all kinds.
+
+    Raises:
+        ExperimentError: a ``--plugins`` entry that is not there.
+    """
+    options = _check_flags(kinds).parse_args(arguments)
+    allow(options.plugins)
+    if options.here:
+        words, limit_s = options.plugin, options.here
+        is_fine = check_here(words, kinds, options.kind, sys.stdout, limit_s)
+        return 0 if is_fine else 1
+    words = [*options.plugin, *(("--kind", options.kind) if options.kind else ())]
+    problems = check_apart(words, print)
+    for problem in problems:
+        print(problem)
+    return 1 if problems else 0
+
+
+def list_plugins(arguments: list[str], kinds: Sequence[Kind]) -> int:
+    """Run ``revolve plugins``; return 0, or 1 if a module cannot be loaded.
+
+    Args:
+        arguments: after the command's name.
+        kinds: all kinds.
+
+    Raises:
+        ExperimentError: a ``--plugins`` entry that is not there.
+    """
+    options = _list_flags().parse_args(arguments)
+    allow(options.plugins)
+    rows = [*_built_in(kinds), *_found(kinds)]
+    if options.json:
+        print(json.dumps([asdict(row) for row in rows], indent=1))
+    else:
+        cells = [(row.kind, row.name, row.defined, row.digest) for row in rows]
+        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+        for row in cells:
+            padded = (
+                f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)
+            )
+            print("  ".join(padded).rstrip())
+    return 0 if all(row.kind for row in rows) else 1
+
+
+def _built_in(kinds: Sequence[Kind]) -> Iterator[Listed]:
+    for kind in kinds:
+        for name, plugin in kind.built_in.items():
+            yield Listed(kind.name, name, where_defined(plugin), BUILT_IN)
+
+
+def _found(kinds: Sequence[Kind]) -> Iterator[Listed]:
+    """Yield what installed packages and the modules of ``--plugins`` offer."""
+    installed = [entry.module for entry in entry_points(group=GROUP)]
+    named = [entry.rpartition("/")[2].removesuffix(".py") for entry in allowed()]
+    for name in dict.fromkeys([*installed, *named]):
+        try:
+            module = load_module(name, "revolve plugins")
+        except RevolveError as error:
+            yield Listed("", name, one_line(error), digest_of(name))
+            continue
+        for kind, attribute in offered(module, kinds):
+            place = where_named(module, attribute)
+            yield Listed(kind.name, f"{name}:{attribute}", place, digest_of(name))
+
+
+def _check_flags(kinds: Sequence[Kind]) -> argparse.ArgumentParser:
+    flags = Flags(
+        prog="revolve check",
+        description="Check plug-ins as a run does before its first birth: one line for "
+        "each; exit code 1 if one is refused.",
+        epilog="example: revolve check my_lab.py:wheel",
+        allow_abbrev=False,
+    )
+    flags.add_argument(
+        "plugin",
+        nargs="+",
+        metavar="PLUGIN",
+        help="MODULE:NAME, FILE.py:NAME, or an experiment (.toml), whose plug-ins are "
+        "checked with its parameters",
+    )
+    flags.add_argument(
+        "--kind",
+        choices=[kind.name for kind in kinds],
+        help="kind of the plug-ins (default: found out)",
+    )
+    flags.add_argument(HERE, type=positive_number, help=argparse.SUPPRESS)
+    add_plugins(flags)
+    return flags
+
+
+def _list_flags() -> argparse.ArgumentParser:
+    flags = Flags(
+        prog="revolve plugins",
+        description="List the plug-ins of every kind, built-in or found, with file, "
+        "line and digest of the source.",
+        epilog="example: revolve plugins --plugins my_lab.py",
+        allow_abbrev=False,
+    )
+    flags.add_argument("--json", action="store_true", help="write JSON")
+    add_plugins(flags)
+    return flags

@@ -1,0 +1,40 @@
+"""Check that the births of a run folder are of the encoding that the run uses now."""
+
+from pathlib import Path
+
+from coordinator.evolution.encodings import encoding_of
+from schema.errors import InvalidRobot, RunFolderError
+from schema.experiment.document import REVOLVE_ANGLE, Experiment
+from schema.tables.files import read_table
+
+
+def check_stored_genomes(folder: Path, experiment: Experiment) -> None:
+    """Raise if the encoding develops another robot from the first stored genome.
+
+    An own encoding may have changed since the run was stopped; its next births would
+    not belong to those in the folder. The thesis's encoding is not checked.
+
+    Args:
+        folder: of the run.
+        experiment: of the run.
+
+    Raises:
+        RunFolderError: it does, or cannot read the genome.
+    """
+    if experiment.encoding.type == REVOLVE_ANGLE:
+        return
+    births = read_table(folder, "births").slice(0, 1).to_pylist()
+    if not births:
+        return
+    row, encoding = births[0], encoding_of(experiment)
+    try:
+        robot = encoding.develop(encoding.from_bytes(row["genome"]))
+        problem = "develops into another robot now"
+    except InvalidRobot as error:
+        robot, problem = None, str(error)
+    if robot is None or encoding.stored_robot(robot) != row["robot"]:
+        raise RunFolderError(
+            f"{folder}: the genome of birth {row['birth']} was written by another "
+            f"encoding than {encoding.name!r} is now: {problem}; restore its code, or "
+            "start a new run"
+        )

@@ -1,0 +1,258 @@
+"""Compares evolution with random search on each task of docs/tasks.md.
+
+    python docs/tasks_campaign.py run runs/tasks    # start, or go on after an end
+    python docs/tasks_campaign.py table             # write the table of docs/tasks.md
+
+Each search has the same number of births. The random one is the shipped experiment with
+``selection.parents = "none"``, as in ``no-reproduction``. Rows are kept in
+docs/data/tasks.csv, one per finished run.
+"""
+
+import argparse
+import csv
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from analysis.measures.load import read_runs
+from schema.experiment.document import Experiment, body_space
+from schema.experiment.file import own_experiment
+from schema.experiment.identity import Identity, Origin
+from schema.experiment.settings import evaluation_settings_of
+from schema.formats.files import write_robot
+from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
+from schema.tables.files import read_table
+from schema.wire.born import robot_of_birth
+from worker.robot.evaluation import evaluate
+
+ROOT = Path(__file__).resolve().parents[1]
+SHIPPED = ROOT / "schema" / "experiment" / "shipped"
+ROWS = ROOT / "docs" / "data" / "tasks.csv"
+ROBOTS = ROOT / "docs" / "data" / "tasks"
+"""Best robot of each task with seed ``DRAWN``, for docs/tasks_pictures.py."""
+DRAWN = 1
+PAGE = ROOT / "docs" / "tasks.md"
+BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
+
+TASKS = {
+    "locomotion": ("scenario1", "m/s"),
+    "directed-locomotion": ("directed-locomotion", "m/s"),
+    "target": ("target", "m/s"),
+    "light": ("light", "1"),
+    "turning": ("turning", "rad/s"),
+    "balance": ("balance", "m"),
+    "stairs": ("stairs", "m/s"),
+    "rough-ground": ("rough-ground", "m/s"),
+}
+"""Shipped experiment of each task, and the unit of its fitness."""
+SEARCHES = ("evolution", "random")
+SEEDS = range(1, 11)
+BIRTHS = 600
+TRIALS = range(1000, 1020)
+"""Trials in which the best robots of a task with pushes are evaluated anew."""
+RESAMPLES = 10_000
+COLUMNS = ("task", "search", "seed", "births", "best", "mean", "failed", "commit")
+_RANDOM = 'parents = "none"'
+
+Numbers = npt.NDArray[np.float64]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one of the commands; return 0, or the exit code of ``revolve``."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    running = commands.add_parser("run", help="run what is missing, seed by seed")
+    running.add_argument("folder", type=Path, help="folder of the runs")
+    running.add_argument("--only", nargs="*", choices=TASKS, default=list(TASKS))
+    commands.add_parser("table", help="write the table of docs/tasks.md")
+    options = parser.parse_args(arguments)
+    if options.command == "table":
+        write_table()
+        return 0
+    return run(options.folder, options.only)
+
+
+def run(folder: Path, tasks: Sequence[str]) -> int:
+    """Run all missing runs, at the lowest priority, all tasks of a seed together."""
+    os.nice(19)
+    folder.mkdir(parents=True, exist_ok=True)
+    for seed in SEEDS:
+        for task in tasks:
+            for search in SEARCHES:
+                known = {(r["task"], r["search"], int(r["seed"])) for r in rows()}
+                if (task, search, seed) in known:
+                    continue
+                if code := _run_one(folder, task, search, seed):
+                    return code
+    return 0
+
+
+def _run_one(folder: Path, task: str, search: str, seed: int) -> int:
+    """Run or resume one search and keep its row; return the exit code."""
+    out = folder / f"{task}-{search}-{seed}"
+    if (out / "run.json").exists():
+        words = ["resume", str(out)]
+    else:
+        document = folder / f"{task}-{search}.toml"
+        document.write_text(_document(task, search), encoding="utf-8")
+        words = ["run", str(document), "--seed", str(seed), "--out", str(out)]
+        words += ["--births", str(BIRTHS)]
+    words += ["--workers", "1", "--quiet"]
+    print(f"revolve {' '.join(words)}", flush=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "revolve", *words], cwd=ROOT, check=False
+    )
+    if done.returncode:
+        return done.returncode
+    row = {"task": task, "search": search, "seed": seed, **_outcome(out)}
+    is_new = not ROWS.exists()
+    with ROWS.open("a", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        if is_new:
+            writer.writeheader()
+        writer.writerow({**row, "commit": _commit()})
+    if search == "evolution" and seed == DRAWN:
+        ROBOTS.mkdir(exist_ok=True)
+        experiment, _, robot = _best(out)
+        write_robot(robot, ROBOTS / f"{task}.yaml", body_space(experiment.space))
+    shutil.rmtree(out)
+    return 0
+
+
+def _document(task: str, search: str) -> str:
+    """Return the experiment of a search: the shipped one, with other parents."""
+    shipped, _ = TASKS[task]
+    text = (SHIPPED / f"{shipped}.toml").read_text(encoding="utf-8")
+    if search == "random":
+        text += f"\n[selection]\n{_RANDOM}\n"
+    return text
+
+
+def _last(out: Path) -> pa.Table:
+    """Return the rows of the last recorded population."""
+    population = read_table(out, "population")
+    last = pc.max(population["births"]).as_py()
+    return population.filter(pc.equal(population["births"], last))
+
+
+def _outcome(out: Path) -> dict[str, object]:
+    """Return births, best and mean fitness of the last population, and failures.
+
+    Where pushes differ from trial to trial, the best fitness is the mean over new
+    trials, because the greatest of many fitness values was lucky, too.
+    """
+    alive = _last(out)
+    fitness = np.array(alive["fitness"].to_pylist(), dtype=float)
+    status = read_table(out, "evaluations")["status"].to_pylist()
+    best = float(fitness.max())
+    experiment, birth, robot = _best(out)
+    if experiment.environment.push_impulse:
+        settings = evaluation_settings_of(experiment)
+        own = [Identity(Origin(), BirthId(0, birth), trial) for trial in TRIALS]
+        again = [evaluate(robot, settings, each).fitness for each in own]
+        best = sum(again) / len(again)
+    return {
+        "births": alive["births"][0].as_py(),
+        "best": best,
+        "mean": float(fitness.mean()),
+        "failed": sum(each != "ok" for each in status),
+    }
+
+
+def _best(out: Path) -> tuple[Experiment, int, Robot]:
+    """Return the experiment of a run, and birth and robot of the last best fitness."""
+    (one,), _ = read_runs([out])
+    experiment = own_experiment(one.document)
+    alive = _last(out)
+    best = int(np.argmax(alive["fitness"].to_numpy()))
+    birth = alive["birth"][best].as_py()
+    births = read_table(out, "births")
+    row = births.filter(pc.equal(births["birth"], birth)).to_pylist()[0]
+    robot = robot_of_birth(row["genome"], row["robot"], experiment)
+    return experiment, birth, robot
+
+
+def _commit() -> str:
+    git = shutil.which("git")
+    if git is None:
+        return ""
+    words = ["describe", "--always", "--dirty", "--exclude=*"]
+    done = subprocess.run(
+        [git, "-C", str(ROOT), *words], capture_output=True, text=True, check=False
+    )
+    return done.stdout.strip()
+
+
+def rows() -> list[dict[str, str]]:
+    """Return the rows that are kept, in the order in which runs finished."""
+    if not ROWS.exists():
+        return []
+    with ROWS.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def difference(first: Numbers, second: Numbers) -> tuple[float, float, float]:
+    """Return the difference of two medians, and its 95 % bootstrap interval.
+
+    Args:
+        first: (N,) one number per run.
+        second: (M,) one number per run of the other search.
+
+    Source: Efron, *Bootstrap methods*, 1979: percentiles, with a fixed seed.
+    """
+    rng = np.random.default_rng(1)
+    medians = [
+        np.median(rng.choice(each, (RESAMPLES, len(each))), axis=1)
+        for each in (first, second)
+    ]
+    low, high = np.percentile(medians[0] - medians[1], (2.5, 97.5)).tolist()
+    return float(np.median(first) - np.median(second)), low, high
+
+
+def table(kept: Sequence[Mapping[str, str]]) -> Iterator[str]:
+    """Yield the lines of the table, in Markdown."""
+    yield "| task | seeds | evolution | random search | difference | 95 % interval |"
+    yield "|---|---|---|---|---|---|"
+    for task, (_, unit) in TASKS.items():
+        found = {
+            search: {
+                int(row["seed"]): float(row["best"])
+                for row in kept
+                if (row["task"], row["search"]) == (task, search)
+            }
+            for search in SEARCHES
+        }
+        seeds = sorted(set(found["evolution"]) & set(found["random"]))
+        if not seeds:
+            continue
+        first, second = (
+            np.array([found[search][seed] for seed in seeds]) for search in SEARCHES
+        )
+        change, low, high = difference(first, second)
+        suffix = "" if unit == "1" else f" {unit}"
+        yield (
+            f"| {task} | {len(seeds)} | {np.median(first):.3f}{suffix} | "
+            f"{np.median(second):.3f}{suffix} | {change:+.3f}{suffix} | "
+            f"{low:+.3f} to {high:+.3f} |"
+        )
+
+
+def write_table() -> None:
+    """Replace the table of docs/tasks.md by that of the rows."""
+    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
+    _, _, after = rest.partition(END)
+    lines = "\n".join([BEGIN, "", *table(rows()), "", END])
+    PAGE.write_text(f"{before}{lines}{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,70 @@
+"""Draws the pictures of docs/tasks.md: best robots that docs/tasks_campaign.py kept.
+
+    python docs/tasks_pictures.py
+
+Each picture shows three moments of an evaluation from a fixed camera.
+"""
+
+import sys
+
+import numpy as np
+
+from analysis.render.picture import (
+    RobotRenderer,
+    Simulate,
+    choose_engine,
+    gait_strip,
+    save_picture,
+)
+from docs.tasks_campaign import ROBOTS, ROOT, TASKS
+from schema.experiment.document import body_space
+from schema.experiment.file import read_experiment
+from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
+from schema.formats.files import read_robot
+from schema.robot.results import Floats
+from schema.robot.robot import Robot
+
+PICTURES = ROOT / "docs" / "pictures" / "tasks"
+SIZE = (280, 210)
+"""Width and height of each of the three pictures [pixels]."""
+SHARES = (0.1, 0.5, 0.99)
+"""Moments of the evaluation."""
+
+
+def main() -> int:
+    """Draw all tasks; return 0."""
+    choose_engine()
+    # Imports MuJoCo.
+    from worker.robot.evaluation import simulate  # noqa: PLC0415
+
+    PICTURES.mkdir(exist_ok=True)
+    for task, (shipped, _) in TASKS.items():
+        file = ROBOTS / f"{task}.yaml"
+        if not file.exists():
+            print(f"{task}: no robot in {file}")
+            continue
+        experiment = read_experiment(shipped)
+        settings = evaluation_settings_of(experiment)
+        robot = read_robot(file, body_space(experiment.space))
+        poses = motion(simulate, robot, settings)
+        shown = [poses[int(share * len(poses))] for share in SHARES]
+        middle = np.mean([pose[:3] for pose in shown], axis=0)
+        with RobotRenderer(robot, settings, size=SIZE) as renderer:
+            strip = [renderer.picture(pose, look_at=middle) for pose in shown]
+        out = PICTURES / f"{task}.png"
+        save_picture(gait_strip(strip), out)
+        print(f"{out}: {out.stat().st_size / 1000:.0f} kB")
+    return 0
+
+
+def motion(
+    simulate: Simulate, robot: Robot, settings: EvaluationSettings
+) -> list[Floats]:
+    """Return the state of an evaluation at each tick."""
+    poses: list[Floats] = []
+    simulate(robot, settings, watch=lambda data: poses.append(data.qpos.copy()))
+    return poses
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,161 @@
+"""Neuron types and brain types that an experiment names, loaded and checked."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple, TypeVar, cast
+
+from msgspec import Struct
+
+from schema.errors import ExperimentError, one_line
+from schema.experiment.document import BrainSection, Space
+from schema.plugins.check_neuron_type import check_neuron_type
+from schema.plugins.load import load_object
+from schema.plugins.origin import where_defined
+from schema.plugins.parameters import read_parameters
+from schema.plugins.protocols import BrainType, NeuronType
+from schema.robot.brain import NeuronKinds, Widths
+from schema.robot.cpg import CpgParameters, cpg_neurons
+from schema.robot.neurons import BUILT_IN_NEURONS
+
+T = TypeVar("T")
+Half = TypeVar("Half")
+
+NEURON_MEMBERS = ("name", "parameters", "states", "step")
+_BRAIN_MEMBERS = ("neurons", "outputs", "grow", "prune", "vary", "pack", "bank")
+_TYPE = "brain.type"
+
+
+class NoParameters(Struct, frozen=True):
+    """Parameters of a brain type that has none."""
+
+
+class _BuiltIn(NamedTuple):
+    """What coordinator and worker, which have one half each, agree on."""
+
+    parameters: type[Struct]
+    neurons: Callable[[Any, tuple[NeuronType, ...]], NeuronKinds]
+
+
+def kinds_of(types: Sequence[NeuronType]) -> NeuronKinds:
+    """Return the parameters of neuron types by name."""
+    return {kind.name: kind.parameters for kind in types}
+
+
+_BUILT_IN = {
+    "network": _BuiltIn(NoParameters, lambda _, types: kinds_of(types)),
+    "cpg": _BuiltIn(CpgParameters, lambda parameters, _: cpg_neurons(parameters)),
+}
+
+
+@lru_cache(maxsize=64)
+def neuron_types(names: tuple[str, ...]) -> tuple[NeuronType, ...]:
+    """Return the neuron types of an experiment, in its order.
+
+    Args:
+        names: ``space.neuron_types``.
+
+    Raises:
+        UnknownPlugin: no such type, module or attribute, or a module that is not
+            allowed.
+        ExperimentError: no type, two of one name, or one that breaks its contract.
+    """
+    where = "space.neuron_types"
+    types: dict[str, NeuronType] = {}
+    for path in names:
+        built_in: Mapping[str, NeuronType] = BUILT_IN_NEURONS
+        kind: Any = load_object(path, where, built_in)
+        if isinstance(kind, type):
+            kind = _made(kind, where)
+        if ":" in path:
+            _require(kind, NEURON_MEMBERS, where)
+            check_neuron_type(kind, where)
+        if kind.name in types:
+            raise ExperimentError(f"{where}: two types are named {kind.name!r}")
+        types[kind.name] = kind
+    if not types:
+        raise ExperimentError(f"{where}: must name at least one type, got none")
+    return tuple(types.values())
+
+
+def neuron_kinds(brain: BrainSection, space: Space) -> NeuronKinds:
+    """Return the types of output and hidden neurons that robots may have, by name.
+
+    Raises:
+        UnknownPlugin: no such neuron type or brain type.
+        ExperimentError: one that breaks its contract, or wrong parameters.
+    """
+    if ":" in brain.type:
+        return _own_brain(brain, space.neuron_types).neurons
+    built_in = load_object(brain.type, _TYPE, _BUILT_IN)
+    parameters = _parameters(brain, built_in.parameters)
+    return built_in.neurons(parameters, neuron_types(space.neuron_types))
+
+
+def brain_half(
+    brain: BrainSection,
+    names: tuple[str, ...],
+    built_in: Mapping[str, Callable[[Any, tuple[NeuronType, ...]], Half]],
+) -> Half:
+    """Return the half of an experiment's brain type that one room needs.
+
+    Args:
+        brain: names the type.
+        names: ``space.neuron_types``.
+        built_in: that half of the built-in types, by short name.
+
+    Raises:
+        UnknownPlugin: no such neuron type or brain type.
+        ExperimentError: one that breaks its contract, or wrong parameters.
+    """
+    if ":" in brain.type:
+        # An own class has both halves.
+        return cast("Half", _own_brain(brain, names))
+    half = load_object(brain.type, _TYPE, built_in)
+    parameters = _parameters(brain, _BUILT_IN[brain.type].parameters)
+    return half(parameters, neuron_types(names))
+
+
+def widths(space: Space) -> Widths:
+    """Return the greatest numbers of neurons in an experiment."""
+    return Widths(space.max_inputs, space.max_outputs, space.max_hidden)
+
+
+@lru_cache(maxsize=64)
+def _own_brain(brain: BrainSection, names: tuple[str, ...]) -> BrainType:
+    """Return the brain type of a user's module, with its parameters."""
+    no_types: Mapping[str, type[BrainType]] = {}
+    found = load_object(brain.type, _TYPE, no_types)
+    if not isinstance(found, type):
+        raise ExperimentError(
+            f"{_TYPE}: {where_defined(found)}: expected a class, got an object of type "
+            f"{type(found).__name__}"
+        )
+    parameters = _parameters(brain, getattr(found, "Parameters", NoParameters))
+    made = _made(found, _TYPE, parameters, neuron_types(names))
+    _require(made, _BRAIN_MEMBERS, _TYPE)
+    return made
+
+
+def _parameters(brain: BrainSection, kind: type[Struct]) -> Struct:
+    return read_parameters(brain.parameters, kind, "brain.parameters")
+
+
+def _made(kind: type[T], where: str, *arguments: object) -> T:
+    """Return an object of a user's class."""
+    try:
+        return kind(*arguments)
+    except Exception as error:
+        raise ExperimentError(
+            f"{where}: {where_defined(kind)}: expected a class of "
+            f"{len(arguments)} arguments, got {type(error).__name__}: {one_line(error)}"
+        ) from error
+
+
+def _require(plugin: object, members: tuple[str, ...], where: str) -> None:
+    """Raise unless a plug-in has all attributes of its kind."""
+    for member in members:
+        if not hasattr(plugin, member):
+            raise ExperimentError(
+                f"{where}: {where_defined(plugin)}: expected an attribute {member!r}, "
+                f"got {type(plugin).__name__} without it"
+            )

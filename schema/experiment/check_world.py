@@ -1,0 +1,61 @@
+"""Checks of the world of an experiment: ground, scenery, light and pushes."""
+
+from collections.abc import Iterator
+from math import isclose
+
+from schema.errors import ExperimentError
+from schema.experiment.document import Experiment, light_of
+from schema.experiment.environment import arena_problems, ground_problems
+
+
+def world_problems(experiment: Experiment) -> Iterator[str]:
+    """Yield what is wrong with the world of one island."""
+    yield from ground_problems(experiment.environment)
+    if experiment.arena is not None:
+        yield from arena_problems(experiment.environment)
+    yield from _scenery_problems(experiment)
+    yield from _push_problems(experiment)
+    yield from _light_problems(experiment)
+
+
+def _scenery_problems(experiment: Experiment) -> Iterator[str]:
+    if scenery := experiment.environment.scenery:
+        # MuJoCo is imported only if needed: it is slow to load.
+        from schema.experiment.scenery import (  # noqa: PLC0415
+            refuse_objects,
+            scenery_model,
+        )
+
+        try:
+            scenery_model(scenery, experiment.simulation)
+            if experiment.arena is not None:
+                refuse_objects(experiment.environment, experiment.simulation)
+        except ExperimentError as error:
+            yield str(error)
+
+
+def _push_problems(experiment: Experiment) -> Iterator[str]:
+    """Yield whether pushes do not begin at a tick."""
+    world, clock = experiment.environment, experiment.simulation
+    tick_s = clock.brain_steps * clock.timestep_s
+    ticks = max(1, round(world.push_interval_s / tick_s))
+    is_whole = isclose(ticks * tick_s, world.push_interval_s, rel_tol=1e-9)
+    if world.push_impulse and not is_whole:
+        yield (
+            f"environment.push_interval_s: must be a whole multiple of {tick_s:g} s, "
+            f"the time between brain ticks, got {world.push_interval_s:g}"
+        )
+
+
+def _light_problems(experiment: Experiment) -> Iterator[str]:
+    arena, there = experiment.arena, experiment.environment.light
+    if experiment.fitness.function == "light" and not light_of(
+        experiment.environment, arena
+    ):
+        yield "fitness.function: 'light' needs environment.light = [x, y, z], got none"
+    here = None if arena is None else arena.light
+    if here and there and here != there:
+        yield (
+            f"arena.light: differs from environment.light = {list(there)}, got "
+            f"{list(here)}; remove one of the two"
+        )

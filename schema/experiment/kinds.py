@@ -1,0 +1,161 @@
+"""Kinds of plug-ins: how one is recognised, what an experiment uses, how it is checked.
+
+Each room lists its kinds; the commands put the lists together.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import schema.parts
+import schema.robogen_parts
+from schema.errors import ExperimentError, RevolveError
+from schema.experiment.brains import NEURON_MEMBERS, neuron_types
+from schema.experiment.document import Experiment, Space, body_space
+from schema.parts import PartType
+from schema.plugins.load import load_instance
+from schema.plugins.origin import where_defined, where_raised
+from schema.robot.neurons import BUILT_IN_NEURONS
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """A plug-in that a key of an experiment names, and its check.
+
+    Attributes:
+        key: of the experiment, or the command line, for messages.
+        path: short name or ``module:attribute``.
+        load: returns the plug-in; raises ``ExperimentError`` if it cannot be had.
+        check: takes the plug-in; raises any error if it breaks its contract.
+    """
+
+    key: str
+    path: str
+    load: Callable[[], object]
+    check: Callable[[Any], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of plug-in.
+
+    Attributes:
+        name: of the kind, such as ``fitness``.
+        built_in: objects that ship, by the name that an experiment gives them.
+        is_one: whether an object is of this kind.
+        by_hand: returns the use of a path, with default parameters.
+        used: yields the uses of an experiment, those of its islands included.
+    """
+
+    name: str
+    built_in: Mapping[str, object]
+    is_one: Callable[[object], bool]
+    by_hand: Callable[[str], Use]
+    used: Callable[[Experiment], Iterable[Use]]
+
+
+def check_use(use: Use, begin: Callable[[str], None] = lambda _: None) -> str:
+    """Check a plug-in; return where it is defined.
+
+    Args:
+        use: to check.
+        begin: called with file and line before the check.
+
+    Raises:
+        ExperimentError: one line with key, file and line, and what was expected.
+    """
+    plugin = use.load()
+    where = where_defined(plugin)
+    begin(where)
+    try:
+        use.check(plugin)
+    # A plug-in may call exit().
+    except (Exception, SystemExit) as error:
+        story = " ".join(str(error).split())
+        if not isinstance(error, RevolveError):
+            line = where_raised(error, where.partition(":")[0])
+            story = f"raised {type(error).__name__}: {story}"
+            story += f" ({line})" if line else ""
+        story = story.removeprefix(f"{use.key}: ")
+        if where not in story:
+            story = f"{where}: {story}"
+        raise ExperimentError(f"{use.key}: {story}") from error
+    return where
+
+
+def offered(module: ModuleType, kinds: Iterable[Kind]) -> list[tuple[Kind, str]]:
+    """Return the plug-ins that a module offers: kind and attribute, in its order.
+
+    Functions and classes that it imports from other modules are left out.
+    """
+    found: list[tuple[Kind, str]] = []
+    for name, value in vars(module).items():
+        home = getattr(value, "__module__", module.__name__)
+        is_own = home == module.__name__ or not callable(value)
+        kind = kind_of(value, kinds) if is_own and not name.startswith("_") else None
+        if kind is not None:
+            found.append((kind, name))
+    return found
+
+
+def kind_of(plugin: object, kinds: Iterable[Kind]) -> Kind | None:
+    """Return the first kind that an object is of; None if it is of none."""
+    return next((kind for kind in kinds if kind.is_one(plugin)), None)
+
+
+def _part_type(path: str) -> Use:
+    key = "space.part_types"
+
+    def check(kind: PartType) -> None:
+        # A space needs a core.
+        core = () if kind.is_root else ("schema.parts:CORE",)
+        body_space(Space(part_types=(*core, path)))
+
+    return Use(key, path, lambda: load_instance(path, key, PartType), check)
+
+
+def _part_types(experiment: Experiment) -> Iterator[Use]:
+    for path in experiment.space.part_types:
+        yield _part_type(path)
+
+
+PART_TYPE = Kind(
+    "part-type",
+    {
+        f"{module.__name__}:{name}": value
+        for module in (schema.parts, schema.robogen_parts)
+        for name, value in vars(module).items()
+        if isinstance(value, PartType)
+    },
+    lambda plugin: isinstance(plugin, PartType),
+    _part_type,
+    _part_types,
+)
+
+
+def _neuron_type(path: str) -> Use:
+    return Use(
+        "space.neuron_types", path, lambda: neuron_types((path,))[0], lambda _: None
+    )
+
+
+def _neuron_types(experiment: Experiment) -> Iterator[Use]:
+    for path in experiment.space.neuron_types:
+        yield _neuron_type(path)
+
+
+def _is_neuron_type(plugin: object) -> bool:
+    return all(hasattr(plugin, name) for name in NEURON_MEMBERS)
+
+
+NEURON_TYPE = Kind(
+    "neuron-type",
+    BUILT_IN_NEURONS,
+    _is_neuron_type,
+    # Loading one checks it.
+    _neuron_type,
+    _neuron_types,
+)
+KINDS = (PART_TYPE, NEURON_TYPE)
+"""Kinds whose checks need no other room."""

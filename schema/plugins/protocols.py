@@ -1,0 +1,453 @@
+"""Protocols of plug-ins: what each kind gets and returns."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol, Self, TypeVar, runtime_checkable
+
+import numpy as np
+from msgspec import Struct
+
+from schema.parts import Parameter, PartType, Vector
+from schema.robot.brain import Brain, Layer, NeuronKinds, Widths
+from schema.robot.genome import ConnectionGene, NeuronGene
+from schema.robot.ids import BirthId
+from schema.robot.neurons import Tick
+from schema.robot.results import Floats
+from schema.robot.robot import Robot
+
+T = TypeVar("T")
+
+Genome = TypeVar("Genome")
+"""Type of the genomes of an encoding: immutable, compared by value."""
+Made_co = TypeVar("Made_co", covariant=True)
+
+
+class Encoding(Protocol[Genome]):
+    """Encoding of robots in genomes, ``encoding.type``; runs in the coordinator.
+
+    The experiment names a class. It is called once for each island, as
+    ``Class(experiment, types, parameters)``: the settings of the island, whose
+    limits of robots are ``experiment.space``; the part types by name; and the
+    parameters: an instance of the msgspec Struct that the class has as its attribute
+    ``Parameters``, read from the table ``[encoding.parameters]``; None without it.
+
+    All methods are pure functions of the object and their arguments: no clock, file
+    or global random state, and nothing is kept from one call to the next. ``rng`` is
+    a ``numpy.random.Generator`` (PCG64) that belongs to this attempt at this birth
+    alone, ``SeedSequence(seed, spawn_key=(run, island, birth, attempt, purpose))``;
+    `crossover` and `mutate` of one attempt get the same one, in this order. Draw from
+    nothing else: then births do not depend on the number of workers.
+
+    The run ends with one line if a method raises. A robot that breaks a limit of
+    ``[space]`` counts as a failed attempt at its birth.
+    """
+
+    def random(self, rng: np.random.Generator, birth: BirthId) -> Genome:
+        """Return the genome of a random robot.
+
+        Args:
+            rng: the only source of randomness.
+            birth: id of the individual; identities of its genes may derive from it.
+        """
+        ...
+
+    def develop(self, genome: Genome) -> Robot:
+        """Return the robot that a genome describes.
+
+        The robot is well formed (``check_robot``) and within the limits of
+        ``[space]``: numbers of parts, inputs, outputs and hidden neurons; planar if
+        the experiment says so. Whether its parts intersect, and whether it has a
+        motor, is checked later.
+        """
+        ...
+
+    def crossover(
+        self, first: Genome, second: Genome, rng: np.random.Generator
+    ) -> Genome | None:
+        """Return a genome made of two parents', or None if they cannot mate.
+
+        Args:
+            first: genome of a parent.
+            second: genome of the other one, which was selected second.
+            rng: the only source of randomness.
+        """
+        ...
+
+    def mutate(
+        self, genome: Genome, rng: np.random.Generator, birth: BirthId
+    ) -> Genome | None:
+        """Return a mutated genome, or None if no robot may develop from it.
+
+        Args:
+            genome: what `crossover` returned.
+            rng: the only source of randomness, as `crossover` left it.
+            birth: id of the child; identities of its new genes may derive from it.
+        """
+        ...
+
+    def to_bytes(self, genome: Genome) -> bytes:
+        """Return a genome as bytes, for tables and the journal; at most 1 MiB."""
+        ...
+
+    def from_bytes(self, data: bytes) -> Genome:
+        """Return the genome that `to_bytes` wrote.
+
+        Raises:
+            ValueError: other bytes.
+        """
+        ...
+
+
+@runtime_checkable
+class OneStepMating(Protocol[Genome]):
+    """Encoding that crosses and mutates in one step; the two methods are not called."""
+
+    def mate(
+        self, first: Genome, second: Genome, rng: np.random.Generator, birth: BirthId
+    ) -> Genome | None:
+        """Return the genome of a child, or None; arguments as of the two methods."""
+        ...
+
+
+@runtime_checkable
+class RobotEncoding(Protocol[Made_co]):
+    """Encoding that can describe a given robot.
+
+    Only with such an encoding can an operator insert a robot's file into an arena.
+    """
+
+    def from_robot(self, robot: Robot) -> Made_co:
+        """Return a genome from which a robot develops.
+
+        Raises:
+            ValueError: the encoding cannot describe this robot.
+        """
+        ...
+
+
+class SensorView(Protocol):
+    """What a sensor of a plug-in sees at a tick: its part, and what is around it.
+
+    The view is valid during ``read`` only. Names of boxes are those of the part's
+    shape; cylinders count as boxes. An unknown name raises ``KeyError``.
+    """
+
+    @property
+    def age_s(self) -> float:
+        """Simulated time since the robot's birth [s]."""
+
+    @property
+    def joint_angle(self) -> float:
+        """Angle [rad] or displacement [m] of the part's joint; 0 without a joint."""
+
+    @property
+    def joint_speed(self) -> float:
+        """Velocity of the part's joint [rad/s] or [m/s]; 0 without a joint."""
+
+    @property
+    def light(self) -> Vector | None:
+        """Position of the light, world frame [m]; None in a world without light."""
+
+    @property
+    def others(self) -> Floats:
+        """Centres of the cores of all other robots, (N, 3), world frame [m].
+
+        By birth; N = 0 off-line.
+        """
+
+    def position(self, box: str) -> Floats:
+        """Return the centre of a box, (3,), world frame [m]."""
+
+    def rotation(self, box: str) -> Floats:
+        """Return the rotation from a box's frame to the world frame, (3, 3)."""
+
+    def touches(self, box: str) -> bool:
+        """Return whether a box was in contact in the last step.
+
+        Contacts with its own rigid segment, or one that a joint connects to it, do
+        not exist.
+        """
+
+    def distance(
+        self,
+        box: str,
+        direction: Vector,
+        reach: float,
+        start: Vector = (0.0, 0.0, 0.0),
+    ) -> float:
+        """Return how far a ray gets [m].
+
+        The ray passes through the rigid segment of the box and meets everything else:
+        the ground, scenery, other robots, and other segments of its own robot.
+
+        Args:
+            box: that sends the ray.
+            direction: of the ray, of length 1, in the frame of the box.
+            reach: length of the ray [m].
+            start: of the ray, in the frame of the box [m].
+
+        Returns:
+            Distance from ``start`` to what the ray meets first, or ``reach``.
+        """
+
+
+class SensorType(Protocol):
+    """Sensor of a plug-in: an object in ``PartType.sensors``.
+
+    It has no state: ``read`` is a pure function of the view. One object serves all
+    parts of its type, of all robots, off-line and in arenas, and an arena that moves
+    to another machine continues with equal readings. What ``read`` raises, a wrong
+    number of values, or one that is not finite, ends the evaluation of the robot as
+    failed, or its life in an arena; the reason names the sensor.
+    """
+
+    @property
+    def inputs(self) -> int:
+        """Number of network inputs, at least 1; always the same."""
+
+    def read(self, view: SensorView, /) -> Sequence[float]:
+        """Return the values of the inputs, finite, at every tick of the brain.
+
+        Noise of the experiment is added afterwards.
+        """
+
+
+class NeuronType(Protocol):
+    """Type of output and hidden neurons: ``space.neuron_types``; runs in workers.
+
+    The experiment names an object, or a class that is instantiated without arguments.
+    At each tick, ``step`` computes all neurons of this type of all robots together.
+    Each neuron must be computed independently of the others, so that a robot moves
+    equally alone and among others: use elementwise NumPy only.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name in robot files and tables; unique in an experiment."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Evolving parameters of each neuron, at least in this range."""
+
+    @property
+    def states(self) -> int:
+        """Number of state variables of a neuron, K >= 1; all start at 0."""
+
+    def step(
+        self, state: Floats, inputs: Floats, parameters: Floats, tick: Tick
+    ) -> Floats:
+        """Return the states of N neurons after a tick, and change no argument.
+
+        Args:
+            state: (K, N); the first row holds the outputs of the previous tick.
+            inputs: (N,) weighted sums of the sensors and of the previous outputs.
+            parameters: (P, N) in the order of ``parameters``.
+            tick: ages of the robots and time since the previous tick.
+
+        Returns:
+            (K, N), finite; the first row holds the new outputs. Motors clip outputs
+            to [0, 1]; all states are clipped to [-1e6, 1e6].
+        """
+
+
+class Draws(Protocol):
+    """Random choices for a birth; the only allowed source of randomness."""
+
+    @property
+    def number(self) -> Callable[[], float]:
+        """Function that returns the next number, uniform in [0, 1)."""
+
+    def chance(self, probability: float) -> bool:
+        """Return true with a probability; never for 0, always for 1."""
+
+    def below(self, count: int) -> int:
+        """Return an integer, uniform in 0..count - 1; count >= 1."""
+
+    def pick(self, items: Sequence[T]) -> T:
+        """Return one item, uniformly; there must be at least one."""
+
+    def rounded(self, expected: float) -> int:
+        """Return a neighbouring integer whose mean is ``expected``, >= 0."""
+
+    def values(self, parameters: Sequence[Parameter]) -> tuple[float, ...]:
+        """Return one value for each parameter, uniform in its range."""
+
+    def nearby(
+        self,
+        parameters: Sequence[Parameter],
+        values: Sequence[float],
+        epsilon: float,
+    ) -> tuple[float, ...]:
+        """Return values moved by the share ``epsilon`` of the way to random ones."""
+
+
+class Branch(Protocol):
+    """Part of a genome that is being made or varied.
+
+    Attributes:
+        outputs: one neuron for each motor of the part.
+        hidden: hidden neurons of the part.
+        connections: from neurons of this part; assign a new tuple to change them.
+    """
+
+    outputs: tuple[NeuronGene, ...]
+    hidden: tuple[NeuronGene, ...]
+    connections: tuple[ConnectionGene, ...]
+
+    @property
+    def kind(self) -> PartType:
+        """Part type."""
+
+    @property
+    def parent(self) -> Self | None:
+        """Parent; None for the core."""
+
+    @property
+    def children(self) -> Mapping[int, Self]:
+        """Children by slot, ascending."""
+
+    def neurons(self, *layers: Layer) -> list[tuple[Layer, int]]:
+        """Return (layer, offset) of its own neurons, in the order of the layers."""
+
+    def path_to(self, other: Self) -> tuple[int, ...]:
+        """Return the path of a connection from this part to one of the same tree."""
+
+    def along(self, path: tuple[int, ...]) -> Self | None:
+        """Return the part at the end of a path; None if the path does not exist."""
+
+
+class BrainRules(Struct, frozen=True):
+    """Settings of an experiment that random and varied brains keep.
+
+    Attributes:
+        max_hidden: greatest number of hidden neurons of a robot.
+        p_connect_neurons: probability of each possible connection.
+        hidden_on: parts that get hidden neurons at random: ``any`` or ``wired``.
+        p_delete_hidden_neuron, p_remove_brain_connection: probabilities of mutation.
+        epsilon: step size of parameters, as a share of the way to a random value.
+        hidden_rounding: rounding of the number of hidden neurons to add.
+    """
+
+    max_hidden: int
+    p_connect_neurons: float
+    hidden_on: str
+    p_delete_hidden_neuron: float
+    p_remove_brain_connection: float
+    epsilon: float
+    hidden_rounding: str
+
+
+class BrainGenes(Protocol):
+    """Half of a brain type that runs in the coordinator: how genes make brains.
+
+    Every method changes ``outputs``, ``hidden`` and ``connections`` of branches in
+    place and draws numbers only from ``draws``. Branches are depth first.
+    """
+
+    @property
+    def neurons(self) -> NeuronKinds:
+        """Types of output and hidden neurons by name, with their parameters."""
+
+    def outputs(self, draws: Draws, part: PartType) -> tuple[NeuronGene, ...]:
+        """Return the output neurons of a new part: exactly one for each motor."""
+
+    def grow(
+        self,
+        draws: Draws,
+        new: Sequence[Branch],
+        branches: Sequence[Branch],
+        rules: BrainRules,
+    ) -> None:
+        """Add hidden neurons and connections to new parts, which have outputs only.
+
+        Args:
+            draws: source of all choices.
+            new: all parts of a random robot, or the part that mutation added.
+            branches: all parts of the robot.
+            rules: of the experiment.
+        """
+
+    def prune(
+        self, draws: Draws, branches: Sequence[Branch], rules: BrainRules
+    ) -> object:
+        """Mutate a child, first half: before the parameters of its parts vary.
+
+        Crossover and mutation of the body may have left connections whose path or
+        whose neurons do not exist; development ignores these.
+
+        Returns:
+            Anything that ``vary`` needs.
+        """
+
+    def vary(
+        self,
+        draws: Draws,
+        branches: Sequence[Branch],
+        rules: BrainRules,
+        pruned: Any,  # noqa: ANN401 - whatever prune returned
+    ) -> None:
+        """Mutate a child, second half: before mutation adds parts."""
+
+
+class Bank(Protocol):
+    """Brains of R robots that are updated together; row r belongs to robot r.
+
+    Attributes:
+        states: (R, K) all that a brain keeps between ticks, 0 at birth; K depends
+            on nothing but the experiment. The caller reads and writes rows, to save,
+            move and restore robots.
+    """
+
+    @property
+    def states(self) -> Floats:
+        """All states, (R, K)."""
+
+    def step(self, readings: Floats, age_ticks: Floats | float) -> Floats:
+        """Update all brains once.
+
+        Args:
+            readings: (R, I) sensor readings; unused inputs are 0.
+            age_ticks: (R, 1) ticks since each robot's birth, or one number.
+
+        Returns:
+            (R, O) outputs, which motors clip to [0, 1]; may be a view that the next
+            tick overwrites.
+        """
+
+
+class BrainControl(Protocol):
+    """Half of a brain type that runs in workers: how brains tick."""
+
+    @property
+    def neurons(self) -> NeuronKinds:
+        """Types of output and hidden neurons by name, with their parameters."""
+
+    def pack(self, brain: Brain, width: Widths) -> Any:  # noqa: ANN401 - its own
+        """Return a brain in the form that ``bank`` takes, as arrays for example.
+
+        Args:
+            brain: a checked brain of this type's neurons, within the widths.
+            width: greatest numbers of neurons.
+        """
+
+    def bank(self, packed: Sequence[Any], width: Widths, tick_s: float) -> Bank:
+        """Return R >= 0 brains that are updated together, at rest.
+
+        A robot must get the same outputs, to the last bit, alone and in any row of
+        any batch: use arrays of fixed width, elementwise functions, and ``matmul``
+        with one slice for each robot.
+
+        Args:
+            packed: R results of ``pack``.
+            width: greatest numbers of neurons.
+            tick_s: time between two ticks [s].
+        """
+
+
+class BrainType(BrainGenes, BrainControl, Protocol):
+    """Type of brain: ``brain.type``; one class with both halves.
+
+    The class is instantiated in each process with the parameters ``brain.parameters``
+    and the neuron types of the experiment: ``Type(parameters, neuron_types)``. Its
+    attribute ``Parameters`` is the msgspec Struct of its parameters; without it the
+    brain type has none.
+    """

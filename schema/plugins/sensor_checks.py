@@ -1,0 +1,168 @@
+"""Check of own sensors, on hand-made views."""
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import SupportsFloat
+
+import numpy as np
+
+from schema.errors import ExperimentError, cut, shown
+from schema.parts import Box, OwnSensor, Shape, Vector
+from schema.plugins.origin import where_defined
+from schema.robot.results import Floats
+
+MOST_INPUTS = 1000
+"""Most inputs of one sensor."""
+_PLAIN = Shape((Box("body", (0.1, 0.1, 0.1), (0.0, 0.0, 0.0), 0.1),), ())
+
+
+@dataclass(frozen=True, slots=True)
+class HandMadeView:
+    """View of a part at the origin, upright, joint at an angle; a ``SensorView``.
+
+    Attributes:
+        shape: of the part.
+        age_s, joint_angle, joint_speed, light, others: as in the protocol.
+        obstacle_m: distance of what all rays meet [m].
+        is_touched: whether all boxes touch something.
+    """
+
+    shape: Shape
+    age_s: float
+    joint_angle: float
+    joint_speed: float
+    light: Vector | None
+    others: Floats
+    obstacle_m: float
+    is_touched: bool
+
+    def position(self, box: str) -> Floats:
+        """Return the centre of a box in the part's frame."""
+        return np.array(self._box(box).position, dtype=np.float64)
+
+    def rotation(self, box: str) -> Floats:
+        """Return the rotation of a box in the part's frame."""
+        return np.array(self._box(box).rotation, dtype=np.float64)
+
+    def touches(self, box: str) -> bool:
+        """Return whether anything is touched."""
+        self._box(box)
+        return self.is_touched
+
+    def distance(
+        self,
+        box: str,
+        direction: Vector,
+        reach: float,
+        start: Vector = (0.0, 0.0, 0.0),
+    ) -> float:
+        """Return the distance of the obstacle, or ``reach``."""
+        self._box(box)
+        ray_problem(direction, reach, start)
+        return min(self.obstacle_m, reach)
+
+    def _box(self, name: str) -> Box:
+        return {box.name: box for box in self.shape.boxes}[name]
+
+
+def ray_problem(direction: Vector, reach: float, start: Vector) -> None:
+    """Raise ValueError unless a sensor's ray is well defined."""
+    if abs(math.hypot(*direction) - 1.0) > 1e-6:  # noqa: PLR2004
+        raise ValueError(f"direction must have length 1, got {direction}")
+    if not (math.isfinite(reach) and reach > 0.0):
+        raise ValueError(f"reach must be finite and > 0, got {reach}")
+    if not all(map(math.isfinite, start)):
+        raise ValueError(f"start must be finite, got {start}")
+
+
+def check_sensor(
+    sensor: OwnSensor, where: str = "sensor", shape: Shape = _PLAIN
+) -> None:
+    """Raise unless an own sensor keeps its contract on three hand-made views.
+
+    The views: at birth with nothing around; later, in touch, with a light and two other
+    robots; and alone with an obstacle at hand.
+
+    Args:
+        sensor: the sensor.
+        where: what holds it, for messages.
+        shape: of its part; the default has one box, ``body``.
+
+    Raises:
+        ExperimentError: no whole number of inputs; no ``read`` of one argument; it
+            raises, returns another number of values, one that is not a finite number,
+            or different values for one view.
+    """
+    at = f"{where}: {where_defined(sensor)}: {type(sensor).__name__}"
+    inputs = getattr(sensor, "inputs", None)
+    if type(inputs) is not int or not 1 <= inputs <= MOST_INPUTS:
+        raise ExperimentError(
+            f"{at}.inputs: must be a whole number from 1 to {MOST_INPUTS}, "
+            f"got {shown(inputs)}"
+        )
+    if not callable(getattr(sensor, "read", None)):
+        raise ExperimentError(f"{at}: must have a method read(view), got none")
+    for name, view in _views(shape).items():
+        found = [_read(sensor, view, f"{at}.read of a part {name}") for _ in range(2)]
+        if found[0] != found[1]:
+            raise ExperimentError(
+                f"{at}.read: must return the same for the same view, "
+                f"got {found[0]} and {found[1]} for a part {name}"
+            )
+
+
+def _read(sensor: OwnSensor, view: HandMadeView, at: str) -> list[float]:
+    try:
+        return values_of(sensor, sensor.read(view))
+    except Exception as error:
+        # A ValueError of ``values_of`` says what was expected.
+        story = f"{type(error).__name__}: {error}"
+        raise ExperimentError(f"{at}: {cut(story)}") from error
+
+
+def values_of(sensor: OwnSensor, found: Iterable[object]) -> list[float]:
+    """Return the values that a sensor has read as plain floats.
+
+    Args:
+        sensor: that has read them.
+        found: what its ``read`` returned.
+
+    Raises:
+        ValueError: another number of values, or one that is not a finite number.
+    """
+    try:
+        values = [_number(value) for value in found]
+    except TypeError:
+        raise ValueError(f"must return numbers, got {shown(found)}") from None
+    if len(values) != sensor.inputs:
+        raise ValueError(
+            f"must return {sensor.inputs} values, its inputs, got {len(values)}"
+        )
+    if not all(map(math.isfinite, values)):
+        raise ValueError(f"must return finite numbers, got {shown(values)}")
+    return values
+
+
+def _number(value: object) -> float:
+    if isinstance(value, SupportsFloat):  # a text is none
+        return float(value)
+    raise TypeError
+
+
+def _views(shape: Shape) -> dict[str, HandMadeView]:
+    """Return the views by what they show."""
+    speed = 0.0 if shape.joint is None else 0.5
+    angle = 0.0 if shape.joint is None else min(0.1, shape.joint.limit)
+    alone, crowd = np.zeros((0, 3)), np.array([(0.3, 0.0, 0.0), (-1.0, 2.0, 0.1)])
+    return {
+        "at birth": HandMadeView(
+            shape, 0.0, 0.0, 0.0, None, alone, math.inf, is_touched=False
+        ),
+        "in a crowd": HandMadeView(
+            shape, 12.5, angle, speed, (0.0, 0.0, 1.0), crowd, 0.3, is_touched=True
+        ),
+        "at an obstacle": HandMadeView(
+            shape, 60.0, -angle, -speed, None, alone, 1e-3, is_touched=False
+        ),
+    }

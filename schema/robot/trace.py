@@ -1,0 +1,150 @@
+"""Recording of a robot's motion: what fitness functions and measures get."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from schema.errors import ExperimentError
+from schema.robot.robot import Robot
+
+Floats = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+Counts = npt.NDArray[np.int64]
+
+RECORDED = (
+    "core_attitude",
+    "joint_angle",
+    "joint_velocity",
+    "joint_torque",
+    "energy",
+    "contact",
+    "readings",
+    "neighbours",
+)
+"""Channels with a value per sample, which exist only if a function declares them."""
+COMPUTED = ("part_position",)
+"""Channels with one value, which exist only if a function declares them."""
+CONSTANT = ("light", "robot", "mass", "gravity")
+"""Channels with one value, which always exist; they may be declared, too."""
+NEIGHBOUR_M = 0.5
+"""Greatest distance between the cores of two robots that are neighbours [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trace:
+    """Recording of one robot over its fitness window, in T samples.
+
+    A function that reads a channel of ``RECORDED`` or ``COMPUTED`` declares it with the
+    decorator ``needs``; a channel that no function of the experiment declares is not
+    recorded.
+
+    Attributes:
+        interval_s: time between two samples [s].
+        core_position: (T, 3) centre of the core, world frame, z up [m]; sample 0
+            is the start of the window, T >= 2.
+        channels: the other values by name; read them as attributes.
+    """
+
+    interval_s: float
+    core_position: Floats
+    channels: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def duration_s(self) -> float:
+        """Time between the first sample and the last one [s]."""
+        return (len(self.core_position) - 1) * self.interval_s
+
+    @property
+    def core_attitude(self) -> Floats:
+        """(T, 4) unit quaternions w, x, y, z of the core, core to world frame."""
+        return cast("Floats", self._channel("core_attitude"))
+
+    @property
+    def joint_angle(self) -> Floats:
+        """(T, J) positions of all joints, driven or not, in part order [rad or m]."""
+        return cast("Floats", self._channel("joint_angle"))
+
+    @property
+    def joint_velocity(self) -> Floats:
+        """(T, J) velocities of the joints [rad/s or m/s]."""
+        return cast("Floats", self._channel("joint_velocity"))
+
+    @property
+    def joint_torque(self) -> Floats:
+        """(T, J) torques, or forces, of the motors in the last step [N m or N].
+
+        It is 0 for joints without a motor.
+        """
+        return cast("Floats", self._channel("joint_torque"))
+
+    @property
+    def energy(self) -> Floats:
+        """(T,) absolute mechanical work of the motors since sample 0 [J].
+
+        The sum over physics steps and motors of abs(torque x displacement): a motor
+        that brakes takes as much energy as one that drives.
+        """
+        return cast("Floats", self._channel("energy"))
+
+    @property
+    def contact(self) -> Mask:
+        """(T, P) whether each part touched anything but its own robot.
+
+        As of the last physics step before the sample; at the start, of the initial
+        position.
+        """
+        return cast("Mask", self._channel("contact"))
+
+    @property
+    def readings(self) -> Floats:
+        """(T, I) latest readings of all sensors, without noise, in the brain's order.
+
+        Units: m/s2 and rad/s of an imu, 0 to 1 of touch and light.
+        """
+        return cast("Floats", self._channel("readings"))
+
+    @property
+    def neighbours(self) -> Counts:
+        """(T,) number of robots whose core is within ``NEIGHBOUR_M``; 0 off-line."""
+        return cast("Counts", self._channel("neighbours"))
+
+    @property
+    def part_position(self) -> Floats:
+        """(P, 3) origins of the parts with all joints at 0, core frame [m]."""
+        return cast("Floats", self._channel("part_position"))
+
+    @property
+    def light(self) -> tuple[float, float, float] | None:
+        """Position of the light, world frame [m]; None if there is none."""
+        return cast("tuple[float, float, float] | None", self._channel("light"))
+
+    @property
+    def robot(self) -> Robot:
+        """Body and brain."""
+        return cast("Robot", self._channel("robot"))
+
+    @property
+    def mass(self) -> float:
+        """Mass of the whole robot [kg]."""
+        return cast("float", self._channel("mass"))
+
+    @property
+    def gravity(self) -> float:
+        """Acceleration of free fall, ``simulation.gravity`` [m/s2]."""
+        return cast("float", self._channel("gravity"))
+
+    def _channel(self, name: str) -> object:
+        """Return a channel.
+
+        Raises:
+            ExperimentError: it was not declared.
+        """
+        if name in self.channels:
+            return self.channels[name]
+        raise ExperimentError(
+            f'trace.{name} is not recorded: declare it with @needs("{name}") above the '
+            "function"
+        )

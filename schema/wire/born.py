@@ -1,0 +1,33 @@
+"""Robot of a row of the births table."""
+
+from schema.errors import RunFolderError
+from schema.experiment.document import REVOLVE_ANGLE, Experiment, body_space
+from schema.robot.genome import develop
+from schema.robot.robot import Robot, check_types
+from schema.wire.codec import decode_genome, decode_robot
+
+
+def robot_of_birth(genome: bytes, robot: bytes | None, experiment: Experiment) -> Robot:
+    """Return the robot that was born.
+
+    Args:
+        genome: column of that name.
+        robot: column of that name; null in runs of the encoding ``revolve-angle``.
+        experiment: of the run.
+
+    Raises:
+        MalformedMessage: invalid bytes.
+        InvalidRobot: the robot does not fit the part types of the experiment.
+        RunFolderError: neither a robot nor a genome of ``revolve-angle``.
+    """
+    types = body_space(experiment.space)
+    if robot is not None:
+        found = decode_robot(robot)
+        check_types(found, types)
+        return found
+    if experiment.encoding.type != REVOLVE_ANGLE:
+        raise RunFolderError(
+            f"births: a genome of encoding {experiment.encoding.type!r} has no robot "
+            f"beside it, and only genomes of {REVOLVE_ANGLE!r} can be read here"
+        )
+    return develop(decode_genome(genome), types)

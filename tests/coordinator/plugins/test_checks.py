@@ -1,0 +1,159 @@
+"""Checks of plug-ins: each fault is one line with key, file, line and expectation."""
+
+import io
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from coordinator.__main__ import plugin_kinds
+from coordinator.plugins.checks import check_apart, check_here, refuse_faulty
+from schema.errors import ExperimentError
+from schema.plugins import permission
+
+Steps = list[tuple[str, str]]
+
+GOOD = """
+from worker.fitness import straight_velocity
+
+def judge(track, fitness):
+    return straight_velocity(track)
+"""
+
+
+@pytest.fixture(autouse=True)
+def _nothing_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(permission, "_allowed", {})
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Callable[[str], Path]:
+    """Return a function that writes a plug-in file with a name of its own."""
+
+    def write(text: str) -> Path:
+        # Modules stay imported, so each test has its own.
+        file = tmp_path / f"{tmp_path.name.replace('-', '_')}.py"
+        file.write_text(text)
+        return file
+
+    return write
+
+
+def checked(*words: str, kind: str | None = None) -> Steps:
+    output = io.StringIO()
+    check_here(words, plugin_kinds(), kind, output, 30.0)
+    return [tuple(json.loads(line)) for line in output.getvalue().splitlines()]
+
+
+def test_a_fitness_function_is_recognised_and_in_order(
+    lab: Callable[[str], Path],
+) -> None:
+    file = lab(GOOD)
+    path = f"{file.stem}:judge"
+    assert checked(f"{file}:judge") == [
+        ("begin", f"{file}:judge"),
+        ("begin", f"fitness.function: {path}"),
+        ("begin", f"fitness.function: {file.name}:4"),
+        ("fine", f"{path}: fitness at {file.name}:4: in order"),
+    ]
+
+
+def test_a_part_type_is_recognised() -> None:
+    (*_, (step, text)) = checked("schema.parts:HINGE")
+    assert step == "fine"
+    assert re.search(r"part-type at parts\.py:\d+: in order", text)
+
+
+FAULTS = {
+    "missing": (GOOD, "nobody", "FILE.py: .* has no 'nobody'"),
+    "misspelt": (GOOD, "juge", "has no 'juge'; did you mean '.*:judge'"),
+    "arity": ("def f(a):\n    return 1.0", "f", "FILE.py:1: must be of one of the"),
+    "type": ("\ndef f(a, b):\n    return 'x'", "f", "FILE.py:2: must return a number"),
+    "finite": ("def f(a, b):\n    return 1e999", "f", "FILE.py:1: .* finite number"),
+    "repeatable": (
+        "from random import random\ndef f(a, b):\n    return random()",
+        "f",
+        "FILE.py:2: must return the same for the same track",
+    ),
+    "raising": (
+        "def f(a, b):\n    c = 0\n    return 1 / c",
+        "f",
+        r"FILE.py:1: raised ZeroDivisionError: .* \(FILE.py:3\)",
+    ),
+    "exiting": (
+        "import sys\ndef f(a, b):\n    sys.exit(3)",
+        "f",
+        r"FILE.py:2: raised SystemExit: 3 \(FILE.py:3\)",
+    ),
+    "import": ("a = 1\nb = a / 0", "f", "FILE.py:2: .*ZeroDivisionError"),
+    "import-exits": ("\nexit(4)", "f", "FILE.py:2: .*SystemExit: 4"),
+    "syntax": ("def f(:\n", "f", "SyntaxError: .*FILE.py, line 1"),
+    "number": ("f = 3", "f", "must be of one of the kinds .*, got a int"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_each_fault_is_one_line(lab: Callable[[str], Path], fault: str) -> None:
+    text, name, expected = FAULTS[fault]
+    file = lab(text)
+    step, line = checked(f"{file}:{name}")[-1]
+    assert step == "fault"
+    assert "\n" not in line
+    pattern = expected.replace("FILE.py", re.escape(file.name))
+    assert re.search(pattern, line), line
+
+
+def test_kind_may_be_said(lab: Callable[[str], Path]) -> None:
+    file = lab("def f(a):\n    return 1.0")
+    step, line = checked(f"{file}:f", kind="fitness")[-1]
+    assert step == "fault"
+    assert f"{file.name}:1: '{file.stem}:f' must take 2 arguments" in line
+
+
+def test_plug_in_that_prints_does_not_disturb_the_report(
+    lab: Callable[[str], Path],
+) -> None:
+    file = lab("def f(a, b):\n    print('hello')\n    return 1.0")
+    assert checked(f"{file}:f")[-1][0] == "fine"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            "import time\ndef f(a, b):\n    time.sleep(60)",
+            r"FILE.py:2: must take at most 1 s, but was still at FILE.py:3",
+        ),
+        (
+            "import time\ntime.sleep(60)",
+            r"FILE.py:f: must take at most 1 s, but was still at FILE.py:2",
+        ),
+        (
+            "import os\ndef f(a, b):\n    os._exit(5)",
+            r"FILE.py:2: must not end its process, but did, with status 5",
+        ),
+    ],
+)
+def test_check_of_a_slow_or_exiting_plug_in_ends(
+    lab: Callable[[str], Path], text: str, expected: str
+) -> None:
+    file = lab(text)
+    good: list[str] = []
+    words = ["worker.fitness:thesis", f"{file}:f"]
+    (line,) = check_apart(words, good.append, limit_s=1.0)
+    assert re.search(expected.replace("FILE.py", re.escape(file.name)), line), line
+    assert len(good) == 1
+
+
+def test_experiment_is_refused_before_its_plug_ins_are_imported_here(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "refused_lab.py").write_text("def f(a, b):\n    return a\n")
+    document = tmp_path / "mine.toml"
+    document.write_text('name = "x"\n[fitness]\nfunction = "refused_lab:f"\n')
+    expected = r"^fitness\.function: refused_lab\.py:1: must return a number, got Tr"
+    with pytest.raises(ExperimentError, match=expected):
+        refuse_faulty(["scenario1", str(document)])
+    assert permission.allowed() == ()

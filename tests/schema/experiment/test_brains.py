@@ -1,0 +1,121 @@
+"""Brain types and neuron types of an experiment, by name."""
+
+from pathlib import Path
+
+import pytest
+
+from schema.errors import ExperimentError
+from schema.experiment.brains import neuron_kinds, neuron_types
+from schema.experiment.document import NETWORK, BrainSection, Space, references
+from schema.experiment.file import (
+    experiment_from_text,
+    experiment_text,
+    parse_experiment,
+)
+from schema.experiment.section import stable_json
+from schema.experiment.settings import evaluation_settings, evaluation_settings_of
+from schema.formats.files import read_robot, write_robot
+from schema.plugins import permission
+from schema.robot.brain import NEURON_TYPES, Brain, Neuron
+from schema.robot.robot import Part, Robot
+
+own = pytest.mark.usefixtures("_own_brains")
+GREY = (0.5, 0.5, 0.5)
+TIRED = '[space]\nneuron_types = ["Sigmoid", "my_brains:Adapting"]\n'
+WAVES = '[brain]\ntype = "my_brains:Wave"\n[brain.parameters]\nfrequency_hz = 2\n'
+
+
+def parse(text: str, where: str = "mine.toml") -> object:
+    return parse_experiment(f'name = "x"\n{text}', where)
+
+
+def test_the_default_is_the_thesis() -> None:
+    names = [kind.name for kind in neuron_types(Space().neuron_types)]
+    assert names == list(NEURON_TYPES)
+    assert neuron_kinds(NETWORK, Space()) == NEURON_TYPES
+
+
+def test_settings_of_the_thesis_keep_their_digest() -> None:
+    """States of arenas hold it; keys that came later must not change it."""
+    experiment = parse_experiment('name = "x"\n', "x.toml")
+    document = stable_json(evaluation_settings_of(experiment))
+    assert b"neuron_types" not in document
+    assert b'"brain"' not in document
+    changed = parse_experiment('name = "x"\n[brain]\ntype = "cpg"\n', "x.toml")
+    assert b'"brain"' in stable_json(evaluation_settings_of(changed))
+
+
+@own
+def test_own_types_are_named_in_documents_requests_and_references() -> None:
+    experiment = parse_experiment(f'name = "x"\n{TIRED}{WAVES}', "x.toml")
+    assert references(experiment)[-2:] == ["my_brains:Adapting", "my_brains:Wave"]
+    assert experiment_from_text(experiment_text(experiment)) == experiment
+    assert b'"my_brains:Wave"' in evaluation_settings(experiment)
+    assert list(neuron_kinds(experiment.brain, experiment.space)) == ["Waver"]
+    tired = neuron_kinds(NETWORK, experiment.space)
+    assert list(tired) == ["Sigmoid", "Adapting"]
+    assert [each.name for each in tired["Adapting"]] == ["rise_s", "fatigue", "drive"]
+
+
+@own
+def test_robots_with_own_neurons_are_written_and_read(tmp_path: Path) -> None:
+    experiment = parse_experiment(f'name = "x"\n{TIRED}', "x.toml")
+    kinds = neuron_kinds(experiment.brain, experiment.space)
+    robot = Robot(
+        (Part("Core", -1, -1, -1, 0, GREY), Part("ActiveHinge", 0, 0, 0, 0, GREY)),
+        Brain(
+            (
+                *(Neuron("input", "Input", 0) for _ in range(6)),
+                Neuron("output", "Adapting", 1, (0.5, 0.1, 0.25)),
+            )
+        ),
+    )
+    for ending in ("yaml", "pb", "xml"):
+        file = tmp_path / f"robot.{ending}"
+        settings = evaluation_settings_of(experiment)
+        write_robot(robot, file, settings=settings, kinds=kinds)
+        assert read_robot(file, kinds=kinds) == robot
+        with pytest.raises(Exception, match=r"one of Simple, .*Adapting"):
+            read_robot(file)
+    assert "fatigue: 0.1" in (tmp_path / "robot.yaml").read_text()
+
+
+@own
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('[brain]\ntype = "cpgs"', "brain.type: must be one of network, cpg or "),
+        ('[brain]\ntype = "cpgs"', "did you mean 'cpg'"),
+        ('[brain]\ntype = "my_brains:Waves"', r"brain\.type: my_brains\.py:\d+: "),
+        ('[brain]\ntype = "my_brains:Wav"', "did you mean 'my_brains:Wave"),
+        ('[brain]\ntype = "my_brains:np"', "expected a class, got an object of type"),
+        ('[brain]\ntype = "my_brains:Adapting"', "expected a class of 2 arguments"),
+        ("[brain]\nparameters = {a = 1}", r"brain\.parameters\.'a': no such key"),
+        (WAVES.replace("2", '"fast"'), r"brain\.parameters\.frequency_hz: Expected"),
+        ("[space]\nneuron_types = []", "must name at least one type"),
+        ('[space]\nneuron_types = ["Simpel"]', "did you mean 'Simple'"),
+        (
+            '[space]\nneuron_types = ["Simple", "Simple"]',
+            "two types are named 'Simple'",
+        ),
+        (
+            '[space]\nneuron_types = ["my_brains:Wave"]',
+            "expected a class of 0 arguments",
+        ),
+        ('[space]\nneuron_types = ["my_brains:np"]', "expected an attribute 'name'"),
+    ],
+)
+def test_a_wrong_name_or_object_is_refused(text: str, message: str) -> None:
+    with pytest.raises(ExperimentError, match=message) as caught:
+        parse(text)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_module_that_is_not_allowed_is_not_imported(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(permission, "_allowed", {})
+    with pytest.raises(ExperimentError, match="module 'intruder' is not allowed"):
+        neuron_kinds(BrainSection(type="intruder:Brain"), Space())
+    with pytest.raises(ExperimentError, match="module 'intruder' is not allowed"):
+        neuron_types(("intruder:Neuron",))

@@ -1,0 +1,92 @@
+"""File and line of a plug-in's code."""
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from schema.plugins import permission
+from schema.plugins.load import load_object
+from schema.plugins.origin import where_defined, where_named, where_raised
+
+SOURCE = '''"""Plug-ins of a lab."""
+
+from functools import lru_cache
+
+
+def judge(trace, parameters):
+    return 1.0
+
+
+@lru_cache
+def cached(trace):
+    return 1.0
+
+
+class Rule:
+    pass
+
+
+RULE = Rule()
+TYPED: Rule = Rule()
+
+
+def fails():
+    return 1 / 0
+'''
+
+
+@pytest.fixture
+def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Return the name of a plug-in module of its own."""
+    name = f"lab_{tmp_path.name}"
+    (tmp_path / f"{name}.py").write_text(SOURCE)
+    monkeypatch.setattr(permission, "_allowed", {})
+    permission.allow([str(tmp_path / f"{name}.py")])
+    return name
+
+
+@pytest.mark.parametrize(
+    ("attribute", "line"),
+    [("judge", 6), ("cached", 10), ("Rule", 15), ("RULE", 19), ("TYPED", 20)],
+)
+def test_file_and_line_of_a_module(lab: str, attribute: str, line: int) -> None:
+    plugin: object = load_object(f"{lab}:{attribute}", "key", {})
+    assert where_defined(plugin) == f"{lab}.py:{line}"
+
+
+def test_object_without_a_name_is_found_by_its_class(lab: str) -> None:
+    rule: type = load_object(f"{lab}:Rule", "key", {})
+    assert where_defined(rule()) == f"{lab}.py:15"
+
+
+def test_partial_function_is_found_by_the_function_inside(lab: str) -> None:
+    judge: Callable[..., float] = load_object(f"{lab}:judge", "key", {})
+    assert where_defined(partial(judge, parameters=3)) == f"{lab}.py:6"
+
+
+def test_name_stands_for_what_has_no_file() -> None:
+    assert where_defined(len) == "builtins:len"
+
+
+def test_constants_are_found_by_their_type() -> None:
+    assert where_defined(3) == "builtins:int"
+
+
+def test_line_of_a_name_in_a_module(lab: str) -> None:
+    module = permission.import_allowed(lab)
+    assert where_named(module, "RULE") == f"{lab}.py:19"
+    assert where_named(module, "judge") == f"{lab}.py:6"
+    assert where_named(module, "no_such") == f"{lab}.py"
+
+
+def test_line_that_raised(lab: str) -> None:
+    judge: Callable[..., float] = load_object(f"{lab}:judge", "key", {})
+    with pytest.raises(TypeError) as caught:
+        judge()
+    # The call failed, not the code.
+    assert where_raised(caught.value, f"{lab}.py") == ""
+    with pytest.raises(ZeroDivisionError) as caught_inside:
+        load_object(f"{lab}:fails", "key", dict[str, Callable[[], None]]())()
+    assert where_raised(caught_inside.value, f"{lab}.py") == f"{lab}.py:24"

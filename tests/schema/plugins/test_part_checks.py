@@ -1,0 +1,331 @@
+"""Part types and sensors that are refused, and why."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import pytest
+from msgspec.structs import replace as changed
+
+from schema import parts, robogen_parts
+from schema.errors import ExperimentError
+from schema.experiment.document import Space, body_space
+from schema.parts import (
+    ACTIVE_HINGE,
+    BUILT_IN,
+    FIXED_BRICK,
+    HINGE,
+    PARAMETRIC_BAR_JOINT,
+    TOUCH_SENSOR,
+    Parameter,
+    PartType,
+    Sensor,
+    Shape,
+)
+from schema.plugins.part_checks import check_part_type
+from schema.plugins.sensor_checks import check_sensor
+
+HINGED = ACTIVE_HINGE.shape(())
+BRICK = FIXED_BRICK.shape(())
+ROBOGEN = [kind for kind in vars(robogen_parts).values() if isinstance(kind, PartType)]
+
+
+def shaped(kind: PartType, shape: Shape) -> PartType:
+    """Return a type with another, constant shape."""
+    return replace(kind, shape=lambda _values: shape)
+
+
+def boxed(**changes: Any) -> PartType:  # noqa: ANN401 - any attribute of a box
+    """Return a brick with its box changed."""
+    box = changed(BRICK.boxes[0], **changes)
+    return shaped(FIXED_BRICK, changed(BRICK, boxes=(box,)))
+
+
+def slotted(**changes: Any) -> PartType:  # noqa: ANN401 - any attribute of a slot
+    """Return a brick with its second slot changed."""
+    first, second, *rest = BRICK.slots
+    return shaped(
+        FIXED_BRICK, changed(BRICK, slots=(first, changed(second, **changes), *rest))
+    )
+
+
+def jointed(**changes: Any) -> PartType:  # noqa: ANN401 - any attribute of a joint
+    """Return a hinge with its joint changed."""
+    assert HINGED.joint is not None
+    return shaped(ACTIVE_HINGE, changed(HINGED, joint=changed(HINGED.joint, **changes)))
+
+
+def driven(**changes: Any) -> PartType:  # noqa: ANN401 - any attribute of a motor
+    """Return a hinge with its motor changed."""
+    assert ACTIVE_HINGE.motor is not None
+    return replace(ACTIVE_HINGE, motor=replace(ACTIVE_HINGE.motor, **changes))
+
+
+def measured(*own: Parameter) -> PartType:
+    """Return a brick with parameters."""
+    return replace(FIXED_BRICK, own_parameters=own)
+
+
+def _thin(values: tuple[float, ...]) -> Shape:
+    """Return a brick of a size that the parameter may make 0."""
+    size = (values[0], 0.041, 0.0355)
+    return changed(BRICK, boxes=(changed(BRICK.boxes[0], size=size),))
+
+
+def _raising(values: tuple[float, ...]) -> Shape:
+    return _thin((1.0 / values[0],))
+
+
+_TURN = ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+"""A mirror image, no rotation."""
+_TAILS = tuple(box for box in HINGED.boxes if box.segment == 1)
+_SIZE = Parameter("size", 0.0, 1.0, 0.5)
+
+WRONG = {
+    "no slots": (replace(FIXED_BRICK, arity=3), r"slots: must be 3, the arity, got 4"),
+    "arity": (replace(FIXED_BRICK, arity=0), r"arity: must be .* >= 1, got 0"),
+    "name": (replace(FIXED_BRICK, name=" "), r"name: must not be empty, got ' '"),
+    "size": (
+        boxed(size=(0.1, 0.0, 0.1)),
+        r"boxes\[0\] \(body\).size: must be 3 finite numbers > 0, got \(0.1, 0.0, 0.1",
+    ),
+    "two numbers": (boxed(size=(0.1, 0.1)), r"size: must be 3 .* got \(0.1, 0.1\)"),
+    "oval": (
+        boxed(is_round=True, size=(0.1, 0.2, 0.1)),
+        r"x and y of a cylinder must be equal, got \(0.1, 0.2, 0.1\)",
+    ),
+    "mass": (boxed(mass=math.nan), r"mass: must be finite and > 0, got nan"),
+    "weightless": (boxed(mass=0.0), r"mass: must be finite and > 0, got 0.0"),
+    "place": (boxed(position=(0.0, math.inf, 0.0)), r"position: must be 3 finite"),
+    "mirrored": (boxed(rotation=_TURN), r"rotation: must be a rotation matrix"),
+    "segment": (boxed(segment=1), r"segment: must be 0 without a joint, got 1"),
+    "list": (boxed(size=[0.1, 0.1, 0.1]), r"must be tuples and numbers, got an unhash"),
+    "long normal": (
+        slotted(normal=(0.0, 2.0, 0.0)),
+        r"slots\[1\].normal: must have length 1, got \(0.0, 2.0, 0.0\) of length 2",
+    ),
+    "skew tangent": (
+        slotted(tangent=(0.0, 0.6, 0.8)),
+        r"slots\[1\].tangent: must be at right angles .* got \(0.0, 0.6, 0.8\)",
+    ),
+    "slot beyond": (slotted(segment=1), r"segment: must be 0 without a joint, got 1"),
+    "third segment": (
+        shaped(HINGE, changed(HINGED, slots=(
+            HINGED.slots[0], changed(HINGED.slots[1], segment=2)))),
+        r"segment: must be 0 or 1 with a joint, got 2",
+    ),
+    "axis": (jointed(axis=(1.0, 1.0, 0.0)), r"joint.axis: must have length 1.* 1.41"),
+    "limit": (jointed(limit=-1.0), r"joint.limit: must be finite and > 0, got -1.0"),
+    "no limit": (jointed(limit=math.inf), r"joint.limit: must be .* > 0, got inf"),
+    "wheel with limit": (
+        jointed(kind="continuous"),
+        r"joint.limit: a continuous joint has none, got 0.78",
+    ),
+    "unknown joint": (
+        jointed(kind="ball"),
+        r"joint.kind: must be one of revolute, continuous, prismatic, got 'ball'",
+    ),
+    "position of a wheel": (
+        jointed(kind="continuous", limit=math.inf),
+        r"motor.control: must be 'velocity' for a continuous joint, got 'position'",
+    ),
+    "motor": (
+        replace(FIXED_BRICK, motor=ACTIVE_HINGE.motor),
+        r"motor: needs a joint, and the shape has none",
+    ),
+    "torque": (driven(max_torque=0.0), r"max_torque: must be finite and > 0, got 0"),
+    "control": (driven(control="force"), r"control: must be one of position, velocity"),
+    "empty segment": (
+        shaped(ACTIVE_HINGE, changed(HINGED, boxes=_TAILS)),
+        r"boxes: segment 0 must have at least one, got none",
+    ),
+    "two boxes": (
+        shaped(FIXED_BRICK, changed(BRICK, boxes=2 * BRICK.boxes)),
+        r"boxes: two are named 'body'",
+    ),
+    "range": (
+        measured(Parameter("size", 1.0, 0.5, 0.7)),
+        r"own_parameters\[0\] \(size\): must be finite with .* got 1.0, 0.7, 0.5",
+    ),
+    "default": (measured(Parameter("size", 0.0, 1.0, 2.0)), r"got 0.0, 2.0, 1.0"),
+    "name of a colour": (
+        measured(Parameter("red", 0.0, 1.0, 0.5)),
+        r"own_parameters: two are named 'red'",
+    ),
+    "corner": (
+        replace(measured(_SIZE), shape=_thin),
+        r"size: must be 3 finite .* got \(0.0, 0.041, 0.0355\) \(with size = 0\)",
+    ),
+    "raising corner": (
+        replace(measured(_SIZE), shape=_raising),
+        r"shape raised ZeroDivisionError: .* \(with size = 0\)",
+    ),
+    "sensor": (
+        replace(TOUCH_SENSOR, sensors=(Sensor("touch", "middle"),)),
+        r"sensors\[0\].box: must be one of base, left, right, got 'middle'",
+    ),
+    "kind of sensor": (
+        replace(TOUCH_SENSOR, sensors=(Sensor("smell", "left"),)),  # type: ignore[arg-type]
+        r"sensors\[0\].kind: must be one of imu, touch, light, got 'smell'",
+    ),
+    "no function": (
+        replace(FIXED_BRICK, shape=BRICK),  # type: ignore[arg-type]
+        r"shape raised TypeError: .*not callable",
+    ),
+    "no shape": (
+        replace(FIXED_BRICK, shape=lambda _: None),  # type: ignore[arg-type, return-value]
+        r"shape: must return a Shape, got None",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", [*BUILT_IN.values(), *ROBOGEN])
+def test_built_in_part_types_pass(kind: PartType) -> None:
+    check_part_type(kind)
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_part_types_are_refused(name: str) -> None:
+    kind, message = WRONG[name]
+    with pytest.raises(ExperimentError, match=message) as caught:
+        check_part_type(kind, "space.part_types")
+    text = str(caught.value)
+    assert text.startswith("space.part_types: ")
+    assert "\n" not in text
+    assert f"part type {kind.name!r}: " in text
+
+
+def test_the_message_names_file_and_line_of_the_shape() -> None:
+    kind = replace(measured(_SIZE), shape=_thin)
+    line = _thin.__code__.co_firstlineno
+    with pytest.raises(
+        ExperimentError, match=rf"test_part_checks.py:{line}: part type"
+    ):
+        check_part_type(kind)
+
+
+def test_of_many_parameters_each_extreme_is_tried_alone() -> None:
+    seen: list[tuple[float, ...]] = []
+
+    def record(values: tuple[float, ...]) -> Shape:
+        seen.append(values)
+        return BRICK
+
+    own = [Parameter(f"p{number}", -1.0, 2.0, 0.0) for number in range(9)]
+    check_part_type(replace(measured(*own), shape=record))
+    found = {values[:9] for values in seen}
+    assert len(found) == 1 + 2 * 9
+    assert (0.0,) * 8 + (2.0,) in found
+
+
+def test_all_corners_of_the_bar_are_tried() -> None:
+    seen: list[tuple[float, ...]] = []
+
+    def record(values: tuple[float, ...]) -> Shape:
+        seen.append(values)
+        return PARAMETRIC_BAR_JOINT.shape(values)
+
+    check_part_type(replace(PARAMETRIC_BAR_JOINT, shape=record))
+    half = math.pi / 2
+    corners = {(x, a, 0.0) for x in (20.0, 100.0) for a in (-half, half)}
+    assert {values[:3] for values in seen} == corners | {(50.0, 0.0, 0.0)}
+
+
+def test_a_document_with_a_wrong_part_type_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    wrong = slotted(normal=(0.0, 0.0, 0.0))
+    monkeypatch.setattr(parts, "WRONG", wrong, raising=False)
+    space = Space(part_types=("schema.parts:CORE", "schema.parts:WRONG"))
+    with pytest.raises(ExperimentError, match=r"space.part_types: .*slots\[1\].normal"):
+        body_space(space)
+
+
+# --- sensors -----------------------------------------------------------------
+
+
+@dataclass
+class Nose:
+    """Sensor whose values are given."""
+
+    values: Any = (0.5,)
+    inputs: Any = 1
+    calls: list[object] = field(default_factory=list)
+
+    def read(self, view: Any) -> Sequence[float]:  # noqa: ANN401
+        self.calls.append(view)
+        found: Sequence[float] = self.values
+        return found
+
+
+class Drunk(Nose):
+    """Sensor that remembers."""
+
+    def read(self, view: Any) -> Sequence[float]:  # noqa: ANN401
+        super().read(view)
+        return (float(len(self.calls)),)
+
+
+class Blind(Nose):
+    """Sensor that raises if there is no light."""
+
+    def read(self, view: Any) -> Sequence[float]:  # noqa: ANN401
+        return (float(view.light[2]),)
+
+
+class Reaching(Nose):
+    """Sensor of a box that the part may not have."""
+
+    def read(self, view: Any) -> Sequence[float]:  # noqa: ANN401
+        return (float(view.position("tip")[0]),)
+
+
+class Longsighted(Nose):
+    """Sensor with a direction that is too long."""
+
+    def read(self, view: Any) -> Sequence[float]:  # noqa: ANN401
+        return (view.distance("body", (1.0, 1.0, 0.0), 0.5),)
+
+
+BAD: dict[str, tuple[Any, str]] = {
+    "two values": (Nose((0.5, 0.5)), r"Nose.read .* must return 1 values.* got 2"),
+    "nan": (Nose((math.nan,)), r"must return finite numbers, got \[nan\]"),
+    "text": (Nose("5"), r"must return numbers, got '5'"),
+    "nothing": (Nose(None), r"must return numbers, got None"),
+    "no inputs": (Nose((), 0), r"inputs: must be a whole number from 1 .* got 0"),
+    "half an input": (Nose((0.5,), 0.5), r"inputs: must be a whole number.* got 0.5"),
+    "state": (
+        Drunk(),
+        r"must return the same for the same view, got \[1.0\] and \[2.0\]",
+    ),
+    "raises": (Blind(), r"Blind.read of a part at birth: TypeError"),
+    "box": (Reaching(), r"Reaching.read of a part at birth: KeyError: 'tip'"),
+    "direction": (
+        Longsighted(),
+        r"direction must have length 1, got \(1.0, 1.0, 0.0\)",
+    ),
+    "no method": (object(), r"inputs: must be a whole number.* got None"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_wrong_sensors_are_refused(name: str) -> None:
+    sensor, message = BAD[name]
+    with pytest.raises(ExperimentError, match=message) as caught:
+        check_sensor(sensor, "here")
+    assert str(caught.value).startswith("here: test_part_checks.py:" if sensor.__class__
+                                        is not object else "here: ")  # fmt: skip
+    assert "\n" not in str(caught.value)
+
+
+def test_sensors_of_a_part_type_read_views_of_its_boxes() -> None:
+    nose = Nose()
+    check_part_type(replace(HINGE, sensors=(nose,)))
+    assert [type(view).__name__ for view in nose.calls] == ["HandMadeView"] * 6
+    view: Any = nose.calls[0]
+    assert view.position("conn_b").tolist() == [0.0276, 0.0, 0.0]
+    with pytest.raises(
+        ExperimentError, match=r"x: Hinge.sensors\[0\]: .*Reaching.read"
+    ):
+        check_part_type(replace(HINGE, sensors=(Reaching(),)), "x")

@@ -1,0 +1,178 @@
+"""Neuron types of users, beside the built-in ones."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from schema.errors import InvalidRobot, SimulationDiverged
+from schema.experiment.brains import NoParameters, widths
+from schema.experiment.document import NETWORK, BrainSection, Space
+from schema.parts import Parameter
+from schema.robot.brain import INPUT, NEURON_TYPES, Brain, Connection, Neuron
+from schema.robot.neurons import BUILT_IN_NEURONS, Tick
+from schema.robot.results import Floats
+from worker.robot.brains import Controls, NetworkControl, SoloBank
+from worker.robot.controller import Bank, pack
+from worker.robot.own_neurons import STATE_LIMIT
+
+WIDTH = widths(Space())
+TICK_S = 0.125
+MIXED = Space(neuron_types=("Simple", "my_brains:Adapting", "Oscillator"))
+own = pytest.mark.usefixtures("_own_brains")
+
+
+def random_brain(seed: int, kinds: dict[str, int]) -> Brain:
+    """Return a full network; kinds: parameters per neuron type."""
+    rng = np.random.default_rng(seed)
+    layers = ["input"] * 10 + ["output"] * 10 + ["hidden"] * 10
+    names = [list(kinds)[int(rng.integers(len(kinds)))] for _ in layers]
+    neurons = tuple(
+        Neuron("input", INPUT, 0)
+        if layer == "input"
+        else Neuron(
+            "output" if layer == "output" else "hidden",
+            name,
+            0,
+            tuple(rng.uniform(0.1, 1.0, kinds[name]).tolist()),
+        )
+        for layer, name in zip(layers, names, strict=True)
+    )
+    edges = tuple(
+        Connection(source, target, float(rng.normal()))
+        for source in range(30)
+        for target in range(10, 30)
+        if rng.random() < 0.2
+    )
+    return Brain(neurons, edges)
+
+
+@pytest.mark.parametrize("kind", list(NEURON_TYPES))
+def test_built_in_types_compute_what_networks_compute(kind: str) -> None:
+    """The objects are the oracle of the batched arithmetic, up to rounding."""
+    count = len(NEURON_TYPES[kind])
+    brain = random_brain(3, {kind: count})
+    bank = Bank([pack(brain, WIDTH)], WIDTH, TICK_S)
+    weights = np.zeros((20, 30))
+    for edge in brain.connections:
+        weights[edge.target - 10, edge.source] = edge.weight
+    parameters = np.array([n.parameters for n in brain.neurons[10:]]).T
+    state = np.zeros((1, 20))
+    rng = np.random.default_rng(0)
+    for tick in range(8):
+        readings = rng.normal(0.0, 1.0, (1, 10))
+        inputs = weights @ np.concatenate([readings[0], state[0]])
+        now = Tick(np.full(20, tick * TICK_S), TICK_S)
+        state = BUILT_IN_NEURONS[kind].step(state, inputs, parameters, now)
+        bank.step(readings, float(tick))
+        assert bank.states[0] == pytest.approx(state[0], rel=1e-12, abs=1e-12)
+
+
+@own
+def test_an_adapting_neuron_by_hand() -> None:
+    brain = Brain(
+        (
+            Neuron("input", INPUT, 0),
+            Neuron("output", "Adapting", 0, (0.25, 2.0, 0.5)),
+            Neuron("hidden", "Simple", 0, (0.0, 1.0)),
+        ),
+        (Connection(0, 1, 0.5), Connection(1, 2, 1.0)),
+    )
+    solo = Controls(NETWORK, MIXED, TICK_S).solo(brain, 5)
+    solo.readings[0, 0] = 2.0
+    # Half of the way to 1 + 0.5 - 2 tired; tired follows by a tenth.
+    assert solo.step(0)[0] == pytest.approx(0.75)
+    assert solo.step(1)[0] == pytest.approx(0.75 + 0.5 * (1.5 - 0.15 - 0.75))
+    assert solo.step(2)[0] == pytest.approx(1.05 + 0.5 * (1.5 - 2 * 0.1725 - 1.05))
+
+
+@own
+def test_own_neurons_are_independent_of_the_batch_and_can_be_moved() -> None:
+    controls = Controls(NETWORK, MIXED, TICK_S)
+    kinds = {"Simple": 2, "Adapting": 3, "Oscillator": 3}
+    packed = [controls.pack(random_brain(seed, kinds)) for seed in range(30)]
+    rng = np.random.default_rng(1)
+    readings = rng.normal(0.0, 5.0, (40, 30, 10))
+    ages = rng.integers(0, 1000, (30, 1)).astype(float)
+    batch, alone = controls.bank(packed), [controls.bank([one]) for one in packed]
+    assert controls.rest().shape == batch.states[0].shape == (60,)
+    for tick in range(40):
+        if tick == 20:
+            states = batch.states.copy()
+            batch = controls.bank(packed)
+            batch.states[...] = states
+        together = batch.step(readings[tick], ages + tick)
+        for row, bank in enumerate(alone):
+            single = bank.step(
+                readings[tick, row : row + 1], float(ages[row, 0] + tick)
+            )
+            assert single.tobytes() == together[row].tobytes()
+            assert bank.states.tobytes() == batch.states[row].tobytes()
+    assert np.abs(batch.states[:, 20:]).max() > 0.1, "potential and tiredness are kept"
+
+
+@own
+def test_a_robot_of_built_in_neurons_only_costs_nothing_more() -> None:
+    controls = Controls(NETWORK, MIXED, TICK_S)
+    solo = controls.solo(Brain((Neuron("output", "Simple", 0, (0.0, 1.0)),)), 3)
+    assert type(solo).__name__ == "SoloNetwork"
+    assert controls.solo(Brain(), 3).step(0).shape == (10,)
+
+
+def test_a_neuron_of_another_type_is_refused() -> None:
+    controls = Controls(NETWORK, Space(neuron_types=("Sigmoid",)), TICK_S)
+    brain = Brain((Neuron("output", "Simple", 0, (0.0, 1.0)),))
+    with pytest.raises(InvalidRobot, match="must be one of Sigmoid, got 'Simple'"):
+        controls.pack(brain)
+    short = Brain((Neuron("output", "Sigmoid", 0, (0.0,)),))
+    with pytest.raises(InvalidRobot, match="Sigmoid takes 2, got 1"):
+        controls.pack(short)
+
+
+@dataclass
+class Growing:
+    """Neuron that grows, and has a last term after a second."""
+
+    last: float
+    name: str = "Growing"
+    parameters: tuple[Parameter, ...] = ()
+    states: int = 2
+
+    def step(
+        self, state: Floats, inputs: Floats, parameters: Floats, tick: Tick
+    ) -> Floats:
+        del inputs, parameters
+        broken = np.where(tick.age_s > 1.0, self.last, 0.0)
+        return state * 4.0 + 1.0 + broken
+
+
+def test_all_states_are_clipped() -> None:
+    brain = Brain((Neuron("output", "Growing", 0),))
+    control = NetworkControl(NoParameters(), (Growing(np.inf),))
+    bank = control.bank([control.pack(brain, WIDTH)], WIDTH, TICK_S)
+    for tick in range(20):
+        outputs = bank.step(np.zeros((1, 10)), float(tick))
+    assert outputs[0, 0] == bank.states[0, 0] == bank.states[0, 20] == STATE_LIMIT
+
+
+def test_off_line_a_state_that_is_not_finite_is_a_failed_result() -> None:
+    control = NetworkControl(NoParameters(), (Growing(np.nan),))
+    brain = Brain((Neuron("output", "Growing", 0),))
+    bank = control.bank([control.pack(brain, WIDTH)], WIDTH, TICK_S)
+    solo = SoloBank(bank, 10, TICK_S)
+    for tick in range(9):
+        solo.step(tick)
+    with pytest.raises(SimulationDiverged, match=r"brain diverged by 1\.125 s"):
+        solo.step(9)
+
+
+@own
+def test_controls_of_a_broken_section_name_the_key() -> None:
+    with pytest.raises(
+        Exception, match=r"brain\.parameters\.'frequenzy_hz': no such key"
+    ):
+        Controls(
+            BrainSection(type="my_brains:Wave", parameters={"frequenzy_hz": 1.0}),
+            Space(),
+            TICK_S,
+        )

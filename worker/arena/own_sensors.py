@@ -1,0 +1,67 @@
+"""Own sensors in an arena: sensors of plug-ins, which see the other robots, too."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from schema.errors import SensorFailed
+from schema.experiment.settings import ArenaSettings
+from schema.parts import BodySpace, Sensor
+from schema.wire.arena import Casualty
+from worker.clusters.population import ArenaPopulation
+from worker.clusters.robot import ArenaRobot
+from worker.robot.own_sensors import Surroundings
+
+
+def has_own_sensors(space: BodySpace) -> bool:
+    """Return whether a part type has a sensor of a plug-in."""
+    return any(
+        not isinstance(sensor, Sensor)
+        for kind in space.values()
+        for sensor in kind.sensors
+    )
+
+
+def read_own_sensors(
+    population: ArenaPopulation,
+    robots: Sequence[ArenaRobot],
+    step: int,
+    settings: ArenaSettings,
+) -> list[Casualty]:
+    """Write the readings of some robots' own sensors.
+
+    Args:
+        population: all robots of the arena; sensors see all of them.
+        robots: whose sensors to read, by birth.
+        step: of the arena.
+        settings: of the arena.
+
+    Returns:
+        The robots with a sensor that failed.
+    """
+    reading = [robot for robot in robots if robot.view.sensors.own is not None]
+    if not reading:
+        return []
+    population.kinematics()
+    places = np.array([robot.view.qpos[:3] for robot in population.robots])
+    rows = population.robot_rows.rows
+    failed = []
+    for robot in reading:
+        sensors = robot.view.sensors
+        cluster = population.cluster_of[robot.birth]
+        is_newborn = step == robot.window.born
+        around = Surroundings(
+            (step - robot.window.born) * settings.simulation.timestep_s,
+            # Nothing has been stepped since a birth.
+            sensors.touching() if is_newborn else cluster.touched,
+            [(c.model, c.data) for c in population.clusters if c is not cluster],
+            np.delete(places, rows[robot.birth], axis=0),
+            settings.light,
+        )
+        assert sensors.own is not None
+        try:
+            sensors.own.read(sensors.readings[0], around)
+        except SensorFailed as error:
+            x, y, z = robot.view.qpos[:3].tolist()
+            failed.append(Casualty(robot.birth, step, str(error), (x, y, z)))
+    return failed

@@ -1,0 +1,1 @@
+"""Measures: numbers of a robot's life that are recorded beside its fitness."""

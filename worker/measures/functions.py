@@ -1,0 +1,154 @@
+"""Measures that an experiment names: their functions, values and channels."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import msgspec
+
+from schema.errors import ExperimentError, FitnessUndefined
+from schema.experiment.document import (
+    Experiment,
+    Fitness,
+    Measures,
+    island_count,
+    island_experiment,
+)
+from schema.experiment.settings import fitness_function
+from schema.plugins.load import load_function, load_object
+from schema.plugins.needs import channels_of
+from schema.plugins.parameters import parameters_type, read_parameters
+from schema.plugins.simple_traces import check_function
+from schema.robot.trace import Trace
+from worker.fitness import check_fitness, path_velocity, straight_velocity
+from worker.measures.built_in import (
+    body_symmetry,
+    contact_share,
+    cost_of_transport,
+    energy,
+    height,
+    joint_effort,
+    turning,
+)
+
+MeasureFunction = Callable[..., Any]
+"""Function of a trace, and of its own parameters if it has any; finite."""
+
+BUILT_IN: dict[str, MeasureFunction] = {
+    function.__name__: function
+    for function in (
+        path_velocity,
+        straight_velocity,
+        turning,
+        energy,
+        cost_of_transport,
+        height,
+        body_symmetry,
+        joint_effort,
+        contact_share,
+    )
+}
+"""Measures by short name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measure:
+    """Measure of an experiment.
+
+    Attributes:
+        name: as in ``measures.names``.
+        function: that computes it.
+        arguments: its parameters, if it has any.
+    """
+
+    name: str
+    function: MeasureFunction
+    arguments: tuple[msgspec.Struct, ...] = ()
+
+    def value(self, trace: Trace) -> float:
+        """Return its value for a trace.
+
+        Raises:
+            FitnessUndefined: the function raised or gave no finite number.
+        """
+        try:
+            value = float(self.function(trace, *self.arguments))
+        except Exception as error:
+            raise FitnessUndefined(
+                f"measure {self.name} raised {type(error).__name__}: {error}"
+            ) from error
+        if not math.isfinite(value):
+            raise FitnessUndefined(
+                f"measure {self.name} must return a finite number, got {value}"
+            )
+        return value
+
+
+@lru_cache(maxsize=64)
+def measures_of(measures: Measures) -> tuple[Measure, ...]:
+    """Return the measures that an experiment names, in its order.
+
+    Raises:
+        UnknownPlugin: no such measure, or a module that is not allowed.
+        ExperimentError: not a function, or parameters that it refuses.
+    """
+    labels = zip(measures.names, measures.labels, strict=True)
+    return tuple(
+        _measure(name, measures.parameters.get(label), f"measures.parameters.{label}")
+        for name, label in labels
+    )
+
+
+def _measure(name: str, table: dict[str, Any] | None, where: str) -> Measure:
+    where_named = "measures.names"
+    found = load_object(name, where_named, BUILT_IN)
+    if not callable(found):
+        raise ExperimentError(f"{where_named}: {name!r} is not a function")
+    kind = parameters_type(found, where_named)
+    if ":" in name:
+        load_function(name, where_named, 1 if kind is None else 2)
+    if kind is None:
+        if table is not None:
+            raise ExperimentError(
+                f"{where}: {name} has no parameters of its own; it must annotate its "
+                "second argument with a msgspec Struct"
+            )
+        return Measure(name, found)
+    return Measure(name, found, (read_parameters(table or {}, kind, where),))
+
+
+def check_measure(measure: Measure) -> None:
+    """Raise unless a measure keeps its contract on simple traces.
+
+    Raises:
+        ExperimentError: as of ``schema.plugins.simple_traces.check_function``.
+    """
+    check_function(measure.function, measure.arguments, "measures.names")
+
+
+def check_functions(experiment: Experiment) -> None:
+    """Raise unless fitness and measures of all islands keep their contracts.
+
+    Raises:
+        UnknownPlugin: an unknown function, or a module that is not allowed.
+        ExperimentError: a function that breaks its contract, or refuses its
+            parameters.
+    """
+    for number in range(island_count(experiment)):
+        fitness = island_experiment(experiment, number).fitness
+        check_fitness(fitness_function(fitness), fitness)
+    for measure in measures_of(experiment.measures):
+        check_measure(measure)
+
+
+@lru_cache(maxsize=64)
+def channels_needed(fitness: Fitness, measures: Measures) -> tuple[str, ...]:
+    """Return the channels that an experiment's functions declare.
+
+    Raises:
+        ExperimentError: an unknown function, or parameters that it refuses.
+    """
+    functions = [each.function for each in measures_of(measures)]
+    return channels_of([fitness_function(fitness), *functions])

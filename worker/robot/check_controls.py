@@ -1,0 +1,137 @@
+"""Check of the half of a brain type that ticks, before it moves a robot."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+
+from schema.errors import ExperimentError, one_line
+from schema.plugins.protocols import Bank
+from schema.robot.brain import (
+    INPUT,
+    LAYERS,
+    Brain,
+    Connection,
+    Layer,
+    Neuron,
+    NeuronKinds,
+    Widths,
+)
+from schema.robot.results import Floats
+
+_ROBOTS = 7
+_TICKS = 12
+
+
+class Controls(Protocol):
+    """Brains of one experiment; see ``worker.robot.brains``."""
+
+    width: Widths
+    neurons: NeuronKinds
+
+    def pack(self, brain: Brain) -> Any:  # noqa: ANN401 - a brain type's own
+        """Return a brain in the form that ``bank`` takes."""
+
+    def bank(self, packed: Sequence[Any]) -> Bank:
+        """Return brains at rest that are updated together."""
+
+
+def check_controls(controls: Controls, place: str) -> None:
+    """Raise unless brains keep the contract of ``BrainControl`` on random brains.
+
+    Args:
+        controls: the brains.
+        place: where their code is, for messages.
+
+    Raises:
+        ExperimentError: code that raises; states or outputs of a wrong shape or not
+            finite; a robot that moves differently a second time, alone, in another
+            row, or after its states were saved and restored.
+    """
+    everybody = list(range(_ROBOTS))
+    expected = _guarded(partial(_run, controls, everybody), place)
+    for what, rows, moved_at in (
+        ("a second time", everybody, _TICKS),
+        ("in another row", everybody[::-1], _TICKS),
+        ("alone", [3], _TICKS),
+        ("after its states were restored", everybody, _TICKS // 2),
+    ):
+        found = _guarded(partial(_run, controls, rows, moved_at), place)
+        for tick, (one, other) in enumerate(zip(found, expected, strict=True)):
+            if one.tobytes() != other[rows].tobytes():
+                raise ExperimentError(
+                    f"{place}: expected equal outputs and states for equal robots, got "
+                    f"other ones {what} at tick {tick}: use elementwise NumPy, arrays "
+                    "of fixed width, and keep everything in `states`"
+                )
+
+
+def _run(
+    controls: Controls, rows: Sequence[int], moved_at: int = _TICKS
+) -> list[Floats]:
+    """Return outputs and states after each tick; restore them once on the way."""
+    packed = [controls.pack(_brain(controls, number)) for number in rows]
+    kept = controls.bank(()).states.shape[1]
+    rng = np.random.default_rng(0)
+    readings = rng.normal(0.0, 3.0, (_TICKS, _ROBOTS, controls.width.inputs))
+    bank = controls.bank(packed)
+    found: list[Floats] = []
+    for tick in range(_TICKS):
+        if tick == moved_at:
+            states = bank.states.copy()
+            bank = controls.bank(packed)
+            bank.states[...] = states
+        outputs = bank.step(readings[tick, rows], float(tick))
+        _require("outputs", outputs, (len(rows), controls.width.outputs))
+        _require("states", bank.states, (len(rows), kept))
+        found.append(np.hstack([outputs, bank.states]))
+    return found
+
+
+def _require(what: str, array: Floats, shape: tuple[int, int]) -> None:
+    """Raise unless an array has a shape and is finite."""
+    if np.shape(array) != shape:
+        raise ValueError(f"{what} of shape {np.shape(array)}, not {shape}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{what} that are not finite")
+
+
+def _guarded(compute: Callable[[], list[Floats]], place: str) -> list[Floats]:
+    """Return what a plug-in computes; its exceptions become one line."""
+    try:
+        return compute()
+    except Exception as error:
+        raise ExperimentError(
+            f"{place}: expected pack, bank and step as in BrainControl, got "
+            f"{type(error).__name__}: {one_line(error)}"
+        ) from error
+
+
+def _brain(controls: Controls, number: int) -> Brain:
+    """Return a random brain of a fourth of the neurons to all of them."""
+    rng = np.random.default_rng(number)
+    width, kinds = controls.width, controls.neurons
+    counts = (width.inputs, width.outputs, width.hidden)
+    neurons: list[Neuron] = []
+    for layer, most in zip(LAYERS, counts, strict=True):
+        count = most * (1 + number % 4) // 4
+        neurons += [_neuron(layer, part, kinds, rng) for part in range(count)]
+    inputs = sum(neuron.layer == "input" for neuron in neurons)
+    edges = tuple(
+        Connection(source, target, float(rng.random()))
+        for source in range(len(neurons))
+        for target in range(inputs, len(neurons))
+        if rng.random() < 0.3  # noqa: PLR2004 - some of them
+    )
+    return Brain(tuple(neurons), edges)
+
+
+def _neuron(
+    layer: Layer, part: int, kinds: NeuronKinds, rng: np.random.Generator
+) -> Neuron:
+    if layer == "input":
+        return Neuron(layer, INPUT, part)
+    name = list(kinds)[int(rng.integers(len(kinds)))]
+    values = tuple(float(rng.uniform(each.low, each.high)) for each in kinds[name])
+    return Neuron(layer, name, part, values)

@@ -1,0 +1,178 @@
+"""Own sensors of one robot: sensors of plug-ins, which read a view of their part."""
+
+from collections.abc import Container, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from schema.errors import SensorFailed, cut, one_line
+from schema.parts import OwnSensor, Vector
+from schema.plugins.protocols import SensorView
+from schema.plugins.sensor_checks import ray_problem, values_of
+from schema.robot.results import Floats
+
+State = tuple[mujoco.MjModel, mujoco.MjData]
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What a robot's own sensors see beside the robot.
+
+    Attributes:
+        age_s: simulated time since the robot's birth [s].
+        touched: geoms of its model that were in contact in the last step.
+        states: other models of the same world, which rays meet, too.
+        others: (N, 3) centres of the cores of all other robots, world frame [m].
+        light: position of the light, world frame [m].
+    """
+
+    age_s: float
+    touched: Container[int]
+    states: Sequence[State] = ()
+    others: Floats | None = None
+    light: Vector | None = None
+
+
+class PartView:
+    """View of a part in a model; a ``SensorView``.
+
+    Attributes:
+        around: what is around it at the present tick.
+    """
+
+    def __init__(self, state: State, index: int, prefix: str) -> None:
+        """Find a part.
+
+        Args:
+            state: model and data that hold its robot.
+            index: of the part.
+            prefix: of the robot's names in the model.
+        """
+        model, self._data = state
+        self._state = state
+        self.around = Surroundings(0.0, ())
+        start = f"{prefix}{index}/"
+        names = [(number, model.geom(number).name) for number in range(model.ngeom)]
+        self._geoms = {
+            name.removeprefix(start): number
+            for number, name in names
+            if name.startswith(start)
+        }
+        kind = mujoco.mjtObj.mjOBJ_JOINT
+        joint = mujoco.mj_name2id(model, kind, f"{prefix}joint{index}")
+        self._joint = joint if joint >= 0 else None
+        self._where = start
+
+    @property
+    def age_s(self) -> float:
+        """Simulated time since the robot's birth [s]."""
+        return self.around.age_s
+
+    @property
+    def joint_angle(self) -> float:
+        """Angle [rad] or displacement [m] of the part's joint; 0 without a joint."""
+        if self._joint is None:
+            return 0.0
+        return float(self._data.qpos[self._state[0].jnt_qposadr[self._joint]])
+
+    @property
+    def joint_speed(self) -> float:
+        """Velocity of the part's joint [rad/s] or [m/s]; 0 without a joint."""
+        if self._joint is None:
+            return 0.0
+        return float(self._data.qvel[self._state[0].jnt_dofadr[self._joint]])
+
+    @property
+    def light(self) -> Vector | None:
+        """Position of the light, world frame [m]."""
+        return self.around.light
+
+    @property
+    def others(self) -> Floats:
+        """Centres of the cores of all other robots, (N, 3), world frame [m]."""
+        others = self.around.others
+        return np.zeros((0, 3)) if others is None else others.copy()
+
+    def position(self, box: str) -> Floats:
+        """Return the centre of a box, (3,), world frame [m]."""
+        return np.array(self._data.geom_xpos[self._geoms[box]])
+
+    def rotation(self, box: str) -> Floats:
+        """Return the rotation from a box's frame to the world frame, (3, 3)."""
+        return np.array(self._data.geom_xmat[self._geoms[box]].reshape(3, 3))
+
+    def touches(self, box: str) -> bool:
+        """Return whether a box was in contact in the last step."""
+        return self._geoms[box] in self.around.touched
+
+    def distance(
+        self,
+        box: str,
+        direction: Vector,
+        reach: float,
+        start: Vector = (0.0, 0.0, 0.0),
+    ) -> float:
+        """Return how far a ray gets [m]; see ``SensorView``."""
+        ray_problem(direction, reach, start)
+        rotation = self.rotation(box)
+        place = self.position(box) + rotation @ start
+        way = rotation @ direction
+        own = int(self._state[0].geom_bodyid[self._geoms[box]])
+        nearest = _ray(self._state, place, way, own)
+        for state in self.around.states:
+            nearest = min(nearest, _ray(state, place, way, -1))
+        return min(nearest, reach)
+
+
+def _ray(state: State, place: Floats, way: Floats, but: int) -> float:
+    """Return the distance of the first geom on a ray, infinite if there is none."""
+    hit = np.zeros(1, dtype=np.int32)
+    found = mujoco.mj_ray(*state, place, way, None, 1, but, hit)
+    return found if hit[0] >= 0 else np.inf
+
+
+class OwnSensors:
+    """Own sensors of one robot in a model."""
+
+    def __init__(
+        self,
+        sensors: Sequence[tuple[int, str, OwnSensor, int]],
+        state: State,
+        prefix: str,
+    ) -> None:
+        """Find their parts.
+
+        Args:
+            sensors: of each, index and type of its part, the sensor, and its first
+                index in the readings.
+            state: model and data that hold the robot.
+            prefix: of the robot's names in the model.
+        """
+        self._sensors = [
+            (PartView(state, index, prefix), sensor, place, f"part {index} ({kind})")
+            for index, kind, sensor, place in sensors
+        ]
+
+    def read(self, readings: Floats, around: Surroundings) -> None:
+        """Read all of them; frames of the bodies must be those of the state.
+
+        Args:
+            readings: (I,) where to write.
+            around: what the sensors see beside the robot.
+
+        Raises:
+            SensorFailed: a sensor raised, or gave a wrong number of values or one
+                that is not finite.
+        """
+        for view, sensor, place, where in self._sensors:
+            view.around = around
+            seen: SensorView = view
+            try:
+                values = values_of(sensor, sensor.read(seen))
+            except Exception as error:
+                story = cut(f"{type(error).__name__}: {one_line(error)}")
+                raise SensorFailed(
+                    f"sensor {type(sensor).__name__} of {where}: {story}"
+                ) from error
+            readings[place : place + sensor.inputs] = values
