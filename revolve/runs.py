@@ -156,10 +156,10 @@ class Run:
             for island in set(homes)
         }
         own = {island: Experiment(each) for island, each in documents.items()}
-        genomes, stored = (rows[name].to_pylist() for name in ("genome", "robot"))
+        columns = (rows[name].to_pylist() for name in ("genome", "robot"))
         return [
-            of_plain(robot_of_birth(genome, robot, documents[island]), own[island])
-            for island, genome, robot in zip(homes, genomes, stored, strict=True)
+            of_plain(robot_of_birth(genome, stored, documents[island]), own[island])
+            for island, genome, stored in zip(homes, *columns, strict=True)
         ]
 
     def best(self, count: int = 1) -> list[Robot]:

@@ -75,12 +75,6 @@ def check_plugins(wanted: str) -> None:
             )
 
 
-def forget_digests() -> None:
-    """Read the sources again next time: their owner may have changed them."""
-    for cached in (plugins_of, check_plugins, _digest):
-        cached.cache_clear()
-
-
 def digest_of(module: str) -> str:
     """Return the digest of a plug-in module's source now; empty if it is not there."""
     return _digest.__wrapped__(module.partition(".")[0])
@@ -89,6 +83,12 @@ def digest_of(module: str) -> str:
 def digest_of_bytes(source: bytes) -> str:
     """Return the digest of a module of one file."""
     return sha256(source).hexdigest()[:_DIGITS]
+
+
+def forget_digests() -> None:
+    """Read the sources again next time: their owner may have changed them."""
+    for cached in (plugins_of, check_plugins, _digest):
+        cached.cache_clear()
 
 
 @lru_cache(maxsize=64)
