@@ -11,7 +11,7 @@ from coordinator.cli.deployment import Deployment
 from coordinator.cli.execute import resume, start, start_campaign
 from coordinator.cli.flags import parser
 from coordinator.dispatch.events import AgentKind
-from coordinator.evolution.check_brain_genes import check_brain_genes
+from coordinator.evolution.brain_kind import brain_kind
 from coordinator.evolution.check_encoding import check_encoding
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.kinds import KINDS
@@ -106,8 +106,10 @@ def main(arguments: list[str]) -> int:
 def plugin_kinds() -> tuple[Kind, ...]:
     """Return all kinds of plug-ins; imports the room of the worker."""
     import worker.kinds
+    from worker.robot.brains import check_control
 
-    return (*schema.experiment.kinds.KINDS, *worker.kinds.KINDS, *KINDS)
+    own = (*KINDS, brain_kind(check_control))
+    return (*schema.experiment.kinds.KINDS, *worker.kinds.KINDS, *own)
 
 
 def _stoppable(folder: Path, execute: Callable[[], int]) -> int:
@@ -137,27 +139,8 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
     for experiment in experiments:
         check_experiment(experiment, "--births" if options.births else experiment.name)
         worker.measures.functions.check_functions(experiment)
-        _check_own_brain(experiment)
         _check_encodings(experiment)
     return experiments
-
-
-def _check_own_brain(experiment: Experiment) -> None:
-    """Raise unless both halves of a user's brain or neuron types keep their contract.
-
-    Raises:
-        ExperimentError: file, line, what was expected and what came.
-    """
-    names = (experiment.brain.type, *experiment.space.neuron_types)
-    if not any(":" in name for name in names):
-        return
-    from worker.robot.brains import controls_of
-
-    clock = experiment.simulation
-    tick_s = clock.brain_steps * clock.timestep_s
-    check_brain_genes(experiment)
-    # Its check runs when it is made.
-    controls_of(experiment.brain, experiment.space, tick_s)
 
 
 def _check_encodings(experiment: Experiment) -> None:

@@ -33,6 +33,8 @@ from schema.parts import Slot as Slot
 from schema.robot.brain import Brain as Brain
 from schema.robot.brain import Connection as Connection
 from schema.robot.brain import Neuron as Neuron
+from schema.robot.genome import ConnectionGene as ConnectionGene
+from schema.robot.genome import NeuronGene as NeuronGene
 from schema.robot.robot import Part as Part
 
 __all__ = [
@@ -40,6 +42,7 @@ __all__ = [
     "Box",
     "Brain",
     "Connection",
+    "ConnectionGene",
     "Experiment",
     "ExperimentError",
     "FitnessUndefined",
@@ -51,6 +54,7 @@ __all__ = [
     "Motor",
     "NetworkError",
     "Neuron",
+    "NeuronGene",
     "Parameter",
     "Part",
     "PartType",

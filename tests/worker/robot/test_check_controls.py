@@ -9,7 +9,7 @@ from schema.errors import ExperimentError
 from schema.experiment.brains import widths
 from schema.experiment.document import NETWORK, Space
 from schema.plugins.protocols import Bank
-from schema.robot.brain import NEURON_TYPES, Brain
+from schema.robot.brain import NEURON_TYPES, Brain, NeuronKinds
 from schema.robot.results import Floats
 from worker.robot.brains import Controls
 from worker.robot.check_controls import check_controls
@@ -36,7 +36,7 @@ class Broken:
     """Brains of one broken type."""
 
     width = widths(Space())
-    neurons = NEURON_TYPES
+    neurons: NeuronKinds = NEURON_TYPES
 
     def __init__(self, change: Change) -> None:
         self._change = change
