@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,10 +10,9 @@ from coordinator.cli.deployment import Deployment
 from coordinator.cli.execute import resume, start, start_campaign
 from coordinator.cli.flags import parser
 from coordinator.dispatch.events import AgentKind
-from coordinator.evolution.brain_kind import brain_kind
-from coordinator.evolution.check_encoding import check_encoding
+from coordinator.evolution.check_brain_genes import check_brain_genes
 from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.kinds import KINDS
+from coordinator.evolution.kinds import KINDS, brain_kind
 from coordinator.plugins.checks import refuse_faulty
 from coordinator.plugins.command import check, list_plugins
 from coordinator.run.cross_checks import Checks
@@ -106,10 +104,13 @@ def main(arguments: list[str]) -> int:
 def plugin_kinds() -> tuple[Kind, ...]:
     """Return all kinds of plug-ins; imports the room of the worker."""
     import worker.kinds
-    from worker.robot.brains import check_control
 
-    own = (*KINDS, brain_kind(check_control))
-    return (*schema.experiment.kinds.KINDS, *worker.kinds.KINDS, *own)
+    return (
+        *schema.experiment.kinds.KINDS,
+        *worker.kinds.KINDS,
+        *KINDS,
+        brain_kind(_check_own_brain),
+    )
 
 
 def _stoppable(folder: Path, execute: Callable[[], int]) -> int:
@@ -139,17 +140,33 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
     for experiment in experiments:
         check_experiment(experiment, "--births" if options.births else experiment.name)
         worker.measures.functions.check_functions(experiment)
+        _check_own_brain(experiment)
         _check_encodings(experiment)
     return experiments
 
 
+def _check_own_brain(experiment: Experiment) -> None:
+    """Raise unless both halves of a user's brain or neuron types keep their contract.
+
+    Raises:
+        ExperimentError: file, line, what was expected and what came.
+    """
+    names = (experiment.brain.type, *experiment.space.neuron_types)
+    if not any(":" in name for name in names):
+        return
+    from worker.robot.brains import controls_of
+
+    clock = experiment.simulation
+    tick_s = clock.brain_steps * clock.timestep_s
+    check_brain_genes(experiment)
+    # Its check runs when it is made.
+    controls_of(experiment.brain, experiment.space, tick_s)
+
+
 def _check_encodings(experiment: Experiment) -> None:
-    """Raise unless the encoding works with the settings of each island."""
-    numbers = range(island_count(experiment))
-    for own in dict.fromkeys(island_experiment(experiment, each) for each in numbers):
-        encoding_of(own)
-        if ":" in own.encoding.type:
-            check_encoding(own, time.monotonic)
+    """Raise unless the encoding can be made with the settings of each island."""
+    for number in range(island_count(experiment)):
+        encoding_of(island_experiment(experiment, number))
 
 
 def _experiments_of(folder: Path) -> tuple[Experiment, ...]:

@@ -47,6 +47,9 @@ _HOMES = {
     "Joint": "schema.parts",
     "Motor": "schema.parts",
     "Sensor": "schema.parts",
+    "cylinder": "schema.parts",
+    "SensorType": "schema.plugins.protocols",
+    "SensorView": "schema.plugins.protocols",
     "RevolveError": "schema.errors",
     "ExperimentError": "schema.errors",
     "UnknownPlugin": "schema.errors",
@@ -54,6 +57,7 @@ _HOMES = {
     "RunFolderError": "schema.errors",
     "NetworkError": "schema.errors",
     "FitnessUndefined": "schema.errors",
+    "SensorFailed": "schema.errors",
     "SimulationDiverged": "schema.errors",
     "JobRefused": "schema.errors",
 }

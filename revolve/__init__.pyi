@@ -20,6 +20,7 @@ from schema.errors import JobRefused as JobRefused
 from schema.errors import NetworkError as NetworkError
 from schema.errors import RevolveError as RevolveError
 from schema.errors import RunFolderError as RunFolderError
+from schema.errors import SensorFailed as SensorFailed
 from schema.errors import SimulationDiverged as SimulationDiverged
 from schema.errors import UnknownPlugin as UnknownPlugin
 from schema.parts import Box as Box
@@ -30,6 +31,9 @@ from schema.parts import PartType as PartType
 from schema.parts import Sensor as Sensor
 from schema.parts import Shape as Shape
 from schema.parts import Slot as Slot
+from schema.parts import cylinder as cylinder
+from schema.plugins.protocols import SensorType as SensorType
+from schema.plugins.protocols import SensorView as SensorView
 from schema.robot.brain import Brain as Brain
 from schema.robot.brain import Connection as Connection
 from schema.robot.brain import Neuron as Neuron
@@ -64,12 +68,16 @@ __all__ = [
     "Run",
     "RunFolderError",
     "Sensor",
+    "SensorFailed",
+    "SensorType",
+    "SensorView",
     "Shape",
     "SimulationDiverged",
     "Slot",
     "Trace",
     "UnknownPlugin",
     "analyze",
+    "cylinder",
     "evaluate",
     "read",
     "resume",

@@ -8,7 +8,7 @@ import numpy as np
 
 from schema.errors import SimulationDiverged
 from schema.experiment.brains import NoParameters, brain_half, kinds_of, widths
-from schema.experiment.document import BrainSection, Experiment, Space
+from schema.experiment.document import BrainSection, Space
 from schema.plugins.origin import where_defined
 from schema.plugins.protocols import Bank as BankProtocol
 from schema.plugins.protocols import BrainControl, NeuronType
@@ -149,17 +149,6 @@ class Controls:
         if isinstance(packed, Network) and not packed.own:
             return SoloNetwork(packed, self.width, self._tick_s, ticks)
         return SoloBank(self.bank([packed]), self.width.inputs, self._tick_s)
-
-
-def check_control(experiment: Experiment) -> None:
-    """Raise unless brains of an experiment keep the contract of ``BrainControl``.
-
-    Raises:
-        ExperimentError: file, line, what was expected and what came.
-    """
-    clock = experiment.simulation
-    # Making them checks them, if their code is a user's.
-    Controls(experiment.brain, experiment.space, clock.brain_steps * clock.timestep_s)
 
 
 @lru_cache(maxsize=64)
