@@ -24,6 +24,8 @@ _HOMES = {
     "Brain": "schema.robot.brain",
     "Neuron": "schema.robot.brain",
     "Connection": "schema.robot.brain",
+    "NeuronGene": "schema.robot.genome",
+    "ConnectionGene": "schema.robot.genome",
     "Genome": "revolve.genome",
     "Experiment": "revolve.experiment",
     "Result": "revolve.evaluation",

@@ -42,6 +42,7 @@ from schema.plugins.protocols import SensorView as SensorView
 from schema.robot.brain import Brain as Brain
 from schema.robot.brain import Connection as Connection
 from schema.robot.brain import Neuron as Neuron
+from schema.robot.genome import ConnectionGene as ConnectionGene
 from schema.robot.genome import NeuronGene as NeuronGene
 from schema.robot.neurons import Tick as Tick
 from schema.robot.robot import Part as Part
@@ -52,6 +53,7 @@ __all__ = [
     "Brain",
     "BrainType",
     "Connection",
+    "ConnectionGene",
     "Encoding",
     "Experiment",
     "ExperimentError",
