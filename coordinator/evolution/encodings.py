@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from coordinator.cppn.encoding import Cppn
+from coordinator.evolution.cppn.encoding import Cppn
 from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError, InvalidRobot, RevolveError, one_line, shown
 from schema.experiment.brains import neuron_kinds
@@ -24,6 +24,7 @@ from schema.parts import BodySpace
 from schema.plugins.load import load_object
 from schema.plugins.parameters import read_parameters
 from schema.plugins.protocols import Encoding, OneStepMating, RobotEncoding
+from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot, check_robot
 from schema.wire.codec import encode_robot
@@ -35,7 +36,8 @@ BUILT_IN: dict[str, Callable[..., Encoding[Any]]] = {
 }
 """Built-in encodings by their short names."""
 
-_METHODS = ("random", "develop", "crossover", "mutate", "to_bytes", "from_bytes")
+METHODS = ("random", "develop", "crossover", "mutate", "to_bytes", "from_bytes")
+"""Methods that an own encoding must have."""
 
 
 class _NoParameters(msgspec.Struct, frozen=True):
@@ -55,7 +57,7 @@ def encoding_of(experiment: Experiment) -> "IslandEncoding":
             parameters, or an error when the class is called.
     """
     name = experiment.encoding.type
-    found = load_object(name, WHERE, BUILT_IN, _METHODS)
+    found = load_object(name, WHERE, BUILT_IN, METHODS)
     if not callable(found):
         raise ExperimentError(f"{WHERE}: {name!r} must be a class, not an object")
     kind = getattr(found, "Parameters", None)
@@ -88,7 +90,7 @@ class IslandEncoding:
         self._space = experiment.space
         self._is_thesis = self.name == REVOLVE_ANGLE
         self._guards = {
-            method: _Guard(self.name, method) for method in (*_METHODS, "mate")
+            method: _Guard(self.name, method) for method in (*METHODS, "mate")
         }
         self.no_child = "its parents' genomes gave no child"
         if self._is_thesis:
@@ -134,12 +136,15 @@ class IslandEncoding:
         if self._is_thesis:
             return self._encoding.develop(genome)
         with self._guards["develop"]:
-            robot = self._encoding.develop(genome)
-            if not isinstance(robot, Robot):
+            found: object = self._encoding.develop(genome)
+            parts, brain = (getattr(found, each, None) for each in ("parts", "brain"))
+            if not isinstance(parts, tuple | list) or not isinstance(brain, Brain):
                 raise ExperimentError(
                     f"{WHERE}: {self.name!r}: develop must return a Robot, "
-                    f"got {shown(robot)}"
+                    f"got {shown(found)}"
                 )
+            # The Python API has a class of its own.
+            robot = Robot(tuple(parts), brain)
             self.check(robot)
         if problem := outside_limits(robot, self._space, self.types):
             raise InvalidRobot(f"{WHERE}: {self.name!r}: {problem}")

@@ -121,11 +121,13 @@ def test_failing_fitness_and_crash_are_results(
 ) -> None:
     (tmp_path / "odd_fitness.py").write_text(
         "import os, signal\n"
-        "def undefined(track, fitness):\n    return float('nan')\n"
+        "def undefined(track, fitness):\n"
+        "    # Not on the short and long tracks of the check.\n"
+        "    return float('nan') if len(track.core_position) == 11 else 1.0\n"
         "def crash(track, fitness):\n    os.kill(os.getpid(), signal.SIGSEGV)\n"
     )
     monkeypatch.chdir(tmp_path)
-    text = 'name = "odd"\n[simulation]\nwindow_steps = 40\n[fitness]\nfunction = '
+    text = 'name = "odd"\n[simulation]\nwindow_steps = 400\n[fitness]\nfunction = '
     robot = rv.Robot.random(seed=1)
     for name, expected in (("undefined", "finite number"), ("crash", "SIGSEGV")):
         (tmp_path / "odd.toml").write_text(f'{text}"odd_fitness:{name}"\n')
@@ -163,3 +165,17 @@ def test_picture_is_a_png() -> None:
         pytest.skip(str(error))
     assert picture.startswith(b"\x89PNG")
     assert robot._repr_png_() is not None
+
+
+def test_genomes_of_other_encodings() -> None:
+    patterns = rv.Experiment.read("scenario1", encoding={"type": "cppn"})
+    rng = np.random.default_rng(1)
+    first, second = (rv.Genome.random(rng, patterns) for _ in range(2))
+    children = [first.mate(second, rng) for _ in range(5)]
+    child = next(filter(None, children))
+    assert rv.Genome.from_bytes(child.to_bytes(), patterns) == child
+    assert child.develop().experiment == patterns
+    with pytest.raises(rv.InvalidRobot, match="not a genome of encoding 'revolve-ang"):
+        rv.Genome.from_bytes(child.to_bytes(), "scenario1")
+    again = (rv.Robot.random(patterns, seed=4) for _ in range(2))
+    assert next(again) == next(again) != rv.Robot.random("scenario1", seed=4)

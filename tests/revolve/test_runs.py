@@ -46,6 +46,7 @@ def test_best_robot_has_the_best_fitness(done: rv.Run) -> None:
     greatest = pc.max(done.evaluations["fitness"]).as_py()
     assert rv.evaluate(best[0]).fitness == greatest
     assert rv.evaluate(best[1]).fitness <= greatest
+    assert done.robots()[3] == done.robot(done.births["birth"][3].as_py())
     with pytest.raises(rv.RunFolderError, match="has no birth 999"):
         done.robot(999)
 
@@ -67,7 +68,7 @@ def test_used_and_missing_folders_raise_the_line_of_the_command(
         rv.resume(tmp_path / "missing")
     with pytest.raises(rv.RunFolderError, match="holds several runs; read one of a"):
         rv.read(done.folder.parent)
-    with pytest.raises(rv.ExperimentError, match="did you mean 'scenario1'"):
+    with pytest.raises(rv.ExperimentError, match="did you mean 'scenario"):
         rv.run("scenario", births=3, out=tmp_path / "x")
 
 
