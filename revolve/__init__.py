@@ -24,6 +24,8 @@ _HOMES = {
     "Brain": "schema.robot.brain",
     "Neuron": "schema.robot.brain",
     "Connection": "schema.robot.brain",
+    "NeuronGene": "schema.robot.genome",
+    "ConnectionGene": "schema.robot.genome",
     "Genome": "revolve.genome",
     "Experiment": "revolve.experiment",
     "Result": "revolve.evaluation",
@@ -62,6 +64,7 @@ _HOMES = {
     "RunFolderError": "schema.errors",
     "NetworkError": "schema.errors",
     "FitnessUndefined": "schema.errors",
+    "SensorFailed": "schema.errors",
     "SimulationDiverged": "schema.errors",
     "JobRefused": "schema.errors",
 }

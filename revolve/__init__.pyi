@@ -20,6 +20,7 @@ from schema.errors import JobRefused as JobRefused
 from schema.errors import NetworkError as NetworkError
 from schema.errors import RevolveError as RevolveError
 from schema.errors import RunFolderError as RunFolderError
+from schema.errors import SensorFailed as SensorFailed
 from schema.errors import SimulationDiverged as SimulationDiverged
 from schema.errors import UnknownPlugin as UnknownPlugin
 from schema.parts import Box as Box
@@ -41,6 +42,7 @@ from schema.plugins.protocols import SensorView as SensorView
 from schema.robot.brain import Brain as Brain
 from schema.robot.brain import Connection as Connection
 from schema.robot.brain import Neuron as Neuron
+from schema.robot.genome import ConnectionGene as ConnectionGene
 from schema.robot.genome import NeuronGene as NeuronGene
 from schema.robot.neurons import Tick as Tick
 from schema.robot.robot import Part as Part
@@ -51,6 +53,7 @@ __all__ = [
     "Brain",
     "BrainType",
     "Connection",
+    "ConnectionGene",
     "Encoding",
     "Experiment",
     "ExperimentError",
@@ -74,6 +77,7 @@ __all__ = [
     "Run",
     "RunFolderError",
     "Sensor",
+    "SensorFailed",
     "SensorType",
     "SensorView",
     "Shape",

@@ -14,8 +14,9 @@ from schema.errors import ExperimentError, RevolveError
 from schema.experiment.brains import NEURON_MEMBERS, neuron_types
 from schema.experiment.document import Experiment, Space, body_space
 from schema.parts import PartType
-from schema.plugins.load import load_instance
+from schema.plugins.load import load_instance, load_object
 from schema.plugins.origin import where_defined, where_raised
+from schema.plugins.sensor_checks import check_sensor
 from schema.robot.neurons import BUILT_IN_NEURONS
 
 
@@ -157,5 +158,27 @@ NEURON_TYPE = Kind(
     _neuron_type,
     _neuron_types,
 )
-KINDS = (PART_TYPE, NEURON_TYPE)
+
+
+def _sensor(path: str) -> Use:
+    key = "sensor"
+
+    def load() -> object:
+        return load_object(path, key, {}, ("inputs", "read"))
+
+    return Use(key, path, load, lambda sensor: check_sensor(sensor, key))
+
+
+SENSOR = Kind(
+    "sensor",
+    {},
+    lambda plugin: (
+        not isinstance(plugin, type)
+        and all(hasattr(plugin, name) for name in ("inputs", "read"))
+    ),
+    _sensor,
+    # Sensors are checked with the part types that hold them.
+    lambda _: (),
+)
+KINDS = (PART_TYPE, NEURON_TYPE, SENSOR)
 """Kinds whose checks need no other room."""
