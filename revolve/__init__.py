@@ -55,7 +55,6 @@ _HOMES = {
     "NeuronType": "schema.plugins.protocols",
     "Tick": "schema.robot.neurons",
     "BrainType": "schema.plugins.protocols",
-    "NeuronGene": "schema.robot.genome",
     "Encoding": "schema.plugins.protocols",
     "RevolveError": "schema.errors",
     "ExperimentError": "schema.errors",
