@@ -31,19 +31,30 @@ from schema.parts import PartType as PartType
 from schema.parts import Sensor as Sensor
 from schema.parts import Shape as Shape
 from schema.parts import Slot as Slot
+from schema.parts import constant_shape as constant_shape
 from schema.parts import cylinder as cylinder
+from schema.plugins.needs import needs as needs
+from schema.plugins.protocols import BrainType as BrainType
+from schema.plugins.protocols import Encoding as Encoding
+from schema.plugins.protocols import NeuronType as NeuronType
 from schema.plugins.protocols import SensorType as SensorType
 from schema.plugins.protocols import SensorView as SensorView
 from schema.robot.brain import Brain as Brain
 from schema.robot.brain import Connection as Connection
 from schema.robot.brain import Neuron as Neuron
+from schema.robot.genome import ConnectionGene as ConnectionGene
+from schema.robot.genome import NeuronGene as NeuronGene
+from schema.robot.neurons import Tick as Tick
 from schema.robot.robot import Part as Part
 
 __all__ = [
     "Analysis",
     "Box",
     "Brain",
+    "BrainType",
     "Connection",
+    "ConnectionGene",
+    "Encoding",
     "Experiment",
     "ExperimentError",
     "FitnessUndefined",
@@ -55,6 +66,8 @@ __all__ = [
     "Motor",
     "NetworkError",
     "Neuron",
+    "NeuronGene",
+    "NeuronType",
     "Parameter",
     "Part",
     "PartType",
@@ -70,11 +83,14 @@ __all__ = [
     "Shape",
     "SimulationDiverged",
     "Slot",
+    "Tick",
     "Trace",
     "UnknownPlugin",
     "analyze",
+    "constant_shape",
     "cylinder",
     "evaluate",
+    "needs",
     "read",
     "resume",
     "run",

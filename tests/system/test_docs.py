@@ -17,6 +17,7 @@ from schema.experiment.file import parse_experiment
 from schema.experiment.settings import fitness_function
 from tests.own_brains import write_module
 from worker.fitness import check_fitness
+from worker.measures.functions import BUILT_IN, measures_of
 
 pytestmark = pytest.mark.system
 
@@ -105,6 +106,36 @@ def test_selection_of_the_selection_page_runs(tmp_path: Path) -> None:
     plugin.unlink()
     revolve("resume", "two", "--in-process", "--quiet")
     assert "equal" in revolve("compare", "calm", "two")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_measures_page_runs_from_top_to_bottom(tmp_path: Path) -> None:
+    page = TOP / "docs" / "measures.md"
+    module, *readers = _blocks(page, "python")
+    built_in, own = _blocks(page, "toml")
+    assert len(readers) >= 2
+    (tmp_path / "gaits.py").write_text(module)
+    (tmp_path / "gaits.toml").write_text(own)
+    (block,) = _blocks(page, "sh")
+    for line in block.splitlines():
+        done = _python(("-m", *line.split()), tmp_path)
+        assert done.returncode == 0, f"{line}\n{done.stderr}"
+    for reader in readers:
+        done = _python(("-W", "error", "-c", reader), tmp_path)
+        assert done.returncode == 0, f"{reader}\n{done.stderr}"
+    listed = re.findall(r"^\| `(\w+)` \| \S.*\| ", page.read_text(), re.MULTILINE)
+    assert [name for name in listed if name in BUILT_IN] == list(BUILT_IN)
+    measures = parse_experiment(built_in, str(page)).measures
+    assert len(measures_of(measures)) == 5
+    # The message that the page quotes.
+    (tmp_path / "gaits.py").write_text(module.replace('@rv.needs("contact")\n', "\n"))
+    done = _python(("-m", "revolve", "check", "gaits.toml"), tmp_path)
+    (quoted,) = re.findall(
+        r"^    (measures\.names: .*)$", page.read_text(), re.MULTILINE
+    )
+    assert done.returncode != 0
+    assert quoted in done.stdout + done.stderr
 
 
 @pytest.mark.slow
@@ -240,7 +271,9 @@ def test_every_command_on_the_pages_exists() -> None:
     named = {
         word
         for page in PAGES
-        for word in re.findall(r"\brevolve ([a-z]+)\b", page.read_text())
+        for word in re.findall(
+            r"(?<!import )(?<!from )\brevolve ([a-z]+)\b", page.read_text()
+        )
     }
     assert len(named) >= 6
     assert named <= set(COMMANDS)
