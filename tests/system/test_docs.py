@@ -69,6 +69,7 @@ def test_code_of_pages_about_tables_runs(
         assert done.returncode == 0, f"{words[-1]}\n{done.stderr}"
 
 
+@pytest.mark.timeout(300)
 def test_selection_of_the_selection_page_runs(tmp_path: Path) -> None:
     """Two workers give the births of one process; the run needs its folder alone."""
     page = TOP / "docs" / "selection.md"
