@@ -1,7 +1,6 @@
 """Check of an encoding before the first birth, on a few dozen genomes."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 import numpy as np
 
@@ -20,12 +19,9 @@ from schema.robot.ids import BirthId
 from schema.robot.robot import check_robot
 
 _GENOMES = 24
-_LONGEST_S = 10.0
 
 
-def check_encoding(
-    experiment: Experiment, now_s: Callable[[], float] | None = None
-) -> None:
+def check_encoding(experiment: Experiment) -> None:
     """Raise unless the encoding of an island keeps its contract.
 
     Random genomes and their children are made twice from equal random streams, written
@@ -33,15 +29,14 @@ def check_encoding(
 
     Args:
         experiment: settings of the island.
-        now_s: a monotonic clock [s]; None: durations are not checked.
 
     Raises:
         UnknownPlugin: no such encoding.
         ExperimentError: another result from equal arguments, a robot that breaks a
             limit, bytes that do not give the genome back, changed parents, no child
-            of any couple, or a method that raises or takes too long.
+            of any couple, or a method that raises.
     """
-    case = _Case(experiment, now_s)
+    case = _Case(experiment)
     genomes = [case.random(number) for number in range(_GENOMES)]
     numbers = range(_GENOMES)
     children = [case.child(genomes[k], genomes[k - 1], k) for k in numbers]
@@ -52,13 +47,10 @@ def check_encoding(
 class _Case:
     """An encoding, and what its methods must return."""
 
-    def __init__(
-        self, experiment: Experiment, now_s: Callable[[], float] | None
-    ) -> None:
+    def __init__(self, experiment: Experiment) -> None:
         self._encoding: IslandEncoding = encoding_of(experiment)
         self._space = experiment.space
         self._code = load_object(experiment.encoding.type, WHERE, BUILT_IN)
-        self._now_s = now_s
 
     def broken(self, expected: str, got: str) -> ExperimentError:
         """Return the error of a broken rule."""
@@ -94,22 +86,18 @@ class _Case:
 
     def _repeated(self, what: str, make: Callable[[], object]) -> object:
         """Return a genome, None if there is none; raise unless it is repeatable."""
-        with self._timed(what):
-            genome = make()
+        genome = make()
         again = make()
         if (genome is None) != (again is None):
             raise self.broken(f"{what}: the same of the same rng", "another result")
         if genome is None:
             return None
-        with self._timed("to_bytes"):
-            data = self._encoding.to_bytes(genome)
+        data = self._encoding.to_bytes(genome)
         if self._encoding.to_bytes(again) != data:
             raise self.broken(f"{what}: the same of the same rng", "another genome")
         try:
-            with self._timed("from_bytes"):
-                read = self._encoding.from_bytes(data)
-            with self._timed("develop"):
-                robot = self._encoding.develop(genome)
+            read = self._encoding.from_bytes(data)
+            robot = self._encoding.develop(genome)
             robots = [self._encoding.develop(each) for each in (genome, again, read)]
             check_robot(robot, self._encoding.types)
         except InvalidRobot as error:
@@ -121,12 +109,3 @@ class _Case:
         if problem := outside_limits(robot, self._space, self._encoding.types):
             raise self.broken("a robot within [space]", problem)
         return genome
-
-    @contextmanager
-    def _timed(self, method: str) -> Iterator[None]:
-        """Raise if the code inside takes too long."""
-        begin_s = self._now_s() if self._now_s else 0.0
-        yield
-        took_s = self._now_s() - begin_s if self._now_s else 0.0
-        if took_s > _LONGEST_S:
-            raise self.broken(f"{method} in < {_LONGEST_S:g} s", f"{took_s:.0f} s")

@@ -35,7 +35,8 @@ BUILT_IN: dict[str, Callable[..., Encoding[Any]]] = {
 }
 """Built-in encodings by their short names."""
 
-_METHODS = ("random", "develop", "crossover", "mutate", "to_bytes", "from_bytes")
+METHODS = ("random", "develop", "crossover", "mutate", "to_bytes", "from_bytes")
+"""Methods of an encoding."""
 
 
 class _NoParameters(msgspec.Struct, frozen=True):
@@ -55,7 +56,7 @@ def encoding_of(experiment: Experiment) -> "IslandEncoding":
             parameters, or an error when the class is called.
     """
     name = experiment.encoding.type
-    found = load_object(name, WHERE, BUILT_IN, _METHODS)
+    found = load_object(name, WHERE, BUILT_IN, METHODS)
     if not callable(found):
         raise ExperimentError(f"{WHERE}: {name!r} must be a class, not an object")
     kind = getattr(found, "Parameters", None)
@@ -88,7 +89,7 @@ class IslandEncoding:
         self._space = experiment.space
         self._is_thesis = self.name == REVOLVE_ANGLE
         self._guards = {
-            method: _Guard(self.name, method) for method in (*_METHODS, "mate")
+            method: _Guard(self.name, method) for method in (*METHODS, "mate")
         }
         self.no_child = "its parents' genomes gave no child"
         if self._is_thesis:

@@ -12,14 +12,20 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
+from itertools import product
 from pathlib import Path
 from typing import IO
 
+from coordinator.storage.campaign import campaign_plugins, is_campaign, read_campaign
+from coordinator.storage.folder import holds_run, read_details
 from schema.errors import ExperimentError, RevolveError, UnknownPlugin, one_line
-from schema.experiment.file import own_references, read_experiment
+from schema.experiment.document import Experiment, references
+from schema.experiment.file import draft_experiment, own_experiment, own_references
 from schema.experiment.kinds import Kind, Use, check_use, kind_of
+from schema.plugins.kept import allow_kept
 from schema.plugins.load import load_object, place_of
 from schema.plugins.permission import FLAG, allow, allow_references, allowed, is_own
+from schema.tables.description import allow_plugins_of
 
 LIMIT_S = 30.0
 """Time for the import, and for the check, of one plug-in [s]."""
@@ -42,8 +48,40 @@ def refuse_faulty(sources: Iterable[str]) -> None:
             ends its process; an experiment that is invalid.
     """
     own = [source for source in sources if any(map(is_own, own_references(source)))]
-    if own and (problems := check_apart(own)):
+    _refuse(own)
+
+
+def refuse_faulty_of(folder: Path) -> tuple[Experiment, ...]:
+    """Check the plug-ins of a run or campaign folder that is resumed.
+
+    Returns:
+        Its experiments.
+
+    Raises:
+        ExperimentError: as of ``refuse_faulty``, or a plug-in that is not that of the
+            beginning.
+    """
+    experiments = _experiments_of(folder, is_resumed=True)
+    named = [path for each in experiments for path in references(each)]
+    _refuse([str(folder)] if any(map(is_own, named)) else [])
+    return experiments
+
+
+def _refuse(words: Sequence[str]) -> None:
+    if words and (problems := check_apart(words)):
         raise ExperimentError(problems[0])
+
+
+def _experiments_of(folder: Path, *, is_resumed: bool) -> tuple[Experiment, ...]:
+    """Return the experiments of a run or campaign folder; allow its plug-ins."""
+    if is_campaign(folder):
+        allow_kept(folder, campaign_plugins(folder), is_resumed=is_resumed)
+        experiments = read_campaign(folder).experiments
+        for experiment in experiments:
+            allow_references(references(experiment))
+        return experiments
+    allow_plugins_of(folder, is_resumed=is_resumed)
+    return (own_experiment(read_details(folder).document),)
 
 
 def check_apart(
@@ -151,8 +189,14 @@ def _uses(
     """
     place, colon, attribute = word.rpartition(":")
     if not colon:
-        experiment = read_experiment(word)
-        for each in kinds:
+        folder = Path(word)
+        is_folder = is_campaign(folder) or holds_run(folder)
+        experiments = (
+            _experiments_of(folder, is_resumed=False)
+            if is_folder
+            else (draft_experiment(word),)
+        )
+        for each, experiment in product(kinds, experiments):
             for use in each.used(experiment):
                 if is_own(use.path):
                     yield each.name, use

@@ -13,10 +13,13 @@ import schema.robogen_parts
 from schema.errors import ExperimentError, RevolveError
 from schema.experiment.brains import NEURON_MEMBERS, neuron_types
 from schema.experiment.document import Experiment, Space, body_space
-from schema.parts import PartType
-from schema.plugins.load import load_instance
+from schema.parts import PartType, Sensor
+from schema.plugins.load import load_instance, load_object
 from schema.plugins.origin import where_defined, where_raised
+from schema.plugins.sensor_checks import check_sensor
 from schema.robot.neurons import BUILT_IN_NEURONS
+
+_SENSOR_MEMBERS = ("inputs", "read")
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,17 +71,18 @@ def check_use(use: Use, begin: Callable[[str], None] = lambda _: None) -> str:
     plugin = use.load()
     where = where_defined(plugin)
     begin(where)
+    file, _, _ = where.partition(":")
     try:
         use.check(plugin)
     # A plug-in may call exit().
     except (Exception, SystemExit) as error:
         story = " ".join(str(error).split())
         if not isinstance(error, RevolveError):
-            line = where_raised(error, where.partition(":")[0])
+            line = where_raised(error, file)
             story = f"raised {type(error).__name__}: {story}"
             story += f" ({line})" if line else ""
         story = story.removeprefix(f"{use.key}: ")
-        if where not in story:
+        if f"{file}:" not in story:
             story = f"{where}: {story}"
         raise ExperimentError(f"{use.key}: {story}") from error
     return where
@@ -134,10 +138,32 @@ PART_TYPE = Kind(
 )
 
 
-def _neuron_type(path: str) -> Use:
+def _sensor(path: str) -> Use:
+    key = "sensor"
     return Use(
-        "space.neuron_types", path, lambda: neuron_types((path,))[0], lambda _: None
+        key,
+        path,
+        lambda: load_object(path, key, {}, _SENSOR_MEMBERS),
+        lambda sensor: check_sensor(sensor, key),
     )
+
+
+def _is_sensor(plugin: object) -> bool:
+    is_object = not isinstance(plugin, type | Sensor)
+    return is_object and all(hasattr(plugin, name) for name in _SENSOR_MEMBERS)
+
+
+SENSOR = Kind("sensor", {}, _is_sensor, _sensor, lambda _: ())
+"""Experiments name sensors by their part types, whose check covers them."""
+
+
+def _neuron_type(path: str) -> Use:
+    key = "space.neuron_types"
+
+    def check(_: object) -> None:
+        neuron_types((path,))
+
+    return Use(key, path, lambda: load_object(path, key, BUILT_IN_NEURONS), check)
 
 
 def _neuron_types(experiment: Experiment) -> Iterator[Use]:
@@ -153,9 +179,8 @@ NEURON_TYPE = Kind(
     "neuron-type",
     BUILT_IN_NEURONS,
     _is_neuron_type,
-    # Loading one checks it.
     _neuron_type,
     _neuron_types,
 )
-KINDS = (PART_TYPE, NEURON_TYPE)
+KINDS = (PART_TYPE, SENSOR, NEURON_TYPE)
 """Kinds whose checks need no other room."""
