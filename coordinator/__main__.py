@@ -11,6 +11,7 @@ from coordinator.cli.execute import resume, start, start_campaign
 from coordinator.cli.flags import parser
 from coordinator.dispatch.events import AgentKind
 from coordinator.evolution.encodings import encoding_of
+from coordinator.evolution.kinds import KINDS
 from coordinator.plugins.checks import refuse_faulty, refuse_faulty_of
 from coordinator.plugins.command import check, list_plugins
 from coordinator.plugins.kinds import ENCODING, brain_kind
@@ -108,6 +109,7 @@ def plugin_kinds() -> tuple[Kind, ...]:
     return (
         *schema.experiment.kinds.KINDS,
         *worker.kinds.KINDS,
+        *KINDS,
         ENCODING,
         brain_kind(check_control),
     )

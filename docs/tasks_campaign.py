@@ -5,7 +5,7 @@
 
 Each search has the same number of births. The random one is the shipped experiment with
 ``selection.parents = "none"``, as in ``no-reproduction``. Rows are kept in
-docs/data/tasks.csv, one per finished run.
+docs/tasks_data/results.csv, one per finished run.
 """
 
 import argparse
@@ -28,19 +28,18 @@ from schema.experiment.file import own_experiment
 from schema.experiment.identity import Identity, Origin
 from schema.experiment.settings import evaluation_settings_of
 from schema.formats.files import write_robot
-from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 from schema.tables.files import read_table
-from schema.wire.codec import decode_genome
+from schema.wire.born import robot_of_birth
 from worker.robot.evaluation import evaluate
 
 ROOT = Path(__file__).resolve().parents[1]
 SHIPPED = ROOT / "schema" / "experiment" / "shipped"
-ROWS = ROOT / "docs" / "data" / "tasks.csv"
-ROBOTS = ROOT / "docs" / "data" / "tasks"
+ROBOTS = ROOT / "docs" / "tasks_data"
 """Best robot of each task with seed ``DRAWN``, for docs/tasks_pictures.py."""
 DRAWN = 1
+ROWS = ROBOTS / "results.csv"
 PAGE = ROOT / "docs" / "tasks.md"
 BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
 
@@ -61,6 +60,8 @@ BIRTHS = 600
 TRIALS = range(1000, 1020)
 """Trials in which the best robots of a task with pushes are evaluated anew."""
 RESAMPLES = 10_000
+FEW = 3
+"""Least number of seeds for an interval."""
 COLUMNS = ("task", "search", "seed", "births", "best", "mean", "failed", "commit")
 _RANDOM = 'parents = "none"'
 
@@ -115,6 +116,7 @@ def _run_one(folder: Path, task: str, search: str, seed: int) -> int:
     if done.returncode:
         return done.returncode
     row = {"task": task, "search": search, "seed": seed, **_outcome(out)}
+    ROBOTS.mkdir(exist_ok=True)
     is_new = not ROWS.exists()
     with ROWS.open("a", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
@@ -122,7 +124,6 @@ def _run_one(folder: Path, task: str, search: str, seed: int) -> int:
             writer.writeheader()
         writer.writerow({**row, "commit": _commit()})
     if search == "evolution" and seed == DRAWN:
-        ROBOTS.mkdir(exist_ok=True)
         experiment, _, robot = _best(out)
         write_robot(robot, ROBOTS / f"{task}.yaml", body_space(experiment.space))
     shutil.rmtree(out)
@@ -177,8 +178,8 @@ def _best(out: Path) -> tuple[Experiment, int, Robot]:
     best = int(np.argmax(alive["fitness"].to_numpy()))
     birth = alive["birth"][best].as_py()
     births = read_table(out, "births")
-    genome = births.filter(pc.equal(births["birth"], birth))["genome"][0].as_py()
-    robot = develop(decode_genome(genome), body_space(experiment.space))
+    (own,) = births.filter(pc.equal(births["birth"], birth)).to_pylist()
+    robot = robot_of_birth(own["genome"], own["robot"], experiment)
     return experiment, birth, robot
 
 
@@ -239,11 +240,14 @@ def table(kept: Sequence[Mapping[str, str]]) -> Iterator[str]:
             np.array([found[search][seed] for seed in seeds]) for search in SEARCHES
         )
         change, low, high = difference(first, second)
+        interval = (
+            f"{low:+.3f} to {high:+.3f}" if len(seeds) >= FEW else "too few seeds"
+        )
         suffix = "" if unit == "1" else f" {unit}"
         yield (
             f"| {task} | {len(seeds)} | {np.median(first):.3f}{suffix} | "
             f"{np.median(second):.3f}{suffix} | {change:+.3f}{suffix} | "
-            f"{low:+.3f} to {high:+.3f} |"
+            f"{interval} |"
         )
 
 

@@ -6,6 +6,7 @@ Each picture shows three moments of an evaluation from a fixed camera.
 """
 
 import sys
+from pathlib import Path
 
 import numpy as np
 
@@ -16,15 +17,13 @@ from analysis.render.picture import (
     gait_strip,
     save_picture,
 )
-from docs.tasks_campaign import ROBOTS, ROOT, TASKS
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
-from schema.formats.files import read_robot
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 
-PICTURES = ROOT / "docs" / "pictures" / "tasks"
+PICTURES = Path(__file__).resolve().parent / "pictures" / "tasks"
 SIZE = (280, 210)
 """Width and height of each of the three pictures [pixels]."""
 SHARES = (0.1, 0.5, 0.99)
@@ -34,7 +33,9 @@ SHARES = (0.1, 0.5, 0.99)
 def main() -> int:
     """Draw all tasks; return 0."""
     choose_engine()
-    # Imports MuJoCo.
+    # They import MuJoCo, which needs to know the engine.
+    from docs.tasks_campaign import ROBOTS, TASKS  # noqa: PLC0415
+    from schema.formats.files import read_robot  # noqa: PLC0415
     from worker.robot.evaluation import simulate  # noqa: PLC0415
 
     PICTURES.mkdir(exist_ok=True)

@@ -21,6 +21,7 @@ from revolve.messages import Outcome, Problem, Task, error_of
 from schema.agent.supervision import crash_cause
 from schema.errors import RevolveError
 from schema.plugins.permission import allowed, source_of
+from schema.plugins.source import forget_digests, plugins_of
 
 _GRACE_S = 5.0
 _OUTCOMES = msgspec.msgpack.Decoder(Outcome)
@@ -120,12 +121,14 @@ def _received(connection: Connection) -> bytes | None:
 class Simulator:
     """The process that simulates single robots; started with the first task.
 
-    A process that was forked from this one starts its own.
+    A process that was forked from this one starts its own. A plug-in whose source has
+    changed is imported again, in a new process.
     """
 
     def __init__(self) -> None:
         self._child: Child | None = None
         self._owner = 0
+        self._sources: dict[str, str] = {}
         self._lock = threading.Lock()
         atexit.register(self.end)
 
@@ -136,6 +139,7 @@ class Simulator:
             RevolveError: the task cannot be done; of the class that the worker raises.
         """
         with self._lock:
+            self._note_sources(task.settings)
             try:
                 child = self._running()
                 child.connection.send_bytes(msgspec.msgpack.encode(task))
@@ -149,6 +153,15 @@ class Simulator:
         if outcome.problem is not None:
             raise error_of(outcome.problem)
         return outcome
+
+    def _note_sources(self, settings: bytes) -> None:
+        """End the process if it may have imported an earlier source of a plug-in."""
+        forget_digests()
+        for each in plugins_of(settings).split():
+            name, _, digest = each.partition("=")
+            if self._sources.setdefault(name, digest) != digest:
+                self.end()
+                self._sources = {name: digest}
 
     def _running(self) -> Child:
         if self._child is None or self._owner != os.getpid():

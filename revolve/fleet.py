@@ -4,13 +4,13 @@ import atexit
 import os
 import threading
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
 from functools import lru_cache, partial
 from itertools import islice
 from pathlib import Path
 from types import TracebackType
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 import msgspec
 
@@ -28,12 +28,20 @@ from schema.agent.address import hub_of
 from schema.agent.network import DEFAULT_FLEET, Tls
 from schema.agent.supervisor import cores
 from schema.agent.topics import unique_name
-from schema.errors import ExperimentError, JobRefused
+from schema.errors import ExperimentError, JobRefused, RevolveError
 from schema.experiment.settings import EvaluationSettings
-from schema.plugins.permission import allow
-from schema.plugins.source import plugins_of
+from schema.plugins.load import load_function
+from schema.plugins.permission import allow, allow_references
+from schema.plugins.source import forget_digests, plugins_of
 from schema.robot.results import Evaluation
 from schema.robot.robot import Robot as PlainRobot
+from schema.wire.calls import (
+    Failed,
+    call_settings,
+    encode_call_request,
+    pack_value,
+    read_call_answer,
+)
 from schema.wire.codec import Answer, encode_request, encode_robot
 
 T = TypeVar("T")
@@ -106,6 +114,8 @@ class Fleet:
         Raises:
             NetworkError: no hub answers.
         """
+        # Its workers import the sources as they are now.
+        forget_digests()
         self._engine = Engine(self._network, self._fault)
         atexit.register(self.close)
         return self
@@ -185,6 +195,53 @@ class Fleet:
             return self._in_order(self.submit(robot) for robot in robots)
         settings = settings_for(None, experiment)
         return self._in_order(self._submit(robot, settings) for robot in robots)
+
+    def map(
+        self, function: str | Callable[[Any], Any], items: Iterable[object]
+    ) -> Iterator[Any]:
+        """Call a function with each item; return its values in the same order.
+
+        The function must be pure: a call may be repeated on another worker. Workers
+        import it by name. Those of this fleet may import its module from now on; those
+        at ``connect`` must have the same source, and their owner must allow it.
+
+            def score(numbers):  # in lab.py
+                return sum(numbers)
+
+            list(fleet.map("lab:score", [[1, 2], [3]]))  # [3, 3]
+
+        Args:
+            function: of one argument, as ``"module:function"`` or as an object that
+                has such a name. A module may be a file in the current folder.
+            items: plain: None, bool, int, float, str, bytes, list or dict of such, and
+                tuples, which become lists.
+
+        Raises:
+            UnknownPlugin: no such function.
+            ExperimentError: no function of one argument, or one of ``__main__``; from
+                the iterator, an item that is not plain.
+            RevolveError: from the iterator, if a call fails; as for ``submit``, too.
+        """
+        path = _path_of(function)
+        allow_references([path], Path.cwd())
+        load_function(path, "function", 1)
+        settings = call_settings(path)
+        return self._in_order(
+            self._call(settings, item, number) for number, item in enumerate(items)
+        )
+
+    def _call(self, settings: bytes, item: object, number: int) -> "Future[Any]":
+        try:
+            argument = pack_value(item)
+        except ExperimentError as error:
+            raise ExperimentError(f"item {number}: {error}") from None
+        order = Order(
+            "call",
+            partial(_encode_call, settings=settings, argument=argument),
+            lambda expected: partial(read_call_answer, expected=expected),
+            partial(_value, number=number),
+        )
+        return self._order(order)
 
     def _submit(
         self, robot: Robot | PlainRobot, settings: EvaluationSettings
@@ -291,6 +348,52 @@ def _settle(end: Deliver, settings: EvaluationSettings) -> Result:
     if isinstance(found, Evaluation):
         return result_of(found, settings)
     return Result(failure=str(found))
+
+
+def _path_of(function: str | Callable[[Any], Any]) -> str:
+    """Return the name by which workers import a function.
+
+    Raises:
+        ExperimentError: it has no such name.
+    """
+    if isinstance(function, str):
+        return function
+    home = str(getattr(function, "__module__", None))
+    name = str(getattr(function, "__qualname__", None))
+    if home == "__main__" or not name.isidentifier():
+        raise ExperimentError(
+            f"workers cannot import {name} of {home}: put it into a file of its own, "
+            "outside of any other function"
+        )
+    return f"{home}:{name}"
+
+
+def _encode_call(
+    run: str, epoch: int, number: int, *, settings: bytes, argument: bytes
+) -> bytes:
+    """Return the request of a call."""
+    return encode_call_request(
+        run=run,
+        epoch=epoch,
+        number=number,
+        settings=settings,
+        argument=argument,
+        plugins=plugins_of(settings),
+    )
+
+
+def _value(end: Deliver, *, number: int) -> object:
+    """Return the value that the end of a call gives.
+
+    Raises:
+        JobRefused: several workers cannot do it, or it ends their processes.
+        RevolveError: the function has failed.
+    """
+    if end.reason:
+        raise refusal(end)
+    if isinstance(end.answer, Failed):
+        raise RevolveError(f"item {number}: {end.answer.reason}")
+    return end.answer
 
 
 def refusal(end: Deliver) -> JobRefused:

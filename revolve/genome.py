@@ -6,14 +6,10 @@ from typing import Self
 
 import numpy as np
 
-from coordinator.evolution.generation import generate
-from coordinator.evolution.variation import mate
+from coordinator.evolution.encodings import IslandEncoding, encoding_of
 from revolve.experiment import Experiment, document_of
 from revolve.robot import DEFAULT, Robot, as_experiment, of_plain
-from schema.experiment.document import body_space
-from schema.robot.genome import Node, develop
 from schema.robot.ids import BirthId
-from schema.wire.codec import decode_genome, encode_genome
 
 _NUMBERS = 2**32
 """Number of different births that new genes are named after."""
@@ -24,11 +20,12 @@ class Genome:
     """Genome of a robot.
 
     Attributes:
-        root: its tree of nodes; each has a part, its neurons and their connections.
-        experiment: whose part types, limits and probabilities apply.
+        value: as the experiment's encoding makes it; of ``revolve-angle`` the root of a
+            tree of nodes, each with a part, its neurons and their connections.
+        experiment: whose encoding, part types, limits and probabilities apply.
     """
 
-    root: Node
+    value: object
     experiment: Experiment = field(compare=False, repr=False)
 
     @classmethod
@@ -45,27 +42,33 @@ class Genome:
             ExperimentError: no such experiment, or it allows (nearly) no robot.
         """
         own = as_experiment(experiment)
-        return cls(generate(rng, document_of(own), _birth(rng)), own)
+        return cls(_encoding(own).random(rng, _birth(rng)), own)
 
     def mate(self, other: Self, rng: np.random.Generator) -> Self | None:
         """Return a child by crossover and mutation; None if the attempt fails.
 
         Args:
-            other: the parent that gives a subtree; this one gives the root.
+            other: the second parent; with ``revolve-angle`` it gives a subtree, and
+                this one gives the root.
             rng: all draws come from it.
         """
-        document = document_of(self.experiment)
-        child = mate(self.root, other.root, rng, document, _birth(rng))
+        encoding, birth = _encoding(self.experiment), _birth(rng)
+        child = encoding.mate(self.value, other.value, rng, birth)
         return None if child is None else type(self)(child, self.experiment)
 
     def develop(self) -> Robot:
-        """Return the robot that the genome describes."""
-        space = body_space(document_of(self.experiment).space)
-        return of_plain(develop(self.root, space), self.experiment)
+        """Return the robot that the genome describes.
+
+        Raises:
+            InvalidRobot: it breaks a limit of ``[space]``; never with built-in
+                encodings.
+        """
+        robot = _encoding(self.experiment).develop(self.value)
+        return of_plain(robot, self.experiment)
 
     def to_bytes(self) -> bytes:
         """Return the genome as bytes."""
-        return encode_genome(self.root)
+        return _encoding(self.experiment).to_bytes(self.value)
 
     @classmethod
     def from_bytes(cls, data: bytes, experiment: Experiment | str | Path) -> Self:
@@ -75,7 +78,12 @@ class Genome:
             RevolveError: other bytes.
             ExperimentError: no such experiment.
         """
-        return cls(decode_genome(data), as_experiment(experiment))
+        own = as_experiment(experiment)
+        return cls(_encoding(own).from_bytes(data), own)
+
+
+def _encoding(experiment: Experiment) -> IslandEncoding:
+    return encoding_of(document_of(experiment))
 
 
 def _birth(rng: np.random.Generator) -> BirthId:

@@ -6,8 +6,7 @@ from typing import Self
 
 import msgspec
 
-from coordinator.evolution.generation import generate
-from coordinator.evolution.random_streams import Purpose, stream
+from coordinator.evolution.breeding import Breeder
 from revolve.children import SIMULATOR, plugins
 from revolve.experiment import Experiment, document_of
 from revolve.messages import Task
@@ -16,7 +15,6 @@ from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import read_robot, settings_of, write_robot
 from schema.robot.brain import Brain
-from schema.robot.genome import develop
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, check_number, check_robot
 from schema.robot.robot import Robot as PlainRobot
@@ -83,12 +81,10 @@ class Robot:
             ExperimentError: no such experiment, or it allows (nearly) no robot.
         """
         own = as_experiment(experiment)
-        document = document_of(own)
-        birth = BirthId(0, number)
-        rng = stream(seed, 0, birth, 0, Purpose.GENERATE)
-        genome = generate(rng, document, birth)
-        found = develop(genome, body_space(document.space))
-        return cls(found.parts, found.brain, own)
+        breeder = Breeder(document_of(own), seed, run=0)
+        candidate = breeder.candidate(BirthId(0, number), 0, ())
+        assert candidate is not None
+        return cls(candidate.robot.parts, candidate.robot.brain, own)
 
     def write(self, path: str | Path) -> None:
         """Write the robot to a file.

@@ -14,12 +14,11 @@ from revolve.children import run_command
 from revolve.experiment import Experiment, document_of
 from revolve.robot import Robot, of_plain
 from schema.errors import RevolveError, RunFolderError
-from schema.experiment.document import body_space, island_experiment
+from schema.experiment.document import island_experiment
 from schema.experiment.file import own_experiment
-from schema.robot.genome import develop
 from schema.tables.description import DETAILS, read_description, read_state
 from schema.tables.files import read_table
-from schema.wire.codec import decode_genome
+from schema.wire.born import robot_of_birth
 
 Folder = str | Path
 
@@ -139,10 +138,29 @@ class Run:
             raise RunFolderError(
                 f"{self.folder}: has no birth {number} on island {island}"
             )
-        genome = decode_genome(found["genome"][0].as_py())
-        document = island_experiment(document_of(self.experiment), island)
-        space = body_space(document.space)
-        return of_plain(develop(genome, space), Experiment(document))
+        return self.robots(found)[0]
+
+    def robots(self, births: pa.Table | None = None) -> list[Robot]:
+        """Return the robots of some births.
+
+        Args:
+            births: rows of the table ``births``; None: all of them.
+
+        Raises:
+            RunFolderError: the table is damaged.
+        """
+        rows = self.births if births is None else births
+        homes = rows["island"].to_pylist()
+        documents = {
+            island: island_experiment(document_of(self.experiment), island)
+            for island in set(homes)
+        }
+        own = {island: Experiment(each) for island, each in documents.items()}
+        columns = (rows[name].to_pylist() for name in ("genome", "robot"))
+        return [
+            of_plain(robot_of_birth(genome, stored, documents[island]), own[island])
+            for island, genome, stored in zip(homes, *columns, strict=True)
+        ]
 
     def best(self, count: int = 1) -> list[Robot]:
         """Return the robots with the highest fitness of all off-line evaluations.

@@ -27,6 +27,8 @@ ADVANCE_REQUEST_BYTES = 256 * MIB
 """A request about an arena; it may contain a snapshot and a history."""
 ANSWER_BYTES = 16 * KIB
 """An answer about one robot, without the intersections of its report."""
+VALUE_BYTES = 1 * MIB
+"""The argument or the value of a call of a user's function."""
 PAIR_BYTES = 16
 """An intersection in a report."""
 ADVANCE_BYTES = 256 * MIB

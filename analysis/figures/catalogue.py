@@ -9,6 +9,7 @@ from typing import Any
 from analysis.figures.bench import arena_speed, spider_speed
 from analysis.figures.forms import Panels, Tables, over_births, over_runs
 from analysis.figures.islands import between, fitness_by_island, migration_graph
+from analysis.figures.named_measures import measures_over_births
 from analysis.figures.robots import (
     effects,
     extremities_and_fitness,
@@ -144,5 +145,9 @@ FIGURES: tuple[Figure, ...] = (
            "correlation where an experiment is compared with a number. In brackets: "
            "the thesis's finding (> greater, < smaller, = no large difference).",
            ("findings",), effects),
+    Figure("G", "Measures over births",
+           "Mean over the population of each measure that the experiment names. Each "
+           "line is an island of a run; units are those of the measure.",
+           ("named_measures",), measures_over_births),
 )  # fmt: skip
 """Figures of the thesis in its order, then further figures."""

@@ -61,6 +61,7 @@ class Run:
         document: the experiment as JSON.
         islands: settings of each island.
         differs: settings that differ from other runs of the same experiment name.
+        has_measures: the experiment names measures of robots.
     """
 
     folder: Path
@@ -71,6 +72,7 @@ class Run:
     document: str
     islands: tuple[IslandSettings, ...]
     differs: str = ""
+    has_measures: bool = False
 
     @property
     def is_finished(self) -> bool:
@@ -153,6 +155,7 @@ def read_run(folder: Path) -> Run:
         document = json.loads(details["document"])
         islands = tuple(_settings(document))
         name, number, seed = details["name"], details["run"], details["seed"]
+        has_measures = bool(document.get("measures", {}).get("names"))
     except (
         ValueError, KeyError, TypeError, AttributeError, RecursionError
     ) as error:  # fmt: skip
@@ -166,6 +169,7 @@ def read_run(folder: Path) -> Run:
         state=_state(folder, details),
         document=str(details["document"]),
         islands=islands,
+        has_measures=has_measures,
     )
     if run.is_finished and not any(has_rows(folder, each) for each in TABLES):
         raise RunFolderError("the run is finished, but its tables are missing")

@@ -13,6 +13,7 @@ from analysis.measures.ancestry import migrants
 from analysis.measures.bodies import extremity_bins
 from analysis.measures.diversity import mean_distances
 from analysis.measures.interactions import interactions
+from analysis.measures.named_measures import named_measures
 from analysis.measures.population_table import (
     Booleans,
     Numbers,
@@ -82,6 +83,7 @@ _OTHERS: dict[str, tuple[Callable[[RunTables], pa.Table], tuple[str, ...]]] = {
         lambda run: mean_distances(run.population_table, run.trees),
         ("births", "population"),
     ),
+    "named_measures": (named_measures, _OF_ROBOTS),
     "migrants": (
         lambda run: migrants(
             run.tables["migrations"], run.births, run.population_table, run.lines
@@ -99,8 +101,8 @@ def measure(
 
     Args:
         run: the run's tables.
-        wanted: which of variability, interactions, between and migrants apply to the
-            run.
+        wanted: which of variability, interactions, between, migrants and
+            named_measures apply to the run.
         unread: tables that could not be read; measures that need them are left out.
 
     Returns:

@@ -157,6 +157,12 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "living": "descendants in that island's last population, itself included",
         "reached": "islands whose last population contains it or a descendant",
     },
+    "named_measures": {
+        **_ISLAND,
+        "measure": "name in measures.names",
+        "mean": "mean of judged robots, in the measure's unit",
+        "robots": "number of these robots",
+    },
     "progression": {
         "experiment": _RUN["experiment"],
         "measure": "column of populations",

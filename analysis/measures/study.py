@@ -99,6 +99,8 @@ def _wanted(run: Run) -> frozenset[str]:
         wanted.add("interactions")
     if len(run.islands) > 1:
         wanted |= {"between", "migrants"}
+    if run.has_measures:
+        wanted.add("named_measures")
     return frozenset(wanted)
 
 

@@ -2,10 +2,12 @@
 
 The tree of segments is rebuilt from the body as in ``schema.mjcf``, without a model: at
 the neutral pose all frames are parallel to the core's, and a joint turns everything
-beyond it. Boxes of one segment share an attitude if they differ by right angles only,
-because equal numbers take less room in a recording.
+beyond it, or moves it. A cylinder is drawn as four boxes that are inscribed in it; in
+plain models it is one box around it. Boxes of one segment share an attitude if they
+differ by right angles only, because equal numbers take less room in a recording.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -13,16 +15,19 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.compute
+from msgspec.structs import replace
 
 from schema.errors import MalformedMessage
 from schema.mjcf.model import quaternion
-from schema.parts import BodySpace, Box
+from schema.parts import BodySpace, Box, Matrix
 from schema.robot.frames import place_parts, shapes_of
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
 
 Float32s = npt.NDArray[np.float32]
 
+_ROUND = 4
+"""Boxes that draw a cylinder: a star of 16 corners on its rim."""
 _PLATE_M = 0.002
 """Thinner boxes only close gaps between parts [m]."""
 
@@ -41,7 +46,8 @@ class BoxModel:
         carried_by: (A,) segment of each attitude.
         parents: (S,) parent of each segment; -1 for the core's.
         anchors: (S, 3) anchor of the joint to the parent, in the parent's frame [m].
-        axes: (S, 3) axis of that joint, of positive angles.
+        axes: (S, 3) axis of that joint, of positive angles or displacements.
+        slides: (S,) whether that joint is a slider.
     """
 
     half_sizes: Float32s
@@ -54,6 +60,7 @@ class BoxModel:
     parents: tuple[int, ...]
     anchors: Floats
     axes: Floats
+    slides: tuple[bool, ...]
 
 
 def box_model(robot: Robot, space: BodySpace, *, is_plain: bool) -> BoxModel:
@@ -76,7 +83,7 @@ def place(model: BoxModel, roots: Floats, angles: Floats) -> tuple[Float32s, Flo
     Args:
         model: the body.
         roots: (T, 7) position x, y, z [m] and attitude w, x, y, z of the core.
-        angles: (T, J) joint angles, by ascending part [rad].
+        angles: (T, J) joint angles [rad] or displacements [m], by ascending part.
 
     Returns:
         Centres (T, B, 3) [m] and attitudes (T, B, 4) x, y, z, w, world frame.
@@ -84,9 +91,12 @@ def place(model: BoxModel, roots: Floats, angles: Floats) -> tuple[Float32s, Flo
     attitudes = [roots[:, [4, 5, 6, 3]]]
     places = [roots[:, :3]]
     for joint, parent in enumerate(model.parents[1:]):
-        half = 0.5 * angles[:, joint : joint + 1]
-        rotation = np.hstack([np.sin(half) * model.axes[joint + 1], np.cos(half)])
-        offset = rotated(attitudes[parent], model.anchors[joint + 1])
+        angle, axis = angles[:, joint : joint + 1], model.axes[joint + 1]
+        anchor, half = model.anchors[joint + 1], 0.5 * angle
+        if model.slides[joint + 1]:
+            anchor, half = anchor + angle * axis, 0.0 * half
+        rotation = np.hstack([np.sin(half) * axis, np.cos(half)])
+        offset = rotated(attitudes[parent], anchor)
         places.append(places[parent] + offset)
         attitudes.append(product(attitudes[parent], rotation))
     turned, placed = np.stack(attitudes, axis=1), np.stack(places, axis=1)
@@ -153,6 +163,7 @@ class _Builder:
         self.parents = [-1]
         self.origins = [np.zeros(3)]
         self.axes = [np.zeros(3)]
+        self.slides = [False]
         # Attitudes in use: (segment, matrix).
         self.attitudes: list[tuple[int, Floats]] = [(0, np.eye(3))]
         self.rows: list[tuple[int, int, Floats, Floats, tuple[float, ...]]] = []
@@ -171,10 +182,12 @@ class _Builder:
             self.parents.append(near)
             self.origins.append(self.positions[index] + rotation @ shape.joint.anchor)
             self.axes.append(axis if own == 0 else -axis)
+            self.slides.append(shape.joint.kind == "prismatic")
             pair[1 - own] = len(self.parents) - 1
             self.attitudes.append((pair[1 - own], np.eye(3)))
         self.pairs.append(pair)
-        for box in _plain(shape.boxes) if self.is_plain else shape.boxes:
+        boxes = _plain(shape.boxes) if self.is_plain else _inscribed(shape.boxes)
+        for box in boxes:
             self._add_box(index, box, pair[box.segment])
 
     def _add_box(self, index: int, box: Box, segment: int) -> None:
@@ -213,7 +226,27 @@ class _Builder:
             parents=tuple(self.parents),
             anchors=origins - origins[parents],
             axes=np.array(self.axes),
+            slides=tuple(self.slides),
         )
+
+
+def _inscribed(boxes: Iterable[Box]) -> list[Box]:
+    """Return boxes, with four boxes in place of each cylinder."""
+    found: list[Box] = []
+    for box in boxes:
+        if not box.is_round:
+            found.append(box)
+            continue
+        diameter, _, length = box.size
+        step = math.pi / _ROUND
+        size = (diameter * math.cos(step / 2), diameter * math.sin(step / 2), length)
+        for number in range(_ROUND):
+            c, s = math.cos(number * step), math.sin(number * step)
+            turn = np.array(box.rotation) @ ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))
+            (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = turn.tolist()
+            matrix: Matrix = ((xx, xy, xz), (yx, yy, yz), (zx, zy, zz))
+            found.append(replace(box, size=size, rotation=matrix, is_round=False))
+    return found
 
 
 def _plain(boxes: Iterable[Box]) -> list[Box]:

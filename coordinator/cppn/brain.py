@@ -6,28 +6,24 @@ Source: Stanley, D'Ambrosio and Gauci, 2009, HyperNEAT; whether a connection exi
 an output of its own, as in Verbancsics and Stanley, 2011.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from coordinator.cppn.body import Grown, parameters_from, point
 from coordinator.cppn.network import Network, evaluate, queries
-from schema.parts import Parameter
-from schema.robot.brain import INPUT, Brain, Connection, Neuron
+from schema.robot.brain import INPUT, Brain, Connection, Neuron, NeuronKinds
 
 HIDDEN, LINK, WEIGHT = "hidden", "link", "weight"
 
-NeuronTypes = Mapping[str, tuple[Parameter, ...]]
-"""Parameters of each type of output and hidden neurons."""
 
-
-def brain_outputs(types: NeuronTypes) -> tuple[str, ...]:
+def brain_outputs(types: NeuronKinds) -> tuple[str, ...]:
     """Return the names of the outputs that describe a brain."""
     return (HIDDEN, LINK, WEIGHT, *_neuron_outputs(types))
 
 
 def grow_brain(
-    network: Network, parts: Sequence[Grown], max_hidden: int, types: NeuronTypes
+    network: Network, parts: Sequence[Grown], max_hidden: int, types: NeuronKinds
 ) -> Brain:
     """Return the brain of a body.
 
@@ -94,7 +90,7 @@ def _connections(
     return tuple(Connection(*pair, weight) for pair, link, weight in rows if link > 0.0)
 
 
-def _neuron_outputs(types: NeuronTypes) -> tuple[str, ...]:
+def _neuron_outputs(types: NeuronKinds) -> tuple[str, ...]:
     parameters = {each.name: None for own in types.values() for each in own}
     return (
         *(f"kind {name}" for name in types),

@@ -10,9 +10,9 @@ from coordinator.cppn.body import body_outputs, grow, parts_of
 from coordinator.cppn.brain import brain_outputs, grow_brain
 from coordinator.cppn.network import Network
 from schema.errors import ExperimentError
+from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Experiment
 from schema.parts import BodySpace
-from schema.robot.brain import NEURON_TYPES
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot
 
@@ -32,7 +32,7 @@ class Cppn:
         self._space = experiment.space
         self._types = types
         self._rules = parameters
-        self._neurons = NEURON_TYPES
+        self._neurons = neuron_kinds(experiment.brain, experiment.space)
         self._outputs = (*body_outputs(types), *brain_outputs(self._neurons))
         # The robot is asked for once by mutation and once by the run.
         self._developed = lru_cache(maxsize=_CACHED)(self._grown)

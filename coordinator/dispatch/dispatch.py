@@ -45,7 +45,11 @@ from coordinator.dispatch.pool import REPLY_S, AgentState, Pool
 from schema.errors import MalformedMessage, UnexpectedEvent
 from schema.wire.packing import fingerprint
 
-AGENT_OF: dict[JobKind, AgentKind] = {"vet": "analyzer", "evaluate": "worker"}
+AGENT_OF: dict[JobKind, AgentKind] = {
+    "vet": "analyzer",
+    "evaluate": "worker",
+    "call": "worker",
+}
 MAX_ERRORS = 3
 MAX_DEATHS = 3
 LEAST_S = 1.0

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 
 AgentKind = Literal["worker", "analyzer"]
 
-JobKind = Literal["vet", "evaluate"]
+JobKind = Literal["vet", "evaluate", "call"]
 
 Read = Callable[[bytes], object]
 """Decodes an answer and checks it; raises ``MalformedMessage`` if it is unfit."""
@@ -34,7 +34,7 @@ class Job:
 
     Attributes:
         number: unique within the process, ascending.
-        kind: "vet" goes to analyzers, "evaluate" to workers.
+        kind: "vet" goes to analyzers, "evaluate" and "call" to workers.
         payload: the encoded request.
         twin: number of the same request's other job, which another agent does if
             there is one; -1 if there is no other job.

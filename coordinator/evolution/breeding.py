@@ -10,14 +10,14 @@ from functools import partial
 from math import inf
 
 from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.random_streams import BufferedRng, Purpose, stream
-from coordinator.evolution.selection import (
-    Couple,
-    Individual,
-    cull_population,
+from coordinator.evolution.random_streams import Purpose, stream
+from coordinator.evolution.rules import (
+    parents_rule,
     select_parents,
     select_survivors,
+    survivors_rule,
 )
+from coordinator.evolution.selection import Couple, Individual, cull_population
 from schema.errors import ExperimentError, InvalidRobot
 from schema.experiment.document import Experiment
 from schema.robot.ids import BirthId
@@ -49,8 +49,16 @@ class Candidate:
         self, generation: int | None, fitness: float | None = 0.0
     ) -> Individual:
         """Return the individual; its fitness is None if its evaluation failed."""
-        rank = 1 + max((parent.rank for parent in self.couple or ()), default=0)
-        individual = Individual(self.birth, self.genome, 0.0, rank, generation)
+        parents = self.couple or ()
+        individual = Individual(
+            self.birth,
+            self.genome,
+            fitness=0.0,
+            rank=1 + max((parent.rank for parent in parents), default=0),
+            generation=generation,
+            parents=tuple(parent.birth for parent in parents),
+            size=len(self.robot.parts),
+        )
         return individual.evaluated(fitness)
 
 
@@ -61,6 +69,8 @@ class Breeder:
         self._experiment = experiment
         self._encoding = encoding_of(experiment)
         self._stream = partial(stream, seed, run)
+        self._parents_rule = parents_rule(experiment.selection)
+        self._survivors_rule = survivors_rule(experiment.selection)
 
     def candidate(
         self,
@@ -123,16 +133,16 @@ class Breeder:
             failed. After ``max_mating_attempts`` new parents are selected.
 
         Raises:
-            ExperimentError: no random robot meets the restrictions, or an encoding's
-                own code fails.
+            ExperimentError: no random robot meets the restrictions, or the selection
+                of parents or an encoding's own code fails.
         """
         selection = self._experiment.selection
         if self._is_random(population):
             rng = self._stream(birth, attempt, Purpose.GENERATE)
             return None, self._encoding.random(rng, birth)
         if couple is None or attempt % selection.max_mating_attempts == 0:
-            draws = BufferedRng(self._stream(birth, attempt, Purpose.PARENTS))
-            couple = select_parents(population, draws, selection)
+            rng = self._stream(birth, attempt, Purpose.PARENTS)
+            couple = select_parents(population, rng, self._parents_rule)
         rng = self._stream(birth, attempt, Purpose.MATE)
         first, second = couple
         return couple, self._encoding.mate(first.genome, second.genome, rng, birth)
@@ -172,13 +182,17 @@ class Breeder:
         Args:
             parents: the population before.
             children: the brood, in birth order; at least one.
+
+        Raises:
+            ExperimentError: the selection of survivors fails.
         """
         selection = self._experiment.selection
         if selection.culling is not None:
             founders = selection.population
             return cull_population(parents, children, founders, selection.culling)
         rng = self._stream(children[-1].birth, 0, Purpose.SURVIVORS)
-        return select_survivors(parents, children, BufferedRng(rng), selection)
+        rule = self._survivors_rule
+        return select_survivors(parents, children, rng, selection, rule)
 
     def _is_random(self, population: Sequence[Individual]) -> bool:
         return not population or self._experiment.selection.parents == "none"

@@ -16,7 +16,6 @@ from schema.experiment.document import Experiment
 from schema.plugins.load import load_object
 from schema.plugins.origin import where_defined
 from schema.robot.ids import BirthId
-from schema.robot.robot import check_robot
 
 _GENOMES = 24
 
@@ -99,7 +98,7 @@ class _Case:
             read = self._encoding.from_bytes(data)
             robot = self._encoding.develop(genome)
             robots = [self._encoding.develop(each) for each in (genome, again, read)]
-            check_robot(robot, self._encoding.types)
+            self._encoding.check(robot)
         except InvalidRobot as error:
             raise self.broken("a robot within [space]", str(error)) from error
         if self._encoding.to_bytes(read) != data:

@@ -24,6 +24,7 @@ from schema.parts import BodySpace
 from schema.plugins.load import load_object
 from schema.plugins.parameters import read_parameters
 from schema.plugins.protocols import Encoding, OneStepMating, RobotEncoding
+from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.robot import Robot, check_robot
 from schema.wire.codec import encode_robot
@@ -135,12 +136,15 @@ class IslandEncoding:
         if self._is_thesis:
             return self._encoding.develop(genome)
         with self._guards["develop"]:
-            robot = self._encoding.develop(genome)
-            if not isinstance(robot, Robot):
+            found: object = self._encoding.develop(genome)
+            parts, brain = (getattr(found, each, None) for each in ("parts", "brain"))
+            if not isinstance(parts, tuple | list) or not isinstance(brain, Brain):
                 raise ExperimentError(
                     f"{WHERE}: {self.name!r}: develop must return a Robot, "
-                    f"got {shown(robot)}"
+                    f"got {shown(found)}"
                 )
+            # The Python API has a class of its own.
+            robot = Robot(tuple(parts), brain)
             self.check(robot)
         if problem := outside_limits(robot, self._space, self.types):
             raise InvalidRobot(f"{WHERE}: {self.name!r}: {problem}")

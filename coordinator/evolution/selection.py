@@ -1,14 +1,14 @@
-"""Selection of parents and of survivors, and culling.
+"""Individuals, their order by fitness, tournaments, and culling.
 
 Source: Hupkes 2016, sections 5.3 and 8.2; the code of the original.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import fsum
 
 from coordinator.evolution.random_streams import BufferedRng
-from schema.experiment.document import Arena, Culling, Selection
+from schema.experiment.document import Arena, Culling
 from schema.robot.ids import BirthId
 
 Couple = tuple["Individual", "Individual"]
@@ -25,6 +25,9 @@ class Individual:
         rank: 1 without parents, else 1 + the greatest of theirs (thesis eq. 6.1).
         generation: number of its brood; founders are 0; None on-line.
         has_failed: its evaluation ended without a fitness.
+        parents: birth ids of its parents; empty for a random robot.
+        size: number of parts of its body.
+        measures: of its evaluation, by name.
     """
 
     birth: BirthId
@@ -33,6 +36,9 @@ class Individual:
     rank: int
     generation: int | None
     has_failed: bool = False
+    parents: tuple[BirthId, ...] = ()
+    size: int = 0
+    measures: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     def evaluated(self, fitness: float | None) -> "Individual":
         """Return the individual with a fitness; None where its evaluation failed."""
@@ -50,60 +56,11 @@ def fittest_first(individuals: Sequence[Individual]) -> list[Individual]:
     return sorted(individuals, key=lambda one: (-one.fitness, one.birth))
 
 
-def select_parents(
-    population: Sequence[Individual], draws: BufferedRng, selection: Selection
-) -> Couple:
-    """Return two different parents, the one that gives its root first.
-
-    Args:
-        population: the candidates, in a reproducible order.
-        draws: source of all choices.
-        selection: ``tournament``: each parent is the fittest of a few drawn without
-            replacement, the second from the rest of the population; otherwise both
-            are uniform.
-    """
-    if selection.parents != "tournament":
-        first, second = draws.sample(population, 2)
-        return first, second
-    first = tournament(population, draws, selection.tournament_size)
-    rest = [one for one in population if one is not first]
-    return first, tournament(rest, draws, selection.tournament_size)
-
-
 def tournament(
     candidates: Sequence[Individual], draws: BufferedRng, size: int
 ) -> Individual:
     """Return the fittest of ``size`` candidates drawn without replacement."""
     return fittest_first(draws.sample(candidates, size))[0]
-
-
-def select_survivors(
-    parents: Sequence[Individual],
-    children: Sequence[Individual],
-    draws: BufferedRng,
-    selection: Selection,
-) -> tuple[Individual, ...]:
-    """Return the next population of constant size, in birth order.
-
-    Args:
-        parents: the population before.
-        children: the brood.
-        draws: source of all choices.
-        selection: size of the population; ``best`` or ``random``; whether parents
-            compete with their children. A brood cut short by the end of the run
-            always competes with its parents, or the population would shrink.
-    """
-    size = selection.population
-    pool = list(children)
-    if selection.keep_parents or len(pool) < size:
-        pool = [*parents, *pool]
-    if len(pool) <= size:
-        chosen = pool
-    elif selection.survivors == "best":
-        chosen = fittest_first(pool)[:size]
-    else:
-        chosen = draws.sample(pool, size)
-    return tuple(sorted(chosen, key=lambda one: one.birth))
 
 
 def cull_population(

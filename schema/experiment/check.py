@@ -19,6 +19,7 @@ from schema.experiment.document import (
     island_experiment,
     steps_of,
 )
+from schema.experiment.selection_rules import rule_problems
 
 # File systems hold names of 255 bytes, of which the run's folders need some.
 _LONGEST_NAME = 200
@@ -126,7 +127,8 @@ def _selection_problems(experiment: Experiment) -> Iterator[str]:
             f"selection.population: a tournament of {selection.tournament_size} for "
             f"two parents needs >= {needed}, got {selection.population}"
         )
-    if selection.parents == "random" and selection.population < 2:  # noqa: PLR2004
+    yield from rule_problems(selection)
+    if selection.parents not in ("tournament", "none") and selection.population < 2:  # noqa: PLR2004
         yield "selection.population: two parents need >= 2, got 1"
     if not selection.keep_parents and selection.children < selection.population:
         yield (

@@ -183,16 +183,24 @@ class Reevaluation(Section, frozen=True):
     fitness: Literal["replace", "mean"] = "replace"
 
 
-class Selection(Section, frozen=True):
+PARENTS = ("tournament", "random", "none")
+SURVIVORS = ("best", "random")
+"""Names of the built-in rules of selection."""
+
+
+class Selection(PluginSection, frozen=True):
     """Parent and survivor selection (thesis section 5.3).
 
     Attributes:
         population: number of individuals; with ``culling``, number of founders.
         children: births per generation.
         window: births in flight at once; ``children`` if not given.
-        parents: selection of parents; ``none`` makes each child a random robot.
+        parents: selection of parents: ``tournament``, ``random``, ``none``, which makes
+            each child a random robot, or ``module:attribute``.
+        parents_parameters: of an own selection of parents.
         tournament_size: individuals per tournament.
-        survivors: the ``best`` or ``random`` ones survive.
+        survivors: the ``best`` or ``random`` ones survive, or ``module:attribute``.
+        survivors_parameters: of an own selection of survivors.
         keep_parents: parents compete with their children for survival.
         max_mating_attempts: attempts per birth before two new parents are chosen.
         culling: makes the population vary in size.
@@ -202,9 +210,11 @@ class Selection(Section, frozen=True):
     population: AtLeastOne = 15
     children: AtLeastOne = 15
     window: AtLeastOne | None = None
-    parents: Literal["tournament", "random", "none"] = "tournament"
+    parents: str = "tournament"
+    parents_parameters: Parameters = field(default_factory=dict)
     tournament_size: AtLeastOne = 4
-    survivors: Literal["best", "random"] = "best"
+    survivors: str = "best"
+    survivors_parameters: Parameters = field(default_factory=dict)
     keep_parents: bool = True
     max_mating_attempts: AtLeastOne = 5
     culling: Culling | None = None
@@ -213,8 +223,8 @@ class Selection(Section, frozen=True):
     @property
     def parents_needed(self) -> int:
         """Least population to choose two parents from; 0 if none are chosen."""
-        needs = {"tournament": self.tournament_size + 1, "random": 2, "none": 0}
-        return needs[self.parents]
+        needs = {"tournament": self.tournament_size + 1, "none": 0}
+        return needs.get(self.parents, 2)
 
 
 class Vetting(Section, frozen=True):
@@ -472,18 +482,27 @@ def with_births(experiment: Experiment, births: int) -> Experiment:
 
 
 def references(experiment: Experiment) -> list[str]:
-    """Return the ``module:attribute`` of all plug-ins that a document names."""
+    """Return the ``module:attribute`` of all plug-ins that a document names.
+
+    Short names of built-in plug-ins are left out.
+    """
     own = [each.fitness for each in experiment.islands if each.fitness is not None]
     functions = [fitness.function for fitness in (experiment.fitness, *own)]
+    islands = [each.selection for each in experiment.islands if each.selection]
+    rules = [
+        path
+        for selection in (experiment.selection, *islands)
+        for path in (selection.parents, selection.survivors)
+    ]
     named = [
         *experiment.space.part_types,
         *experiment.space.neuron_types,
         *functions,
         *experiment.measures.names,
+        *rules,
         experiment.encoding.type,
         experiment.brain.type,
     ]
-    # A short name is not that of a module.
     return [path for path in named if ":" in path]
 
 

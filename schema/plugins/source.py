@@ -85,6 +85,12 @@ def digest_of_bytes(source: bytes) -> str:
     return sha256(source).hexdigest()[:_DIGITS]
 
 
+def forget_digests() -> None:
+    """Read the sources again next time: their owner may have changed them."""
+    for cached in (plugins_of, check_plugins, _digest):
+        cached.cache_clear()
+
+
 @lru_cache(maxsize=64)
 def _digest(module: str) -> str:
     """Return the digest of a top-level module's source; empty if not installed."""

@@ -211,7 +211,8 @@ POSES = _table(
 
 - ``x``, ``y``, ``z``: centre of the core, world frame [m].
 - ``qw``, ``qx``, ``qy``, ``qz``: attitude of the core as a unit quaternion.
-- ``angles``: angle of every joint, driven or not, by ascending part [rad].
+- ``angles``: angle of every joint, driven or not, by ascending part [rad]; of a slider
+  its displacement [m].
 """
 
 DEATHS = _table(

@@ -124,8 +124,14 @@ class Identity(_message.Message):
     trial: int
     def __init__(self, seed: _Optional[int] = ..., run: _Optional[int] = ..., island: _Optional[int] = ..., birth: _Optional[_Union[BirthName, _Mapping]] = ..., trial: _Optional[int] = ...) -> None: ...
 
+class Call(_message.Message):
+    __slots__ = ("argument",)
+    ARGUMENT_FIELD_NUMBER: _ClassVar[int]
+    argument: bytes
+    def __init__(self, argument: _Optional[bytes] = ...) -> None: ...
+
 class Request(_message.Message):
-    __slots__ = ("run", "epoch", "number", "settings", "robot", "steps", "plugins", "identity")
+    __slots__ = ("run", "epoch", "number", "settings", "robot", "steps", "plugins", "identity", "call")
     RUN_FIELD_NUMBER: _ClassVar[int]
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     NUMBER_FIELD_NUMBER: _ClassVar[int]
@@ -134,6 +140,7 @@ class Request(_message.Message):
     STEPS_FIELD_NUMBER: _ClassVar[int]
     PLUGINS_FIELD_NUMBER: _ClassVar[int]
     IDENTITY_FIELD_NUMBER: _ClassVar[int]
+    CALL_FIELD_NUMBER: _ClassVar[int]
     run: str
     epoch: int
     number: int
@@ -142,7 +149,8 @@ class Request(_message.Message):
     steps: int
     plugins: str
     identity: Identity
-    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., settings: _Optional[bytes] = ..., robot: _Optional[bytes] = ..., steps: _Optional[int] = ..., plugins: _Optional[str] = ..., identity: _Optional[_Union[Identity, _Mapping]] = ...) -> None: ...
+    call: Call
+    def __init__(self, run: _Optional[str] = ..., epoch: _Optional[int] = ..., number: _Optional[int] = ..., settings: _Optional[bytes] = ..., robot: _Optional[bytes] = ..., steps: _Optional[int] = ..., plugins: _Optional[str] = ..., identity: _Optional[_Union[Identity, _Mapping]] = ..., call: _Optional[_Union[Call, _Mapping]] = ...) -> None: ...
 
 class Vector(_message.Message):
     __slots__ = ("x", "y", "z")
@@ -195,20 +203,22 @@ class Evaluation(_message.Message):
     def __init__(self, fitness: _Optional[float] = ..., path_velocity: _Optional[float] = ..., straight_velocity: _Optional[float] = ..., simulated_s: _Optional[float] = ..., measures: _Optional[_Iterable[float]] = ...) -> None: ...
 
 class Answer(_message.Message):
-    __slots__ = ("epoch", "number", "wall_s", "report", "evaluation", "failure")
+    __slots__ = ("epoch", "number", "wall_s", "report", "evaluation", "failure", "value")
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     NUMBER_FIELD_NUMBER: _ClassVar[int]
     WALL_S_FIELD_NUMBER: _ClassVar[int]
     REPORT_FIELD_NUMBER: _ClassVar[int]
     EVALUATION_FIELD_NUMBER: _ClassVar[int]
     FAILURE_FIELD_NUMBER: _ClassVar[int]
+    VALUE_FIELD_NUMBER: _ClassVar[int]
     epoch: int
     number: int
     wall_s: float
     report: Report
     evaluation: Evaluation
     failure: str
-    def __init__(self, epoch: _Optional[int] = ..., number: _Optional[int] = ..., wall_s: _Optional[float] = ..., report: _Optional[_Union[Report, _Mapping]] = ..., evaluation: _Optional[_Union[Evaluation, _Mapping]] = ..., failure: _Optional[str] = ...) -> None: ...
+    value: bytes
+    def __init__(self, epoch: _Optional[int] = ..., number: _Optional[int] = ..., wall_s: _Optional[float] = ..., report: _Optional[_Union[Report, _Mapping]] = ..., evaluation: _Optional[_Union[Evaluation, _Mapping]] = ..., failure: _Optional[str] = ..., value: _Optional[bytes] = ...) -> None: ...
 
 class Death(_message.Message):
     __slots__ = ("agent", "run", "epoch", "number", "cause", "request")

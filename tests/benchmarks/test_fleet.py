@@ -50,7 +50,7 @@ def test_fleet_costs_little_more_than_a_run(tmp_path: Path) -> None:
             out=tmp_path / "run",
         )
     )
-    robots = [run.robot(number) for number in range(ROBOTS)]
+    robots = run.robots(run.births.sort_by("birth"))
     results, fleet_s, fleet_cpu_s = costs(lambda: _in_fleet(robots))
     print(
         f"{ROBOTS} evaluations on {WORKERS} workers: in a run {run_s:.1f} s "

@@ -83,6 +83,15 @@ from schema.wire.arena_codec import (
     encode_advance_request,
     encode_live,
 )
+from schema.wire.calls import (
+    Call,
+    call_settings,
+    decode_call_request,
+    encode_call_answer,
+    encode_call_request,
+    pack_value,
+    read_call_answer,
+)
 from schema.wire.codec import (
     Answer,
     decode_answer,
@@ -162,6 +171,7 @@ def targets() -> list[Target]:
         *_robots(),
         *_requests(rules, made[-1][1]),
         *_answers(made),
+        *_calls(),
         *_viewers(made),
         *_operators(),
         *_agents(),
@@ -325,6 +335,21 @@ def _operators() -> Iterator[Target]:
     status = Status((run,), 1, 1, 1.0, (PeerFault("late", "w", 3),))
     reply = encode_operator_reply(OperatorReply("text", status=status))
     yield Target("decode_operator_reply", decode_operator_reply, (reply,))
+
+
+def _calls() -> Iterator[Target]:
+    value = pack_value({"a": [1, 2.5, None, "é"]})
+    request = encode_call_request(
+        run="run",
+        epoch=JOB[0],
+        number=JOB[1],
+        settings=call_settings("lab:score"),
+        argument=value,
+        plugins="",
+    )
+    answer = encode_call_answer(Call(*JOB, "lab:score", None), 0.1, value)
+    yield Target("decode_call_request", decode_call_request, (request,))
+    yield Target("read_call_answer", partial(read_call_answer, expected=JOB), (answer,))
 
 
 def _agents() -> Iterator[Target]:

@@ -35,6 +35,7 @@ PERMITTED = {
 }
 # Reference implementations for tests and developer tools: no room imports them.
 TEST_ONLY = {
+    "cmaes",
     "duckdb",
     "grpc_tools",
     "hypothesis",
@@ -42,6 +43,7 @@ TEST_ONLY = {
     "pickle",
     "polars",
     "pytest",
+    "ribs",
     "scipy",
     "zss",
 }

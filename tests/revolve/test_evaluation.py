@@ -163,3 +163,17 @@ def test_picture_is_a_png() -> None:
         pytest.skip(str(error))
     assert picture.startswith(b"\x89PNG")
     assert robot._repr_png_() is not None
+
+
+def test_genomes_of_other_encodings() -> None:
+    patterns = rv.Experiment.read("scenario1", encoding={"type": "cppn"})
+    rng = np.random.default_rng(1)
+    first, second = (rv.Genome.random(rng, patterns) for _ in range(2))
+    children = [first.mate(second, rng) for _ in range(5)]
+    child = next(filter(None, children))
+    assert rv.Genome.from_bytes(child.to_bytes(), patterns) == child
+    assert child.develop().experiment == patterns
+    with pytest.raises(rv.InvalidRobot, match="not a genome of encoding 'revolve-ang"):
+        rv.Genome.from_bytes(child.to_bytes(), "scenario1")
+    again = (rv.Robot.random(patterns, seed=4) for _ in range(2))
+    assert next(again) == next(again) != rv.Robot.random("scenario1", seed=4)

@@ -5,16 +5,20 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
+from contextlib import suppress
 from pathlib import Path
 
-import psutil
 import pytest
 
 import revolve as rv
 from coordinator.network.service import Network
+from revolve.workers import Workers
+from schema.plugins import permission
+from schema.wire.calls import call_settings
 
 TOP = Path(__file__).parents[2]
 pytestmark = pytest.mark.system
@@ -34,11 +38,22 @@ def until(is_true: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-def workers_of(fleet: rv.Fleet) -> list[psutil.Process]:
+def below(process: int) -> list[int]:
+    """Return the processes that a process has started, but for Python's tracker."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            parent = (entry / "stat").read_text().rpartition(")")[2].split()[1]
+            words = (entry / "cmdline").read_text()
+            if int(parent) == process and "resource_tracker" not in words:
+                found.append(int(entry.name))
+    return found
+
+
+def workers_of(fleet: rv.Fleet) -> list[int]:
     """Return the processes that do the jobs of a fleet's own workers."""
     (command,) = (each._process.pid for each in fleet._workers)
-    below = psutil.Process(command).children()
-    return [each for each in below if "spawn_main" in " ".join(each.cmdline())]
+    return below(command)
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +103,7 @@ def test_killed_worker_costs_no_result() -> None:
         results = fleet.evaluate(many, SHORT)
         found = [next(results)]
         until(lambda: len(workers_of(fleet)) == 2)
-        workers_of(fleet)[0].send_signal(signal.SIGKILL)
+        os.kill(workers_of(fleet)[0], signal.SIGKILL)
         found += results
     assert found == [rv.evaluate(robot) for robot in many]
 
@@ -113,6 +128,59 @@ def test_own_modules_fail_as_results_and_are_quarantined(tmp_path: Path) -> None
             assert expected in result.failure
 
 
+def test_map_calls_a_function_by_name(
+    fleet: rv.Fleet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "lab_of_maps.py").write_text(
+        "import os\n"
+        "def size(text):\n    return [len(text), os.getpid()]\n"
+        "def inverse(number):\n    return 1 / number\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    items = ["a" * number for number in range(60)]
+    values = list(fleet.map("lab_of_maps:size", items))
+    assert [length for length, _ in values] == list(range(60))
+    assert os.getpid() not in {process for _, process in values}
+    found = fleet.map("lab_of_maps:inverse", [2, 0])
+    assert next(found) == 0.5
+    with pytest.raises(
+        rv.RevolveError, match="item 1: lab_of_maps:inverse raised Zero"
+    ):
+        next(found)
+    with pytest.raises(rv.ExperimentError, match="item 0: must be None, bool"):
+        next(fleet.map("lab_of_maps:inverse", [1j]))
+    with pytest.raises(rv.UnknownPlugin, match="did you mean 'lab_of_maps:size'"):
+        fleet.map("lab_of_maps:sizes", items)
+    with pytest.raises(rv.UnknownPlugin, match="not allowed"):
+        fleet.map(os.path.getsize, items)
+    with pytest.raises(rv.ExperimentError, match="workers cannot import"):
+        fleet.map(lambda item: item, items)
+
+
+def test_map_runs_only_what_the_owner_of_a_worker_allows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "lab_of_others.py").write_text("def f(item):\n    return item\n")
+    monkeypatch.chdir(tmp_path)
+    place = Path(tempfile.mkdtemp(prefix="rv-"))
+    listen = f"unixsock-stream/{place / 'hub'}"
+    with Network(name="hub", listen=(listen,)) as hub:
+        # A worker of another owner, who allows nothing.
+        stranger = Workers(hub.own_address, 1, ())
+        try:
+            with rv.Fleet(connect=hub.own_address) as fleet:
+                future = fleet.submit(robots(1)[0], SHORT)
+                assert future.result(60).failure == ""
+                permission.allow_references(["lab_of_others:f"], tmp_path)
+                call = fleet._call(call_settings("lab_of_others:f"), 1, 0)
+                until(lambda: fleet.workers == 0)
+                told = fleet._network.refused
+                assert any("lab_of_others" in why for why in told.values())
+            assert call.cancelled()
+        finally:
+            stranger.end()
+
+
 def test_closed_fleet_cancels_and_refuses() -> None:
     with rv.Fleet(workers=1) as fleet:
         future = fleet.submit(robots(1)[0], "scenario1")
@@ -127,7 +195,7 @@ def test_closed_fleet_cancels_and_refuses() -> None:
 
 
 def test_workers_of_another_hub_do_the_jobs() -> None:
-    address = f"unixsock-stream/{os.environ.get('TMPDIR', '/tmp')}/rv-{os.getpid()}"  # noqa: S108 - short enough for a socket
+    address = f"unixsock-stream/{tempfile.mkdtemp(prefix='rv-')}/hub"
     with Network(name="hub", listen=(address,)) as hub:
         with pytest.raises(rv.NetworkError, match="no hub at"):
             rv.Fleet(connect=f"{address}x").__enter__()
@@ -156,14 +224,13 @@ def test_no_worker_outlives_its_loop(number: signal.Signals) -> None:
         text=True,
     ) as process:
         assert process.stdout is not None
-        command = psutil.Process(int(process.stdout.readline()))
-        below = [command, *command.children()]
-        assert len(below) > 2
+        command = int(process.stdout.readline())
+        started = [command, *below(command)]
+        assert len(started) == 3
         process.send_signal(number)
         process.communicate()
     assert process.returncode == -number
-    _, alive = psutil.wait_procs(below, 20)
-    assert alive == []
+    until(lambda: not any(Path(f"/proc/{each}").exists() for each in started))
 
 
 def test_failed_results_have_no_number() -> None:

@@ -46,6 +46,7 @@ def test_best_robot_has_the_best_fitness(done: rv.Run) -> None:
     greatest = pc.max(done.evaluations["fitness"]).as_py()
     assert rv.evaluate(best[0]).fitness == greatest
     assert rv.evaluate(best[1]).fitness <= greatest
+    assert done.robots()[3] == done.robot(done.births["birth"][3].as_py())
     with pytest.raises(rv.RunFolderError, match="has no birth 999"):
         done.robot(999)
 

@@ -14,6 +14,8 @@ import pytest
 from revolve.command import COMMANDS
 from schema.experiment.document import Arena
 from schema.experiment.file import parse_experiment
+from schema.experiment.settings import fitness_function
+from worker.fitness import check_fitness
 
 pytestmark = pytest.mark.system
 
@@ -65,6 +67,56 @@ def test_code_of_pages_about_tables_runs(
         assert done.returncode == 0, f"{words[-1]}\n{done.stderr}"
 
 
+def test_selection_of_the_selection_page_runs(tmp_path: Path) -> None:
+    """Two workers give the births of one process; the run needs its folder alone."""
+    page = TOP / "docs" / "selection.md"
+    (module,) = _blocks(page, "python")
+    (document,) = _blocks(page, "toml")
+    plugin = tmp_path / "crowding.py"
+    plugin.write_text(module)
+    (tmp_path / "crowding.toml").write_text(document)
+    (block,) = _blocks(page, "sh")
+    check, run = (line.split()[1:] for line in block.strip().splitlines())
+    environment = {
+        **_environment(),
+        "XDG_STATE_HOME": str(tmp_path / "state"),
+        # As an installed command: the folder is not searched for modules.
+        "PYTHONSAFEPATH": "1",
+    }
+
+    def revolve(*words: str) -> str:
+        done = subprocess.run(
+            [sys.executable, "-m", "revolve", *words],
+            cwd=tmp_path, env=environment, capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert revolve(*check).count("in order") == 2
+    revolve(*run, "--in-process", "--quiet", "--out", "calm")
+    revolve(*run, "--workers", "2", "--quiet", "--out", "two")
+    assert "equal" in revolve("compare", "calm", "two")
+    # As a kill leaves it: without the end of its journal.
+    journal = tmp_path / "two" / "journal.bin"
+    journal.write_bytes(journal.read_bytes()[: journal.stat().st_size // 2])
+    (tmp_path / "two" / "state").write_text("running")
+    shutil.rmtree(tmp_path / "two" / "tables")
+    plugin.unlink()
+    revolve("resume", "two", "--in-process", "--quiet")
+    assert "equal" in revolve("compare", "calm", "two")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_code_of_the_python_page_runs_from_top_to_bottom(tmp_path: Path) -> None:
+    blocks = _blocks(TOP / "docs" / "python.md", "python")
+    assert len(blocks) >= 8
+    done = _python(("-W", "error", "-c", "\n".join(blocks)), tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "no such experiment; did you mean 'scenario1'" in done.stdout
+    assert "\n20 of 20\n" in done.stdout
+
+
 def test_experiments_of_the_experiments_page_run(tmp_path: Path) -> None:
     page = TOP / "docs" / "experiments.md"
     (module,) = _blocks(page, "python")
@@ -84,6 +136,36 @@ def test_experiments_of_the_experiments_page_run(tmp_path: Path) -> None:
         assert done.returncode == 0, f"{document}\n{done.stderr}"
         if "my_parts" not in document:
             parse_experiment(document, str(tmp_path / page.name))
+
+
+def test_parts_page_runs(tmp_path: Path) -> None:
+    page = TOP / "docs" / "parts.md"
+    (module,) = _blocks(page, "python")
+    (document,) = _blocks(page, "toml")
+    (tmp_path / "my_parts.py").write_text(module)
+    (tmp_path / "mine.toml").write_text(document)
+    words = "run mine.toml --births 20 --in-process --quiet --out out"
+    done = _python(("-m", "revolve", *words.split()), tmp_path)
+    assert done.returncode == 0, done.stderr
+    # The message that the page quotes.
+    wrong = module.replace(
+        "length, 0.0, 0.0), (1.0, 0.0, 0.0), (", "length, 0.0, 0.0), (2.0, 0.0, 0.0), ("
+    )
+    (tmp_path / "my_parts.py").write_text(wrong)
+    done = _python(("-m", "revolve", *words.split()), tmp_path)
+    (quoted,) = re.findall(
+        r"^    (space\.part_types: .*)$", page.read_text(), re.MULTILINE
+    )
+    assert done.returncode != 0
+    assert quoted in done.stderr
+
+
+def test_experiments_of_the_tasks_page_are_accepted(tmp_path: Path) -> None:
+    documents = _blocks(TOP / "docs" / "tasks.md", "toml")
+    assert len(documents) >= 5
+    for document in documents:
+        fitness = parse_experiment(document, str(tmp_path / "mine.toml")).fitness
+        check_fitness(fitness_function(fitness), fitness)
 
 
 def test_arenas_page_lists_all_keys_with_their_defaults() -> None:

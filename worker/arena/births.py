@@ -88,6 +88,8 @@ def newborn(
 ) -> ArenaRobot | Casualty:
     """Return a robot at its place with its first readings, or a casualty.
 
+    The caller adds the first sample to its window.
+
     Args:
         insertion: birth, robot, place and heading.
         population: that it is to join.
@@ -113,5 +115,4 @@ def newborn(
         reason = f"physics diverged: {one_line(error)}"
         return Casualty(insertion.birth, step, reason, place)
     window = Window(cache.settings.simulation, step)
-    window.add(step, place)
     return ArenaRobot(insertion.birth, body, cache.controls, window, place)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 from msgspec import Struct
+from msgspec.structs import asdict
 
 from schema.errors import InvalidRobot, MalformedMessage
 from schema.experiment.document import body_space
@@ -25,6 +26,7 @@ from schema.wire.arena import Casualty
 from schema.wire.codec import decode_robot
 from worker.clusters.population import ArenaPopulation
 from worker.clusters.robot import ArenaRobot, Window
+from worker.measures.functions import channels_needed
 
 FORMAT = 2
 """Increases when the meaning of a field changes."""
@@ -66,6 +68,23 @@ class _ArenaState(Struct, frozen=True, array_like=True, forbid_unknown_fields=Tr
     casualties: list[tuple[BirthId, int, str, Vector]]
 
 
+class _Recording(Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+    """Recorded channels of one robot: rows of its window, numbers of its probe."""
+
+    rows: bytes
+    probe: bytes
+
+
+class _RecordingState(_ArenaState, frozen=True, array_like=True):
+    """State of an arena whose fitness or measures need recorded channels.
+
+    Attributes:
+        recordings: of the robots, by birth.
+    """
+
+    recordings: list[_Recording]
+
+
 def write_snapshot(
     settings: ArenaSettings,
     step: int,
@@ -89,6 +108,9 @@ def write_snapshot(
         clusters=[[rows[b] for b in c.members] for c in population.clusters],
         casualties=[(c.birth, c.step, c.reason, c.place) for c in casualties],
     )
+    if channels_needed(settings.fitness, settings.measures):
+        recordings = [_recording(robot) for robot in population.robots]
+        state = _RecordingState(**asdict(state), recordings=recordings)
     return msgspec.msgpack.encode(state)
 
 
@@ -109,8 +131,11 @@ def read_snapshot(
         MalformedMessage: not a snapshot's bytes, another format, of an arena with
             other settings, or a robot that breaks their rules.
     """
+    is_recorded = bool(channels_needed(settings.fitness, settings.measures))
     try:
-        state = msgspec.msgpack.decode(data, type=_ArenaState)
+        state: _ArenaState = msgspec.msgpack.decode(
+            data, type=_RecordingState if is_recorded else _ArenaState
+        )
     except (ValueError, RecursionError) as error:  # of msgspec, or not UTF-8
         raise MalformedMessage(f"snapshot: {error}") from None
     if state.format != FORMAT:
@@ -120,7 +145,13 @@ def read_snapshot(
     members = sorted(row for group in state.clusters for row in group)
     if members != list(range(len(state.robots))):
         raise MalformedMessage("snapshot: every robot must be in one cluster")
-    population.add([_restored(robot, population) for robot in state.robots])
+    robots = [_restored(robot, population) for robot in state.robots]
+    if isinstance(state, _RecordingState):
+        if len(state.recordings) != len(robots):
+            raise MalformedMessage("snapshot: every robot must have a recording")
+        for robot, recording in zip(robots, state.recordings, strict=True):
+            _restore_recording(robot, recording)
+    population.add(robots)
     births = [robot.birth for robot in population.robots]
     population.regroup([tuple(births[row] for row in g) for g in state.clusters])
     population.merges = population.splits = 0
@@ -171,6 +202,23 @@ def _restored(state: _RobotState, population: ArenaPopulation) -> ArenaRobot:
     robot.states = _unpack(state.states, *robot.states.shape)
     robot.brain_start = state.brain_start
     return robot
+
+
+def _recording(robot: ArenaRobot) -> _Recording:
+    probe = robot.view.probe
+    return _Recording(
+        rows=_pack(np.array(robot.window.rows)),
+        probe=b"" if probe is None else _pack(probe.numbers),
+    )
+
+
+def _restore_recording(robot: ArenaRobot, recording: _Recording) -> None:
+    width, probe = robot.body.channels.width, robot.view.probe
+    if width:
+        shape = len(robot.window.positions), width
+        robot.window.rows.extend(_unpack(recording.rows, *shape))
+    if probe is not None:
+        probe.numbers[:] = _unpack(recording.probe, *probe.numbers.shape)
 
 
 def _robot(data: bytes, settings: ArenaSettings) -> Robot:

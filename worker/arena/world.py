@@ -25,6 +25,7 @@ from worker.arena.divergence import diverged
 from worker.arena.light import read_lights
 from worker.arena.own_sensors import has_own_sensors, read_own_sensors
 from worker.arena.records import Contacts, Poses
+from worker.arena.samples import Samples
 from worker.arena.snapshot import read_snapshot, write_snapshot
 from worker.arena.threads import Pool
 from worker.clusters.population import ArenaPopulation
@@ -69,6 +70,7 @@ class World:
         self._contacts = Contacts(settings) if settings.arena.record_touches else None
         self._poses = Poses(clock.timestep_s)
         self._has_own_sensors = has_own_sensors(body_space(settings.space))
+        self._samples = Samples(settings, self.population)
 
     def close(self) -> None:
         """Stop the threads; the world cannot be advanced any more."""
@@ -224,10 +226,7 @@ class World:
 
     def _sample(self, state: Floats) -> None:
         layout = self.population.layout
-        places = state[layout.roots[:, :3]].tolist()
-        for robot, (x, y, z) in zip(self.population.robots, places, strict=True):
-            robot.place = (x, y, z)
-            robot.window.add(self.step, robot.place)
+        self._samples.add(self.step, state)
         self._poses.add(self.step, layout, state)
 
     # --- births and deaths ------------------------------------------------------
@@ -251,6 +250,9 @@ class World:
             robots = [robot for robot in robots if robot.birth in self.population]
         first_tick = partial(self._controllers.first_tick, self.step)
         self._remove_broken([robot for robot in robots if not first_tick(robot)])
+        for robot in robots:
+            if robot.birth in self.population:
+                self._samples.first(self.step, robot)
         self.population.kinematics()
         self.population.merge()
 

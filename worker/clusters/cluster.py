@@ -19,6 +19,7 @@ from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.clusters.bounds import Indices
 from worker.robot.motors import Servos
+from worker.robot.recording import Probe, probed_channels, step_with
 from worker.robot.sensors import Sensors
 
 NEVER = 1 << 62
@@ -50,6 +51,7 @@ class EngineView:
         offsets: where its part of each of ``Cluster.live`` starts.
         geoms: first and last + 1 of its geoms.
         sensors, servos: of the robot.
+        probe: of its work, torques and contacts; None if nothing needs them.
     """
 
     def __init__(
@@ -81,6 +83,16 @@ class EngineView:
             has_light=settings.light is not None,
         )
         self.servos = Servos(member.robot, types, model, data, prefix=prefix)
+        self.probe: Probe | None = None
+        if probed_channels(settings):
+            self.probe = Probe(
+                model,
+                data,
+                member.robot,
+                dofs=self.dofs,
+                geoms=self.geoms,
+                prefix=prefix,
+            )
         self.qpos: Floats = data.qpos[self.joints]
         self.qvel: Floats = data.qvel[self.dofs]
         self.ctrl: Floats = data.ctrl[self.servos.actuators]
@@ -91,6 +103,8 @@ class EngineView:
         self.ctrl[:] = other.ctrl
         self.sensors.readings[:] = other.sensors.readings
         self.sensors.velocities = list(other.sensors.velocities)
+        if self.probe is not None and other.probe is not None:
+            self.probe.numbers[:] = other.probe.numbers
 
 
 class StateHistory:
@@ -101,6 +115,7 @@ class StateHistory:
         qpos, qvel: positions and velocities of it, (K, Q) and (K, V).
         warnings: (K, N) the engine's counts of each of its warnings.
         touching: pairs of members in contact, if they are recorded.
+        probed: numbers of the members' probes, if there are any.
     """
 
     def __init__(self, cluster: "Cluster", count: int) -> None:
@@ -112,6 +127,8 @@ class StateHistory:
         self._warning_counts: Indices = cluster.data.warning.number
         self.warnings = np.zeros((count, len(self._warning_counts)), dtype=np.intp)
         self.touching: list[list[tuple[int, int]]] = [[] for _ in range(count)]
+        self._probes = cluster.probes
+        self.probed: list[list[Floats]] = [[] for _ in range(count)]
         # Copies between views of bytes are faster than between arrays.
         self._live = [_bytes(array) for array in cluster.live]
         self._rows = [[_bytes(array[k]) for array in parts] for k in range(count)]
@@ -124,6 +141,8 @@ class StateHistory:
         qpos, qvel, xpos, xmat = self._rows[moment]
         qpos[:], qvel[:], xpos[:], xmat[:] = self._live
         self.warnings[moment] = self._warning_counts
+        if self._probes:
+            self.probed[moment] = [probe.numbers.copy() for probe in self._probes]
 
 
 class Cluster:
@@ -141,6 +160,7 @@ class Cluster:
         failed_at: moment of the interval of that error.
         touched: geoms in contact in the last step; kept only if a member has touch
             sensors, or own ones.
+        probes: of the members, in that order, if anything needs them.
     """
 
     def __init__(
@@ -168,6 +188,9 @@ class Cluster:
         frames = self.data.xpos.reshape(-1), self.data.xmat.reshape(-1)
         self.live: tuple[Floats, ...] = (self.data.qpos, self.data.qvel, *frames)
         self.sizes = tuple(len(array) for array in self.live)
+        self.probes = [view.probe for view in self.views if view.probe is not None]
+        has_work = "energy" in probed_channels(settings)
+        self._working = self.probes if has_work else []
         self.history = StateHistory(self, 0)
         self.cost = int(model.nv + 4 * model.ngeom)
         self.failure, self.failed_at = "", NEVER
@@ -189,11 +212,13 @@ class Cluster:
         model, data, keep = self.model, self.data, self.history.keep
         for moment in range(first, len(plan)):
             try:
-                mujoco.mj_step(model, data, nstep=plan[moment])
+                step_with(self._working, model, data, plan[moment])
             except mujoco.FatalError as error:
                 self.failure, self.failed_at = one_line(error), moment
                 self.keep(range(moment, len(plan)))
                 return
+            for probe in self.probes:
+                probe.read()
             keep(moment)
             if self._records_contacts:
                 self.history.touching[moment] = self.touching()
@@ -212,6 +237,10 @@ class Cluster:
         """Set positions and velocities to those of a moment of the interval."""
         self.data.qpos[:] = self.history.qpos[moment]
         self.data.qvel[:] = self.history.qvel[moment]
+        for probe, numbers in zip(
+            self.probes, self.history.probed[moment], strict=True
+        ):
+            probe.numbers[:] = numbers
 
     def touching(self) -> list[tuple[int, int]]:
         """Return the pairs of members in contact in the last step, ascending."""

@@ -19,6 +19,7 @@ from schema.robot.robot import Robot
 from worker.clusters.bounds import BoundingSpheres, bounding_spheres
 from worker.clusters.cluster import Cluster, Member
 from worker.robot.brains import controls_of
+from worker.robot.recording import Channels
 
 CACHE_SIZE = 64
 """Shared clusters that are cached in case their members meet again."""
@@ -32,11 +33,13 @@ class Body:
         robot: its parts, and its brain at birth or in the snapshot.
         bounds: bounding spheres.
         solo: the cluster in which it is alone.
+        channels: of its trace.
     """
 
     robot: Robot
     bounds: BoundingSpheres
     solo: Cluster
+    channels: Channels
 
 
 class ModelCache:
@@ -78,7 +81,8 @@ class ModelCache:
             furnish=self._furnish,
         ).compile()
         solo = Cluster((birth,), [Member("", robot, model)], model, self.settings)
-        return Body(robot, bounding_spheres(model), solo)
+        channels = Channels(robot, model, self.settings)
+        return Body(robot, bounding_spheres(model), solo, channels)
 
     def height(self, body: Body, place: tuple[float, float], heading: float) -> float:
         """Return the height of a robot's core when the arena drops it [m].

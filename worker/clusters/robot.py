@@ -10,12 +10,14 @@ from schema.experiment.settings import ArenaSettings
 from schema.parts import Vector
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
-from schema.robot.results import Track
+from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Trace
 from schema.wire.arena import Casualty, Judgement
 from schema.wire.codec import encode_robot
 from worker.clusters.models import Body
 from worker.fitness import fitness_of, path_velocity, straight_velocity
+from worker.measures.functions import measures_of
 from worker.robot.brains import Controls
 
 LEAST_SHARE = 0.25
@@ -32,6 +34,7 @@ class Window:
     Attributes:
         born: step of birth.
         positions: of the core's centre, oldest first, world frame [m].
+        rows: of the channels of these samples; none if no channel is recorded.
     """
 
     def __init__(self, simulation: Simulation, born: int) -> None:
@@ -45,16 +48,20 @@ class Window:
         self._clock = simulation
         self._intervals = simulation.window_steps // simulation.pose_steps
         self.positions: deque[Vector] = deque(maxlen=self._intervals + 1)
+        self.rows: deque[Floats] = deque(maxlen=self._intervals + 1)
 
-    def add(self, step: int, position: Vector) -> None:
+    def add(self, step: int, position: Vector, row: Floats | None = None) -> None:
         """Add a sample, one every ``pose_steps`` of the arena.
 
         Args:
             step: of the arena.
             position: of the core's centre, world frame [m].
+            row: of the channels; None if none is recorded.
         """
         if step - self.born >= self._clock.warmup_steps:
             self.positions.append(position)
+            if row is not None:
+                self.rows.append(row)
 
     @property
     def is_mature(self) -> bool:
@@ -66,10 +73,10 @@ class Window:
         """Whether it covers enough of a window for a fitness."""
         return len(self.positions) - 1 >= max(1, LEAST_SHARE * self._intervals)
 
-    def track(self) -> Track:
-        """Return the samples as a track for fitness functions; at least two."""
+    def track(self) -> Trace:
+        """Return the samples as a trace without channels; at least two."""
         interval_s = self._clock.pose_steps * self._clock.timestep_s
-        return Track(interval_s, np.array(self.positions))
+        return Trace(interval_s, np.array(self.positions))
 
 
 class ArenaRobot:
@@ -123,9 +130,10 @@ class ArenaRobot:
         self.brain_start = start
 
     def judgement(self, step: int, settings: ArenaSettings) -> Judgement | Casualty:
-        """Return its window fitness, or a casualty if the fitness is undefined.
+        """Return its window fitness, or a casualty if it or a measure is undefined.
 
-        Velocities and fitness are 0 until the window is long enough for a fitness.
+        Velocities and fitness are 0, and there are no measures, until the window is
+        long enough for a fitness.
 
         Args:
             step: of the arena.
@@ -135,14 +143,27 @@ class ArenaRobot:
         x, y, z = self.view.qpos[:3].tolist()
         place, is_mature = (x, y, z), self.window.is_mature
         path = straight = fitness = 0.0
+        measures: tuple[float, ...] = ()
         if self.window.has_fitness:
             track = self.window.track()
+            trace = self.body.channels.trace(
+                track.interval_s, track.core_position, self.window.rows
+            )
             try:
-                fitness = fitness_of(track, settings.fitness)
+                fitness = fitness_of(trace, settings.fitness)
+                own = measures_of(settings.measures)
+                measures = tuple(each.value(trace) for each in own)
             except FitnessUndefined as error:
                 reason = f"fitness undefined: {error}"
                 return Casualty(self.birth, step, reason, place)
-            path, straight = path_velocity(track), straight_velocity(track)
+            path, straight = path_velocity(trace), straight_velocity(trace)
         return Judgement(
-            self.birth, age_s, path, straight, fitness, is_mature=is_mature, place=place
+            self.birth,
+            age_s,
+            path,
+            straight,
+            fitness,
+            is_mature=is_mature,
+            place=place,
+            measures=measures,
         )

@@ -4,7 +4,7 @@ A sample is one row of numbers, so that a window of them is an array that a snap
 can hold. Channels that nothing declares have no numbers.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import mujoco
@@ -22,6 +22,16 @@ from worker.measures.functions import channels_needed
 Indices = npt.NDArray[np.intp]
 _FREE, _FREE_DOFS = 7, 6
 """Numbers of a free joint's position and orientation, and of its velocity."""
+
+
+PROBED = ("joint_torque", "energy", "contact")
+"""Channels that are not functions of positions and velocities."""
+
+
+def probed_channels(settings: EvaluationSettings | ArenaSettings) -> tuple[str, ...]:
+    """Return the channels of an experiment that need a probe."""
+    wanted = channels_needed(settings.fitness, settings.measures)
+    return tuple(name for name in PROBED if name in wanted)
 
 
 class Channels:
@@ -71,7 +81,7 @@ class Channels:
         for name in self.names:
             self._spans[name] = slice(self.width, self.width + sizes[name])
             self.width += sizes[name]
-        self.has_probe = not {"energy", "joint_torque", "contact"}.isdisjoint(wanted)
+        self.has_probe = bool(probed_channels(settings))
         self.has_work = "energy" in wanted
         self._constants: dict[str, Any] = {
             "light": settings.light,
@@ -126,7 +136,7 @@ class Channels:
         return slice(1, first) if name == "joint_torque" else slice(first, None)
 
     def trace(
-        self, interval_s: float, positions: Floats, rows: Sequence[Floats]
+        self, interval_s: float, positions: Floats, rows: Iterable[Floats]
     ) -> Trace:
         """Return the trace of some samples.
 
@@ -137,7 +147,7 @@ class Channels:
         """
         if not self.names:
             return Trace(interval_s, positions, self._constants)
-        table = np.array(rows).reshape(len(positions), self.width)
+        table = np.array(list(rows)).reshape(len(positions), self.width)
         found: dict[str, Any] = {n: table[:, span] for n, span in self._spans.items()}
         if "energy" in found:
             found["energy"] = found["energy"][:, 0] - found["energy"][0, 0]

@@ -1,4 +1,4 @@
-"""Requests of both kinds and their answers, as bytes."""
+"""Requests of all kinds and their answers, as bytes."""
 
 import time
 from collections.abc import Callable
@@ -9,6 +9,7 @@ from schema.experiment.settings import lasting
 from schema.robot.results import Evaluation
 from schema.robot.robot import check_types
 from schema.wire.arena_codec import Live
+from schema.wire.calls import is_call_request
 from schema.wire.codec import (
     Answer,
     decode_request,
@@ -17,6 +18,7 @@ from schema.wire.codec import (
 )
 from worker.arena.world import World
 from worker.robot.evaluation import evaluate
+from worker.serve.calls import answer_call
 from worker.serve.checks import checked_evaluation
 from worker.serve.shards import Shards
 
@@ -43,13 +45,15 @@ class Jobs:
         )
 
     def answer(self, request: bytes) -> bytes:
-        """Return the encoded answer to an encoded request of either kind.
+        """Return the encoded answer to an encoded request of any kind.
 
         Raises:
-            RevolveError: see ``answer`` and ``Shards.answer``.
+            RevolveError: see ``answer``, ``answer_call`` and ``Shards.answer``.
         """
         if is_advance_request(request):
             return self._shards.answer(request)
+        if is_call_request(request):
+            return answer_call(request)
         return answer(request)
 
 

@@ -10,7 +10,17 @@ from analysis.viewer.body import box_model, neutral_pose, place, place_rows
 from schema.errors import MalformedMessage
 from schema.experiment.document import Simulation
 from schema.mjcf.model import robot_spec
-from schema.parts import BUILT_IN
+from schema.parts import (
+    BUILT_IN,
+    Box,
+    Joint,
+    Matrix,
+    PartType,
+    Shape,
+    Slot,
+    cylinder,
+)
+from schema.robogen_parts import ACTIVE_WHEEL
 from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
@@ -77,6 +87,70 @@ def test_boxes_are_where_the_engine_has_them(seed: int) -> None:
     for corners in expected:
         nearest = min(found, key=lambda own: _apart(own, corners))
         assert _apart(nearest, corners) < 1e-5
+
+
+SLIDING: Matrix = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
+_SLIDE = Shape(
+    boxes=(
+        Box("rail", (0.02, 0.02, 0.02), (0.01, 0.0, 0.0), 0.02),
+        cylinder("rod", 0.005, 0.04, (0.04, 0.0, 0.0), 0.01, segment=1,
+                 rotation=SLIDING),
+    ),
+    slots=(
+        Slot((0.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
+        Slot((0.06, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), 1),
+    ),
+    joint=Joint((0.03, 0.0, 0.0), (1.0, 0.0, 0.0), 0.015, "prismatic"),
+)  # fmt: skip
+SPACE = {
+    **BUILT_IN,
+    "ActiveWheel": ACTIVE_WHEEL,
+    "Slide": PartType("Slide", 2, lambda _: _SLIDE),
+}
+WHEELED = Robot(
+    (
+        Part("Core", -1, -1, -1, 0, GREY),
+        Part("Slide", 0, 0, 0, 90, GREY),
+        Part("ActiveHinge", 1, 1, 0, 0, GREY),
+        Part("Slide", 2, 1, 1, 0, GREY),
+        Part("ActiveWheel", 3, 0, 0, 90, (50.0, *GREY)),
+    )
+)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_sliders_and_cylinders_are_where_the_engine_has_them(seed: int) -> None:
+    """Boxes of a cylinder are centred in it; their corners are on its rims."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=7)
+    root[3:] /= np.linalg.norm(root[3:])
+    angles = np.array([0.01, 0.6, -0.015, 40.0]) * rng.uniform(-1.0, 1.0, 4)
+    model = robot_spec(WHEELED, SPACE, Simulation()).spec.compile()
+    data = mujoco.MjData(model)
+    data.qpos[:7], data.qpos[7:] = root, angles
+    mujoco.mj_kinematics(model, data)
+    drawn = box_model(WHEELED, SPACE, is_plain=False)
+    centres, attitudes = place(drawn, root[None], angles[None])
+    corners = np.array(
+        [
+            _own_corners(centre, attitude, half)
+            for centre, attitude, half in zip(
+                centres[0], attitudes[0], drawn.half_sizes, strict=True
+            )
+        ]
+    )
+    geoms = [model.geom(n).id for n in ("1/rod", "3/rod", "4/wheel")]
+    for geom in geoms:
+        radius, half = model.geom_size[geom, :2]
+        matrix = data.geom_xmat[geom].reshape(3, 3)
+        local = (corners - data.geom_xpos[geom]) @ matrix
+        rim = np.hypot(local[..., 0], local[..., 1]) - radius
+        off = np.maximum(np.abs(rim), np.abs(np.abs(local[..., 2]) - half))
+        assert (off.max(axis=1) < 1e-6).sum() == 4
+    # Each of the other geoms is one box.
+    assert len(corners) == model.ngeom - 3 + 3 * 4
+    wheel = np.linalg.norm(centres[0] - data.geom_xpos[geoms[-1]], axis=1)
+    assert (wheel < 1e-6).sum() == 4
 
 
 def _apart(first: Floats, second: Floats) -> float:

@@ -65,8 +65,8 @@ CASES = {
         "expected a robot within [space], got body.parts[2].parent_slot: ActiveHinge",
     ),
     "a rotated brick": (
-        "return Robot(",
-        'parts.append(Part("FixedBrick", 0, 1, 0, 90, GREY));return Robot(',
+        "return rv.Robot(",
+        'parts.append(rv.Part("FixedBrick", 0, 1, 0, 90, GREY));return rv.Robot(',
         "a FixedBrick, is rotated by 90 degrees",
     ),
     "no children": (
@@ -86,7 +86,7 @@ def test_a_broken_rule_is_refused_with_file_and_line(
     with pytest.raises(ExperimentError) as caught:
         check_encoding(experiment)
     file = f"{experiment.encoding.type.partition(':')[0]}.py"
-    assert str(caught.value).startswith(f"encoding.type: {file}:16: expected ")
+    assert str(caught.value).startswith(f"encoding.type: {file}:15: expected ")
     assert problem in str(caught.value)
 
 

@@ -125,7 +125,7 @@ def test_a_class_without_a_method_is_refused(own_encoding: Own) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ("self.types = types", "1 / 0", "the class failed in {}:23: ZeroDivisionError"),
+        ("self.types = types", "1 / 0", "the class failed in {}:22: ZeroDivisionError"),
         (
             "def __init__(self, experiment, types, parameters)",
             "def __init__(self, experiment)",
@@ -153,19 +153,23 @@ def test_errors_of_own_code_are_one_line(own_encoding: Own) -> None:
     )
     with pytest.raises(ExperimentError) as caught:
         encoding.random(rng(), BIRTH)
-    assert str(caught.value).endswith("_0.py:29: SystemExit: a b")
+    assert str(caught.value).endswith("_0.py:28: SystemExit: a b")
     assert "random failed in" in str(caught.value)
 
 
 def test_a_result_that_is_no_robot_is_refused(own_encoding: Own) -> None:
-    encoding = broken(own_encoding, "return Robot(", "return (")
+    encoding = broken(own_encoding, "return rv.Robot(", "return (")
     with pytest.raises(ExperimentError, match="develop must return a Robot, got "):
         encoding.develop(encoding.random(rng(), BIRTH))
 
 
 def test_a_robot_of_wrong_types_is_refused(own_encoding: Own) -> None:
-    encoding = broken(own_encoding, "return Robot(tuple(parts)", "return Robot(7")
-    with pytest.raises(ExperimentError, match=r"develop failed in .*: TypeError: "):
+    encoding = broken(
+        own_encoding, "return rv.Robot(tuple(parts)", "return rv.Robot((7,)"
+    )
+    with pytest.raises(
+        ExperimentError, match=r"develop failed in .*: AttributeError: "
+    ):
         encoding.develop(encoding.random(rng(), BIRTH))
 
 

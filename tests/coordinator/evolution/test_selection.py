@@ -7,14 +7,17 @@ import msgspec
 import numpy as np
 import pytest
 
-from coordinator.evolution.random_streams import BufferedRng
+from coordinator.evolution.rules import (
+    parents_rule,
+    select_parents,
+    select_survivors,
+    survivors_rule,
+)
 from coordinator.evolution.selection import (
     Individual,
     cull_population,
     fittest_first,
     select_culled,
-    select_parents,
-    select_survivors,
 )
 from schema.experiment.document import Arena, Culling, Selection
 from schema.robot.genome import Node
@@ -37,8 +40,8 @@ def numbers(chosen: Any) -> list[int]:  # noqa: ANN401 - any individuals
 
 def couples(population: list[Individual], **settings: Any) -> list[list[int]]:  # noqa: ANN401 - any setting
     selection = Selection(**settings)
-    draws = BufferedRng(np.random.default_rng(2))
-    return [numbers(select_parents(population, draws, selection)) for _ in range(N)]
+    rng, rule = np.random.default_rng(2), parents_rule(selection)
+    return [numbers(select_parents(population, rng, rule)) for _ in range(N)]
 
 
 def test_of_equals_the_elder_comes_first() -> None:
@@ -86,9 +89,9 @@ def survivors(
     seed: int = 0,
     **settings: Any,  # noqa: ANN401 - any setting
 ) -> list[int]:
-    draws = BufferedRng(np.random.default_rng(seed))
-    selection = Selection(**settings)
-    return numbers(select_survivors(parents, children, draws, selection))
+    rng, selection = np.random.default_rng(seed), Selection(**settings)
+    rule = survivors_rule(selection)
+    return numbers(select_survivors(parents, children, rng, selection, rule))
 
 
 OLD = individuals(0.5, 0.1, 0.3)

@@ -14,6 +14,7 @@ from coordinator.islands.events import (
     Vetted,
     VettingFailed,
 )
+from coordinator.run.answer_checks import read_evaluation
 from schema.errors import MalformedMessage
 from schema.limits import ANSWER_BYTES, LONGEST_REASON
 from schema.robot.results import Evaluation, Report
@@ -40,6 +41,7 @@ EVALUATIONS: dict[str, Evaluation | Report] = {
     "faster than the engine allows": replace(JUDGED, path_velocity=1e13),
     "negative velocity": replace(JUDGED, straight_velocity=-0.01),
     "path shorter than the straight line": replace(JUDGED, path_velocity=0.04),
+    "a measure that is not asked for": replace(JUDGED, measures=(1.0,)),
     "a report": VIABLE,
 }
 REPORTS: dict[str, Evaluation | Report] = {
@@ -94,6 +96,19 @@ def test_false_evaluation_is_refused(
     ask = Evaluate(BIRTH, ROBOT)
     sent_requests.requests.send(ask)
     check_refused(sent_requests, ask, sent_requests.reply(lie))
+
+
+@pytest.mark.parametrize("given", [(), (1.0,), (1.0, 2.0, 3.0), (1.0, math.nan)])
+def test_evaluation_needs_a_finite_number_for_each_measure(
+    given: tuple[float, ...],
+) -> None:
+    def read(measures: tuple[float, ...]) -> Answer:
+        answer = encode_answer(Answer(1, 2, 0.0, replace(JUDGED, measures=measures)))
+        return read_evaluation(answer, expected=(1, 2), simulated_s=12.0, measures=2)
+
+    assert read((1.0, -2.5)).result == replace(JUDGED, measures=(1.0, -2.5))
+    with pytest.raises(MalformedMessage, match="measures: must be"):
+        read(given)
 
 
 @pytest.mark.parametrize("lie", REPORTS.values(), ids=REPORTS)

@@ -9,12 +9,14 @@ from schema.robot.results import Evaluation, Provenance
 
 NAME = BirthId(2, 17)
 JUDGED = Evaluation(0.5, 0.1, 0.08, 27.5)
+MEASURED = Evaluation(0.5, 0.1, 0.08, 27.5, (0.25, -3.0))
 
 
 @pytest.mark.parametrize("trial", [0, 1, 200])
 def test_trials_are_read_as_they_were_written(trial: int) -> None:
     for event in (
         Evaluated(NAME, JUDGED, Provenance("w", "p", 0.5), trial),
+        Evaluated(NAME, MEASURED, Provenance("w", "p", 0.5), trial),
         EvaluationFailed(NAME, "diverged", Provenance("w", "p", 0.5), trial),
     ):
         assert decode_entry(encode_entry(event)) == event

@@ -95,7 +95,7 @@ def test_window_may_be_smaller_than_a_generation() -> None:
         ("[simulation]\nactor_noise = 1", "no such key; did you mean 'actuator_noise'"),
         (
             '[selection]\nparents = "rank"',
-            "selection.parents: must be one of 'tournament', .*, 'none', got 'rank'",
+            "selection.parents: must be one of 'tournament', .* 'none' or .*'rank'",
         ),
         (
             '[selection.reevaluation]\nfitness = "meen"',
@@ -103,7 +103,7 @@ def test_window_may_be_smaller_than_a_generation() -> None:
         ),
         (
             '[[islands]]\n[islands.selection]\nsurvivors = "bets"',
-            r"islands.0..selection.survivors: .*, got 'bets'; did you mean 'best'\?",
+            r"islands.0.: selection.survivors: .*, got 'bets'; did you mean 'best'\?",
         ),
         (
             "[vetting]\nmode = 3",

@@ -1,5 +1,6 @@
 """URDF: MuJoCo reads it with the same masses and poses."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -8,19 +9,68 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
+from msgspec.structs import replace as changed
 
 from schema.errors import InvalidRobot
+from schema.experiment.bounded import parse_xml
 from schema.experiment.document import Simulation
 from schema.formats.files import read_robot, write_robot
 from schema.formats.urdf import robot_to_urdf
+from schema.limits import MOST_MJCF_BYTES
 from schema.mjcf.model import robot_spec
 from schema.parts import BUILT_IN
+from schema.robogen_parts import ACTIVE_WHEEL, WHEEL
 from schema.robot.brain import INPUT, Brain, Neuron
 from schema.robot.robot import Part, Robot
 
 GREY = (0.5, 0.5, 0.5)
 SENSES = tuple(Neuron("input", INPUT, 0) for _ in range(6))
 SIMULATION = Simulation()
+
+
+def test_wheels_become_continuous_joints_and_cylinders() -> None:
+    """Of the driven wheel: radius 60 mm, 3 mm thick, 0.3924 N m, 5.236 rad/s."""
+    wheel = (60.0, *GREY)
+    robot = Robot(
+        (
+            Part("Core", -1, -1, -1, 0, GREY),
+            Part("ActiveWheel", 0, 2, 0, 0, wheel),
+            Part("Wheel", 0, 3, 0, 0, wheel),
+        ),
+        Brain((*SENSES, Neuron("output", "Sigmoid", 1, (0.0, 1.0)))),
+    )
+    space = {**BUILT_IN, "ActiveWheel": ACTIVE_WHEEL, "Wheel": WHEEL}
+    root = parse_xml(robot_to_urdf(robot, space, SIMULATION), MOST_MJCF_BYTES)
+    driven, free = root.iter("joint")
+    assert [each.get("type") for each in (driven, free)] == ["continuous"] * 2
+    limits = driven.find("limit")
+    assert limits is not None
+    assert limits.attrib == {"effort": "0.3924", "velocity": "5.236"}
+    shapes = [each.attrib for each in root.iter("cylinder")]
+    assert shapes == [{"radius": "0.06", "length": "0.003"}] * 4
+    ours = robot_spec(robot, space, SIMULATION).spec.compile()
+    theirs = mujoco.MjSpec.from_string(
+        robot_to_urdf(robot, space, SIMULATION)
+    ).compile()
+    kind = mujoco.mjtGeom.mjGEOM_CYLINDER
+    assert (theirs.geom_type == kind).sum() == (ours.geom_type == kind).sum() == 2
+    assert [bool(theirs.jnt_limited[j]) for j in range(theirs.njnt)] == [False] * 2
+
+
+def test_a_slider_becomes_a_prismatic_joint() -> None:
+    shape = BUILT_IN["ActiveHinge"].shape(GREY)
+    assert shape.joint is not None
+    sliding = changed(shape.joint, kind="prismatic", limit=0.012)
+    slide = replace(BUILT_IN["Hinge"], shape=lambda _: changed(shape, joint=sliding))
+    parts = (Part("Core", -1, -1, -1, 0, GREY), Part("Hinge", 0, 2, 0, 0, GREY))
+    text = robot_to_urdf(
+        Robot(parts, Brain(SENSES)), {**BUILT_IN, "Hinge": slide}, SIMULATION
+    )
+    (joint,) = parse_xml(text, MOST_MJCF_BYTES).iter("joint")
+    assert joint.get("type") == "prismatic"
+    limits = joint.find("limit")
+    assert limits is not None
+    assert (limits.get("lower"), limits.get("upper")) == ("-0.012", "0.012")
 
 
 @settings(max_examples=25, deadline=None)

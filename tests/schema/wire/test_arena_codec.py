@@ -49,7 +49,15 @@ def some(things: SearchStrategy[object]) -> SearchStrategy[tuple[object, ...]]:
 
 
 JUDGEMENTS = st.builds(
-    Judgement, BIRTHS, NUMBER, NUMBER, NUMBER, NUMBER, st.booleans(), PLACE
+    Judgement,
+    BIRTHS,
+    NUMBER,
+    NUMBER,
+    NUMBER,
+    NUMBER,
+    st.booleans(),
+    PLACE,
+    some(NUMBER),
 )
 ADVANCES = st.builds(
     Advance,
@@ -145,6 +153,7 @@ def test_damaged_bytes_decode_or_are_malformed(data: DataObject) -> None:
         replace(ADVANCE, digest=b"short"),
         replace(ADVANCE, judgements=(replace(JUDGEMENT, fitness=math.nan),)),
         replace(ADVANCE, judgements=(replace(JUDGEMENT, age_s=math.inf),)),
+        replace(ADVANCE, judgements=(replace(JUDGEMENT, measures=(math.nan,)),)),
         replace(ADVANCE, casualties=(Casualty(ZERO, 1, "", (0, math.nan, 0)),)),
         replace(ADVANCE, touches=(Touch(ZERO, ZERO, -math.inf),)),
     ],

@@ -54,7 +54,8 @@ IDENTITIES = st.just(NO_IDENTITY) | st.builds(
 )
 NUMBER = st.floats(allow_nan=False, allow_infinity=False)
 VECTOR = st.tuples(NUMBER, NUMBER, NUMBER)
-EVALUATIONS = st.builds(Evaluation, NUMBER, NUMBER, NUMBER, NUMBER)
+MEASURES = st.lists(NUMBER, max_size=4).map(tuple)
+EVALUATIONS = st.builds(Evaluation, NUMBER, NUMBER, NUMBER, NUMBER, MEASURES)
 PAIRS = st.lists(st.tuples(U32, U32), max_size=4).map(tuple)
 REASON = st.text(max_size=2000).map(lambda text: printable(text, LONGEST_REASON))
 REPORTS = st.builds(
@@ -218,6 +219,7 @@ def test_failure_with_empty_reason_round_trip() -> None:
         Evaluation(0.0, math.inf, 0.0, 12.0),
         Evaluation(0.0, 0.0, -math.inf, 12.0),
         Evaluation(0.0, 0.0, 0.0, math.nan),
+        Evaluation(0.0, 0.0, 0.0, 12.0, (1.0, math.nan)),
         replace(REPORT, mass=math.inf),
         replace(REPORT, lower=(0.0, math.nan, 0.0)),
         replace(REPORT, reason="it is viable all the same"),

@@ -32,6 +32,8 @@ def everything(monkeypatch: pytest.MonkeyPatch) -> EvaluationSettings:
         return 1.0
 
     monkeypatch.setitem(functions.BUILT_IN, "everything", all_channels)
+    functions.measures_of.cache_clear()
+    functions.channels_needed.cache_clear()
     return replace(PLAIN, simulation=CLOCK, measures=Measures(names=("everything",)))
 
 

@@ -1,0 +1,35 @@
+"""Figure of the measures that experiments name."""
+
+import plotnine as p9
+
+from analysis.figures.forms import NothingToDraw, Tables
+from analysis.figures.style import in_order, scales, theme_of_size
+
+_NARROW = 3
+"""Panels in a row."""
+
+
+def measures_over_births(tables: Tables) -> p9.ggplot:
+    """Return the mean of each measure over births, a line per run and island.
+
+    Args:
+        tables: ``named_measures``.
+
+    Raises:
+        NothingToDraw: no experiment names measures.
+    """
+    rows = tables.get("named_measures")
+    if not rows:
+        raise NothingToDraw("no experiment names measures")
+    frame = rows.to_pandas()
+    frame["line"] = frame["folder"] + " " + frame["island"].astype(str)
+    experiments = in_order(frame["experiment"])
+    lines = -(-frame["measure"].nunique() // _NARROW)
+    return (
+        p9.ggplot(frame, p9.aes("births", "mean"))
+        + p9.geom_line(p9.aes(colour="experiment", group="line"), size=0.6, alpha=0.8)
+        + p9.facet_wrap("measure", ncol=_NARROW, scales="free_y")
+        + scales(experiments)
+        + p9.labs(x="births on the island", y="mean of the population")
+        + theme_of_size(1.0 + 2.0 * lines)
+    )

@@ -1,0 +1,147 @@
+"""Kinds of plug-ins that the coordinator runs: selections of parents and survivors."""
+
+import inspect
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from coordinator.evolution.rules import PARENTS, SURVIVORS, Rule
+from schema.errors import ExperimentError
+from schema.experiment.document import Experiment, Selection
+from schema.experiment.kinds import Kind, Use
+from schema.experiment.selection_rules import own_rule
+from schema.plugins.origin import where_defined
+from schema.robot.ids import BirthId
+
+_CHILDREN = 15
+
+
+@dataclass(frozen=True, slots=True)
+class _Example:
+    """An individual of a check, with every measure that a rule may ask for."""
+
+    birth: BirthId
+    parents: tuple[BirthId, ...]
+    fitness: float
+    size: int
+    rank: int
+    measures: defaultdict[str, float] = field(hash=False)
+
+
+def _example(number: int, fitness: float) -> _Example:
+    parents = (BirthId(0, number // 2), BirthId(0, number // 3)) if number else ()
+    measures: defaultdict[str, float] = defaultdict(lambda: number / 7)
+    size, rank = 3 + number % 5, 1 + number // 4
+    return _Example(BirthId(0, number), parents, fitness, size, rank, measures)
+
+
+def _populations(least: int) -> Iterator[list[_Example]]:
+    """Yield populations: small, of equals, varied, in part without fitness."""
+    for count, fitness in (
+        (least, float),
+        (30, lambda _: 0.0),
+        (30, lambda number: (number * 7 % 30) / 10),
+        (30, lambda number: float(number) if number % 3 else -1.0),
+    ):
+        yield [_example(number, fitness(number)) for number in range(count)]
+
+
+def check_parents(function: Callable[..., Any], parameters: object = None) -> None:
+    """Raise unless a selection of parents keeps its contract on simple populations.
+
+    Args:
+        function: a ``ParentSelection``.
+        parameters: its last argument.
+
+    Raises:
+        ExperimentError: it raises, returns other than two different places, or other
+            ones for the same population and stream.
+    """
+    rule = Rule("selection.parents", function, parameters)
+    for population in _populations(2):
+        _check_twice(rule, 2, population)
+
+
+def check_survivors(function: Callable[..., Any], parameters: object = None) -> None:
+    """Raise unless a selection of survivors keeps its contract on simple populations.
+
+    Args:
+        function: a ``SurvivorSelection``.
+        parameters: its last argument.
+
+    Raises:
+        ExperimentError: it raises, returns other than ``count`` different places, or
+            different ones for the same population and stream.
+    """
+    rule = Rule("selection.survivors", function, parameters)
+    for population in _populations(_CHILDREN + 1):
+        _check_twice(rule, _CHILDREN, population, _CHILDREN)
+
+
+def _check_twice(
+    rule: Rule, count: int, population: list[_Example], *rest: int
+) -> None:
+    first, second = (
+        rule.places(count, population, *rest, np.random.default_rng(1))
+        for _ in range(2)
+    )
+    if first != second:
+        raise ExperimentError(
+            f"{rule.key}: {where_defined(rule.function)}: must return the same for the "
+            f"same population and rng, got {first} and {second}"
+        )
+
+
+def _use(name: str, selection: Selection) -> Use:
+    """Return the use of an own rule of a section; ``name`` as of ``own_rule``."""
+
+    def check(function: Callable[..., Any]) -> None:
+        found = own_rule(selection, name)
+        assert found is not None
+        (check_parents if name == "parents" else check_survivors)(function, found[1])
+
+    def load() -> object:
+        found = own_rule(selection, name)
+        assert found is not None
+        return found[0]
+
+    return Use(f"selection.{name}", getattr(selection, name), load, check)
+
+
+def _used(name: str, experiment: Experiment) -> Iterator[Use]:
+    sections = (experiment.selection, *(each.selection for each in experiment.islands))
+    for selection in dict.fromkeys(filter(None, sections)):
+        if ":" in getattr(selection, name):
+            yield _use(name, selection)
+
+
+def _takes(arguments: int, plugin: object) -> bool:
+    if not inspect.isfunction(plugin):
+        return False
+    try:
+        inspect.signature(plugin).bind(*range(arguments))
+    except TypeError:
+        return False
+    return True
+
+
+KINDS = (
+    Kind(
+        "parents",
+        PARENTS,
+        partial(_takes, 3),
+        lambda path: _use("parents", Selection(parents=path)),
+        partial(_used, "parents"),
+    ),
+    Kind(
+        "survivors",
+        SURVIVORS,
+        partial(_takes, 4),
+        lambda path: _use("survivors", Selection(survivors=path)),
+        partial(_used, "survivors"),
+    ),
+)

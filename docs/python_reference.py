@@ -1,0 +1,79 @@
+"""Write the reference of the Python API, docs/reference.md, from its docstrings.
+
+python -m docs.python_reference
+"""
+
+import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from types import FunctionType
+
+import revolve
+
+PAGE = Path(__file__).parent / "reference.md"
+_HEAD = """# Reference of the Python interface
+
+Written from the docstrings by `python -m docs.python_reference`. [Python](python.md)
+is the introduction.
+
+"""
+_ADDRESS = re.compile(r" at 0x[0-9a-f]+")
+
+
+def reference() -> str:
+    """Return the page."""
+    names = sorted(revolve.__all__, key=lambda name: (_order(name), name.lower()))
+    return _HEAD + "\n".join(line for name in names for line in _entry(name))
+
+
+def _order(name: str) -> int:
+    """Return the place of a kind of name: functions, classes, errors."""
+    found = getattr(revolve, name)
+    if not inspect.isclass(found):
+        return 0
+    return 2 if issubclass(found, Exception) else 1
+
+
+def _entry(name: str) -> Iterator[str]:
+    """Yield the lines about a public name."""
+    found = getattr(revolve, name)
+    yield f"## `{name}`"
+    yield from _text(found, f"{name}{_signature(found)}")
+    if not inspect.isclass(found) or issubclass(found, Exception):
+        return
+    for key, member in sorted(vars(found).items()):
+        if key.startswith("_") or not inspect.getdoc(member):
+            continue
+        own = getattr(found, key)
+        if isinstance(member, property):
+            yield from (f"### `{name}.{key}`", inspect.getdoc(member) or "", "")
+        elif isinstance(member, FunctionType | classmethod):
+            yield f"### `{name}.{key}`"
+            yield from _text(own, f"{name}.{key}{_signature(own)}")
+
+
+def _text(found: object, call: str) -> Iterator[str]:
+    """Yield call and docstring of a name as text of fixed width."""
+    yield from ("```", call, "", inspect.getdoc(found) or "", "```", "")
+
+
+def _signature(found: object) -> str:
+    """Return the signature of a function or class; empty for an error."""
+    if inspect.isclass(found) and issubclass(found, Exception):
+        return ""
+    assert callable(found)
+    signature = inspect.signature(found)
+    plain = [
+        each.replace(annotation=inspect.Parameter.empty)
+        for each in signature.parameters.values()
+        if each.name != "self"
+    ]
+    without = signature.replace(
+        parameters=plain, return_annotation=inspect.Signature.empty
+    )
+    return _ADDRESS.sub("", str(without))
+
+
+if __name__ == "__main__":
+    PAGE.write_text(reference(), "utf-8")

@@ -1,0 +1,83 @@
+"""Own functions that select parents and survivors, and their parameters.
+
+Built-in rules have short names; ``coordinator.evolution.selection`` holds them.
+"""
+
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from msgspec import Struct
+
+from schema.errors import ExperimentError, nearest, shown
+from schema.experiment.document import PARENTS, SURVIVORS, Selection
+from schema.plugins.load import load_function
+from schema.plugins.origin import where_defined
+from schema.plugins.parameters import read_parameters
+
+_ARGUMENTS = {"parents": 3, "survivors": 4}
+_NAMES = {"parents": PARENTS, "survivors": SURVIVORS}
+
+
+def own_rule(selection: Selection, name: str) -> tuple[Callable[..., Any], Any] | None:
+    """Return an own function and its parameters; None for a built-in rule.
+
+    Args:
+        selection: the section.
+        name: ``parents`` or ``survivors``.
+
+    Raises:
+        UnknownPlugin: no such module or attribute, or a module that is not allowed.
+        ExperimentError: not a function of that many arguments, or other parameters than
+            it declares.
+    """
+    path, key = getattr(selection, name), f"selection.{name}"
+    if ":" not in path:
+        return None
+    function = load_function(path, key, _ARGUMENTS[name])
+    table = getattr(selection, f"{name}_parameters")
+    return function, _parameters(function, table, key)
+
+
+def _parameters(
+    function: Callable[..., Any], table: Mapping[str, Any], key: str
+) -> Struct | None:
+    """Return parameters as the Struct with which the last argument is annotated."""
+    try:
+        arguments = inspect.signature(function, eval_str=True).parameters
+    except NameError as error:
+        raise ExperimentError(
+            f"{key}: {where_defined(function)}: annotation: {error}"
+        ) from None
+    kind = list(arguments.values())[-1].annotation
+    if isinstance(kind, type) and issubclass(kind, Struct):
+        return read_parameters(table, kind, f"{key}_parameters")
+    if table:
+        raise ExperimentError(
+            f"{key}_parameters: {where_defined(function)}: must annotate its last "
+            f"argument with a msgspec Struct to get parameters, got {shown(table)}"
+        )
+    return None
+
+
+def rule_problems(selection: Selection) -> Iterator[str]:
+    """Yield what is wrong with the rules of a section.
+
+    Raises:
+        ExperimentError: as of ``own_rule``.
+    """
+    for name, built_in in _NAMES.items():
+        path = getattr(selection, name)
+        if ":" in path:
+            own_rule(selection, name)
+        elif path not in built_in:
+            allowed = ", ".join(map(repr, built_in))
+            yield (
+                f"selection.{name}: must be one of {allowed} or 'module:attribute', "
+                f"got {shown(path)}{nearest(path, built_in)}"
+            )
+        elif table := getattr(selection, f"{name}_parameters"):
+            yield (
+                f"selection.{name}_parameters: {path!r} has no parameters, got "
+                f"{shown(table)}"
+            )

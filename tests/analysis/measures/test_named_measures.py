@@ -1,0 +1,79 @@
+"""Means of named measures, worked out by hand."""
+
+from typing import Any
+
+import pytest
+
+from analysis.figures.catalogue import FIGURES
+from analysis.figures.forms import NothingToDraw
+from analysis.measures.named_measures import named_measures
+from analysis.measures.run_tables import RunTables
+from tests.analysis.tables import births, population, run, table
+
+BORN = births(((0, 0), []), ((0, 1), []), ((0, 2), []))
+
+
+def evaluation(birth: int, *measures: tuple[str, float], trial: int = 0) -> Any:  # noqa: ANN401
+    values = list(measures) or None
+    return {"birth": birth, "trial": trial, "measures": values}
+
+
+def test_off_line_each_robot_counts_with_its_last_evaluation() -> None:
+    tables = run(
+        births=BORN,
+        population=population(
+            (0, 2, {(0, 0): 0.5, (0, 1): 0.25}),
+            (0, 3, {(0, 1): 0.25, (0, 2): None}),
+        ),
+        evaluations=table(
+            "evaluations",
+            [
+                evaluation(0, ("height", 1.0), ("turning", 4.0)),
+                evaluation(1, ("height", 3.0), ("turning", 5.0)),
+                evaluation(2),
+                evaluation(1, ("height", 5.0), ("turning", 7.0), trial=1),
+            ],
+        ),
+    )
+    assert named_measures(RunTables(tables)).to_pylist() == [
+        {"island": 0, "births": 2, "measure": "height", "mean": 3.0, "robots": 2},
+        {"island": 0, "births": 2, "measure": "turning", "mean": 5.5, "robots": 2},
+        {"island": 0, "births": 3, "measure": "height", "mean": 5.0, "robots": 1},
+        {"island": 0, "births": 3, "measure": "turning", "mean": 7.0, "robots": 1},
+    ]
+
+
+def test_on_line_the_samples_of_mature_robots_count() -> None:
+    def sample(birth: int, count: int, height: float | None, **more: bool) -> Any:  # noqa: ANN401
+        values = None if height is None else [("height", height)]
+        row = {"birth": birth, "births": count, "is_mature": True, "measures": values}
+        return row | more
+
+    tables = run(
+        births=BORN,
+        population=population((0, 2, {(0, 0): 0.5, (0, 1): 0.25}), is_online=True),
+        fitness=table(
+            "fitness",
+            [
+                sample(0, 2, 1.0),
+                sample(1, 2, 9.0, is_mature=False),
+                sample(0, 2, 2.0),
+                sample(1, 2, 6.0),
+                sample(2, 3, None),
+                sample(1, 3, 4.0),
+            ],
+        ),
+    )
+    assert named_measures(RunTables(tables)).to_pylist() == [
+        {"island": 0, "births": 2, "measure": "height", "mean": 3.0, "robots": 2},
+        {"island": 0, "births": 3, "measure": "height", "mean": 4.0, "robots": 1},
+    ]
+
+
+def test_run_without_measures_has_no_rows_and_no_figure() -> None:
+    tables = run(births=BORN, population=population((0, 1, {(0, 0): 0.5})))
+    found = named_measures(RunTables(tables))
+    assert found.num_rows == 0
+    (figure,) = (each for each in FIGURES if each.number == "G")
+    with pytest.raises(NothingToDraw, match="no experiment names measures"):
+        figure.draw({"named_measures": found})

@@ -1,0 +1,169 @@
+"""Own rules of selection: what they get, and how bad answers are refused."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from coordinator.evolution.kinds import check_parents, check_survivors
+from coordinator.evolution.rules import (
+    PARENTS,
+    SURVIVORS,
+    Tournament,
+    parents_rule,
+    select_parents,
+    select_survivors,
+    survivors_rule,
+)
+from coordinator.evolution.selection import Individual
+from schema.errors import ExperimentError, UnknownPlugin
+from schema.experiment.document import Selection
+from schema.experiment.file import parse_experiment
+from schema.plugins import permission
+from schema.robot.genome import Node
+from schema.robot.ids import BirthId
+
+CORE = Node("Core", -1, 0, (0.5, 0.5, 0.5))
+
+LAB = """
+from typing import Any
+
+from msgspec import Struct
+
+
+class Ends(Struct):
+    first: int = 0
+
+
+def ends(population, rng, parameters: Ends):
+    return parameters.first, len(population) - 1
+
+
+def smallest(population, count, rng, parameters):
+    places = sorted(range(len(population)), key=lambda at: population[at].size)
+    return places[:count]
+
+
+def text(population, rng, parameters: Any):
+    return "ab"
+"""
+
+ANSWERS = {
+    "return 0, 0": r"must return 2 different whole numbers from 0 to 1, got \(0, 0\)",
+    "return 0, 2": r"must return 2 different .* from 0 to 1, got \(0, 2\)",
+    "return -1, 0": r"must return 2 different .* got \(-1, 0\)",
+    "return (0,)": r"must return 2 different .* got \(0,\)",
+    "return 0.0, 1.0": r"must return 2 different .* got \(0\.0, 1\.0\)",
+    "return None": "must return 2 different .* got None",
+    "return 'ab'": "must return 2 different .* got 'ab'",
+    "return population[5], 1": r"raised IndexError: .* \(NAME.py:3\)",
+    "return rng.choice(2, 2) + open('no').read()": "raised FileNotFoundError",
+    "COUNT[0] += 1; return COUNT[0] % 2, 1 - COUNT[0] % 2": "must return the same for",
+}
+
+
+@pytest.fixture
+def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], str]:
+    """Return a function that writes and allows a module, and returns its name."""
+    monkeypatch.setattr(permission, "_allowed", {})
+
+    def write(text: str) -> str:
+        name = f"rules_{tmp_path.name.replace('-', '_')}"
+        (tmp_path / f"{name}.py").write_text(text)
+        permission.allow([str(tmp_path / f"{name}.py")])
+        return name
+
+    return write
+
+
+def population(*sizes: int) -> list[Individual]:
+    return [
+        Individual(BirthId(0, number), CORE, number / 10, 1, 0, size=size)
+        for number, size in enumerate(sizes)
+    ]
+
+
+def test_built_in_rules_keep_their_contract() -> None:
+    # A tournament of one draws from any population.
+    check_parents(PARENTS["tournament"], Tournament(1))
+    check_parents(PARENTS["random"])
+    for survivors in SURVIVORS.values():
+        check_survivors(survivors)
+
+
+def test_own_parents_get_their_parameters(lab: Callable[[str], str]) -> None:
+    path = f"{lab(LAB)}:ends"
+    selection = Selection(parents=path, parents_parameters={"first": 2})
+    rule = parents_rule(selection)
+    living = population(3, 3, 3, 3, 3)
+    first, second = select_parents(living, np.random.default_rng(0), rule)
+    assert (first, second) == (living[2], living[4])
+
+
+def test_own_survivors_come_in_birth_order(lab: Callable[[str], str]) -> None:
+    selection = Selection(population=2, survivors=f"{lab(LAB)}:smallest")
+    everybody = population(9, 5, 7, 4)
+    chosen = select_survivors(
+        everybody[:2],
+        everybody[2:],
+        np.random.default_rng(0),
+        selection,
+        survivors_rule(selection),
+    )
+    # Of sizes 9, 5, 7 and 4 the smallest are 4 and 5.
+    assert chosen == (everybody[1], everybody[3])
+
+
+@pytest.mark.parametrize("answer", ANSWERS)
+def test_bad_rule_is_refused_with_file_and_line(
+    lab: Callable[[str], str], answer: str
+) -> None:
+    name = lab(f"COUNT = [0]\ndef rule(population, rng, parameters):\n    {answer}\n")
+    rule = parents_rule(Selection(parents=f"{name}:rule"))
+    expected = ANSWERS[answer].replace("NAME", name)
+    with pytest.raises(ExperimentError) as caught:
+        check_parents(rule.function, rule.parameters)
+    message = str(caught.value)
+    assert re.match(rf"selection\.parents: {name}\.py:2: {expected}", message), message
+
+
+def test_survivors_of_wrong_number_are_refused(lab: Callable[[str], str]) -> None:
+    name = lab("def few(population, count, rng, parameters):\n    return [0, 1]\n")
+    rule = survivors_rule(Selection(survivors=f"{name}:few"))
+    expected = rf"survivors: {name}\.py:1: must return 15 different .* 0 to 15, got \[0"
+    with pytest.raises(ExperimentError, match=expected):
+        check_survivors(rule.function, rule.parameters)
+
+
+@pytest.mark.parametrize(
+    ("keys", "expected"),
+    [
+        ('parents = "NAME:endz"', r"has no 'endz'; did you mean 'NAME:ends'\?"),
+        ('parents = "NAME:smallest"', "must take 3 arguments"),
+        ('survivors = "NAME:ends"', "must take 4 arguments"),
+        (
+            'parents = "NAME:ends"\nparents_parameters = {frist = 1}',
+            r"parents_parameters\.'frist': no such key; did you mean 'first'",
+        ),
+        (
+            'parents = "NAME:text"\nparents_parameters = {a = 1}',
+            r"NAME\.py:20: must annotate its last argument with a msgspec Struct",
+        ),
+        ("parents_parameters = {a = 1}", "'tournament' has no parameters"),
+        ('survivors = "bets"', "'bets'; did you mean 'best'"),
+    ],
+)
+def test_experiment_with_a_bad_rule_is_refused(
+    lab: Callable[[str], str], keys: str, expected: str
+) -> None:
+    name = lab(LAB)
+    text = f'name = "x"\n[selection]\n{keys.replace("NAME", name)}\n'
+    with pytest.raises(ExperimentError, match=expected.replace("NAME", name)):
+        parse_experiment(text, "x.toml")
+
+
+def test_module_that_is_not_allowed_is_refused() -> None:
+    with pytest.raises(UnknownPlugin, match="is not allowed"):
+        parents_rule(Selection(parents="no_lab:rule"))

@@ -1,0 +1,178 @@
+"""Channels in an arena: against a robot alone, and after a snapshot."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from schema.errors import MalformedMessage
+from schema.experiment.document import Fitness, Measures
+from schema.experiment.file import read_experiment
+from schema.experiment.settings import (
+    ArenaSettings,
+    EvaluationSettings,
+    arena_settings_of,
+)
+from schema.plugins.needs import needs
+from schema.robot.ids import BirthId
+from schema.robot.robot import Robot
+from schema.robot.trace import COMPUTED, RECORDED, Trace
+from schema.wire.arena import Advance, Casualty, Changes, Insertion
+from worker.arena.world import World
+from worker.measures import functions
+from worker.measures.functions import BUILT_IN
+from worker.robot.evaluation import simulate
+
+SETTINGS = arena_settings_of(read_experiment("scenario3"))
+CLOCK = replace(SETTINGS.simulation, window_steps=400, warmup_steps=0)
+ARENA = replace(SETTINGS.arena, drop_m=0.0)
+NAMES = tuple(BUILT_IN)
+
+
+def forget() -> None:
+    """Forget the functions of earlier tests."""
+    functions.measures_of.cache_clear()
+    functions.channels_needed.cache_clear()
+
+
+@pytest.fixture
+def recorded(monkeypatch: pytest.MonkeyPatch) -> tuple[ArenaSettings, list[Trace]]:
+    """Return settings with a measure that keeps the traces that it gets."""
+    traces: list[Trace] = []
+
+    @needs(*RECORDED, *COMPUTED)
+    def keep(trace: Trace) -> float:
+        traces.append(trace)
+        return 0.0
+
+    monkeypatch.setitem(functions.BUILT_IN, "keep", keep)
+    forget()
+    measures = Measures(names=("keep", *NAMES))
+    return replace(SETTINGS, simulation=CLOCK, arena=ARENA, measures=measures), traces
+
+
+def settings(**changes: Any) -> ArenaSettings:  # noqa: ANN401
+    measures = Measures(names=NAMES)
+    return replace(SETTINGS, simulation=CLOCK, measures=measures, **changes)
+
+
+def inserted(world: World, robot: Robot, *places: tuple[float, float]) -> None:
+    world.apply(
+        Changes(
+            insertions=tuple(
+                Insertion(BirthId(0, number), robot, place)
+                for number, place in enumerate(places)
+            )
+        )
+    )
+
+
+def test_channels_of_a_lone_robot_equal_those_of_an_evaluation(
+    turtle: Robot, recorded: tuple[ArenaSettings, list[Trace]]
+) -> None:
+    own, traces = recorded
+    world = World(own)
+    inserted(world, turtle, (0.0, 0.0))
+    (judged,) = world.advance(400).judgements
+    assert judged.is_mature
+    together = traces[-1]
+    alone = simulate(
+        turtle,
+        EvaluationSettings(
+            space=own.space,
+            simulation=own.simulation,
+            fitness=own.fitness,
+            measures=own.measures,
+        ),
+    )
+    np.testing.assert_array_equal(together.core_position, alone.core_position)
+    assert set(together.channels) == set(alone.channels)
+    for name in (*RECORDED, *COMPUTED):
+        np.testing.assert_array_equal(
+            together.channels[name], alone.channels[name], err_msg=name
+        )
+    assert together.energy[-1] > 0.0
+    assert together.readings.any()
+
+
+def test_neighbours_are_those_within_half_a_metre(
+    turtle: Robot, recorded: tuple[ArenaSettings, list[Trace]]
+) -> None:
+    """The first and second are 0.4 m apart, the third is 2 m away."""
+    own, traces = recorded
+    world = World(own)
+    inserted(world, turtle, (0.0, 0.0), (0.4, 0.0), (2.0, 0.0))
+    world.advance(400)
+    assert [trace.neighbours[0] for trace in traces] == [1, 1, 0]
+
+
+def test_energy_of_robots_that_merge_is_not_lost(
+    turtle: Robot, recorded: tuple[ArenaSettings, list[Trace]]
+) -> None:
+    """A pile of robots merges and splits; energy never falls."""
+    own, traces = recorded
+    world = World(replace(own, arena=replace(ARENA, drop_m=0.25)))
+    inserted(world, turtle, (0.0, 0.0), (0.1, 0.0), (0.2, 0.05))
+    world.advance(200)
+    assert world.population.merges > 0
+    world.advance(400)
+    assert len(traces) == 6  # of both advances
+    for trace in traces:
+        assert (np.diff(trace.energy) > 0.0).all()
+        assert trace.contact.any()
+
+
+@pytest.mark.parametrize("stops", [(200, 400, 425, 800), (75, 300, 800)])
+def test_restored_arena_answers_equally(turtle: Robot, stops: tuple[int, ...]) -> None:
+    own = settings()
+    places = ((0.0, 0.0), (0.12, 0.0), (1.0, 1.0))
+    whole = World(own)
+    inserted(whole, turtle, *places)
+    steady: list[Advance] = [whole.advance(stop) for stop in stops]
+    world = World(own)
+    inserted(world, turtle, *places)
+    for expected, (stop, _) in zip(steady, pairwise((*stops, 0)), strict=True):
+        found = world.advance(stop)
+        assert found == expected
+        world = World.restore(own, world.snapshot())
+        assert world.digest() == expected.digest
+    assert all(len(one.measures) == len(NAMES) for one in steady[-1].judgements)
+    assert whole.population.merges > 0
+
+
+def test_measures_do_not_change_the_arena(turtle: Robot) -> None:
+    plain, measured = World(replace(SETTINGS, simulation=CLOCK)), World(settings())
+    for world in (plain, measured):
+        inserted(world, turtle, (0.0, 0.0), (0.12, 0.0))
+    one, other = plain.advance(400), measured.advance(400)
+    assert one.poses == other.poses
+    assert [each.fitness for each in one.judgements] == [
+        each.fitness for each in other.judgements
+    ]
+    assert [each.measures for each in one.judgements] == [(), ()]
+
+
+def test_snapshot_without_a_recording_is_refused(turtle: Robot) -> None:
+    world = World(settings())
+    inserted(world, turtle, (0.0, 0.0))
+    world.advance(200)
+    other = replace(SETTINGS, simulation=CLOCK)
+    with pytest.raises(MalformedMessage, match="snapshot"):
+        World.restore(other, world.snapshot())
+
+
+def test_undefined_measure_removes_the_robot(
+    turtle: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(functions.BUILT_IN, "height", lambda _trace: 1 / 0)
+    forget()
+    world = World(settings(fitness=Fitness()))
+    inserted(world, turtle, (0.0, 0.0))
+    found = world.advance(400)
+    forget()
+    assert found.judgements == ()
+    (fallen,) = found.casualties
+    assert isinstance(fallen, Casualty)
+    assert fallen.reason.startswith("fitness undefined: measure height raised Zero")
