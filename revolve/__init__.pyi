@@ -30,16 +30,31 @@ from schema.parts import PartType as PartType
 from schema.parts import Sensor as Sensor
 from schema.parts import Shape as Shape
 from schema.parts import Slot as Slot
+from schema.parts import cylinder as cylinder
+from schema.plugins.needs import needs as needs
+from schema.plugins.protocols import BrainRules as BrainRules
+from schema.plugins.protocols import Branch as Branch
+from schema.plugins.protocols import Draws as Draws
+from schema.plugins.protocols import Selectable as Selectable
+from schema.plugins.protocols import SensorView as SensorView
 from schema.robot.brain import Brain as Brain
 from schema.robot.brain import Connection as Connection
 from schema.robot.brain import Neuron as Neuron
+from schema.robot.brain import Widths as Widths
+from schema.robot.genome import ConnectionGene as ConnectionGene
+from schema.robot.genome import NeuronGene as NeuronGene
+from schema.robot.neurons import Tick as Tick
 from schema.robot.robot import Part as Part
 
 __all__ = [
     "Analysis",
     "Box",
     "Brain",
+    "BrainRules",
+    "Branch",
     "Connection",
+    "ConnectionGene",
+    "Draws",
     "Experiment",
     "ExperimentError",
     "FitnessUndefined",
@@ -51,6 +66,7 @@ __all__ = [
     "Motor",
     "NetworkError",
     "Neuron",
+    "NeuronGene",
     "Parameter",
     "Part",
     "PartType",
@@ -59,14 +75,20 @@ __all__ = [
     "Robot",
     "Run",
     "RunFolderError",
+    "Selectable",
     "Sensor",
+    "SensorView",
     "Shape",
     "SimulationDiverged",
     "Slot",
+    "Tick",
     "Trace",
     "UnknownPlugin",
+    "Widths",
     "analyze",
+    "cylinder",
     "evaluate",
+    "needs",
     "read",
     "resume",
     "run",

@@ -34,6 +34,8 @@ HERE = "--here"
 # What ``faulthandler`` writes for each thread when time is up; the main one is last.
 _LATE = re.compile(r'^Thread .* first\):\n *File "([^"]*)", line (\d+)', re.MULTILINE)
 
+_PLACE = re.compile(r"\.py:\d")
+
 
 def refuse_faulty(sources: Iterable[str]) -> None:
     """Check the plug-ins of experiments before a run, in a process of their own.
@@ -147,10 +149,13 @@ def check_here(
         output.write(f"{json.dumps([step, text])}\n")
         output.flush()
 
-    def check(name: str, use: Use) -> None:
+    def check(word: str, name: str, use: Use) -> None:
         say("begin", f"{use.key}: {use.path}")
         with _time_limit(limit_s):
-            where = check_use(use, lambda place: say("begin", f"{use.key}: {place}"))
+            try:
+                where = check_use(use, lambda at: say("begin", f"{use.key}: {at}"))
+            except ExperimentError as error:
+                raise _placed(error, word, use) from error
         say("fine", f"{use.path}: {name} at {where}: in order")
 
     # A plug-in may print.
@@ -161,11 +166,22 @@ def check_here(
                 with _time_limit(limit_s):
                     uses = list(_uses(word, kinds, kind))
                 for name, use in uses:
-                    check(name, use)
+                    check(word, name, use)
             except RevolveError as error:
                 is_fine = False
                 say("fault", one_line(error))
     return is_fine
+
+
+def _placed(error: ExperimentError, word: str, use: Use) -> ExperimentError:
+    """Return an error with file and line: of the plug-in, or of where it is named."""
+    story = one_line(error)
+    if word.endswith(".toml") and not _PLACE.search(story):
+        lines = Path(word).read_text("utf-8").splitlines()
+        for number, line in enumerate(lines, 1):
+            if use.path in line:
+                return ExperimentError(f"{Path(word).name}:{number}: {story}")
+    return error
 
 
 @contextmanager

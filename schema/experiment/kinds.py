@@ -78,9 +78,8 @@ def check_use(use: Use, begin: Callable[[str], None] = lambda _: None) -> str:
     except (Exception, SystemExit) as error:
         story = " ".join(str(error).split())
         if not isinstance(error, RevolveError):
-            line = where_raised(error, file)
-            story = f"raised {type(error).__name__}: {story}"
-            story += f" ({line})" if line else ""
+            line = where_raised(error, file) or where
+            story = f"{line}: raised {type(error).__name__}: {story}"
         story = story.removeprefix(f"{use.key}: ")
         if f"{file}:" not in story:
             story = f"{where}: {story}"

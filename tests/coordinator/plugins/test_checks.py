@@ -85,7 +85,7 @@ FAULTS = {
     "exiting": (
         "import sys\ndef f(a, b):\n    sys.exit(3)",
         "f",
-        r"FILE.py:2: raised SystemExit: 3 \(FILE.py:3\)",
+        r"FILE.py:3: raised SystemExit: 3",
     ),
     "import": ("a = 1\nb = a / 0", "f", "FILE.py:2: .*ZeroDivisionError"),
     "import-exits": ("\nexit(4)", "f", "FILE.py:2: .*SystemExit: 4"),
