@@ -10,11 +10,11 @@ from coordinator.cli.deployment import Deployment
 from coordinator.cli.execute import resume, start, start_campaign
 from coordinator.cli.flags import parser
 from coordinator.dispatch.events import AgentKind
+from coordinator.evolution.check_brain_genes import check_brain_genes
 from coordinator.evolution.encodings import encoding_of
-from coordinator.evolution.kinds import KINDS
+from coordinator.evolution.kinds import KINDS, brain_kind
 from coordinator.plugins.checks import refuse_faulty, refuse_faulty_of
 from coordinator.plugins.command import check, list_plugins
-from coordinator.plugins.kinds import ENCODING, brain_kind
 from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
     Campaign,
@@ -100,7 +100,8 @@ def plugin_kinds() -> tuple[Kind, ...]:
     import worker.kinds
     from worker.robot.brains import controls_of
 
-    def check_control(experiment: Experiment) -> None:
+    def check_brain(experiment: Experiment) -> None:
+        check_brain_genes(experiment)
         clock = experiment.simulation
         tick_s = clock.brain_steps * clock.timestep_s
         # Its check runs when it is made.
@@ -110,8 +111,7 @@ def plugin_kinds() -> tuple[Kind, ...]:
         *schema.experiment.kinds.KINDS,
         *worker.kinds.KINDS,
         *KINDS,
-        ENCODING,
-        brain_kind(check_control),
+        brain_kind(check_brain),
     )
 
 

@@ -20,6 +20,7 @@ from schema.errors import JobRefused as JobRefused
 from schema.errors import NetworkError as NetworkError
 from schema.errors import RevolveError as RevolveError
 from schema.errors import RunFolderError as RunFolderError
+from schema.errors import SensorFailed as SensorFailed
 from schema.errors import SimulationDiverged as SimulationDiverged
 from schema.errors import UnknownPlugin as UnknownPlugin
 from schema.parts import Box as Box
@@ -30,12 +31,17 @@ from schema.parts import PartType as PartType
 from schema.parts import Sensor as Sensor
 from schema.parts import Shape as Shape
 from schema.parts import Slot as Slot
+from schema.parts import constant_shape as constant_shape
 from schema.parts import cylinder as cylinder
 from schema.plugins.needs import needs as needs
 from schema.plugins.protocols import BrainRules as BrainRules
+from schema.plugins.protocols import BrainType as BrainType
 from schema.plugins.protocols import Branch as Branch
 from schema.plugins.protocols import Draws as Draws
+from schema.plugins.protocols import Encoding as Encoding
+from schema.plugins.protocols import NeuronType as NeuronType
 from schema.plugins.protocols import Selectable as Selectable
+from schema.plugins.protocols import SensorType as SensorType
 from schema.plugins.protocols import SensorView as SensorView
 from schema.robot.brain import Brain as Brain
 from schema.robot.brain import Connection as Connection
@@ -51,10 +57,12 @@ __all__ = [
     "Box",
     "Brain",
     "BrainRules",
+    "BrainType",
     "Branch",
     "Connection",
     "ConnectionGene",
     "Draws",
+    "Encoding",
     "Experiment",
     "ExperimentError",
     "FitnessUndefined",
@@ -67,6 +75,7 @@ __all__ = [
     "NetworkError",
     "Neuron",
     "NeuronGene",
+    "NeuronType",
     "Parameter",
     "Part",
     "PartType",
@@ -77,6 +86,8 @@ __all__ = [
     "RunFolderError",
     "Selectable",
     "Sensor",
+    "SensorFailed",
+    "SensorType",
     "SensorView",
     "Shape",
     "SimulationDiverged",
@@ -86,6 +97,7 @@ __all__ = [
     "UnknownPlugin",
     "Widths",
     "analyze",
+    "constant_shape",
     "cylinder",
     "evaluate",
     "needs",

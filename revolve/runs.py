@@ -16,7 +16,12 @@ from revolve.robot import Robot, of_plain
 from schema.errors import RevolveError, RunFolderError
 from schema.experiment.document import island_experiment
 from schema.experiment.file import own_experiment
-from schema.tables.description import DETAILS, read_description, read_state
+from schema.tables.description import (
+    DETAILS,
+    allow_plugins_of,
+    read_description,
+    read_state,
+)
 from schema.tables.files import read_table
 from schema.wire.born import robot_of_birth
 
@@ -149,6 +154,7 @@ class Run:
         Raises:
             RunFolderError: the table is damaged.
         """
+        allow_plugins_of(self.folder)
         rows = self.births if births is None else births
         homes = rows["island"].to_pylist()
         documents = {

@@ -7,9 +7,14 @@ import msgspec
 
 from revolve.messages import Outcome, Task, problem_of
 from revolve.trace import pack_trace
-from schema.errors import FitnessUndefined, RevolveError, SimulationDiverged
+from schema.errors import (
+    FitnessUndefined,
+    RevolveError,
+    SensorFailed,
+    SimulationDiverged,
+)
 from schema.experiment.document import body_space
-from schema.experiment.settings import EvaluationSettings, read_evaluation_settings
+from schema.experiment.settings import EvaluationSettings
 from schema.plugins.permission import allow
 from schema.robot.robot import Robot, check_types
 from schema.wire.codec import decode_robot
@@ -28,21 +33,23 @@ def outcome_of(data: bytes) -> bytes:
 
 def _done(task: Task) -> Outcome:
     allow(task.plugins)
-    settings = read_evaluation_settings(task.settings)
-    robot = decode_robot(task.robot)
-    check_types(robot, body_space(settings.space))
-    if task.size is not None:
-        return Outcome(picture=_picture(robot, settings, task.size))
-    # Before MuJoCo is imported, in case that a later task is a picture.
+    # Before MuJoCo is imported, in case that any task is a picture.
     with suppress(RevolveError, ImportError):
         from analysis.render.picture import choose_engine  # noqa: PLC0415
 
         choose_engine()
     from worker.robot.evaluation import judge, simulate  # noqa: PLC0415
+    from worker.serve.checks import checked_evaluation  # noqa: PLC0415
 
+    # Before the robot, whose neurons may be those of a plug-in.
+    settings = checked_evaluation(task.settings)
+    robot = decode_robot(task.robot)
+    check_types(robot, body_space(settings.space))
+    if task.size is not None:
+        return Outcome(picture=_picture(robot, settings, task.size))
     try:
         trace = simulate(robot, settings)
-    except SimulationDiverged as error:
+    except (SimulationDiverged, SensorFailed) as error:
         return Outcome(failure=str(error))
     packed = pack_trace(trace)
     if not task.is_judged:

@@ -145,7 +145,7 @@ FIGURES: tuple[Figure, ...] = (
            "correlation where an experiment is compared with a number. In brackets: "
            "the thesis's finding (> greater, < smaller, = no large difference).",
            ("findings",), effects),
-    Figure("G", "Measures over births",
+    Figure("H", "Measures over births",
            "Mean over the population of each measure that the experiment names. Each "
            "line is an island of a run; units are those of the measure.",
            ("named_measures",), measures_over_births),

@@ -75,7 +75,9 @@ class Arena:
         self._parents_needed = experiment.selection.parents_needed
         self._number = number
         self._vetting_queue = VettingQueue(experiment, seed, run, number)
-        self._living = LivingRobots(rules, seed=seed, run=run)
+        self._living = LivingRobots(
+            rules, experiment.measures.labels, seed=seed, run=run
+        )
         self._orders = Orders(experiment, self._living)
         self._migration = (
             None if epochs is None else ArenaMigration(experiment, epochs, self._living)

@@ -60,8 +60,11 @@ class LivingRobots:
     with the next advance, which takes them by ``take_changes``.
     """
 
-    def __init__(self, rules: Arena, *, seed: int, run: int) -> None:
+    def __init__(
+        self, rules: Arena, labels: Sequence[str], *, seed: int, run: int
+    ) -> None:
         self._rules = rules
+        self._labels = labels
         self._stream = partial(stream, seed, run)
         self._living: dict[BirthId, LivingRobot] = {}
         self._removals: list[BirthId] = []
@@ -132,7 +135,11 @@ class LivingRobots:
         for judgement in advance.judgements:
             robot = self._living[judgement.birth]
             robot.judgement = judgement
-            robot.individual = replace(robot.individual, fitness=judgement.fitness)
+            robot.individual = replace(
+                robot.individual,
+                fitness=judgement.fitness,
+                measures=dict(zip(self._labels, judgement.measures, strict=False)),
+            )
 
     def take_changes(self) -> Changes:
         """Return all changes since the last call."""

@@ -4,7 +4,7 @@ Every candidate is a pure function of seed, run, birth, attempt and population.
 Attempts are numbered through all couples of a birth, so that each has its own stream.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from math import inf
@@ -46,7 +46,10 @@ class Candidate:
     robot: Robot
 
     def individual(
-        self, generation: int | None, fitness: float | None = 0.0
+        self,
+        generation: int | None,
+        fitness: float | None = 0.0,
+        measures: Mapping[str, float] | None = None,
     ) -> Individual:
         """Return the individual; its fitness is None if its evaluation failed."""
         parents = self.couple or ()
@@ -59,7 +62,7 @@ class Candidate:
             parents=tuple(parent.birth for parent in parents),
             size=len(self.robot.parts),
         )
-        return individual.evaluated(fitness)
+        return individual.evaluated(fitness, measures)
 
 
 class Breeder:

@@ -1,5 +1,6 @@
 """Check of the half of a brain type that makes genes, before the first birth."""
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -35,11 +36,13 @@ def check_brain_genes(experiment: Experiment) -> None:
     genes = brain_genes(experiment)
     place = f"brain.type: {where_defined(type(genes))}"
     try:
-        first, second = _genomes(experiment), _genomes(experiment)
-        for genome in first:
+        first = []
+        for genome in _genomes(experiment):
             robot = develop(genome, body_space(experiment.space))
             check_robot(robot, body_space(experiment.space), genes.neurons)
             check_widths(robot.brain, widths(experiment.space))
+            first.append(genome)
+        second = list(_genomes(experiment))
     except InvalidRobot as error:
         raise ExperimentError(f"{place}: expected valid robots, got {error}") from None
     except RevolveError:
@@ -56,17 +59,18 @@ def check_brain_genes(experiment: Experiment) -> None:
         )
 
 
-def _genomes(experiment: Experiment) -> list[Genome]:
-    """Return random genomes and children of them."""
-    found = [
-        generate(np.random.default_rng(seed), experiment, BirthId(0, seed))
-        for seed in range(_FOUNDERS)
-    ]
+def _genomes(experiment: Experiment) -> Iterator[Genome]:
+    """Yield random genomes and children of them."""
+    found = []
+    for seed in range(_FOUNDERS):
+        rng = np.random.default_rng(seed)
+        found.append(generate(rng, experiment, BirthId(0, seed)))
+        yield found[-1]
     for seed in range(_CHILDREN):
         for first, second in pairwise(found[-_FOUNDERS:]):
             rng = np.random.default_rng((seed, len(found)))
             birth = BirthId(0, len(found))
             if child := mate(first, second, rng, experiment, birth):
                 found.append(child)
+                yield child
                 break
-    return found

@@ -12,7 +12,9 @@ from coordinator.evolution.encodings import (
     outside_limits,
 )
 from schema.errors import ExperimentError, InvalidRobot
-from schema.experiment.document import Experiment
+from schema.experiment.document import (
+    Experiment,
+)
 from schema.plugins.load import load_object
 from schema.plugins.origin import where_defined
 from schema.robot.ids import BirthId

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from coordinator.cppn.encoding import Cppn
+from coordinator.evolution.cppn.encoding import Cppn
 from coordinator.evolution.revolve_angle import RevolveAngle
 from schema.errors import ExperimentError, InvalidRobot, RevolveError, one_line, shown
 from schema.experiment.brains import neuron_kinds
@@ -37,7 +37,7 @@ BUILT_IN: dict[str, Callable[..., Encoding[Any]]] = {
 """Built-in encodings by their short names."""
 
 METHODS = ("random", "develop", "crossover", "mutate", "to_bytes", "from_bytes")
-"""Methods of an encoding."""
+"""Methods that an own encoding must have."""
 
 
 class _NoParameters(msgspec.Struct, frozen=True):

@@ -1,19 +1,32 @@
-"""Kinds of plug-ins that the coordinator runs: selections of parents and survivors."""
+"""Kinds of plug-ins that the coordinator runs: selections, encodings, brains."""
 
 import inspect
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from coordinator.evolution.brains import BUILT_IN as BRAINS
+from coordinator.evolution.check_encoding import check_encoding
+from coordinator.evolution.encodings import BUILT_IN as ENCODINGS
+from coordinator.evolution.encodings import METHODS, WHERE
 from coordinator.evolution.rules import PARENTS, SURVIVORS, Rule
 from schema.errors import ExperimentError
-from schema.experiment.document import Experiment, Selection
+from schema.experiment.check import check_experiment
+from schema.experiment.document import (
+    BrainSection,
+    Encoding,
+    Experiment,
+    Selection,
+    island_count,
+    island_experiment,
+)
 from schema.experiment.kinds import Kind, Use
 from schema.experiment.selection_rules import own_rule
+from schema.plugins.load import load_object
 from schema.plugins.origin import where_defined
 from schema.robot.ids import BirthId
 
@@ -129,7 +142,63 @@ def _takes(arguments: int, plugin: object) -> bool:
     return True
 
 
+def _has(methods: Iterable[str], plugin: object) -> bool:
+    """Return whether an object is a class with some methods."""
+    return isinstance(plugin, type) and all(hasattr(plugin, name) for name in methods)
+
+
+def _encoding(experiment: Experiment) -> Use:
+    path = experiment.encoding.type
+
+    def load() -> object:
+        # What is wrong elsewhere is not the fault of this plug-in.
+        check_experiment(experiment, experiment.name)
+        return load_object(path, WHERE, ENCODINGS, METHODS)
+
+    return Use(WHERE, path, load, lambda _: check_encoding(experiment))
+
+
+def _encodings(experiment: Experiment) -> Iterator[Use]:
+    numbers = range(island_count(experiment))
+    for own in dict.fromkeys(island_experiment(experiment, each) for each in numbers):
+        yield _encoding(own)
+
+
+def brain_kind(check: Callable[[Experiment], None]) -> Kind:
+    """Return the kind of brain types.
+
+    Args:
+        check: of both halves of the brain type of an experiment; one of them runs in
+            workers.
+    """
+
+    def use(experiment: Experiment) -> Use:
+        path, key = experiment.brain.type, "brain.type"
+        return Use(
+            key,
+            path,
+            lambda: load_object(path, key, BRAINS),
+            lambda _: check(experiment),
+        )
+
+    return Kind(
+        "brain",
+        BRAINS,
+        partial(_has, ("outputs", "grow", "pack", "bank")),
+        lambda path: use(Experiment("by hand", brain=BrainSection(type=path))),
+        lambda experiment: [use(experiment)],
+    )
+
+
+ENCODING = Kind(
+    "encoding",
+    ENCODINGS,
+    partial(_has, METHODS),
+    lambda path: _encoding(Experiment("by hand", encoding=Encoding(type=path))),
+    _encodings,
+)
 KINDS = (
+    ENCODING,
     Kind(
         "parents",
         PARENTS,

@@ -40,13 +40,11 @@ def tournament(
     rest of the population. Of equals the elder wins.
     """
     draws = BufferedRng(rng)
-
-    def winner(places: Sequence[int]) -> int:
-        drawn = draws.sample(places, parameters.size)
-        return min(drawn, key=lambda at: _fittest_first(population[at]))
-
-    first = winner(range(len(population)))
-    return first, winner([at for at in range(len(population)) if at != first])
+    order = [(-one.fitness, one.birth) for one in population]
+    places = list(range(len(population)))
+    first = min(draws.sample(places, parameters.size), key=order.__getitem__)
+    places.remove(first)
+    return first, min(draws.sample(places, parameters.size), key=order.__getitem__)
 
 
 def random_parents(
@@ -131,8 +129,9 @@ class Rule:
                 + (f" ({line})" if line else "")
             ) from error
         places = _whole_numbers(answer)
-        is_inside = all(0 <= at < len(population) for at in places)
-        if is_inside and len(places) == len(set(places)) == count:
+        if len(places) == len(set(places)) == count and (
+            min(places) >= 0 and max(places) < len(population)
+        ):
             return places
         raise ExperimentError(
             f"{self.key}: {where_defined(self.function)}: must return {count} "
@@ -143,11 +142,13 @@ class Rule:
 
 def _whole_numbers(answer: object) -> list[int]:
     """Return the answer of a rule as plain integers; empty if it is none."""
-    if isinstance(answer, list | tuple | np.ndarray) and all(
-        isinstance(at, int | np.integer) for at in answer
-    ):
-        return [int(at) for at in answer]
-    return []
+    if not isinstance(answer, (list, tuple, np.ndarray)):
+        return []
+    kinds = set(map(type, answer))
+    if kinds <= {int}:
+        return list(answer)
+    is_whole = all(issubclass(kind, (int, np.integer)) for kind in kinds)
+    return [int(at) for at in answer] if is_whole else []
 
 
 def parents_rule(selection: Selection) -> Rule:

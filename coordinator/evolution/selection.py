@@ -40,10 +40,22 @@ class Individual:
     size: int = 0
     measures: Mapping[str, float] = field(default_factory=dict, hash=False)
 
-    def evaluated(self, fitness: float | None) -> "Individual":
-        """Return the individual with a fitness; None where its evaluation failed."""
+    def evaluated(
+        self, fitness: float | None, measures: Mapping[str, float] | None = None
+    ) -> "Individual":
+        """Return the individual with the results of an evaluation.
+
+        Args:
+            fitness: None where its evaluation failed.
+            measures: of the evaluation; None keeps those of an earlier one.
+        """
         value = 0.0 if fitness is None else fitness
-        return replace(self, fitness=value, has_failed=fitness is None)
+        return replace(
+            self,
+            fitness=value,
+            has_failed=fitness is None,
+            measures=self.measures if measures is None else measures,
+        )
 
     @property
     def known_fitness(self) -> float | None:

@@ -3,7 +3,7 @@
 Events are past participles, commands imperatives; all are immutable.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from msgspec import Struct
@@ -329,3 +329,9 @@ ArenaCommand = Vet | AdvanceShard | Record | Append | Emigrate | Finish
 def fitness_of(outcome: Outcome) -> float | None:
     """Return the fitness of an outcome; None if the evaluation failed."""
     return outcome.evaluation.fitness if outcome.evaluation else None
+
+
+def measures_of(outcome: Outcome, labels: Sequence[str]) -> dict[str, float]:
+    """Return the measures of an outcome by name; none if the evaluation failed."""
+    found = outcome.evaluation
+    return dict(zip(labels, found.measures, strict=True)) if found else {}

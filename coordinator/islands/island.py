@@ -26,6 +26,7 @@ from coordinator.islands.events import (
     Verdict,
     Vet,
     fitness_of,
+    measures_of,
 )
 from coordinator.islands.island_migration import IslandMigration
 from coordinator.islands.migration import MigrationEpochs
@@ -86,6 +87,7 @@ class Island:
         self.births = 0
         self.population: tuple[Individual, ...] = ()
         self.experiment = experiment
+        self._labels = experiment.measures.labels
         self._seed, self._run, self._number = seed, run, number
         self._encoding = encoding_of(experiment)
         self._breeder = Breeder(experiment, seed, run)
@@ -222,11 +224,13 @@ class Island:
     def _commit(self, candidate: Candidate, outcome: Outcome) -> list[IslandCommand]:
         """Add an evaluated candidate to the brood; return its rows."""
         del self._in_flight[self.births]
-        individual = candidate.individual(self._generation, fitness_of(outcome))
+        individual = candidate.individual(
+            self._generation, fitness_of(outcome), measures_of(outcome, self._labels)
+        )
         self._brood.append(individual)
         self.births += 1
         born = birth_record(candidate, individual, self._encoding)
-        return [born, evaluation_record(outcome, self.experiment.measures.labels)]
+        return [born, evaluation_record(outcome, self._labels)]
 
     def _close_brood(self) -> list[IslandCommand]:
         """Select the survivors, and end the epoch of migration if it is due."""

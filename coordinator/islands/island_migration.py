@@ -11,6 +11,7 @@ from coordinator.islands.events import (
     Outcome,
     Record,
     fitness_of,
+    measures_of,
 )
 from coordinator.islands.migration import MigrationEpochs
 from coordinator.islands.rows import evaluation_record, migration_records
@@ -88,7 +89,9 @@ class IslandMigration:
         for birth, outcome in self._outcomes.items():
             assert outcome is not None
             immigrant = self._immigrants[birth]
-            self._immigrants[birth] = immigrant.evaluated(fitness_of(outcome))
+            self._immigrants[birth] = immigrant.evaluated(
+                fitness_of(outcome), measures_of(outcome, self._labels)
+            )
             commands.append(evaluation_record(outcome, self._labels))
         settled = self._settle(population, self._immigrants.values())
         self._immigrants, self._outcomes = None, {}

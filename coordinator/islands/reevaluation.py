@@ -20,6 +20,7 @@ from coordinator.islands.events import (
     Outcome,
     Record,
     fitness_of,
+    measures_of,
 )
 from coordinator.islands.rows import evaluation_record
 from schema.errors import UnexpectedEvent
@@ -119,18 +120,23 @@ class Reevaluations:
             self._trials[birth].append(fitness_of(outcome))
             records.append(evaluation_record(outcome, self._labels))
         evaluated = (
-            self._evaluated(one) if one.birth in outcomes else one for one in population
+            self._evaluated(one, outcome)
+            if (outcome := outcomes.get(one.birth))
+            else one
+            for one in population
         )
         return tuple(evaluated), records
 
-    def _evaluated(self, individual: Individual) -> Individual:
+    def _evaluated(self, individual: Individual, outcome: Outcome | None) -> Individual:
         """Return an individual with the fitness that follows from its trials."""
+        measures = measures_of(outcome, self._labels) if outcome else None
         trials = self._trials[individual.birth]
         if self._rules.fitness == "replace":
             trials = trials[-1:]
         if all(each is None for each in trials):
-            return individual.evaluated(None)
-        return individual.evaluated(fsum(each or 0.0 for each in trials) / len(trials))
+            return individual.evaluated(None, measures)
+        fitness = fsum(each or 0.0 for each in trials) / len(trials)
+        return individual.evaluated(fitness, measures)
 
     def _last_evaluation(self, individual: Individual) -> tuple[int, BirthId]:
         """Return the number of births at the last evaluation, and the id for ties."""

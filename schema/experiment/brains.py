@@ -21,7 +21,7 @@ T = TypeVar("T")
 Half = TypeVar("Half")
 
 NEURON_MEMBERS = ("name", "parameters", "states", "step")
-BRAIN_METHODS = ("outputs", "grow", "prune", "vary", "pack", "bank")
+_BRAIN_MEMBERS = ("neurons", "outputs", "grow", "prune", "vary", "pack", "bank")
 _TYPE = "brain.type"
 
 
@@ -132,7 +132,7 @@ def _own_brain(brain: BrainSection, names: tuple[str, ...]) -> BrainType:
         )
     parameters = _parameters(brain, getattr(found, "Parameters", NoParameters))
     made = _made(found, _TYPE, parameters, neuron_types(names))
-    _require(made, ("neurons", *BRAIN_METHODS), _TYPE)
+    _require(made, _BRAIN_MEMBERS, _TYPE)
     return made
 
 

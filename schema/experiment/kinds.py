@@ -13,13 +13,11 @@ import schema.robogen_parts
 from schema.errors import ExperimentError, RevolveError
 from schema.experiment.brains import NEURON_MEMBERS, neuron_types
 from schema.experiment.document import Experiment, Space, body_space
-from schema.parts import PartType, Sensor
+from schema.parts import PartType
 from schema.plugins.load import load_instance, load_object
 from schema.plugins.origin import where_defined, where_raised
 from schema.plugins.sensor_checks import check_sensor
 from schema.robot.neurons import BUILT_IN_NEURONS
-
-_SENSOR_MEMBERS = ("inputs", "read")
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,25 +135,6 @@ PART_TYPE = Kind(
 )
 
 
-def _sensor(path: str) -> Use:
-    key = "sensor"
-    return Use(
-        key,
-        path,
-        lambda: load_object(path, key, {}, _SENSOR_MEMBERS),
-        lambda sensor: check_sensor(sensor, key),
-    )
-
-
-def _is_sensor(plugin: object) -> bool:
-    is_object = not isinstance(plugin, type | Sensor)
-    return is_object and all(hasattr(plugin, name) for name in _SENSOR_MEMBERS)
-
-
-SENSOR = Kind("sensor", {}, _is_sensor, _sensor, lambda _: ())
-"""Experiments name sensors by their part types, whose check covers them."""
-
-
 def _neuron_type(path: str) -> Use:
     key = "space.neuron_types"
 
@@ -181,5 +160,27 @@ NEURON_TYPE = Kind(
     _neuron_type,
     _neuron_types,
 )
-KINDS = (PART_TYPE, SENSOR, NEURON_TYPE)
+
+
+def _sensor(path: str) -> Use:
+    key = "sensor"
+
+    def load() -> object:
+        return load_object(path, key, {}, ("inputs", "read"))
+
+    return Use(key, path, load, lambda sensor: check_sensor(sensor, key))
+
+
+SENSOR = Kind(
+    "sensor",
+    {},
+    lambda plugin: (
+        not isinstance(plugin, type)
+        and all(hasattr(plugin, name) for name in ("inputs", "read"))
+    ),
+    _sensor,
+    # Sensors are checked with the part types that hold them.
+    lambda _: (),
+)
+KINDS = (PART_TYPE, NEURON_TYPE, SENSOR)
 """Kinds whose checks need no other room."""

@@ -18,7 +18,7 @@ from msgspec import Struct
 
 from schema.errors import ExperimentError
 from schema.limits import MOST_PLUGIN_BYTES
-from schema.plugins.permission import FLAG, allow_file, allowed_file, is_named
+from schema.plugins.permission import FLAG, allow_file, allowed_file
 from schema.plugins.source import digest_of, digest_of_bytes, modules_named
 
 PLUGINS = "plugins"
@@ -89,12 +89,11 @@ def allow_kept(
         if not note.file:
             if is_resumed:
                 _check_installed(name, note)
-        elif is_named(name):
-            if (found := digest_of(name)) != note.digest:
+        elif found := digest_of(name):
+            if found != note.digest:
                 raise ExperimentError(
-                    f"plug-in {name}: has source digest {found or 'none'}, but "
-                    f"{folder} was made with {note.digest}; to use that one: "
-                    f"{FLAG} {copy}"
+                    f"plug-in {name}: has source digest {found}, but {folder} was made "
+                    f"with {note.digest}; to use that one: {FLAG} {copy}"
                 )
         else:
             if is_resumed:

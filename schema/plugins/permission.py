@@ -88,14 +88,14 @@ def allowed_file(module: str) -> Path | None:
     return _allowed.get(module)
 
 
-def is_named(module: str) -> bool:
-    """Return whether the user named a module on the command line, or a document did."""
-    return module in _allowed
-
-
 def allowed() -> tuple[str, ...]:
     """Return the entries with which ``allow`` gives another process the same list."""
-    return tuple(name if file is None else str(file) for name, file in _allowed.items())
+    return tuple(
+        name if file is None else str(file)
+        for name, file in _allowed.items()
+        # A document may name a module that is not there.
+        if file is not None or _source(_top(name)) is not None
+    )
 
 
 def is_allowed(module: str) -> bool:

@@ -13,6 +13,7 @@ from schema.robot.ids import BirthId
 from schema.robot.neurons import Tick
 from schema.robot.results import Floats
 from schema.robot.robot import Robot
+from schema.robot.trace import Trace
 
 T = TypeVar("T")
 
@@ -552,4 +553,39 @@ class SurvivorSelection(Protocol):
         Returns:
             ``count`` different places in ``population``, from 0, in any order.
         """
+        ...
+
+
+class FitnessFunction(Protocol):
+    """Fitness function, ``fitness.function``; runs in the worker.
+
+    A pure function of its arguments: the same number for the same trace, always
+    finite, higher is better. It may raise: the evaluation is then a failed result.
+    The second argument is an instance of the msgspec Struct with which it is
+    annotated, read from the table ``[fitness.parameters]``; without such an
+    annotation, the section ``[fitness]``. A function that reads more of the trace
+    than the core's position declares the channels with ``schema.plugins.needs``.
+    """
+
+    def __call__(self, trace: Trace, parameters: Any, /) -> float:  # noqa: ANN401
+        """Return the fitness of a trace.
+
+        Args:
+            trace: of the robot over its fitness window, with the declared channels;
+                not to be changed.
+            parameters: own parameters, or the section.
+        """
+        ...
+
+
+class MeasureFunction(Protocol):
+    """Measure, one of ``measures.names``; runs in the worker.
+
+    As a fitness function, but it may have no second argument: then it has no
+    parameters. Otherwise the argument is annotated with a msgspec Struct, which is
+    read from the table ``[measures.parameters.<name>]``.
+    """
+
+    def __call__(self, trace: Trace, /, *parameters: Any) -> float:  # noqa: ANN401
+        """Return the measure of a trace; arguments as of a fitness function."""
         ...

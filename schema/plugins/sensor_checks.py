@@ -14,7 +14,6 @@ from schema.robot.results import Floats
 
 MOST_INPUTS = 1000
 """Most inputs of one sensor."""
-_PLAIN = Shape((Box("body", (0.1, 0.1, 0.1), (0.0, 0.0, 0.0), 0.1),), ())
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,13 +21,13 @@ class HandMadeView:
     """View of a part at the origin, upright, joint at an angle; a ``SensorView``.
 
     Attributes:
-        shape: of the part.
+        shape: of the part; None for one that has any box, and a joint.
         age_s, joint_angle, joint_speed, light, others: as in the protocol.
         obstacle_m: distance of what all rays meet [m].
         is_touched: whether all boxes touch something.
     """
 
-    shape: Shape
+    shape: Shape | None
     age_s: float
     joint_angle: float
     joint_speed: float
@@ -63,6 +62,8 @@ class HandMadeView:
         return min(self.obstacle_m, reach)
 
     def _box(self, name: str) -> Box:
+        if self.shape is None:
+            return Box(name, (0.1, 0.1, 0.1), (0.0, 0.0, 0.0), 0.1)
         return {box.name: box for box in self.shape.boxes}[name]
 
 
@@ -77,7 +78,7 @@ def ray_problem(direction: Vector, reach: float, start: Vector) -> None:
 
 
 def check_sensor(
-    sensor: OwnSensor, where: str = "sensor", shape: Shape = _PLAIN
+    sensor: OwnSensor, where: str = "sensor", shape: Shape | None = None
 ) -> None:
     """Raise unless an own sensor keeps its contract on three hand-made views.
 
@@ -87,7 +88,7 @@ def check_sensor(
     Args:
         sensor: the sensor.
         where: what holds it, for messages.
-        shape: of its part; the default has one box, ``body``.
+        shape: of its part; None allows any name of a box.
 
     Raises:
         ExperimentError: no whole number of inputs; no ``read`` of one argument; it
@@ -150,10 +151,12 @@ def _number(value: object) -> float:
     raise TypeError
 
 
-def _views(shape: Shape) -> dict[str, HandMadeView]:
+def _views(shape: Shape | None) -> dict[str, HandMadeView]:
     """Return the views by what they show."""
-    speed = 0.0 if shape.joint is None else 0.5
-    angle = 0.0 if shape.joint is None else min(0.1, shape.joint.limit)
+    speed, angle = 0.5, 0.1
+    if shape is not None:
+        speed = 0.0 if shape.joint is None else speed
+        angle = 0.0 if shape.joint is None else min(angle, shape.joint.limit)
     alone, crowd = np.zeros((0, 3)), np.array([(0.3, 0.0, 0.0), (-1.0, 2.0, 0.1)])
     return {
         "at birth": HandMadeView(

@@ -3,15 +3,13 @@
 import math
 from collections.abc import Callable
 from numbers import Real
-from pathlib import Path
-from traceback import extract_tb
 from typing import Any
 
 import numpy as np
 
 from schema.errors import ExperimentError
 from schema.plugins.needs import channels_of
-from schema.plugins.origin import where_defined
+from schema.plugins.origin import where_defined, where_raised
 from schema.robot.robot import Part, Robot
 from schema.robot.trace import CONSTANT, Floats, Trace
 
@@ -62,10 +60,10 @@ def check_function(
                 )
     if len(raised) == len(traces):
         first = raised[0]
-        story = f"{type(first).__name__}: {first}"
+        line = where_raised(first, place.partition(":")[0])
+        story = f"{type(first).__name__}: {first}" + (f" ({line})" if line else "")
         raise ExperimentError(
-            f"{where}: {_where_raised(first, place)}: must return a number, raised "
-            f"{story}"
+            f"{where}: {place}: must return a number, raised {story}"
         ) from first
 
 
@@ -127,17 +125,6 @@ def _problem(values: list[Any]) -> str:
     if values[0] != values[1]:
         return f"must return the same twice, got {values[0]} and {values[1]}"
     return ""
-
-
-def _where_raised(error: Exception, place: str) -> str:
-    """Return the last line of a function's own file that an error came through."""
-    file = place.partition(":")[0]
-    lines = [
-        f"{file}:{frame.lineno}"
-        for frame in extract_tb(error.__traceback__)
-        if Path(frame.filename).name == file
-    ]
-    return lines[-1] if lines else place
 
 
 def _arrays(trace: Trace) -> dict[str, Any]:

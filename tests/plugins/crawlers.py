@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from schema.parts import Box, Joint, Motor, PartType, Shape, Slot, cylinder
+from revolve import Box, Joint, Motor, PartType, Shape, Slot, cylinder
 
 ALONG_X = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
 _PISTON = Shape(

@@ -121,11 +121,13 @@ def test_failing_fitness_and_crash_are_results(
 ) -> None:
     (tmp_path / "odd_fitness.py").write_text(
         "import os, signal\n"
-        "def undefined(track, fitness):\n    return float('nan')\n"
+        "def undefined(track, fitness):\n"
+        "    # Not on the short and long tracks of the check.\n"
+        "    return float('nan') if len(track.core_position) == 11 else 1.0\n"
         "def crash(track, fitness):\n    os.kill(os.getpid(), signal.SIGSEGV)\n"
     )
     monkeypatch.chdir(tmp_path)
-    text = 'name = "odd"\n[simulation]\nwindow_steps = 40\n[fitness]\nfunction = '
+    text = 'name = "odd"\n[simulation]\nwindow_steps = 400\n[fitness]\nfunction = '
     robot = rv.Robot.random(seed=1)
     for name, expected in (("undefined", "finite number"), ("crash", "SIGSEGV")):
         (tmp_path / "odd.toml").write_text(f'{text}"odd_fitness:{name}"\n')

@@ -15,7 +15,9 @@ from revolve.command import COMMANDS
 from schema.experiment.document import Arena
 from schema.experiment.file import parse_experiment
 from schema.experiment.settings import fitness_function
+from tests.own_brains import write_module
 from worker.fitness import check_fitness
+from worker.measures.functions import BUILT_IN, measures_of
 
 pytestmark = pytest.mark.system
 
@@ -107,6 +109,36 @@ def test_selection_of_the_selection_page_runs(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_measures_page_runs_from_top_to_bottom(tmp_path: Path) -> None:
+    page = TOP / "docs" / "measures.md"
+    module, *readers = _blocks(page, "python")
+    built_in, own = _blocks(page, "toml")
+    assert len(readers) >= 2
+    (tmp_path / "gaits.py").write_text(module)
+    (tmp_path / "gaits.toml").write_text(own)
+    (block,) = _blocks(page, "sh")
+    for line in block.splitlines():
+        done = _python(("-m", *line.split()), tmp_path)
+        assert done.returncode == 0, f"{line}\n{done.stderr}"
+    for reader in readers:
+        done = _python(("-W", "error", "-c", reader), tmp_path)
+        assert done.returncode == 0, f"{reader}\n{done.stderr}"
+    listed = re.findall(r"^\| `(\w+)` \| \S.*\| ", page.read_text(), re.MULTILINE)
+    assert [name for name in listed if name in BUILT_IN] == list(BUILT_IN)
+    measures = parse_experiment(built_in, str(page)).measures
+    assert len(measures_of(measures)) == 5
+    # The message that the page quotes.
+    (tmp_path / "gaits.py").write_text(module.replace('@rv.needs("contact")\n', "\n"))
+    done = _python(("-m", "revolve", "check", "gaits.toml"), tmp_path)
+    (quoted,) = re.findall(
+        r"^    (measures\.names: .*)$", page.read_text(), re.MULTILINE
+    )
+    assert done.returncode != 0
+    assert quoted in done.stdout + done.stderr
+
+
+@pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_code_of_the_python_page_runs_from_top_to_bottom(tmp_path: Path) -> None:
     blocks = _blocks(TOP / "docs" / "python.md", "python")
@@ -136,6 +168,24 @@ def test_experiments_of_the_experiments_page_run(tmp_path: Path) -> None:
         assert done.returncode == 0, f"{document}\n{done.stderr}"
         if "my_parts" not in document:
             parse_experiment(document, str(tmp_path / page.name))
+
+
+def test_experiments_of_the_brains_page_run(tmp_path: Path) -> None:
+    """Each runs equally with one and two workers."""
+    write_module(tmp_path)
+    for document in _blocks(TOP / "docs" / "brains.md", "toml"):
+        (tmp_path / "mine.toml").write_text(document)
+        runs = []
+        for workers in ("1", "2"):
+            runs.append(f"out-{len(document)}-{workers}")
+            done = _python(
+                ("-m", "revolve", "run", "mine.toml", "--births", "20",
+                 "--workers", workers, "--quiet", "--out", runs[-1]),
+                tmp_path,
+            )  # fmt: skip
+            assert done.returncode == 0, f"{document}\n{done.stderr}"
+        done = _python(("-m", "revolve", "compare", *runs), tmp_path)
+        assert done.returncode == 0, done.stdout
 
 
 def test_parts_page_runs(tmp_path: Path) -> None:

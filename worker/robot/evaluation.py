@@ -206,6 +206,7 @@ class _ControlLoop:
         if recorder is not None:
             self._sensors.read(self._tick_s)
             self._read_light()
+            self._read_own(end)
             recorder.readings = self._sensors.readings
             recorder.sample()
         if data.warning.number.any() or not math.isfinite(
@@ -229,12 +230,7 @@ class _ControlLoop:
         else:
             self._sensors.start()
         self._read_light()
-        if self._sensors.own is not None:
-            # Frames are those of the state before the last step.
-            mujoco.mj_kinematics(self._model, self.data)
-            age_s = step * self._simulation.timestep_s
-            around = Surroundings(age_s, self._sensors.touching(), light=self._light)
-            self._sensors.own.read(self._sensors.readings[0], around)
+        self._read_own(step)
         tick = step // self._simulation.brain_steps
         if self._pushes is not None:
             self._pushes.apply(tick)
@@ -252,6 +248,14 @@ class _ControlLoop:
             mujoco.mj_kinematics(self._model, self.data)
             world = self._model, self.data
             read_light(self._light, self._sensors, world, (world,))
+
+    def _read_own(self, step: int) -> None:
+        if self._sensors.own is not None:
+            # Frames are those of the state before the last step.
+            mujoco.mj_kinematics(self._model, self.data)
+            age_s = step * self._simulation.timestep_s
+            around = Surroundings(age_s, self._sensors.touching(), light=self._light)
+            self._sensors.own.read(self._sensors.readings[0], around)
 
 
 def _raise_diverged(data: mujoco.MjData, time_s: float) -> None:

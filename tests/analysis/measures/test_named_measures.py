@@ -74,6 +74,6 @@ def test_run_without_measures_has_no_rows_and_no_figure() -> None:
     tables = run(births=BORN, population=population((0, 1, {(0, 0): 0.5})))
     found = named_measures(RunTables(tables))
     assert found.num_rows == 0
-    (figure,) = (each for each in FIGURES if each.number == "G")
+    (figure,) = (each for each in FIGURES if each.number == "H")
     with pytest.raises(NothingToDraw, match="no experiment names measures"):
         figure.draw({"named_measures": found})

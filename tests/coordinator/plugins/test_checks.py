@@ -12,6 +12,7 @@ from coordinator.__main__ import plugin_kinds
 from coordinator.plugins.checks import check_apart, check_here, refuse_faulty
 from schema.errors import ExperimentError
 from schema.plugins import permission
+from tests.own_brains import write_module
 
 Steps = list[tuple[str, str]]
 
@@ -66,6 +67,25 @@ def test_a_part_type_is_recognised() -> None:
     assert re.search(r"part-type at parts\.py:\d+: in order", text)
 
 
+def test_neuron_and_brain_types_are_recognised(tmp_path: Path) -> None:
+    file = write_module(tmp_path)
+    found = checked(f"{file}:Adapting", f"{file}:Wave")
+    neuron, brain = [text for step, text in found if step == "fine"]
+    assert re.fullmatch(r"my_brains:Adapting: neuron-type at .*:\d+: in order", neuron)
+    assert re.fullmatch(r"my_brains:Wave: brain at my_brains.py:\d+: in order", brain)
+
+
+def test_a_broken_half_of_a_brain_type_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "half_brains.py"
+    text = write_module(tmp_path).read_text()
+    half = text.replace("amplitude * np.sin", "readings.max() * np.sin")
+    assert half != text
+    file.write_text(half)
+    ((_, fault),) = [each for each in checked(f"{file}:Wave") if each[0] == "fault"]
+    expected = r"brain\.type: half_brains\.py:\d+: expected equal outputs .* alone"
+    assert re.match(expected, fault)
+
+
 FAULTS = {
     "missing": (GOOD, "nobody", "FILE.py: .* has no 'nobody'"),
     "misspelt": (GOOD, "juge", "has no 'juge'; did you mean '.*:judge'"),
@@ -75,12 +95,12 @@ FAULTS = {
     "repeatable": (
         "from random import random\ndef f(a, b):\n    return random()",
         "f",
-        "FILE.py:2: must return the same twice",
+        "FILE.py:2: must return the same twice, got",
     ),
     "raising": (
         "def f(a, b):\n    c = 0\n    return 1 / c",
         "f",
-        r"FILE.py:3: must return a number, raised ZeroDivisionError",
+        r"must return a number, raised ZeroDivisionError: .* \(FILE.py:3\)",
     ),
     "exiting": (
         "import sys\ndef f(a, b):\n    sys.exit(3)",

@@ -1,6 +1,6 @@
 """A user's plug-in package: part types, and an object that is not a part type."""
 
-from schema.parts import Box, PartType, Sensor, Shape, Slot
+from revolve import Box, PartType, Sensor, Shape, Slot
 
 _PADDLE = Shape(
     boxes=(Box("paddle", (0.06, 0.03, 0.002), (0.0, 0.0, 0.0), 0.004),),

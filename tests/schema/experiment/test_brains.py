@@ -48,7 +48,7 @@ def test_settings_of_the_thesis_keep_their_digest() -> None:
 @own
 def test_own_types_are_named_in_documents_requests_and_references() -> None:
     experiment = parse_experiment(f'name = "x"\n{TIRED}{WAVES}', "x.toml")
-    assert {"my_brains:Adapting", "my_brains:Wave"} < {*references(experiment)}
+    assert {"my_brains:Adapting", "my_brains:Wave"} <= set(references(experiment))
     assert experiment_from_text(experiment_text(experiment)) == experiment
     assert b'"my_brains:Wave"' in evaluation_settings(experiment)
     assert list(neuron_kinds(experiment.brain, experiment.space)) == ["Waver"]

@@ -300,7 +300,6 @@ BAD: dict[str, tuple[Any, str]] = {
         r"must return the same for the same view, got \[1.0\] and \[2.0\]",
     ),
     "raises": (Blind(), r"Blind.read of a part at birth: TypeError"),
-    "box": (Reaching(), r"Reaching.read of a part at birth: KeyError: 'tip'"),
     "direction": (
         Longsighted(),
         r"direction must have length 1, got \(1.0, 1.0, 0.0\)",

@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import Meta, Struct
 from msgspec.structs import replace
 
-from coordinator.cppn.network import (
+from coordinator.evolution.cppn.network import (
     FUNCTIONS,
     GREATEST_WEIGHT,
     INPUTS,

@@ -4,7 +4,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from coordinator.cppn.network import (
+from coordinator.evolution.cppn.network import (
     INPUTS,
     Link,
     Network,

@@ -4,11 +4,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from coordinator.cppn import network as cppn
-from coordinator.cppn import variation
-from coordinator.cppn.body import body_outputs, grow, parts_of
-from coordinator.cppn.brain import brain_outputs, grow_brain
-from coordinator.cppn.network import Network
+from coordinator.evolution.cppn import network as cppn
+from coordinator.evolution.cppn import variation
+from coordinator.evolution.cppn.body import body_outputs, grow, parts_of
+from coordinator.evolution.cppn.brain import brain_outputs, grow_brain
+from coordinator.evolution.cppn.network import Network
 from schema.errors import ExperimentError
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Experiment

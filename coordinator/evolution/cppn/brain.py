@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coordinator.cppn.body import Grown, parameters_from, point
-from coordinator.cppn.network import Network, evaluate, queries
+from coordinator.evolution.cppn.body import Grown, parameters_from, point
+from coordinator.evolution.cppn.network import Network, evaluate, queries
 from schema.robot.brain import INPUT, Brain, Connection, Neuron, NeuronKinds
 
 HIDDEN, LINK, WEIGHT = "hidden", "link", "weight"

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from analyzer.report import analyze
-from coordinator.cppn.body import body_outputs, share
-from coordinator.cppn.encoding import Cppn
-from coordinator.cppn.network import Link, Network
-from coordinator.cppn.variation import Parameters
+from coordinator.evolution.cppn.body import body_outputs, share
+from coordinator.evolution.cppn.encoding import Cppn
+from coordinator.evolution.cppn.network import Link, Network
+from coordinator.evolution.cppn.variation import Parameters
 from coordinator.evolution.encodings import outside_limits
 from schema.errors import ExperimentError
 from schema.experiment.document import Encoding, Experiment, Space, body_space
@@ -191,7 +191,7 @@ def test_all_robots_keep_all_limits(
 def test_a_space_without_viable_robots_is_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("coordinator.cppn.encoding._MOST_TRIES", 3)
+    monkeypatch.setattr("coordinator.evolution.cppn.encoding._MOST_TRIES", 3)
     alone = encoding(parameters=Parameters(p_connect=0.0, first_nodes=0))
     with pytest.raises(ExperimentError, match=r"'cppn': 3 random networks gave no"):
         alone.random(np.random.default_rng(1), FIRST)

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from coordinator.cppn.network import Network, evaluate, queries
+from coordinator.evolution.cppn.network import Network, evaluate, queries
 from schema.experiment.document import Space
 from schema.parts import BodySpace, Parameter, PartType, Shape
 from schema.robot.frames import attach

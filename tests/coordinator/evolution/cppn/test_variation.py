@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.cppn.network import (
+from coordinator.evolution.cppn.network import (
     GREATEST_WEIGHT,
     Link,
     Network,
@@ -13,7 +13,7 @@ from coordinator.cppn.network import (
     from_bytes,
     to_bytes,
 )
-from coordinator.cppn.variation import (
+from coordinator.evolution.cppn.variation import (
     Parameters,
     add_link,
     add_node,

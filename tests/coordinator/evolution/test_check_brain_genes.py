@@ -1,0 +1,77 @@
+"""The check of genes refuses each breach of the contract, with file and line."""
+
+from pathlib import Path
+
+import pytest
+
+from coordinator.evolution.check_brain_genes import check_brain_genes
+from schema.errors import ExperimentError
+from schema.experiment.document import BrainSection, Experiment
+from schema.plugins import permission
+
+MODULE = """\
+import random
+from schema.robot.genome import ConnectionGene, NeuronGene
+import my_brains
+
+class {name}(my_brains.Wave):
+    def {method}:
+        {body}
+"""
+CASES = {
+    "Unfair": (
+        "outputs(self, draws, part)",
+        'return (NeuronGene("Waver", (random.random(), 0.5)),) * part.outputs',
+        "equal robots from equal random numbers",
+    ),
+    "Mute": ("outputs(self, draws, part)", "return ()", "no motor"),
+    "Doubled": (
+        "outputs(self, draws, part)",
+        'return (NeuronGene("Waver", (0.5, 0.5)),) * 2',
+        "valid robots, got brain: output neurons must belong to parts",
+    ),
+    "Short": (
+        "outputs(self, draws, part)",
+        'return (NeuronGene("Waver", (0.5,)),) * part.outputs',
+        "valid robots, got .*Waver takes 2, got 1",
+    ),
+    "Strange": (
+        "grow(self, draws, new, branches, rules)",
+        'new[0].hidden = (NeuronGene("Sigmoid", (0.0, 1.0)),)',
+        "valid robots, got .*must be one of Waver, got 'Sigmoid'",
+    ),
+    "Crowded": (
+        "grow(self, draws, new, branches, rules)",
+        'new[0].hidden = (NeuronGene("Waver", (0.0, 1.0)),) * 11',
+        "valid robots, got brain: hidden neurons must be <= 10, got ",
+    ),
+    "Raising": (
+        "vary(self, draws, branches, rules, pruned)",
+        "branches[99].outputs",
+        "outputs, grow, prune and vary to make genes, got IndexError",
+    ),
+}
+
+
+@pytest.mark.usefixtures("_own_brains")
+@pytest.mark.parametrize("name", list(CASES))
+def test_broken_genes_are_refused_in_one_line(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    method, body, message = CASES[name]
+    module = f"broken_{name.lower()}"
+    file = tmp_path / f"{module}.py"
+    file.write_text(MODULE.format(name=name, method=method, body=body))
+    monkeypatch.setattr(permission, "_allowed", {**permission._allowed, module: file})
+    experiment = Experiment(name="x", brain=BrainSection(type=f"{module}:{name}"))
+    with pytest.raises(ExperimentError, match=message) as caught:
+        check_brain_genes(experiment)
+    assert "\n" not in str(caught.value)
+    if name != "Mute":
+        assert str(caught.value).startswith(f"brain.type: {module}.py:5: expected ")
+
+
+@pytest.mark.usefixtures("_own_brains")
+def test_sound_genes_pass() -> None:
+    check_brain_genes(Experiment(name="x", brain=BrainSection(type="my_brains:Wave")))

@@ -1,0 +1,74 @@
+"""Births of a run folder must be of the encoding that the run uses now."""
+
+from pathlib import Path
+
+import pyarrow as pa
+import pytest
+
+from coordinator.evolution.breeding import Breeder
+from coordinator.evolution.encodings import encoding_of
+from coordinator.run import stored_genomes
+from coordinator.run.stored_genomes import check_stored_genomes
+from schema.errors import RunFolderError
+from schema.experiment.document import Encoding, Experiment, Space
+from schema.robot.ids import BirthId
+
+CPPN = Experiment(name="test", encoding=Encoding(type="cppn"))
+FOLDER = Path("runs/a")
+
+
+def stored(
+    monkeypatch: pytest.MonkeyPatch, experiment: Experiment, count: int = 1
+) -> None:
+    """Let the folder hold births of an experiment."""
+    encoding, breeder = encoding_of(experiment), Breeder(experiment, 7, 0)
+    rows = []
+    for number in range(count):
+        candidate = breeder.candidate(BirthId(0, number), 0, ())
+        assert candidate is not None
+        rows.append(
+            {
+                "birth": number,
+                "genome": encoding.to_bytes(candidate.genome),
+                "robot": encoding.stored_robot(candidate.robot),
+            }
+        )
+    columns = {"birth": pa.int64(), "genome": pa.binary(), "robot": pa.binary()}
+    table = pa.Table.from_pylist(rows, schema=pa.schema(columns))
+    monkeypatch.setattr(stored_genomes, "read_table", lambda *_: table)
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_births_of_the_same_encoding_are_accepted(
+    monkeypatch: pytest.MonkeyPatch, count: int
+) -> None:
+    stored(monkeypatch, CPPN, count)
+    check_stored_genomes(FOLDER, CPPN)
+
+
+def test_births_of_another_encoding_are_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stored(monkeypatch, Experiment(name="test"))
+    with pytest.raises(
+        RunFolderError, match=r"another encoding than 'cppn' is now: not"
+    ):
+        check_stored_genomes(FOLDER, CPPN)
+
+
+def test_another_development_of_a_genome_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stored(monkeypatch, CPPN)
+    smaller = Experiment(name="test", encoding=CPPN.encoding, space=Space(max_parts=3))
+    with pytest.raises(
+        RunFolderError, match=r"birth 0 .* into another robot now; rest"
+    ):
+        check_stored_genomes(FOLDER, smaller)
+
+
+def test_births_of_the_thesis_encoding_are_not_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delattr(stored_genomes, "read_table")
+    check_stored_genomes(FOLDER, Experiment(name="test"))

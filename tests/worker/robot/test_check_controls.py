@@ -1,0 +1,85 @@
+"""The check of brains in workers refuses each breach of the contract."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+
+from schema.errors import ExperimentError
+from schema.experiment.brains import widths
+from schema.experiment.document import NETWORK, Space
+from schema.plugins.protocols import Bank
+from schema.robot.brain import NEURON_TYPES, Brain, NeuronKinds
+from schema.robot.results import Floats
+from worker.robot.brains import Controls
+from worker.robot.check_controls import check_controls
+
+Change = Callable[["Leaking", Floats, Floats], Floats]
+
+
+class Leaking:
+    """Bank whose outputs are sums of past readings, changed by a function."""
+
+    def __init__(self, count: int, change: Change) -> None:
+        self.states = np.zeros((count, 10))
+        self.hidden = np.zeros((count, 10))
+        self._change = change
+
+    def step(self, readings: Floats, age_ticks: Floats | float) -> Floats:
+        del age_ticks
+        self.states += readings
+        self.hidden += readings
+        return self._change(self, readings, self.states.copy())
+
+
+class Broken:
+    """Brains of one broken type."""
+
+    width = widths(Space())
+    neurons: NeuronKinds = NEURON_TYPES
+
+    def __init__(self, change: Change) -> None:
+        self._change = change
+
+    def pack(self, brain: Brain) -> Brain:
+        return brain
+
+    def bank(self, packed: Sequence[Brain]) -> Bank:
+        return Leaking(len(packed), self._change)
+
+
+def raises(bank: Leaking, readings: Floats, outputs: Floats) -> Floats:
+    del bank, readings
+    raise KeyError(f"{outputs.shape[1]} motors")
+
+
+CASES: dict[str, tuple[Change, str]] = {
+    "shape": (lambda _, __, outputs: outputs[:, :3], "outputs of shape"),
+    "not finite": (lambda _, __, outputs: outputs / 0.0, "outputs that are not finite"),
+    "company": (lambda _, readings, outputs: outputs + readings.max(), "alone"),
+    "row": (
+        lambda _, __, outputs: outputs + np.arange(len(outputs))[:, np.newaxis],
+        "in another row",
+    ),
+    "memory": (lambda bank, _, __: bank.hidden.copy(), "states were restored"),
+    "random": (
+        lambda _, __, outputs: outputs + np.random.default_rng().random(),
+        "a second time",
+    ),
+    "raises": (raises, "got KeyError: '10 motors'"),
+}
+
+
+@pytest.mark.parametrize("name", list(CASES))
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_broken_brains_are_refused_in_one_line(name: str) -> None:
+    change, message = CASES[name]
+    with pytest.raises(ExperimentError, match=message) as caught:
+        check_controls(Broken(change), "brain.type: mine.py:7")
+    assert str(caught.value).startswith("brain.type: mine.py:7: expected ")
+    assert "\n" not in str(caught.value)
+
+
+def test_sound_brains_pass() -> None:
+    check_controls(Broken(lambda _, __, outputs: outputs), "mine")
+    check_controls(Controls(NETWORK, Space(), 0.125), "network")
