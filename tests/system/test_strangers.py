@@ -187,7 +187,8 @@ def test_a_strangers_plug_ins_evolve_on_two_workers_of_which_one_is_killed(
         rows = read_table(commands.folder / "one", "births").to_pylist()
         kinds = {part["kind"] for row in rows for part in row["body"]}
         assert "Piston" in kinds
-        assert "sway" in read_table(commands.folder / "one", "evaluations").schema.names
+        rows = read_table(commands.folder / "one", "evaluations").to_pylist()
+        assert all(dict(row["measures"])["sway"] > 0.0 for row in rows)
 
 
 @pytest.mark.long
