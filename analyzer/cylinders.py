@@ -3,7 +3,7 @@
 Two convex bodies are apart exactly if they are apart along some direction. The search
 starts from the axes of both bodies, their cross products and the directions between
 the bodies, and refines the best of them. It is conservative: bodies that it finds apart
-are apart, but it may take a small gap for an intersection. In 2000 random pairs about
+are apart, but it may take a small gap for an intersection. In 400 random pairs about
 0.5 m long it never did so for gaps above 0.1 mm (tests/analyzer/test_cylinders.py).
 """
 

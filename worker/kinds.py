@@ -37,8 +37,8 @@ def measure_use(measures: Measures) -> Use:
     )
 
 
-def _measures(experiment: Experiment) -> Iterator[Use]:
-    measures = experiment.measures
+def measure_uses(measures: Measures) -> Iterator[Use]:
+    """Yield the use of each measure of a section."""
     for name, label in zip(measures.names, measures.labels, strict=True):
         tables = measures.parameters
         own = {label: tables[label]} if label in tables else {}
@@ -72,6 +72,6 @@ MEASURE_KIND = Kind(
     # One with parameters looks like a fitness function: ``--kind`` says that it is not.
     lambda plugin: _takes(plugin, 1),
     lambda path: measure_use(Measures(names=(path,))),
-    _measures,
+    lambda experiment: measure_uses(experiment.measures),
 )
 KINDS = (FITNESS_KIND, MEASURE_KIND)

@@ -36,11 +36,16 @@ def main(arguments: list[str]) -> int:
     allow(options.plugins)
     robot, settings = _read(options.file, options.experiment)
     found = evaluate(robot, settings)
+    labels = settings.measures.labels
     for name, value, unit in (
         ("fitness", found.fitness, ""),
         ("path velocity", found.path_velocity, " m/s"),
         ("straight velocity", found.straight_velocity, " m/s"),
         ("simulated", found.simulated_s, " s"),
+        *(
+            (name, value, "")
+            for name, value in zip(labels, found.measures, strict=True)
+        ),
     ):
         # All digits, for comparisons of two runs.
         print(f"{name + ':':19}{value!r}{unit}")

@@ -166,7 +166,7 @@ def pairs(count: int, *, both: bool) -> Iterator[tuple[Boxes, float]]:
 @pytest.mark.parametrize("both", [False, True])
 def test_random_pairs_are_as_far_apart_as_in_mujoco(*, both: bool) -> None:
     apart = together = 0
-    for pair, distance in pairs(400, both=both):
+    for pair, distance in pairs(200, both=both):
         found = round_separation(pair, 0, 1)
         if distance > 1e-4:
             apart += 1
@@ -174,7 +174,7 @@ def test_random_pairs_are_as_far_apart_as_in_mujoco(*, both: bool) -> None:
         elif distance < -1e-5:
             together += 1
             assert found < 0.0
-    assert min(apart, together) > 80
+    assert min(apart, together) > 40
 
 
 @pytest.mark.parametrize("radius", [40.0, 60.0, 80.0])

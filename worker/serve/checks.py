@@ -11,7 +11,7 @@ from schema.experiment.settings import (
     read_arena_settings,
     read_evaluation_settings,
 )
-from worker.kinds import fitness_use
+from worker.kinds import fitness_use, measure_uses
 
 T = TypeVar("T", EvaluationSettings, ArenaSettings)
 
@@ -35,5 +35,6 @@ def checked_arena(settings: bytes) -> ArenaSettings:
 
 def _checked(settings: T) -> T:
     body_space(settings.space)
-    check_use(fitness_use(settings.fitness))
+    for use in (fitness_use(settings.fitness), *measure_uses(settings.measures)):
+        check_use(use)
     return settings

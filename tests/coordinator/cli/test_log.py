@@ -160,7 +160,8 @@ def test_json_is_one_object_per_line(
     assert rows[3] == {
         "record": 3, "event": "evaluated", "island": 0, "birth": "0:0", "trial": 0,
         "fitness": 0.125, "path_velocity": 0.5, "straight_velocity": 0.25,
-        "simulated_s": 30.0, "worker": "hal", "platform": "linux", "wall_s": 0.05,
+        "simulated_s": 30.0, "measures": [], "worker": "hal", "platform": "linux",
+        "wall_s": 0.05,
     }  # fmt: skip
     assert rows[5]["state"] == bytes(range(32)).hex()
     assert rows[8]["outcomes"] == ["diverged\nat 3.2 s", 0.125]

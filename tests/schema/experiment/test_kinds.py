@@ -1,0 +1,49 @@
+"""Sensors among the kinds of plug-ins that are checked by hand."""
+
+from pathlib import Path
+
+import pytest
+
+from schema.errors import ExperimentError
+from schema.experiment.kinds import KINDS, SENSOR, check_use, kind_of
+from schema.plugins.permission import allow
+
+MODULE = '''"""Two sensors."""
+
+
+class Nose:
+    """Sensor of one input."""
+
+    inputs = 1
+
+    def read(self, view):
+        """Return how near the ground is."""
+        return (1.0 - view.distance("tip", (0.0, 0.0, -1.0), 0.5) / 0.5,)
+
+
+class Drip(Nose):
+    """Sensor of a value too many."""
+
+    def read(self, view):
+        """Return two values."""
+        return (*super().read(view), 0.0)
+
+
+NOSE, DRIP = Nose(), Drip()
+'''
+
+
+def test_a_sensor_is_recognised_and_checked(tmp_path: Path) -> None:
+    file = tmp_path / "noses_of_a_user.py"
+    file.write_text(MODULE)
+    allow([str(file)])
+    use = SENSOR.by_hand("noses_of_a_user:NOSE")
+    plugin = use.load()
+    assert kind_of(plugin, KINDS) is SENSOR
+    assert kind_of(type(plugin), KINDS) is None
+    assert check_use(use).startswith("noses_of_a_user.py")
+    message = r"sensor: noses_of_a_user.py.*must return 1 values, its inputs, got 2"
+    with pytest.raises(ExperimentError, match=message):
+        check_use(SENSOR.by_hand("noses_of_a_user:DRIP"))
+    with pytest.raises(ExperimentError, match="has no 'inputs'"):
+        SENSOR.by_hand("schema.parts:SERVO").load()
