@@ -13,19 +13,17 @@ from coordinator.dispatch.events import AgentKind
 from coordinator.evolution.check_brain_genes import check_brain_genes
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.kinds import KINDS, brain_kind
-from coordinator.plugins.checks import refuse_faulty
+from coordinator.plugins.checks import refuse_faulty, refuse_faulty_of
 from coordinator.plugins.command import check, list_plugins
 from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
     Campaign,
-    campaign_plugins,
     is_campaign,
-    read_campaign,
     read_experiments,
     shipped_campaigns,
 )
 from coordinator.storage.compare import compare
-from coordinator.storage.folder import holds_run, read_details
+from coordinator.storage.folder import holds_run
 from coordinator.storage.hints import command as command_line
 from coordinator.storage.hints import stopped
 from schema.agent.address import HUB, listen_address
@@ -41,15 +39,11 @@ from schema.experiment.document import (
     Experiment,
     island_count,
     island_experiment,
-    references,
     with_births,
 )
-from schema.experiment.file import experiment_from_text
 from schema.experiment.kinds import Kind
 from schema.limits import MOST_REPEATS
-from schema.plugins.kept import allow_kept
-from schema.plugins.permission import allow, allow_references
-from schema.tables.description import allow_plugins_of
+from schema.plugins.permission import allow, is_own
 
 
 def main(arguments: list[str]) -> int:
@@ -79,7 +73,7 @@ def main(arguments: list[str]) -> int:
         check_load(flags, "--workers", options.workers or 0, options)
     if command == "resume":
         folder = Path(options.folder)
-        deployment = _deployment(options, _experiments_of(folder))
+        deployment = _deployment(options, refuse_faulty_of(folder))
         return _stoppable(folder, lambda: resume(folder, deployment))
     experiments = _experiments(options)
     deployment = _deployment(options, experiments)
@@ -104,12 +98,20 @@ def main(arguments: list[str]) -> int:
 def plugin_kinds() -> tuple[Kind, ...]:
     """Return all kinds of plug-ins; imports the room of the worker."""
     import worker.kinds
+    from worker.robot.brains import controls_of
+
+    def check_brain(experiment: Experiment) -> None:
+        check_brain_genes(experiment)
+        clock = experiment.simulation
+        tick_s = clock.brain_steps * clock.timestep_s
+        # Its check runs when it is made.
+        controls_of(experiment.brain, experiment.space, tick_s)
 
     return (
         *schema.experiment.kinds.KINDS,
         *worker.kinds.KINDS,
         *KINDS,
-        brain_kind(_check_own_brain),
+        brain_kind(check_brain),
     )
 
 
@@ -129,8 +131,6 @@ def _stoppable(folder: Path, execute: Callable[[], int]) -> int:
 
 def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
     """Return the experiments to run, checked; imports the room of the worker."""
-    import worker.measures.functions
-
     refuse_faulty(options.experiments)
     experiments = read_experiments(options.experiments)
     if options.births is not None:
@@ -139,48 +139,25 @@ def _experiments(options: argparse.Namespace) -> tuple[Experiment, ...]:
         )
     for experiment in experiments:
         check_experiment(experiment, "--births" if options.births else experiment.name)
-        worker.measures.functions.check_functions(experiment)
-        _check_own_brain(experiment)
-        _check_encodings(experiment)
+        _check_built_in(experiment)
     return experiments
 
 
-def _check_own_brain(experiment: Experiment) -> None:
-    """Raise unless both halves of a user's brain or neuron types keep their contract.
+def _check_built_in(experiment: Experiment) -> None:
+    """Raise unless built-in plug-ins take the parameters of an experiment.
 
-    Raises:
-        ExperimentError: file, line, what was expected and what came.
+    A user's own were checked by ``refuse_faulty``, with a time limit.
     """
-    names = (experiment.brain.type, *experiment.space.neuron_types)
-    if not any(":" in name for name in names):
-        return
-    from worker.robot.brains import controls_of
+    import worker.kinds
 
-    clock = experiment.simulation
-    tick_s = clock.brain_steps * clock.timestep_s
-    check_brain_genes(experiment)
-    # Its check runs when it is made.
-    controls_of(experiment.brain, experiment.space, tick_s)
-
-
-def _check_encodings(experiment: Experiment) -> None:
-    """Raise unless the encoding can be made with the settings of each island."""
+    for kind in worker.kinds.KINDS:
+        for use in kind.used(experiment):
+            if not is_own(use.path):
+                use.check(use.load())
     for number in range(island_count(experiment)):
-        encoding_of(island_experiment(experiment, number))
-
-
-def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
-    """Return the experiments of a run or campaign folder."""
-    if is_campaign(folder):
-        allow_kept(folder, campaign_plugins(folder), is_resumed=True)
-        experiments = read_campaign(folder).experiments
-    else:
-        allow_plugins_of(folder, is_resumed=True)
-        experiments = (experiment_from_text(read_details(folder).document),)
-    for experiment in experiments:
-        allow_references(references(experiment))
-        _check_encodings(experiment)
-    return experiments
+        own = island_experiment(experiment, number)
+        if not is_own(own.encoding.type):
+            encoding_of(own)
 
 
 def _deployment(

@@ -34,14 +34,19 @@ from schema.parts import Slot as Slot
 from schema.parts import constant_shape as constant_shape
 from schema.parts import cylinder as cylinder
 from schema.plugins.needs import needs as needs
+from schema.plugins.protocols import BrainRules as BrainRules
 from schema.plugins.protocols import BrainType as BrainType
+from schema.plugins.protocols import Branch as Branch
+from schema.plugins.protocols import Draws as Draws
 from schema.plugins.protocols import Encoding as Encoding
 from schema.plugins.protocols import NeuronType as NeuronType
+from schema.plugins.protocols import Selectable as Selectable
 from schema.plugins.protocols import SensorType as SensorType
 from schema.plugins.protocols import SensorView as SensorView
 from schema.robot.brain import Brain as Brain
 from schema.robot.brain import Connection as Connection
 from schema.robot.brain import Neuron as Neuron
+from schema.robot.brain import Widths as Widths
 from schema.robot.genome import ConnectionGene as ConnectionGene
 from schema.robot.genome import NeuronGene as NeuronGene
 from schema.robot.neurons import Tick as Tick
@@ -51,9 +56,12 @@ __all__ = [
     "Analysis",
     "Box",
     "Brain",
+    "BrainRules",
     "BrainType",
+    "Branch",
     "Connection",
     "ConnectionGene",
+    "Draws",
     "Encoding",
     "Experiment",
     "ExperimentError",
@@ -76,6 +84,7 @@ __all__ = [
     "Robot",
     "Run",
     "RunFolderError",
+    "Selectable",
     "Sensor",
     "SensorFailed",
     "SensorType",
@@ -86,6 +95,7 @@ __all__ = [
     "Tick",
     "Trace",
     "UnknownPlugin",
+    "Widths",
     "analyze",
     "constant_shape",
     "cylinder",

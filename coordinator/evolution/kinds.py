@@ -15,6 +15,7 @@ from coordinator.evolution.encodings import BUILT_IN as ENCODINGS
 from coordinator.evolution.encodings import METHODS, WHERE
 from coordinator.evolution.rules import PARENTS, SURVIVORS, Rule
 from schema.errors import ExperimentError
+from schema.experiment.check import check_experiment
 from schema.experiment.document import (
     BrainSection,
     Encoding,
@@ -148,17 +149,19 @@ def _has(methods: Iterable[str], plugin: object) -> bool:
 
 def _encoding(experiment: Experiment) -> Use:
     path = experiment.encoding.type
-    return Use(
-        WHERE,
-        path,
-        lambda: load_object(path, WHERE, ENCODINGS, METHODS),
-        lambda _: check_encoding(experiment),
-    )
+
+    def load() -> object:
+        # What is wrong elsewhere is not the fault of this plug-in.
+        check_experiment(experiment, experiment.name)
+        return load_object(path, WHERE, ENCODINGS, METHODS)
+
+    return Use(WHERE, path, load, lambda _: check_encoding(experiment))
 
 
 def _encodings(experiment: Experiment) -> Iterator[Use]:
-    for number in range(island_count(experiment)):
-        yield _encoding(island_experiment(experiment, number))
+    numbers = range(island_count(experiment))
+    for own in dict.fromkeys(island_experiment(experiment, each) for each in numbers):
+        yield _encoding(own)
 
 
 def brain_kind(check: Callable[[Experiment], None]) -> Kind:

@@ -12,14 +12,20 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
+from itertools import product
 from pathlib import Path
 from typing import IO
 
+from coordinator.storage.campaign import campaign_plugins, is_campaign, read_campaign
+from coordinator.storage.folder import holds_run, read_details
 from schema.errors import ExperimentError, RevolveError, UnknownPlugin, one_line
-from schema.experiment.file import own_references, read_experiment
+from schema.experiment.document import Experiment, references
+from schema.experiment.file import draft_experiment, own_experiment, own_references
 from schema.experiment.kinds import Kind, Use, check_use, kind_of
+from schema.plugins.kept import allow_kept
 from schema.plugins.load import load_object, place_of
 from schema.plugins.permission import FLAG, allow, allow_references, allowed, is_own
+from schema.tables.description import allow_plugins_of
 
 LIMIT_S = 30.0
 """Time for the import, and for the check, of one plug-in [s]."""
@@ -27,6 +33,8 @@ HERE = "--here"
 """Flag of ``revolve check`` in the process that does the checks, with their limit."""
 # What ``faulthandler`` writes for each thread when time is up; the main one is last.
 _LATE = re.compile(r'^Thread .* first\):\n *File "([^"]*)", line (\d+)', re.MULTILINE)
+
+_PLACE = re.compile(r"\.py:\d")
 
 
 def refuse_faulty(sources: Iterable[str]) -> None:
@@ -42,8 +50,40 @@ def refuse_faulty(sources: Iterable[str]) -> None:
             ends its process; an experiment that is invalid.
     """
     own = [source for source in sources if any(map(is_own, own_references(source)))]
-    if own and (problems := check_apart(own)):
+    _refuse(own)
+
+
+def refuse_faulty_of(folder: Path) -> tuple[Experiment, ...]:
+    """Check the plug-ins of a run or campaign folder that is resumed.
+
+    Returns:
+        Its experiments.
+
+    Raises:
+        ExperimentError: as of ``refuse_faulty``, or a plug-in that is not that of the
+            beginning.
+    """
+    experiments = _experiments_of(folder, is_resumed=True)
+    named = [path for each in experiments for path in references(each)]
+    _refuse([str(folder)] if any(map(is_own, named)) else [])
+    return experiments
+
+
+def _refuse(words: Sequence[str]) -> None:
+    if words and (problems := check_apart(words)):
         raise ExperimentError(problems[0])
+
+
+def _experiments_of(folder: Path, *, is_resumed: bool) -> tuple[Experiment, ...]:
+    """Return the experiments of a run or campaign folder; allow its plug-ins."""
+    if is_campaign(folder):
+        allow_kept(folder, campaign_plugins(folder), is_resumed=is_resumed)
+        experiments = read_campaign(folder).experiments
+        for experiment in experiments:
+            allow_references(references(experiment))
+        return experiments
+    allow_plugins_of(folder, is_resumed=is_resumed)
+    return (own_experiment(read_details(folder).document),)
 
 
 def check_apart(
@@ -109,10 +149,13 @@ def check_here(
         output.write(f"{json.dumps([step, text])}\n")
         output.flush()
 
-    def check(name: str, use: Use) -> None:
+    def check(word: str, name: str, use: Use) -> None:
         say("begin", f"{use.key}: {use.path}")
         with _time_limit(limit_s):
-            where = check_use(use, lambda place: say("begin", f"{use.key}: {place}"))
+            try:
+                where = check_use(use, lambda at: say("begin", f"{use.key}: {at}"))
+            except ExperimentError as error:
+                raise _placed(error, word, use) from error
         say("fine", f"{use.path}: {name} at {where}: in order")
 
     # A plug-in may print.
@@ -123,11 +166,22 @@ def check_here(
                 with _time_limit(limit_s):
                     uses = list(_uses(word, kinds, kind))
                 for name, use in uses:
-                    check(name, use)
+                    check(word, name, use)
             except RevolveError as error:
                 is_fine = False
                 say("fault", one_line(error))
     return is_fine
+
+
+def _placed(error: ExperimentError, word: str, use: Use) -> ExperimentError:
+    """Return an error with file and line: of the plug-in, or of where it is named."""
+    story = one_line(error)
+    if word.endswith(".toml") and not _PLACE.search(story):
+        lines = Path(word).read_text("utf-8").splitlines()
+        for number, line in enumerate(lines, 1):
+            if use.path in line:
+                return ExperimentError(f"{Path(word).name}:{number}: {story}")
+    return error
 
 
 @contextmanager
@@ -151,8 +205,14 @@ def _uses(
     """
     place, colon, attribute = word.rpartition(":")
     if not colon:
-        experiment = read_experiment(word)
-        for each in kinds:
+        folder = Path(word)
+        is_folder = is_campaign(folder) or holds_run(folder)
+        experiments = (
+            _experiments_of(folder, is_resumed=False)
+            if is_folder
+            else (draft_experiment(word),)
+        )
+        for each, experiment in product(kinds, experiments):
             for use in each.used(experiment):
                 if is_own(use.path):
                     yield each.name, use

@@ -132,6 +132,23 @@ def own_experiment(text: str) -> Experiment:
     return experiment
 
 
+def draft_experiment(source: str) -> Experiment:
+    """Return an experiment before the checks across its keys; no plug-in is imported.
+
+    The modules that it names may be imported by this process from now on.
+
+    Args:
+        source: as for ``read_experiment``.
+
+    Raises:
+        ExperimentError: as of ``own_references``.
+    """
+    text, where = source_text(source)
+    experiment = _converted(parse_toml(text, where), where)
+    allow_references(references(experiment), Path(where).parent)
+    return experiment
+
+
 def own_references(source: str) -> list[str]:
     """Return the ``module:attribute`` that an experiment names; nothing is imported.
 

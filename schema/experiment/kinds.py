@@ -69,17 +69,17 @@ def check_use(use: Use, begin: Callable[[str], None] = lambda _: None) -> str:
     plugin = use.load()
     where = where_defined(plugin)
     begin(where)
+    file, _, _ = where.partition(":")
     try:
         use.check(plugin)
     # A plug-in may call exit().
     except (Exception, SystemExit) as error:
         story = " ".join(str(error).split())
         if not isinstance(error, RevolveError):
-            line = where_raised(error, where.partition(":")[0])
-            story = f"raised {type(error).__name__}: {story}"
-            story += f" ({line})" if line else ""
+            line = where_raised(error, file) or where
+            story = f"{line}: raised {type(error).__name__}: {story}"
         story = story.removeprefix(f"{use.key}: ")
-        if where not in story:
+        if f"{file}:" not in story:
             story = f"{where}: {story}"
         raise ExperimentError(f"{use.key}: {story}") from error
     return where
@@ -136,9 +136,12 @@ PART_TYPE = Kind(
 
 
 def _neuron_type(path: str) -> Use:
-    return Use(
-        "space.neuron_types", path, lambda: neuron_types((path,))[0], lambda _: None
-    )
+    key = "space.neuron_types"
+
+    def check(_: object) -> None:
+        neuron_types((path,))
+
+    return Use(key, path, lambda: load_object(path, key, BUILT_IN_NEURONS), check)
 
 
 def _neuron_types(experiment: Experiment) -> Iterator[Use]:
@@ -154,7 +157,6 @@ NEURON_TYPE = Kind(
     "neuron-type",
     BUILT_IN_NEURONS,
     _is_neuron_type,
-    # Loading one checks it.
     _neuron_type,
     _neuron_types,
 )

@@ -139,7 +139,8 @@ def _shape(kind: PartType, values: tuple[float, ...]) -> tuple[Shape, str]:
         hash(shape)
     except TypeError as error:
         return _EMPTY, f"shape: all of it must be tuples and numbers, got an {error}"
-    if shape != found[1]:
+    # NaN differs from itself; what is not finite has a message of its own.
+    if shape != found[1] and repr(shape) != repr(found[1]):
         return _EMPTY, "shape: must be equal for equal parameters, got different ones"
     return shape, ""
 

@@ -27,7 +27,7 @@ class Feeler:
 
     inputs: int = 3
 
-    def read(self, view: Any) -> list[float]:  # noqa: ANN401
+    def read(self, view: Any) -> list[float]:
         """Return nearness of an obstacle, position of the rod, number of robots."""
         ahead = view.distance("rod", (0.0, 0.0, 1.0), 0.3, (0.0, 0.0, 0.0201))
         near = abs(view.others - view.position("rod")).max(axis=1) < 1.0
@@ -38,7 +38,7 @@ class Feeler:
 class Fragile(Feeler):
     """Sensor that fails while its robot is 2 s to 10 s old."""
 
-    def read(self, view: Any) -> list[float]:  # noqa: ANN401
+    def read(self, view: Any) -> list[float]:
         """Return the same, or what is no number."""
         found = super().read(view)
         is_old = 2.0 < view.age_s < 10.0

@@ -10,11 +10,8 @@ import msgspec
 
 from schema.errors import ExperimentError, FitnessUndefined
 from schema.experiment.document import (
-    Experiment,
     Fitness,
     Measures,
-    island_count,
-    island_experiment,
 )
 from schema.experiment.settings import fitness_function
 from schema.plugins.load import load_function, load_object
@@ -22,7 +19,7 @@ from schema.plugins.needs import channels_of
 from schema.plugins.parameters import parameters_type, read_parameters
 from schema.plugins.simple_traces import check_function
 from schema.robot.trace import Trace
-from worker.fitness import check_fitness, path_velocity, straight_velocity
+from worker.fitness import path_velocity, straight_velocity
 from worker.measures.built_in import (
     body_symmetry,
     contact_share,
@@ -126,21 +123,6 @@ def check_measure(measure: Measure) -> None:
         ExperimentError: as of ``schema.plugins.simple_traces.check_function``.
     """
     check_function(measure.function, measure.arguments, "measures.names")
-
-
-def check_functions(experiment: Experiment) -> None:
-    """Raise unless fitness and measures of all islands keep their contracts.
-
-    Raises:
-        UnknownPlugin: an unknown function, or a module that is not allowed.
-        ExperimentError: a function that breaks its contract, or refuses its
-            parameters.
-    """
-    for number in range(island_count(experiment)):
-        fitness = island_experiment(experiment, number).fitness
-        check_fitness(fitness_function(fitness), fitness)
-    for measure in measures_of(experiment.measures):
-        check_measure(measure)
 
 
 @lru_cache(maxsize=64)

@@ -1,0 +1,234 @@
+"""A stranger's installed package, which imports ``revolve`` alone, in runs.
+
+The plug-ins of ``tests/plugins/critters_lab`` evolve off-line and in an arena. The run
+on two workers, of which one is killed, equals that in one process.
+"""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from coordinator.storage.compare import compare
+from schema.tables.files import read_table
+from tests.system.documents import OFF_LINE, SMALL_ARENA
+
+pytestmark = [pytest.mark.system, pytest.mark.timeout(600)]
+
+Workspace = Any
+Until = Callable[[Callable[[], bool], str], None]
+
+TOP = Path(__file__).parents[2]
+PACKAGE = TOP / "tests" / "plugins" / "critters_lab"
+ROOMS = ("schema", "coordinator", "worker", "analyzer", "analysis")
+_BODIES = """
+[space]
+max_inputs = 20
+part_types = ["schema.parts:CORE", "schema.parts:FIXED_BRICK",
+    "schema.parts:ACTIVE_HINGE", "critters.bodies:PISTON"]
+"""
+_NEURONS = 'neuron_types = ["Sigmoid", "critters.neurons:Leaky"]\n'
+_BRAIN = """
+[brain]
+type = "critters.brains:Beat"
+parameters = {frequency_hz = 0.8}
+"""
+_ENCODING = """
+[encoding]
+type = "critters.genomes:Snakes"
+parameters = {most_joints = 5}
+"""
+_FITNESS = """
+[fitness]
+function = "critters.scores:thrifty"
+parameters = {price = 0.02}
+"""
+_MEASURES = """
+[measures]
+names = ["critters.scores:sway"]
+"""
+_PARENTS = 'parents = "critters.choices:alike"\n'
+_SURVIVORS = (
+    'survivors = "critters.choices:elite_and_young"\n'
+    "survivors_parameters = {share = 0.7}\n"
+)
+PLUGINS = {
+    "part type and sensor": _BODIES,
+    "neuron type": f"[space]\n{_NEURONS}",
+    "brain": _BRAIN,
+    "encoding": _ENCODING,
+    "fitness": _FITNESS,
+    "measure": _MEASURES,
+    "parents": f"[selection]\n{_PARENTS}",
+    "survivors": f"[selection]\n{_SURVIVORS}",
+}
+"""What each plug-in adds to an experiment."""
+TOGETHER = {
+    "bodies": (
+        f"{_BODIES}{_NEURONS}{_FITNESS}{_MEASURES}[selection]\n{_PARENTS}{_SURVIVORS}"
+    ),
+    "brain": f"{_BRAIN}{_FITNESS}",
+    "encoding": f"{_ENCODING}{_MEASURES}",
+}
+
+
+def _document(text: str, added: str, births: int) -> str:
+    """Return an experiment with a plug-in; tables of one name are joined."""
+    text = re.sub(r"births = \d+", f"births = {births}", text)
+    for table in re.split(r"^(?=\[)", added.strip(), flags=re.MULTILINE):
+        head, _, keys = table.partition("\n")
+        if f"{head}\n" in text:
+            text = text.replace(f"{head}\n", f"{head}\n{keys.strip()}\n")
+        else:
+            text += f"{table.strip()}\n"
+    return text
+
+
+@pytest.fixture(scope="session")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder in which the package is installed, as from its wheel."""
+    folder = tmp_path_factory.mktemp("stranger")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder],
+        cwd=PACKAGE,
+        check=True,
+        capture_output=True,
+    )
+    (wheel,) = folder.glob("*.whl")
+    site = folder / "site"
+    zipfile.ZipFile(wheel).extractall(site)
+    return site
+
+
+class Commands:
+    """Commands of an environment that has the package, in a test's folder."""
+
+    def __init__(self, workspace: Workspace, site: Path) -> None:
+        self.folder: Path = workspace.folder
+        self._start = workspace.start
+        self._environment = {"PYTHONPATH": f"{TOP}{os.pathsep}{site}"}
+
+    def start(self, *words: str) -> "subprocess.Popen[str]":
+        started: subprocess.Popen[str] = self._start(
+            *words, environment=self._environment
+        )
+        return started
+
+    def run(self, *words: str) -> str:
+        process = self.start(*words)
+        out, err = process.communicate(timeout=300)
+        assert process.returncode == 0, f"{words}: {out}{err}"
+        return out + err
+
+
+@pytest.fixture
+def commands(workspace: Workspace, installed: Path) -> Commands:
+    return Commands(workspace, installed)
+
+
+def _is_equal_after_a_kill(commands: Commands, document: str, until: Until) -> None:
+    """Run in one process, and on two workers of which one is killed; compare."""
+    folder = commands.folder
+    (folder / "mine.toml").write_text(document)
+    words = ("mine.toml", "--seed", "5", "--quiet", "--out")
+    commands.run("run", *words, "one", "--in-process")
+    whole = (folder / "one" / "journal.bin").stat().st_size
+    journal = folder / "two" / "journal.bin"
+    run = commands.start("coordinator", *words, "two", "--listen", "tcp/127.0.0.1:0")
+    until(
+        lambda: (folder / "two" / "address").exists() or run.poll() is not None,
+        "the coordinator listens",
+    )
+    address = (folder / "two" / "address").read_text().split()[0]
+    commands.start("analyzer", "--connect", address)
+    workers = [
+        commands.start("worker", "--connect", address, "--processes", "1")
+        for _ in range(2)
+    ]
+    until(
+        lambda: (
+            run.poll() is not None
+            or (journal.exists() and journal.stat().st_size > 0.4 * whole)
+        ),
+        "the run is on its way",
+    )
+    assert run.poll() is None
+    workers[0].send_signal(signal.SIGKILL)
+    out, err = run.communicate(timeout=300)
+    assert run.returncode == 0, out + err
+    assert compare(folder / "one", folder / "two") == []
+
+
+def _check_births(folder: Path, count: int) -> None:
+    births = read_table(folder, "births").to_pylist()
+    assert len(births) == count
+    assert max(row["rank"] for row in births) > 1
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("bodies", OFF_LINE), ("brain", SMALL_ARENA), ("encoding", OFF_LINE)],
+)
+def test_a_strangers_plug_ins_evolve_on_two_workers_of_which_one_is_killed(
+    commands: Commands, until: Until, name: str, text: str
+) -> None:
+    births = 12 if text is SMALL_ARENA else 30
+    document = _document(text, TOGETHER[name], births)
+    _is_equal_after_a_kill(commands, document, until)
+    _check_births(commands.folder / "one", births)
+    if name == "bodies":
+        rows = read_table(commands.folder / "one", "births").to_pylist()
+        kinds = {part["kind"] for row in rows for part in row["body"]}
+        assert "Piston" in kinds
+        rows = read_table(commands.folder / "one", "evaluations").to_pylist()
+        assert all(dict(row["measures"])["sway"] > 0.0 for row in rows)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("text", [OFF_LINE, SMALL_ARENA], ids=["off-line", "arena"])
+@pytest.mark.parametrize("name", PLUGINS)
+def test_each_plug_in_alone_evolves_60_births(
+    commands: Commands, until: Until, name: str, text: str
+) -> None:
+    if name == "survivors" and text is SMALL_ARENA:
+        pytest.skip("the removal of robots from an arena depends on their fitness")
+    document = _document(text, PLUGINS[name], 60)
+    _is_equal_after_a_kill(commands, document, until)
+    _check_births(commands.folder / "one", 60)
+    commands.run("run", "mine.toml", "--seed", "5", "--quiet", "--workers", "2",
+                 "--out", "three")  # fmt: skip
+    assert compare(commands.folder / "one", commands.folder / "three") == []
+
+
+def test_all_plug_ins_of_the_package_are_found_and_in_order(
+    commands: Commands,
+) -> None:
+    listed = commands.run("plugins").splitlines()
+    found = [row.split()[:2] for row in listed if " critters." in row]
+    assert sorted(found) == [
+        ["brain", "critters.brains:Beat"],
+        ["encoding", "critters.genomes:Snakes"],
+        ["fitness", "critters.scores:thrifty"],
+        ["measure", "critters.scores:sway"],
+        ["neuron-type", "critters.neurons:Leaky"],
+        ["parents", "critters.choices:alike"],
+        ["part-type", "critters.bodies:PISTON"],
+        ["survivors", "critters.choices:elite_and_young"],
+    ]
+    checked = commands.run("check", *(path for _, path in found))
+    assert checked.count(": in order\n") == len(found)
+
+
+def test_the_package_imports_revolve_alone() -> None:
+    for file in PACKAGE.rglob("*.py"):
+        text = file.read_text()
+        assert not re.search(
+            rf"^\s*(from|import) ({'|'.join(ROOMS)})\b", text, re.MULTILINE
+        )
