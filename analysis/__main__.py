@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from schema.agent.flags import Flags, add_plugins, whole_number
 from schema.errors import RevolveError
-from schema.flags import Flags, add_plugins, whole_number
 from schema.plugins.permission import allow
 
 

@@ -4,11 +4,11 @@ import argparse
 import sys
 from pathlib import Path
 
+from schema.agent.flags import Flags, add_plugins
 from schema.errors import RevolveError
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
-from schema.flags import Flags, add_plugins
 from schema.formats.files import read_robot, settings_of, write_robot
 from schema.parts import BUILT_IN, BodySpace
 from schema.plugins.permission import allow

@@ -4,11 +4,11 @@ import argparse
 import sys
 from pathlib import Path
 
+from schema.agent.flags import Flags, add_plugins
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import EvaluationSettings
-from schema.flags import Flags, add_plugins
 from schema.formats.files import MJCF_ENDING, read_robot, settings_of
 from schema.formats.mjcf import read_mjcf
 from schema.plugins.permission import allow

@@ -16,10 +16,10 @@ from analysis.render.picture import (
     save_animation,
     save_picture,
 )
+from schema.agent.flags import Flags, add_plugins, whole_number
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Simulation, body_space
 from schema.experiment.file import read_experiment
-from schema.flags import Flags, add_plugins, whole_number
 from schema.formats.files import read_robot, settings_of
 from schema.plugins.permission import allow
 from schema.robot.cpg import BUILT_IN_KINDS

@@ -30,10 +30,10 @@ from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
 from analysis.viewer.watch import watch
 from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
+from schema.agent.flags import Flags, add_plugins, number
 from schema.agent.log import tell_user
 from schema.agent.supervisor import stop_on_signals
 from schema.experiment.file import own_experiment
-from schema.flags import Flags, add_plugins, number
 from schema.plugins.permission import allow
 from schema.robot.ids import BirthId
 from schema.tables.description import allow_plugins_of

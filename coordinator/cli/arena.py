@@ -7,8 +7,8 @@ from uuid import uuid4
 
 from coordinator.cli.status import ask, ask_status
 from schema.agent.command import add_connect, add_network_flags
+from schema.agent.flags import Flags, add_count, number, whole_number
 from schema.errors import InvalidRobot, NetworkError
-from schema.flags import Flags, add_count, number, whole_number
 from schema.formats.files import read_robot
 from schema.robot.ids import BirthId
 from schema.wire.codec import encode_robot

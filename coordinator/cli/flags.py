@@ -12,8 +12,7 @@ from schema.agent.command import (
     add_network_flags,
     add_oversubscribe,
 )
-from schema.experiment.file import shipped_experiments
-from schema.flags import (
+from schema.agent.flags import (
     Flags,
     add_count,
     add_plugins,
@@ -21,6 +20,7 @@ from schema.flags import (
     share,
     whole_number,
 )
+from schema.experiment.file import shipped_experiments
 
 _COMMANDS = {
     "run": (

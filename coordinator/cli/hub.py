@@ -12,10 +12,10 @@ from schema.agent.command import (
     add_network_flags,
     tls_of,
 )
+from schema.agent.flags import Flags
 from schema.agent.log import start_log, warn_user
 from schema.agent.network import hub_config
 from schema.agent.supervisor import stop_on_signals
-from schema.flags import Flags
 
 
 def main(arguments: list[str]) -> int:

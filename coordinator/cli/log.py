@@ -20,8 +20,8 @@ from coordinator.storage.journal import (
     is_empty,
     read_records,
 )
+from schema.agent.flags import Flags, add_count, whole_number
 from schema.errors import RunFolderError
-from schema.flags import Flags, add_count, whole_number
 from schema.tables.description import read_state
 
 POLL_S = 0.5

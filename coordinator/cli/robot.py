@@ -5,10 +5,10 @@ import sys
 from pathlib import Path
 
 from coordinator.evolution.breeding import Breeder
+from schema.agent.flags import Flags, add_count
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
-from schema.flags import Flags, add_count
 from schema.formats.files import settings_of, write_robot
 from schema.robot.ids import BirthId
 

@@ -17,9 +17,9 @@ from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.lock import LOCK, read_holder
 from schema.agent.address import read_address
 from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
+from schema.agent.flags import Flags
 from schema.agent.log import tell_user
 from schema.errors import NetworkError, RevolveError, RunFolderError
-from schema.flags import Flags
 from schema.limits import printable
 from schema.tables.description import DETAILS
 from schema.tables.segments import FINISHED, SEGMENTS

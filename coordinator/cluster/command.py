@@ -7,7 +7,7 @@ from typing import get_args
 
 from coordinator.cluster.kit import DAYS, PORT, Cluster, Kit, utc_now
 from schema.agent.access import CertificateRole
-from schema.flags import Flags, add_count
+from schema.agent.flags import Flags, add_count
 
 _OTHERS: tuple[tuple[str, CertificateRole], ...] = (
     ("coordinator", "coordinator"),

@@ -23,11 +23,11 @@ from schema.agent.command import (
     host_name,
     tls_of,
 )
+from schema.agent.flags import Flags
 from schema.agent.network import Tls
 from schema.agent.platform_tag import cpu_flags, platform_tag
 from schema.agent.supervisor import cores
 from schema.errors import NetworkError
-from schema.flags import Flags
 
 _REACH_S = 1.0
 _RENDER_S = 4.5

@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import entry_points
 
 from coordinator.plugins.checks import HERE, check_apart, check_here
+from schema.agent.flags import Flags, add_plugins, positive_number
 from schema.errors import RevolveError, one_line
 from schema.experiment.kinds import Kind, offered
-from schema.flags import Flags, add_plugins, positive_number
 from schema.plugins.load import load_module
 from schema.plugins.origin import where_defined, where_named
 from schema.plugins.permission import GROUP, allow, allowed

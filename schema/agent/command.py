@@ -21,6 +21,7 @@ from schema.agent.address import (
     hub_of,
     parse_address,
 )
+from schema.agent.flags import Flags, add_plugins, positive_number, whole_number
 from schema.agent.log import LOG_VARIABLE, start_log, tell_error, warn_user
 from schema.agent.network import DEFAULT_FLEET, Agent, Tls, client_config
 from schema.agent.service import GAVE_UP, gave_up
@@ -33,7 +34,6 @@ from schema.agent.supervisor import (
 )
 from schema.agent.topics import Role, check_name
 from schema.errors import NetworkError, RevolveError
-from schema.flags import Flags, add_plugins, positive_number, whole_number
 from schema.plugins.permission import allow, allowed
 
 _POLL_S = 0.5

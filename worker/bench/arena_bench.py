@@ -16,11 +16,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from msgspec.structs import replace
 
+from schema.agent.flags import add_count, whole_number
 from schema.errors import RevolveError
 from schema.experiment.document import Experiment, Vetting, body_space
 from schema.experiment.file import read_experiment
 from schema.experiment.settings import arena_settings_of
-from schema.flags import add_count, whole_number
 from schema.parts import BodySpace
 from schema.robot.genome import Genome, develop
 from schema.robot.ids import BirthId

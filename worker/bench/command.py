@@ -17,11 +17,11 @@ from msgspec.structs import replace
 from rich.console import Console
 from rich.progress import track
 
+from schema.agent.flags import Flags, add_count
 from schema.errors import SimulationDiverged
 from schema.experiment.document import Experiment, Simulation, body_space
 from schema.experiment.file import parse_experiment, read_experiment
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
-from schema.flags import Flags, add_count
 from schema.mjcf.model import solo_spec
 from schema.robot.results import Floats
 from schema.robot.robot import Robot

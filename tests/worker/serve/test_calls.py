@@ -73,7 +73,7 @@ def test_error_of_the_function_is_a_failure() -> None:
 
 
 @pytest.mark.parametrize(
-    "function", ["os:getcwd", "shutil:rmtree", "schema.flags:share"]
+    "function", ["os:getcwd", "shutil:rmtree", "schema.agent.flags:share"]
 )
 def test_modules_that_are_not_allowed_are_not_called(function: str) -> None:
     with pytest.raises(UnknownPlugin, match="is not allowed"):

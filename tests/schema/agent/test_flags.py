@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from schema.flags import Flags, number, positive_number, share, whole_number
+from schema.agent.flags import Flags, number, positive_number, share, whole_number
 
 
 def parsed(read: Callable[[str], float], text: str) -> float:
