@@ -11,9 +11,8 @@ import revolve as rv
 BATCH, BATCHES = 24, 6
 experiment = rv.Experiment.read("scenario1", simulation={"window_steps": 800})
 rng = np.random.default_rng(1)
-ranges = [(3, 31), (1, 11)]
 archive = GridArchive(
-    solution_dim=(), dims=(10, 10), ranges=ranges, solution_dtype=object
+    solution_dim=(), dims=(10, 10), ranges=[(3, 31), (1, 11)], solution_dtype=object
 )
 
 
@@ -35,6 +34,7 @@ with rv.Fleet() as fleet:
             (len(r.parts), sum(n.layer == "output" for n in r.brain.neurons))
             for r in robots
         ]
-        archive.add(genomes, [result.fitness or 0.0 for result in results], sizes)
+        fitness = [result.fitness or 0.0 for result in results]
+        archive.add(np.array(genomes, dtype=object), fitness, sizes)
         print(f"batch {batch}: {len(archive)} cells, {archive.stats.obj_max:.4f}")
         genomes = [child() for _ in range(BATCH)]
