@@ -43,7 +43,7 @@ from tests.hostile.decoders import update
 from tests.hostile.mutation import Mutator
 
 _NOW = zenoh.ConsolidationMode.NONE
-_PATIENCE_S = 30.0
+_PATIENCE_S = 120.0
 """Time without a hub after which the run is over [s]."""
 _OPEN = 200
 """Most queries that wait for replies at a time."""
