@@ -3,7 +3,6 @@
 Built-in rules have short names; ``coordinator.evolution.selection`` holds them.
 """
 
-import inspect
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -13,7 +12,7 @@ from schema.errors import ExperimentError, nearest, shown
 from schema.experiment.document import PARENTS, SURVIVORS, Selection
 from schema.plugins.load import load_function
 from schema.plugins.origin import where_defined
-from schema.plugins.parameters import read_parameters
+from schema.plugins.parameters import parameters_type, read_parameters
 
 _ARGUMENTS = {"parents": 3, "survivors": 4}
 _NAMES = {"parents": PARENTS, "survivors": SURVIVORS}
@@ -43,18 +42,13 @@ def _parameters(
     function: Callable[..., Any], table: Mapping[str, Any], key: str
 ) -> Struct | None:
     """Return parameters as the Struct with which the last argument is annotated."""
-    try:
-        arguments = inspect.signature(function, eval_str=True).parameters
-    except NameError as error:
-        raise ExperimentError(
-            f"{key}: {where_defined(function)}: annotation: {error}"
-        ) from None
-    kind = list(arguments.values())[-1].annotation
-    if isinstance(kind, type) and issubclass(kind, Struct):
+    place = where_defined(function)
+    kind = parameters_type(function, f"{key}: {place}", position=-1)
+    if kind is not None:
         return read_parameters(table, kind, f"{key}_parameters")
     if table:
         raise ExperimentError(
-            f"{key}_parameters: {where_defined(function)}: must annotate its last "
+            f"{key}_parameters: {place}: must annotate its last "
             f"argument with a msgspec Struct to get parameters, got {shown(table)}"
         )
     return None

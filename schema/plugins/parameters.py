@@ -44,13 +44,14 @@ def read_parameters(table: Mapping[str, Any], kind: type[T], where: str) -> T:
 
 
 def parameters_type(
-    function: Callable[..., Any], where: str
+    function: Callable[..., Any], where: str, position: int = 1
 ) -> type[msgspec.Struct] | None:
-    """Return the Struct with which a function's second argument is annotated.
+    """Return the Struct with which the argument for parameters is annotated.
 
     Args:
-        function: a fitness function or measure.
+        function: a fitness function, a measure or a rule of selection.
         where: the key that names it, for messages.
+        position: of that argument: the second one of fitness functions and measures.
 
     Returns:
         The Struct; None if there is no second argument, or no Struct as annotation.
@@ -62,9 +63,9 @@ def parameters_type(
         arguments = inspect.signature(function, eval_str=True).parameters
     except NameError as error:
         raise ExperimentError(f"{where}: annotation: {error}") from None
-    if len(arguments) < 2:  # noqa: PLR2004 - trace and parameters
+    if len(arguments) < 2:  # noqa: PLR2004 - the parameters come after another one
         return None
-    kind = list(arguments.values())[1].annotation
+    kind = list(arguments.values())[position].annotation
     is_struct = isinstance(kind, type) and issubclass(kind, msgspec.Struct)
     return kind if is_struct else None
 
