@@ -58,7 +58,7 @@ SEARCHES = ("evolution", "random")
 SEEDS = range(1, 11)
 BIRTHS = 600
 TRIALS = range(1000, 1020)
-"""Trials in which the best robots of a task with pushes are evaluated anew."""
+"""Trials in which the best robots of a task with pushes are re-evaluated."""
 RESAMPLES = 10_000
 FEW = 3
 """Least number of seeds for an interval."""

@@ -31,7 +31,7 @@ Folder = str | Path
 class Run:
     """A run folder: its description and its tables, as they are now.
 
-    Each table is read anew when it is asked for, so a run in progress can be watched.
+    Each access reads the table from disk, so a run in progress can be watched.
     docs/tables.md has the columns. In a notebook a run shows a summary.
 
     Attributes:
