@@ -54,6 +54,12 @@ TASKS = {
     "rough-ground": ("rough-ground", "m/s"),
 }
 """Shipped experiment of each task, and the unit of its fitness."""
+ALTERED = {
+    "locomotion, cpg": '[brain]\ntype = "cpg"\n',
+    "locomotion, cppn": '[encoding]\ntype = "cppn"\n',
+}
+"""What the experiments of another brain and encoding add to scenario 1."""
+SEARCHED = {**TASKS, **dict.fromkeys(ALTERED, TASKS["locomotion"])}
 SEARCHES = ("evolution", "random")
 SEEDS = range(1, 11)
 BIRTHS = 600
@@ -74,16 +80,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     commands = parser.add_subparsers(dest="command", required=True)
     running = commands.add_parser("run", help="run what is missing, seed by seed")
     running.add_argument("folder", type=Path, help="folder of the runs")
-    running.add_argument("--only", nargs="*", choices=TASKS, default=list(TASKS))
+    running.add_argument("--only", nargs="*", choices=SEARCHED, default=list(SEARCHED))
+    running.add_argument("--workers", type=int, default=1, help="workers per run")
     commands.add_parser("table", help="write the table of docs/tasks.md")
     options = parser.parse_args(arguments)
     if options.command == "table":
         write_table()
         return 0
-    return run(options.folder, options.only)
+    return run(options.folder, options.only, options.workers)
 
 
-def run(folder: Path, tasks: Sequence[str]) -> int:
+def run(folder: Path, tasks: Sequence[str], workers: int = 1) -> int:
     """Run all missing runs, at the lowest priority, all tasks of a seed together."""
     os.nice(19)
     folder.mkdir(parents=True, exist_ok=True)
@@ -93,22 +100,23 @@ def run(folder: Path, tasks: Sequence[str]) -> int:
                 known = {(r["task"], r["search"], int(r["seed"])) for r in rows()}
                 if (task, search, seed) in known:
                     continue
-                if code := _run_one(folder, task, search, seed):
+                if code := _run_one(folder, task, search, seed, workers):
                     return code
     return 0
 
 
-def _run_one(folder: Path, task: str, search: str, seed: int) -> int:
+def _run_one(folder: Path, task: str, search: str, seed: int, workers: int) -> int:
     """Run or resume one search and keep its row; return the exit code."""
-    out = folder / f"{task}-{search}-{seed}"
+    name = f"{_file_name(task)}-{search}"
+    out = folder / f"{name}-{seed}"
     if (out / "run.json").exists():
         words = ["resume", str(out)]
     else:
-        document = folder / f"{task}-{search}.toml"
+        document = folder / f"{name}.toml"
         document.write_text(_document(task, search), encoding="utf-8")
         words = ["run", str(document), "--seed", str(seed), "--out", str(out)]
         words += ["--births", str(BIRTHS)]
-    words += ["--workers", "1", "--quiet"]
+    words += ["--workers", str(workers), "--quiet"]
     print(f"revolve {' '.join(words)}", flush=True)
     done = subprocess.run(
         [sys.executable, "-m", "revolve", *words], cwd=ROOT, check=False
@@ -125,15 +133,23 @@ def _run_one(folder: Path, task: str, search: str, seed: int) -> int:
         writer.writerow({**row, "commit": _commit()})
     if search == "evolution" and seed == DRAWN:
         experiment, _, robot = _best(out)
-        write_robot(robot, ROBOTS / f"{task}.yaml", body_space(experiment.space))
+        write_robot(
+            robot, ROBOTS / f"{_file_name(task)}.yaml", body_space(experiment.space)
+        )
     shutil.rmtree(out)
     return 0
 
 
+def _file_name(task: str) -> str:
+    """Return the name of a task's files."""
+    return task.replace(", ", "-")
+
+
 def _document(task: str, search: str) -> str:
     """Return the experiment of a search: the shipped one, with other parents."""
-    shipped, _ = TASKS[task]
+    shipped, _ = SEARCHED[task]
     text = (SHIPPED / f"{shipped}.toml").read_text(encoding="utf-8")
+    text += "\n" + ALTERED.get(task, "")
     if search == "random":
         text += f"\n[selection]\n{_RANDOM}\n"
     return text
@@ -230,7 +246,7 @@ def table(kept: Sequence[Mapping[str, str]]) -> Iterator[str]:
     """Yield the lines of the table, in Markdown."""
     yield "| task | seeds | evolution | random search | difference | 95 % interval |"
     yield "|---|---|---|---|---|---|"
-    for task, (_, unit) in TASKS.items():
+    for task, (_, unit) in SEARCHED.items():
         found = {
             search: {
                 int(row["seed"]): float(row["best"])
