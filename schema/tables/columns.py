@@ -7,6 +7,8 @@ machines and clocks.
 Columns of several tables:
 
 - ``record``: number of the row in its table.
+- ``seed``: random seed of the run or campaign; repeats of a campaign share it.
+- ``run_id``: identifier of the run, see ``schema.tables.description.run_columns``.
 - ``island``: number of the island where the event of the row happened.
 - ``birth_island``, ``birth``: id of an individual, the island and the number of its
   birth. ``birth_island`` is null if it equals ``island``, so that the id is
@@ -20,6 +22,7 @@ Columns of several tables:
   if the evaluation failed, or if the robot has no fitness yet.
 """
 
+from collections.abc import Mapping
 from itertools import chain
 from typing import Any
 
@@ -38,6 +41,12 @@ Row = dict[str, Any]
 
 TABLES: dict[str, pa.Schema] = {}
 """Schemas by table name; each table below adds itself."""
+
+ROWS: dict[str, pa.Schema] = {}
+"""Schemas of rows in messages and as state machines make them, by table name.
+
+They lack ``record``, what is the same in all rows of a run, and all metadata.
+"""
 
 
 def _columns(
@@ -62,12 +71,22 @@ def _columns(
     ]
 
 
+_OF_RUN = [
+    *_columns("seed", pa.uint64(), is_nullable=True),
+    *_columns("run_id", pa.string(), is_repeatable=False, is_nullable=True),
+]
+"""Last columns of each table; null only if ``run.json`` is lost."""
+
+
 def _table(
     name: str, *columns: list[pa.Field], is_repeatable: bool = True
 ) -> pa.Schema:
     """Return a schema; ``is_repeatable`` false holds for all of its columns."""
     metadata = {"revolve.schema": name, "revolve.schema_version": str(VERSION)}
-    fields = list(chain(_columns("record", pa.int64()), *columns))
+    own = list(chain(*columns))
+    ROWS[name] = pa.schema([field.remove_metadata() for field in own])
+    of_run = [field for field in _OF_RUN if field.name not in ROWS[name].names]
+    fields = [*_columns("record", pa.int64()), *own, *of_run]
     if not is_repeatable:
         fields = [
             field.with_metadata(field.metadata | {b"repeatable": b"false"})
@@ -326,12 +345,12 @@ def read_columns(table: str, columns: bytes) -> pa.Table:
 
     Args:
         table: name of their table.
-        columns: Arrow IPC stream of all columns but ``record``; empty for no rows.
+        columns: Arrow IPC stream of the columns in ``ROWS``; empty for no rows.
 
     Raises:
         MalformedMessage: not such a stream, or columns of other names or types.
     """
-    schema = TABLES[table].remove(0)
+    schema = ROWS[table]
     if not columns:
         return schema.empty_table()
     try:
@@ -366,16 +385,28 @@ def is_earlier(found: pa.Schema, schema: pa.Schema) -> bool:
     )
 
 
-def completed(rows: pa.Table, schema: pa.Schema) -> pa.Table:
+def absent_value(field: pa.Field) -> int | None:
+    """Return the value of a column in rows that are older than it; None is null."""
+    absent = field.metadata.get(b"absent")
+    return absent and int(absent)
+
+
+def completed(
+    rows: pa.Table, schema: pa.Schema, of_run: Mapping[str, object]
+) -> pa.Table:
     """Return rows with the columns added that they lack.
+
+    Args:
+        rows: of a table.
+        schema: present schema of the table.
+        of_run: values of columns that are the same in all rows of the run.
 
     Raises:
         ValueError: the rows are not of the table.
     """
     missing = [field for field in schema if field.name not in rows.column_names]
     for field in missing:
-        absent = field.metadata.get(b"absent")
-        value = pa.scalar(absent and int(absent), field.type)
+        value = pa.scalar(of_run.get(field.name, absent_value(field)), field.type)
         rows = rows.append_column(field, pa.repeat(value, rows.num_rows))
     # Parquet has its own name for the items of a list.
     return rows.select(schema.names).cast(schema)

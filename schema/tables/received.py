@@ -10,7 +10,7 @@ from struct import Struct
 import pyarrow as pa
 
 from schema.errors import MalformedMessage
-from schema.tables.columns import TABLES
+from schema.tables.columns import ROWS
 
 _U16, _I32, _U32, _I64 = map(Struct, ("<H", "<i", "<I", "<q"))
 _HEADER = 2
@@ -27,8 +27,8 @@ def received_columns(
 
     Args:
         table: name of their table.
-        columns: Arrow IPC stream of all columns but ``record``, not compressed; empty
-            for no rows.
+        columns: Arrow IPC stream of the columns in ``ROWS``, not compressed; empty for
+            no rows.
         most_bytes: length that it may have.
         most_rows: number of rows that it may have.
 
@@ -36,7 +36,7 @@ def received_columns(
         MalformedMessage: not such a stream; columns of other names or types; nulls in
             a column that has none; too many bytes or rows.
     """
-    schema = TABLES[table].remove(0)
+    schema = ROWS[table]
     if not columns:
         return schema.empty_table()
     if len(columns) > most_bytes:
@@ -55,7 +55,7 @@ def received_columns(
 
 
 def _batches(table: str, columns: bytes, most_rows: int) -> Iterator[pa.RecordBatch]:
-    schema = TABLES[table].remove(0)
+    schema = ROWS[table]
     messages = iter(pa.ipc.MessageReader.open_stream(columns))
     first = next(messages, None)
     if first is None or first.type != "schema":

@@ -43,6 +43,8 @@ def birth(genome: Genome, record: int) -> dict[str, object]:
         "x": None if record else -1.5,
         "y": None if record else 0.0,
         "robot": encode_robot(robot) if record else None,
+        "seed": 7,
+        "run_id": "0123456789ab",
     }
 
 
@@ -63,14 +65,14 @@ def test_every_column_has_unit_and_repeatable_metadata(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "others"),
     [
-        ("births", {"robot"}),
-        ("evaluations", {"wall_s", "worker", "platform"}),
-        ("population", set()),
-        ("fitness", set()),
-        ("poses", set()),
-        ("deaths", set()),
-        ("touches", set()),
-        ("runs", {"versions", "platform", "cpu_flags", "start", "end"}),
+        ("births", {"robot", "run_id"}),
+        ("evaluations", {"wall_s", "worker", "platform", "run_id"}),
+        ("population", {"run_id"}),
+        ("fitness", {"run_id"}),
+        ("poses", {"run_id"}),
+        ("deaths", {"run_id"}),
+        ("touches", {"run_id"}),
+        ("runs", {"versions", "platform", "cpu_flags", "start", "end", "run_id"}),
     ],
 )
 def test_columns_of_machines_and_clocks_are_not_repeatable(
@@ -78,6 +80,14 @@ def test_columns_of_machines_and_clocks_are_not_repeatable(
 ) -> None:
     schema = TABLES[name]
     assert set(schema.names) - set(repeatable(schema)) == others
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_every_table_names_its_run(name: str) -> None:
+    schema = TABLES[name]
+    assert schema.field("seed").type == pa.uint64()
+    assert schema.field("run_id").type == pa.string()
+    assert schema.names[-1] == "run_id"
 
 
 def test_no_column_has_the_name_of_a_partition() -> None:
