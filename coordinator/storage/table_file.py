@@ -17,9 +17,10 @@ from coordinator.storage.disk import (
 from coordinator.storage.segment import Segment, cut_segment, remove_segment
 from schema.errors import MalformedMessage, RunFolderError
 from schema.tables.checksums import digest_of
-from schema.tables.columns import ROWS, TABLES, read_columns
+from schema.tables.columns import ROWS, TABLES
 from schema.tables.description import run_columns
 from schema.tables.files import batches_by_island, damage_of, read_table, stored_rows
+from schema.tables.received import read_columns
 from schema.tables.segments import SEGMENTS, read_segment, segment_path, segments_of
 
 _LOG = logging.getLogger(__name__)

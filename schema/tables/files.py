@@ -23,8 +23,9 @@ from pyarrow.parquet import ParquetFile, read_schema
 
 from schema.errors import RunFolderError
 from schema.tables.checksums import digest_of, read_seal
-from schema.tables.columns import TABLES, absent_value, completed
+from schema.tables.columns import TABLES
 from schema.tables.description import read_description, run_columns
+from schema.tables.earlier import absent_value, completed
 from schema.tables.segments import (
     FINISHED,
     Batch,

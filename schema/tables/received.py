@@ -20,6 +20,37 @@ _LENGTH, _COMPRESSION = 0, 3
 _MOST_BATCHES = 16
 
 
+def read_columns(table: str, columns: bytes) -> pa.Table:
+    """Return the rows of an Arrow stream.
+
+    Args:
+        table: name of their table.
+        columns: Arrow IPC stream of the columns in ``ROWS``; empty for no rows.
+
+    Raises:
+        MalformedMessage: not such a stream, or columns of other names or types.
+    """
+    schema = ROWS[table]
+    if not columns:
+        return schema.empty_table()
+    try:
+        with pa.ipc.open_stream(columns) as reader:
+            found = reader.read_all()
+        if not found.schema.equals(schema):
+            raise MalformedMessage(
+                f"{table}: columns must be {_described(schema)}, got "
+                f"{_described(found.schema)}"
+            )
+        found.validate(full=True)
+    except (pa.ArrowException, OSError) as error:
+        raise MalformedMessage(f"{table}: not an Arrow stream: {error}") from None
+    return found
+
+
+def _described(schema: pa.Schema) -> str:
+    return ", ".join(f"{field.name}: {field.type}" for field in schema)
+
+
 def received_columns(
     table: str, columns: bytes, *, most_bytes: int, most_rows: int
 ) -> pa.Table:

@@ -16,8 +16,9 @@ import pyarrow as pa
 
 from schema.errors import RunFolderError
 from schema.tables.checksums import Damaged, read_seal, sound_messages, sums_path
-from schema.tables.columns import TABLES, completed, is_earlier
+from schema.tables.columns import TABLES
 from schema.tables.description import run_columns
+from schema.tables.earlier import completed, is_earlier
 
 SEGMENTS = "segments"
 FINISHED = "tables"

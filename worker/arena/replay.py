@@ -18,7 +18,8 @@ from schema.experiment.settings import EvaluationSettings, read_arena_settings
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Floats
 from schema.robot.robot import Robot
-from schema.tables.columns import ROWS, read_columns
+from schema.tables.columns import ROWS
+from schema.tables.received import read_columns
 from schema.wire.arena_codec import Rebuild
 from worker.arena.births import possible
 from worker.arena.records import pose_batch

@@ -10,8 +10,9 @@ from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from schema.errors import MalformedMessage, RunFolderError
 from schema.robot.ids import BirthId
-from schema.tables.columns import POSES, ROWS, read_columns
+from schema.tables.columns import POSES, ROWS
 from schema.tables.files import read_table
+from schema.tables.received import read_columns
 from schema.tables.segments import segment_path, segments_of
 from tests.coordinator.arena_world import poses
 

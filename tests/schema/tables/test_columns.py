@@ -12,13 +12,12 @@ from hypothesis.strategies import DataObject, SearchStrategy
 
 from schema.parts import BUILT_IN
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop
+from schema.tables.births import body_rows, sizes
 from schema.tables.columns import (
     BIRTHS,
     EVALUATIONS,
     TABLES,
-    body_rows,
     repeatable,
-    sizes,
 )
 from schema.wire.codec import decode_genome, encode_genome, encode_robot
 
@@ -49,17 +48,29 @@ def birth(genome: Genome, record: int) -> dict[str, object]:
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_every_column_has_unit_and_repeatable_metadata(name: str) -> None:
+def test_every_column_has_a_description_and_a_unit(name: str) -> None:
     schema = TABLES[name]
+    assert schema.metadata[b"description"]
     assert schema.names[0] == "record"
     assert schema.metadata[b"revolve.schema"] == name.encode()
     assert int(schema.metadata[b"revolve.schema_version"]) >= 1
     for field in schema:
-        assert set(field.metadata) - {b"absent"} == {b"unit", b"repeatable"}
+        assert set(field.metadata) - {b"absent"} == {
+            b"unit",
+            b"description",
+            b"repeatable",
+        }
+        text = field.metadata[b"description"].decode()
+        assert len(text) > 10
+        assert not text.endswith(".")
         if field.name.endswith("_s"):
             assert field.metadata[b"unit"] == b"s"
         if field.name.endswith("velocity"):
             assert field.metadata[b"unit"] == b"m/s"
+        if field.name in "xyz":
+            assert field.metadata[b"unit"] == b"m"
+        is_float = pa.types.is_floating(getattr(field.type, "value_type", field.type))
+        assert bool(field.metadata[b"unit"]) >= is_float
 
 
 @pytest.mark.parametrize(

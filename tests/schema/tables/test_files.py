@@ -127,6 +127,33 @@ def test_run_id_is_that_of_one_run(tmp_path: Path) -> None:
     assert len(ids | {own["run_id"]}) == 1 + len(others)
 
 
+def relabelled(**changes: str | None) -> pa.Table:
+    """Return one row whose columns have other metadata; None removes a key."""
+    rows = without()
+    fields = []
+    for field in rows.schema:
+        known = {key.decode(): text.decode() for key, text in field.metadata.items()}
+        found = {**known, **changes}
+        kept = {key: text for key, text in found.items() if text is not None}
+        fields.append(field.with_metadata(kept))
+    metadata = dict(EVALUATIONS.metadata)
+    del metadata[b"description"]
+    return rows.cast(pa.schema(fields, metadata))
+
+
+def test_descriptions_and_units_of_earlier_runs_are_replaced(tmp_path: Path) -> None:
+    write_segment(tmp_path, relabelled(description=None, unit="furlong"))
+    found = read_table(tmp_path, "evaluations")
+    assert found.to_pylist() == [ROW]
+    assert found.schema.equals(EVALUATIONS, check_metadata=True)
+
+
+def test_columns_of_another_repeatability_are_refused(tmp_path: Path) -> None:
+    write_segment(tmp_path, relabelled(repeatable="maybe"))
+    with pytest.raises(RunFolderError, match="another version of Revolve"):
+        read_table(tmp_path, "evaluations")
+
+
 def test_a_nullable_column_is_null_in_older_rows(tmp_path: Path) -> None:
     write_segment(tmp_path, without("fitness"))
     assert read_table(tmp_path, "evaluations")["fitness"].to_pylist() == [None]
