@@ -8,13 +8,13 @@ from pathlib import Path
 import schema.experiment.kinds
 from coordinator.cli.deployment import Deployment
 from coordinator.cli.execute import resume, start, start_campaign
-from coordinator.cli.flags import parser
+from coordinator.cli.flags import parser as run_flags
 from coordinator.dispatch.events import AgentKind
 from coordinator.evolution.check_brain_genes import check_brain_genes
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.kinds import KINDS, brain_kind
 from coordinator.plugins.checks import refuse_faulty, refuse_faulty_of
-from coordinator.plugins.command import check, list_plugins
+from coordinator.plugins.command import check, check_flags, list_flags, list_plugins
 from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
     Campaign,
@@ -29,6 +29,7 @@ from coordinator.storage.hints import stopped
 from schema.agent.address import HUB, listen_address
 from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.command import access_of, check_load, connect_of, tls_of
+from schema.agent.flags import Flags
 from schema.agent.log import start_log, tell_user
 from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
@@ -61,7 +62,7 @@ def main(arguments: list[str]) -> int:
     if command in ("check", "plugins"):
         about_plugins = check if command == "check" else list_plugins
         return about_plugins(words, plugin_kinds())
-    flags = parser(command)
+    flags = run_flags(command)
     options = flags.parse_args(words)
     if command == "compare":
         return _compare(options)
@@ -93,6 +94,13 @@ def main(arguments: list[str]) -> int:
         flags.error(f"--repeats: must be <= {MOST_REPEATS}, got {repeats}")
     campaign = Campaign(experiments, repeats, options.seed)
     return _stoppable(folder, lambda: start_campaign(folder, campaign, deployment))
+
+
+def parser(command: str) -> Flags:
+    """Return the parser of one of the coordinator's commands."""
+    if command == "check":
+        return check_flags(plugin_kinds())
+    return list_flags() if command == "plugins" else run_flags(command)
 
 
 def plugin_kinds() -> tuple[Kind, ...]:

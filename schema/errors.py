@@ -110,6 +110,16 @@ def cut(text: str) -> str:
     return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number and a noun in the right form, such as "2 workers".
+
+    Args:
+        number: any whole number.
+        noun: singular of a noun whose plural ends in "s".
+    """
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def nearest(word: Any, words: Any) -> str:  # noqa: ANN401 - any iterable of str
     """Return ``; did you mean 'x'?`` for the nearest word, or an empty text."""
     # The search takes quadratic time.

@@ -9,10 +9,10 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
+from analysis.viewer.flags import HOST
 from analysis.viewer.recording import Recording, ViewerError
 from schema.agent.log import tell_user
 
-HOST, PORT = "127.0.0.1", 9876
 _ENDING = ".rrd"
 _WINDOW_S = 3.0
 _POLL_S = 0.2

@@ -34,7 +34,7 @@ from coordinator.storage.hints import command, stopped
 from coordinator.storage.lock import FolderLock
 from schema.agent.log import tell_error, tell_user, warn_user
 from schema.agent.stopping import STOPPED, advise, tell_stopped
-from schema.errors import NetworkError, RevolveError, RunFolderError
+from schema.errors import NetworkError, RevolveError, RunFolderError, counted
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text, experiment_text
 from schema.tables.description import STATE, read_state
@@ -208,7 +208,7 @@ def _execute_campaign(
     advise(stopped(folder))
     finished = sum(one.is_finished for one in planned)
     if finished:
-        tell_user(f"{finished} of {len(planned)} runs are already finished")
+        tell_user(f"{finished} of {counted(len(planned), 'run')} already finished")
 
     def conclude_run(run: RunSession) -> None:
         conclusion = conclude(run)
@@ -223,8 +223,8 @@ def _execute_campaign(
         return STOPPED
     if scheduler.failed:
         tell_user(
-            f"{len(scheduler.failed)} of {len(planned)} runs failed; after fixing the "
-            f"cause, run: {command('resume', folder)}"
+            f"{len(scheduler.failed)} of {counted(len(planned), 'run')} failed; after "
+            f"fixing the cause, run: {command('resume', folder)}"
         )
         return 1
     print(

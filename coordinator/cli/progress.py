@@ -16,6 +16,7 @@ from coordinator.cli.format import about_arenas, best_of, duration, run_details
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import SPAN_S
 from schema.agent.log import log_form, tell_user, warn_user
+from schema.errors import counted
 from schema.wire.status import IslandStatus, RunStatus, Status
 
 MOST_BARS = 16
@@ -98,14 +99,14 @@ class Display:
                 rows[f"  island {number}"] = (island, best_of(island))
         for gone in [key for key in self._tasks if key not in rows]:
             self._progress.remove_task(self._tasks.pop(gone))
-        for key, (counted, what) in rows.items():
+        for key, (shown, what) in rows.items():
             if key not in self._tasks:
                 self._tasks[key] = self._progress.add_task(key, about="")
             self._progress.update(
                 self._tasks[key],
                 description=key or name,
-                completed=counted.births,
-                total=counted.wanted,
+                completed=shown.births,
+                total=shown.wanted,
                 about=what,
             )
 
@@ -142,7 +143,7 @@ class Display:
 
 def _line(status: Status) -> str:
     """Return the state as one line of a log."""
-    about = f"{status.births} of {status.wanted} births, {_rates(status)}"
+    about = f"{status.births} of {counted(status.wanted, 'birth')}, {_rates(status)}"
     if len(status.runs) == 1:
         return f"{about}{about_arenas(status.runs[0])}"
     return f"{_runs_done(status)}, {about}"
@@ -150,11 +151,11 @@ def _line(status: Status) -> str:
 
 def _runs_done(status: Status) -> str:
     done = sum(run.state == "finished" for run in status.runs)
-    return f"{done} of {len(status.runs)} runs"
+    return f"{done} of {counted(len(status.runs), 'run')}"
 
 
 def _rates(status: Status) -> str:
     return (
         f"{status.births_per_s:.1f}/s, {duration(status.left_s)} left, "
-        f"{status.workers} workers"
+        f"{counted(status.workers, 'worker')}"
     )

@@ -19,7 +19,7 @@ from schema.agent.address import read_address
 from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
 from schema.agent.flags import Flags
 from schema.agent.log import tell_user
-from schema.errors import NetworkError, RevolveError, RunFolderError
+from schema.errors import NetworkError, RevolveError, RunFolderError, counted
 from schema.limits import printable
 from schema.tables.description import DETAILS
 from schema.tables.segments import FINISHED, SEGMENTS
@@ -49,7 +49,7 @@ def main(arguments: list[str]) -> int:
         NetworkError: no coordinator answers at the address.
         RunFolderError: the folder holds no run and no campaign.
     """
-    flags = _flags()
+    flags = parser()
     options = flags.parse_args(arguments[1:])
     if options.folder is not None and options.connect is not None:
         flags.error("give either a folder or --connect")
@@ -189,12 +189,13 @@ def _show(status: Status, title: str, root: Path | None = None) -> None:
             run_details(run) if run.islands else "",
         )
     done = sum(run.state == "finished" for run in status.runs)
-    births = f"{status.births} of {status.wanted} births"
-    lines = [title, f"{done} of {len(status.runs)} runs finished, {births}"]
+    births = f"{status.births} of {counted(status.wanted, 'birth')}"
+    runs = counted(len(status.runs), "run")
+    lines = [title, f"{done} of {runs} finished, {births}"]
     if status.workers or status.analyzers:
         lines.append(
-            f"{status.births_per_s:.1f} births/s, {status.workers} workers, "
-            f"{status.analyzers} analyzers, {duration(status.left_s)} left"
+            f"{status.births_per_s:.1f} births/s, {counted(status.workers, 'worker')}, "
+            f"{counted(status.analyzers, 'analyzer')}, {duration(status.left_s)} left"
         )
     elif done < len(status.runs):
         lines.append("no coordinator is running, or it has no workers and analyzers")
@@ -206,11 +207,16 @@ def _show(status: Status, title: str, root: Path | None = None) -> None:
     console.print(table)
 
 
-def _flags() -> Flags:
+def parser(_command: str = "status") -> Flags:
+    """Return the parser of ``revolve status``."""
     flags = Flags(
         prog="revolve status",
         description="Show the progress of a run, a campaign or all runs of a fleet.",
-        epilog="example: revolve status runs/thesis-seed1",
+        examples=(
+            "revolve status    # all coordinators at this user's hub",
+            "revolve status runs",
+            "revolve status runs/thesis-seed1 --json",
+        ),
         allow_abbrev=False,
     )
     flags.add_argument(
@@ -221,7 +227,7 @@ def _flags() -> Flags:
         "coordinators at the hub)",
     )
     flags.add_argument(
-        "--json", action="store_true", help="print one JSON document for programs"
+        "--json", action="store_true", help="print JSON, one document for programs"
     )
     add_connect(flags)
     add_network_flags(flags)
