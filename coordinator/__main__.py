@@ -34,7 +34,7 @@ from schema.agent.log import start_log, tell_user
 from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
-from schema.errors import NetworkError
+from schema.errors import ExperimentError, NetworkError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import (
     Experiment,
@@ -177,6 +177,9 @@ def _deployment(
     import worker.serve.jobs
     import worker.serve.service
 
+    if options.speed is not None and not any(map(_has_arena, experiments)):
+        names = ", ".join(experiment.name for experiment in experiments)
+        raise ExperimentError(f"--speed: limits arenas, and there is none in {names}")
     if options.connect and options.listen:
         raise NetworkError("--listen and --connect exclude each other")
     if options.view and options.in_process:
@@ -220,6 +223,11 @@ def _deployment(
         allows_drift=options.allow_drift,
         metrics=options.metrics,
     )
+
+
+def _has_arena(experiment: Experiment) -> bool:
+    numbers = range(island_count(experiment))
+    return any(island_experiment(experiment, one).arena is not None for one in numbers)
 
 
 def _has_one_arena(experiment: Experiment, options: argparse.Namespace) -> bool:

@@ -110,6 +110,13 @@ def cut(text: str) -> str:
     return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
 
 
+def unreadable(error: OSError | UnicodeDecodeError) -> str:
+    """Return why a file cannot be read, as the end of a message."""
+    if isinstance(error, UnicodeDecodeError):
+        return f"cannot be read: not UTF-8 at byte {error.start}"
+    return f"cannot be read: {error.strerror or error}"
+
+
 def counted(number: int, noun: str) -> str:
     """Return a number and a noun in the right form, such as "2 workers".
 

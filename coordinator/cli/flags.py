@@ -168,7 +168,8 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         "--speed",
         type=positive_number,
         metavar="X",
-        help="limit arenas to X simulated seconds per second (default: no limit)",
+        help="limit arenas to X simulated seconds per second; refused if there is no "
+        "arena (default: no limit)",
     )
     flags.add_argument(
         "--view", action="store_true", help="open a viewer, as revolve view does"

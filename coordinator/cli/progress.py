@@ -12,7 +12,13 @@ from rich.progress import (
     TextColumn,
 )
 
-from coordinator.cli.format import about_arenas, best_of, duration, run_details
+from coordinator.cli.format import (
+    about_arenas,
+    best_of,
+    duration,
+    missing_agents,
+    run_details,
+)
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import SPAN_S
 from schema.agent.log import log_form, tell_user, warn_user
@@ -112,21 +118,20 @@ class Display:
 
     def _warn_of_missing(self, status: Status, now_s: float) -> None:
         """Warn of missing kinds of agents, and of arenas without a suitable worker."""
-        counts = {"worker": status.workers, "analyzer": status.analyzers}
-        missing = [kind for kind, count in counts.items() if not count]
+        missing = missing_agents(status)
         if not missing:
             self._missing_since_s = None
         elif self._missing_since_s is None:
             self._missing_since_s = now_s
         elif now_s - self._missing_since_s > SPAN_S:
             self._missing_since_s = now_s + 6 * SPAN_S
-            self._warn(f"waiting: no {' and no '.join(missing)} has joined")
+            self._warn(f"waiting for {' and '.join(missing)}: none has joined")
         waiting = {
             f"arena {shard} of {run.held.path.name}": platform
             for run in self._scheduler.active
             for shard, platform in run.waiting.items()
         }
-        if "worker" not in missing and waiting != self._shown_waiting:
+        if "workers" not in missing and waiting != self._shown_waiting:
             self._shown_waiting = waiting
             for arena, platform in waiting.items():
                 self._warn(

@@ -242,6 +242,7 @@ def run_pool(
             processes=options.processes,
             plugins=allowed(),
             give_up_after_s=options.give_up_after,
+            tells_hub=True,
         )
         client_config(connect, tls)
     except RevolveError as error:
