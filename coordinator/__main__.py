@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import schema.experiment.kinds
@@ -31,6 +32,7 @@ from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.command import access_of, check_load, connect_of, tls_of
 from schema.agent.flags import Flags
 from schema.agent.log import start_log, tell_user
+from schema.agent.screen import missing_screen
 from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
@@ -74,10 +76,9 @@ def main(arguments: list[str]) -> int:
         check_load(flags, "--workers", options.workers or 0, options)
     if command == "resume":
         folder = Path(options.folder)
-        deployment = _deployment(options, refuse_faulty_of(folder))
+        deployment = _deployment(options, refuse_faulty_of(folder), folder)
         return _stoppable(folder, lambda: resume(folder, deployment))
     experiments = _experiments(options)
-    deployment = _deployment(options, experiments)
     is_campaign_wanted = len(experiments) > 1 or options.repeats is not None
     name = "+".join(
         options.experiments
@@ -85,6 +86,7 @@ def main(arguments: list[str]) -> int:
         else [experiment.name for experiment in experiments]
     )
     folder = Path(options.out or Path("runs") / f"{name}-seed{options.seed}")
+    deployment = _deployment(options, experiments, folder)
     if not is_campaign_wanted:
         return _stoppable(
             folder, lambda: start(folder, experiments[0], options.seed, deployment)
@@ -169,7 +171,7 @@ def _check_built_in(experiment: Experiment) -> None:
 
 
 def _deployment(
-    options: argparse.Namespace, experiments: tuple[Experiment, ...]
+    options: argparse.Namespace, experiments: tuple[Experiment, ...], folder: Path
 ) -> Deployment:
     """Return processes and network; imports the rooms of worker and analyzer."""
     import analyzer.report
@@ -180,6 +182,8 @@ def _deployment(
     if options.speed is not None and not any(map(_has_arena, experiments)):
         names = ", ".join(experiment.name for experiment in experiments)
         raise ExperimentError(f"--speed: limits arenas, and there is none in {names}")
+    if options.view:
+        _check_window(folder)
     if options.connect and options.listen:
         raise NetworkError("--listen and --connect exclude each other")
     if options.view and options.in_process:
@@ -223,6 +227,20 @@ def _deployment(
         allows_drift=options.allow_drift,
         metrics=options.metrics,
     )
+
+
+def _check_window(folder: Path) -> None:
+    """Raise unless ``--view`` can open a window.
+
+    Raises:
+        NetworkError: the viewer is not installed, or there is no screen.
+    """
+    if find_spec("rerun") is None:
+        install = "pip install 'revolve-islands[view]'"
+        raise NetworkError(f"--view: the viewer is not installed: {install}")
+    if why := missing_screen():
+        beside = command_line("view", "--connect", folder, "--serve")
+        raise NetworkError(f"--view: {why}: run without it, and beside it: {beside}")
 
 
 def _has_arena(experiment: Experiment) -> bool:

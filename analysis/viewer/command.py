@@ -55,16 +55,17 @@ def view(options: argparse.Namespace, simulators: Simulators) -> int:
         ViewerError: the viewer cannot be opened, or the flags conflict.
     """
     allow(options.plugins)
-    output = Output.of(options.save, options.serve)
     if options.run is not None and options.connect is not None:
         raise ViewerError("give either a run folder or --connect ADDRESS")
     if options.ancestry and not options.robot:
         raise ViewerError("--ancestry: needs --robot best or --robot ISLAND:BIRTH")
     if options.run is not None:
+        output = Output.of(options.save, options.serve)
         _replay(options, output, simulators)
         return 0
     if options.robot or (options.start, options.until) != (None, None):
         raise ViewerError("--robot, --from and --until: for a run folder only")
+    output = Output.of(options.save, options.serve)
     stop = stop_on_signals()
     with LiveSource(connect_of(options), options.fleet, tls_of(options)) as source:
         watch(source, output, options.follow, stop)

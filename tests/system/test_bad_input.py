@@ -106,6 +106,19 @@ def test_what_is_no_experiment_is_told_apart(
     assert message in said
 
 
+def test_a_viewer_needs_a_screen_before_the_run_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(variable, raising=False)
+    assert main(["run", "scenario1", "--view", "--out", "x"]) == 2
+    said = capsys.readouterr().err
+    assert "no screen here" in said
+    assert said.endswith("beside it: revolve view --connect x --serve\n")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_limit_of_speed_needs_an_arena(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
