@@ -97,7 +97,7 @@ def test_killed_campaign_resumes_and_includes_existing_runs(
     first.communicate()
     assert "stopped" in workspace.run("status", "campaign")
     output = workspace.run("resume", "campaign", "--workers", "1", "--quiet")
-    assert "4 runs are finished" in output
+    assert "4 runs finished" in output
     assert (
         "keeps its own number of births" not in output
     )  # it has as many births as the others

@@ -110,7 +110,7 @@ def test_campaign_reports_runs_without_any_fitness(workspace: Workspace) -> None
     output = _run(workspace, *sources, "--out", "both", code=1)
     assert "both/blind-0: 12 of 12 evaluations failed, all: " in output
     assert "seeing-0" not in output
-    assert "2 runs are finished" in output
+    assert "2 runs finished" in output
     again = workspace.run("resume", "both", "--in-process", "--quiet", code=1)
     assert "2 of 2 runs already finished" in again
     # A campaign of one run reports the reason, too.
