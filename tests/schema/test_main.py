@@ -78,4 +78,4 @@ def test_part_types_of_an_experiment(
 def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["robot", "--help"])
-    assert "example: revolve robot convert" in capsys.readouterr().out
+    assert "examples:\n  revolve robot check" in capsys.readouterr().out
