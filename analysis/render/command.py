@@ -40,7 +40,7 @@ def main(arguments: list[str], simulate: Simulate) -> int:
         0 if the picture was written.
 
     Raises:
-        NoPictures: this machine cannot render, the file name has another ending, or
+        NoPictures: the file name has another ending, the file cannot be written, or
             ``--gait`` exceeds the number of ticks.
         InvalidRobot: the file contains no robot.
         SimulationDiverged: the physics diverged.
