@@ -120,9 +120,8 @@ def _simulation() -> Callable[..., Any]:
 
     Raises:
         MissingExtra: a library for rendering is not installed.
-        NoPictures: this machine cannot render.
     """
-    with _extra("pictures need", "view"):
+    with _extra("pictures need", "pictures"):
         from analysis.render.picture import choose_engine
 
         # Before MuJoCo is imported.
