@@ -62,20 +62,20 @@ def test_rows_of_settings_have_type_default_unit_and_meaning() -> None:
         "`tournament_size` | whole number >= 1 | `4` |  | individuals per tournament",
         "`timestep_s` | number > 0 | `0.005` | s | physics step",
         (
-            "`fitness` | [`[fitness]`](#fitness) | not given |  | fitness function of these"
-            " islands"
+            "`fitness` | [`[fitness]`](#fitness) | not given |  | fitness function of"
+            " these islands"
         ),
         (
             '`duplicable_size` | `"mean"`, `"sum"` | `"mean"` |  | size of subtrees in'
             " that number: their `mean` or `sum`"
         ),
         (
-            "`light` | list of 3 (number) | not given | m | position of the light; no light"
-            " if not given"
+            "`light` | list of 3 (number) | not given | m | position of the light; no"
+            " light if not given"
         ),
         (
-            "`culling` | [`[selection.culling]`](#selectionculling) | not given |  | makes"
-            " the population vary in size"
+            "`culling` | [`[selection.culling]`](#selectionculling) | not given |  |"
+            " makes the population vary in size"
         ),
     ):
         assert f"| {row} |" in page
