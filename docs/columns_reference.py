@@ -13,9 +13,9 @@ _HEAD = """# Columns of the tables
 Written from the code by `python -m docs.reference_pages`. [Tables](../tables.md) shows
 how to read them. Unit and description are also in the metadata of each column.
 
-Units are symbols; numbers of things, counts, names and bytes have none. A column that is
-not *repeatable* depends on machines and clocks; all others are equal, row by row, in two
-runs of the same experiment and seed. A column that is not marked *null* has a value in
+Units are symbols; numbers of things, counts, names and bytes have none. A column that
+is not repeatable depends on machines and clocks; all others are equal, row by row, in
+two runs of the same experiment and seed. A column without the mark null has a value in
 every row.
 
 """
@@ -32,7 +32,7 @@ def page() -> str:
 def _table(name: str, schema: pa.Schema) -> Iterator[str]:
     """Yield the lines about a table."""
     yield f"## `{name}`\n"
-    yield f"One row for each {schema.metadata[b'description'].decode()}.\n"
+    yield f"Each row is {schema.metadata[b'description'].decode()}.\n"
     yield "| column | type | unit | meaning |"
     yield "|---|---|---|---|"
     for field in schema:

@@ -3,21 +3,19 @@
 import logging
 import os
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
-from analysis.render.picture import NoPictures, choose_engine
+from analysis.render.picture import choose_engine
 from schema.plugins import permission
 from tests.own_brains import write_module
 
 # MuJoCo selects its rendering engine when it is first imported, by whichever test comes
 # first. Processes that tests start select their own engine.
 _SETTING = os.environ.get("MUJOCO_GL")
-with suppress(NoPictures):
-    choose_engine()
+choose_engine()
 import mujoco  # noqa: E402, F401
 
 if _SETTING is None:

@@ -246,13 +246,15 @@ def test_a_lost_hub_is_told_once_and_its_return(
         until(lambda: journal.stat().st_size > size + 1000, "more births")
 
     grows()
+    for process in agents:
+        assert said(process.stderr.readline()) == [f"connected to {place}"]
     first.terminate()
     lost = f"no hub at {place}; retrying; press Ctrl-C to stop"
     for process in (coordinator, *agents):
         assert said(process.stderr.readline()) == [lost]
     second = hub()
     for process in (coordinator, *agents):
-        assert said(process.stderr.readline()) == [f"connected to {place}"]
+        assert said(process.stderr.readline()) == [f"reconnected to {place}"]
     grows()
     second.terminate()
     assert coordinator.wait(60) == 1
