@@ -36,6 +36,12 @@ def _plain_log(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     logging.getLogger("revolve").handlers.clear()
 
 
+@pytest.fixture(autouse=True)
+def _plugins_of_a_test(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forget after each test which modules it has allowed."""
+    monkeypatch.setattr(permission, "_allowed", dict(permission._allowed))
+
+
 @pytest.fixture
 def _own_brains(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Allow the module of docs/brains.md as the plug-in ``my_brains``."""

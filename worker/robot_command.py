@@ -1,6 +1,5 @@
 """``revolve robot simulate``: simulate and evaluate the robot of a file."""
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -33,7 +32,7 @@ def main(arguments: list[str]) -> int:
         ExperimentError: an invalid experiment, or a sensor that has no stimulus in
             its environment.
     """
-    options = _parser().parse_args(arguments[1:])
+    options = parser().parse_args(arguments[1:])
     allow(options.plugins)
     robot, settings = _read(options.file, options.experiment)
     found = evaluate(robot, settings)
@@ -82,27 +81,31 @@ def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings
     return read_robot(path, body_space(settings.space), kinds), settings
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = Flags(
+def parser(_command: str = "robot simulate") -> Flags:
+    """Return the parser of ``revolve robot simulate``."""
+    flags = Flags(
         prog="revolve robot simulate",
         description="Simulate a robot alone and evaluate it as an experiment does.",
-        epilog="example: revolve robot simulate best.yaml --experiment scenario1",
+        examples=(
+            "revolve robot simulate best.yaml --experiment scenario1",
+            "revolve robot simulate best.xml",
+        ),
     )
-    parser.add_argument("file", type=Path, metavar="FILE")
-    parser.add_argument(
+    flags.add_argument("file", type=Path, metavar="FILE", help="robot file")
+    flags.add_argument(
         "--experiment",
         metavar="NAME|FILE.toml",
         help="experiment whose settings to use (default: those in an MJCF file, or "
         "those of the thesis's off-line experiments)",
     )
-    parser.add_argument(
+    flags.add_argument(
         "--robustness",
         action="store_true",
         help="evaluate it again with finer time steps, 1 %% less friction and starts "
         "raised by about 0.1 mm, and show how much of its fitness it keeps",
     )
-    add_plugins(parser)
-    return parser
+    add_plugins(flags)
+    return flags
 
 
 if __name__ == "__main__":

@@ -11,7 +11,8 @@ import pytest
 from msgspec.structs import replace
 from PIL import Image
 
-from analysis.render.command import main
+from analysis.render.command import render
+from analysis.render.flags import parser
 from analysis.render.picture import (
     NoPictures,
     RobotRenderer,
@@ -150,6 +151,11 @@ def simulate(*_: object, **__: object) -> NoReturn:
     raise AssertionError("words come first")
 
 
+def main(words: list[str]) -> int:
+    """Run ``revolve robot render``."""
+    return render(parser().parse_args(words[1:]), simulate)
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -161,7 +167,7 @@ def test_invalid_flags_are_refused(
     words: tuple[str, str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as end:
-        main(["robot render", "a.yaml", "a.png", *words], simulate)
+        main(["robot render", "a.yaml", "a.png", *words])
     assert end.value.code == 2
     assert message in capsys.readouterr().err
 
@@ -177,10 +183,10 @@ def test_a_strip_longer_than_the_evaluation_is_refused(robot_file: Path) -> None
     words = ["robot render", str(robot_file), str(robot_file.with_suffix(".png"))]
     message = r"--gait 49: must be <= 48, the number of ticks in the second half"
     with pytest.raises(NoPictures, match=message):
-        main([*words, "--gait", "49"], simulate)
+        main([*words, "--gait", "49"])
     # One less is what there is, and goes on to the simulation.
     with pytest.raises(AssertionError, match="words come first"):
-        main([*words, "--gait", "48"], simulate)
+        main([*words, "--gait", "48"])
 
 
 def test_a_log_names_the_picture_that_is_rendered(
@@ -188,13 +194,13 @@ def test_a_log_names_the_picture_that_is_rendered(
 ) -> None:
     out = robot_file.with_suffix(".gif")
     with pytest.raises(AssertionError, match="words come first"):
-        main(["robot render", str(robot_file), str(out)], simulate)
+        main(["robot render", str(robot_file), str(out)])
     assert capsys.readouterr().err == f"simulating and rendering {out}\n"
 
 
 def test_a_strip_as_gif_is_refused() -> None:
     with pytest.raises(NoPictures, match=r"--gait needs a \.png"):
-        main(["robot render", "a.yaml", "a.gif", "--gait", "5"], simulate)
+        main(["robot render", "a.yaml", "a.gif", "--gait", "5"])
 
 
 def test_a_machine_without_graphics_library_gets_pictures_and_one_line(
