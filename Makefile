@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DOCS_STAMP := $(VENV)/.docs-installed
 
 # Settings of `make demo`; to change them: make SEED=2 BIRTHS=3000 demo.
 SEED ?= 1
@@ -25,6 +26,8 @@ help:
 	@echo 'make format       fix and format the code with ruff'
 	@echo 'make proto        write schema/wire/revolve_pb2.py(i) from revolve.proto'
 	@echo 'make constraints  update constraints.txt from this environment'
+	@echo 'make docs         build the docs site, docs/_build/html'
+	@echo 'make docs-serve   build the docs site and show it on this machine; Ctrl-C ends'
 	@echo 'make clean        remove the environment and all caches'
 
 demo: $(STAMP)
@@ -71,13 +74,33 @@ proto: $(STAMP)
 		schema/wire/revolve.proto
 
 # Only names and versions: each machine configures its own package sources.
-constraints: $(STAMP)
+constraints: $(STAMP) $(DOCS_STAMP)
 	@{ sed -n '/^#/p' constraints.txt; \
 	   $(BIN)/python -m pip freeze --all --exclude pip --exclude-editable; } > $(VENV)/constraints.txt
 	@mv $(VENV)/constraints.txt constraints.txt
 
+# The docs site, from docs/*.md; its generator is an extra of its own.
+DOCS_PORT ?= 8000
+.PHONY: docs docs-serve
+docs: $(DOCS_STAMP)
+	@$(BIN)/python -m sphinx -q -E -W --keep-going docs docs/_build/html
+	@echo 'The site is in docs/_build/html; make docs-serve shows it.'
+
+docs-serve: docs
+	@echo 'Open http://127.0.0.1:$(DOCS_PORT)/ in a browser; press Ctrl-C to stop.'
+	@$(BIN)/python -m http.server --bind 127.0.0.1 --directory docs/_build/html \
+		$(DOCS_PORT) 2> $(VENV)/docs-serve.log \
+		|| { tail -n 1 $(VENV)/docs-serve.log >&2; \
+		echo 'To use another port: make DOCS_PORT=8001 docs-serve' >&2; exit 1; }
+
+$(DOCS_STAMP): $(STAMP)
+	@echo 'Adding the generator of the docs site to $(VENV): about 200 MB ...'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+		-c constraints.txt -e '.[docs]'
+	@touch $@
+
 clean:
-	rm -rf $(VENV) dist .hypothesis .import_linter_cache .mypy_cache \
+	rm -rf $(VENV) docs/_build dist .hypothesis .import_linter_cache .mypy_cache \
 		.pytest_cache .ruff_cache MUJOCO_LOG.TXT
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 

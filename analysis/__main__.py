@@ -1,5 +1,6 @@
 """``revolve analyze``: tables to measures, figures and a report."""
 
+import argparse
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -43,35 +44,56 @@ def main(arguments: list[str]) -> int:
         RunFolderError: no run is found.
         MissingExtra: a library is not installed.
     """
+    options = parser(arguments[0]).parse_args(arguments[1:])
     if arguments[0] == "robot render":
         simulate = _simulation()
-        from analysis.render.command import main as render
+        from analysis.render.command import render
 
-        return render(arguments, simulate)
+        return render(options, simulate)
     if arguments[0] == "view":
-        return _view(arguments)
-    options = _flags().parse_args(arguments[1:])
+        return _view(options)
     allow(options.plugins)
     with _extra("analysis needs", "analysis"):
         from analysis.analyze_command import analyze
     return analyze(options, arguments, _simulation)
 
 
-def _flags() -> Flags:
+def parser(command: str) -> Flags:
+    """Return the parser of ``analyze``, ``robot render`` or ``view``.
+
+    It needs none of the libraries that the command itself needs.
+    """
+    if command == "view":
+        from analysis.viewer.flags import parser as view
+
+        return view()
+    if command == "robot render":
+        from analysis.render.flags import parser as render
+
+        return render()
     flags = Flags(
         prog="revolve analyze",
         description="Measure runs, compare experiments, draw the thesis's figures, and "
         "write a report.",
-        epilog="for example: revolve analyze runs --out report; files of benchmarks "
-        "(revolve bench arena --out FILE) may be given with the runs",
+        examples=(
+            "revolve analyze runs/scenario1-seed1",
+            "revolve analyze runs/a runs/b --out report --processes 2",
+            "revolve analyze runs arena.parquet    # with a file of revolve bench",
+        ),
     )
     flags.add_argument(
-        "runs", nargs="+", type=Path, help="run folders, or folders that contain them"
+        "runs",
+        nargs="+",
+        type=Path,
+        metavar="FOLDER",
+        help="run or campaign folder, or a folder that contains some; also files that "
+        "'revolve bench arena --out FILE' wrote",
     )
     flags.add_argument(
         "--out",
         type=Path,
         default=Path("report"),
+        metavar="FOLDER",
         help="folder to write to (default: report)",
     )
     flags.add_argument(
@@ -86,7 +108,8 @@ def _flags() -> Flags:
         type=whole_number(),
         default=os.cpu_count() or 1,
         metavar="N",
-        help="number of runs measured in parallel (default: number of cores)",
+        help="number of processes, which measure runs in parallel (default: number of "
+        "cores)",
     )
     add_plugins(flags)
     return flags
@@ -97,9 +120,8 @@ def _simulation() -> Callable[..., Any]:
 
     Raises:
         MissingExtra: a library for rendering is not installed.
-        NoPictures: this machine cannot render.
     """
-    with _extra("pictures need", "view"):
+    with _extra("pictures need", "pictures"):
         from analysis.render.picture import choose_engine
 
         # Before MuJoCo is imported.
@@ -108,15 +130,15 @@ def _simulation() -> Callable[..., Any]:
     return simulate
 
 
-def _view(arguments: list[str]) -> int:
+def _view(options: argparse.Namespace) -> int:
     """Show a run; robots are re-simulated by the worker from the run's journal."""
     with _extra("the viewer needs", "view"):
-        from analysis.viewer.command import main as view
+        from analysis.viewer.command import view
     from analysis.viewer.resimulate import Simulators
     from coordinator.run.history import arena_history
     from worker.arena.replay import alone, together
 
-    return view(arguments, Simulators(alone, arena_history, together))
+    return view(options, Simulators(alone, arena_history, together))
 
 
 if __name__ == "__main__":

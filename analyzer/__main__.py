@@ -2,6 +2,7 @@
 
 import sys
 
+from schema.agent.flags import Flags
 from schema.agent.supervisor import prepare_process
 
 
@@ -19,6 +20,13 @@ def main(arguments: list[str]) -> int:
     from schema.agent.command import run_pool
 
     return run_pool("analyzer", process, arguments[1:], processes=1)
+
+
+def parser(_command: str) -> Flags:
+    """Return the parser of ``revolve analyzer``."""
+    from schema.agent.command import parser as agent
+
+    return agent("analyzer", 1)
 
 
 if __name__ == "__main__":

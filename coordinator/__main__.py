@@ -3,18 +3,19 @@
 import argparse
 import sys
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 
 import schema.experiment.kinds
 from coordinator.cli.deployment import Deployment
 from coordinator.cli.execute import resume, start, start_campaign
-from coordinator.cli.flags import parser
+from coordinator.cli.flags import parser as run_flags
 from coordinator.dispatch.events import AgentKind
 from coordinator.evolution.check_brain_genes import check_brain_genes
 from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.kinds import KINDS, brain_kind
 from coordinator.plugins.checks import refuse_faulty, refuse_faulty_of
-from coordinator.plugins.command import check, list_plugins
+from coordinator.plugins.command import check, check_flags, list_flags, list_plugins
 from coordinator.run.cross_checks import Checks
 from coordinator.storage.campaign import (
     Campaign,
@@ -29,11 +30,13 @@ from coordinator.storage.hints import stopped
 from schema.agent.address import HUB, listen_address
 from schema.agent.capacity import memory_bytes, shards_that_fit
 from schema.agent.command import access_of, check_load, connect_of, tls_of
+from schema.agent.flags import Flags
 from schema.agent.log import start_log, tell_user
+from schema.agent.screen import missing_screen
 from schema.agent.service import HubLost
 from schema.agent.stopping import STOPPED, advise, tell_stopped
 from schema.agent.supervisor import cores
-from schema.errors import NetworkError
+from schema.errors import ExperimentError, NetworkError
 from schema.experiment.check import check_experiment
 from schema.experiment.document import (
     Experiment,
@@ -61,7 +64,7 @@ def main(arguments: list[str]) -> int:
     if command in ("check", "plugins"):
         about_plugins = check if command == "check" else list_plugins
         return about_plugins(words, plugin_kinds())
-    flags = parser(command)
+    flags = run_flags(command)
     options = flags.parse_args(words)
     if command == "compare":
         return _compare(options)
@@ -73,10 +76,9 @@ def main(arguments: list[str]) -> int:
         check_load(flags, "--workers", options.workers or 0, options)
     if command == "resume":
         folder = Path(options.folder)
-        deployment = _deployment(options, refuse_faulty_of(folder))
+        deployment = _deployment(options, refuse_faulty_of(folder), folder)
         return _stoppable(folder, lambda: resume(folder, deployment))
     experiments = _experiments(options)
-    deployment = _deployment(options, experiments)
     is_campaign_wanted = len(experiments) > 1 or options.repeats is not None
     name = "+".join(
         options.experiments
@@ -84,6 +86,7 @@ def main(arguments: list[str]) -> int:
         else [experiment.name for experiment in experiments]
     )
     folder = Path(options.out or Path("runs") / f"{name}-seed{options.seed}")
+    deployment = _deployment(options, experiments, folder)
     if not is_campaign_wanted:
         return _stoppable(
             folder, lambda: start(folder, experiments[0], options.seed, deployment)
@@ -93,6 +96,13 @@ def main(arguments: list[str]) -> int:
         flags.error(f"--repeats: must be <= {MOST_REPEATS}, got {repeats}")
     campaign = Campaign(experiments, repeats, options.seed)
     return _stoppable(folder, lambda: start_campaign(folder, campaign, deployment))
+
+
+def parser(command: str) -> Flags:
+    """Return the parser of one of the coordinator's commands."""
+    if command == "check":
+        return check_flags(plugin_kinds())
+    return list_flags() if command == "plugins" else run_flags(command)
 
 
 def plugin_kinds() -> tuple[Kind, ...]:
@@ -161,7 +171,7 @@ def _check_built_in(experiment: Experiment) -> None:
 
 
 def _deployment(
-    options: argparse.Namespace, experiments: tuple[Experiment, ...]
+    options: argparse.Namespace, experiments: tuple[Experiment, ...], folder: Path
 ) -> Deployment:
     """Return processes and network; imports the rooms of worker and analyzer."""
     import analyzer.report
@@ -169,6 +179,11 @@ def _deployment(
     import worker.serve.jobs
     import worker.serve.service
 
+    if options.speed is not None and not any(map(_has_arena, experiments)):
+        names = ", ".join(experiment.name for experiment in experiments)
+        raise ExperimentError(f"--speed: limits arenas, and there is none in {names}")
+    if options.view:
+        _check_window(folder)
     if options.connect and options.listen:
         raise NetworkError("--listen and --connect exclude each other")
     if options.view and options.in_process:
@@ -212,6 +227,25 @@ def _deployment(
         allows_drift=options.allow_drift,
         metrics=options.metrics,
     )
+
+
+def _check_window(folder: Path) -> None:
+    """Raise unless ``--view`` can open a window.
+
+    Raises:
+        NetworkError: the viewer is not installed, or there is no screen.
+    """
+    if find_spec("rerun") is None:
+        install = "pip install 'revolve-islands[view]'"
+        raise NetworkError(f"--view: the viewer is not installed: {install}")
+    if why := missing_screen():
+        beside = command_line("view", "--connect", folder, "--serve")
+        raise NetworkError(f"--view: {why}: run without it, and beside it: {beside}")
+
+
+def _has_arena(experiment: Experiment) -> bool:
+    numbers = range(island_count(experiment))
+    return any(island_experiment(experiment, one).arena is not None for one in numbers)
 
 
 def _has_one_arena(experiment: Experiment, options: argparse.Namespace) -> bool:

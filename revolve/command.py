@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Callable, Iterable
 from importlib import import_module
+from types import ModuleType
 
 from revolve.strangers import stranger
 
@@ -35,8 +36,9 @@ COMMANDS = {
 }
 """Module and summary of each command.
 
-The module's ``main`` gets the arguments, the command's name first. Names of two words
-take precedence over their first word; ``main`` gets them as one argument.
+The module's ``main`` gets the arguments, the command's name first; its ``parser``
+returns the parser of the command with that name. Names of two words take precedence
+over their first word; ``main`` gets them as one argument.
 """
 
 
@@ -100,16 +102,22 @@ def _tell(error: Exception) -> None:
 
 def _run(words: list[str], tell: Callable[[Exception], None]) -> int:
     """Run the command that the words start with and return its exit code."""
+    if words[:1] == ["help"]:
+        words = [*words[1:], "--help"]
     if not words or words[0] in ("-h", "--help"):
         print(_overview())
+        return 0
+    if words[0] == "--version":
+        print(import_module("revolve.cli.version").version_text())
         return 0
     name = " ".join(words[:2])
     if name in COMMANDS:
         words = [name, *words[2:]]
     if words[0] not in COMMANDS:
-        near = import_module("schema.experiment.file").nearest(words[0], COMMANDS)
+        allowed = ["help", *COMMANDS]
+        near = import_module("schema.errors").nearest(words[0], allowed)
         print(
-            f"revolve: no command {words[0]!r}{near}; allowed: {', '.join(COMMANDS)}",
+            f"revolve: no command {words[0]!r}{near}; allowed: {', '.join(allowed)}",
             file=sys.stderr,
         )
         return 2
@@ -118,6 +126,9 @@ def _run(words: list[str], tell: Callable[[Exception], None]) -> int:
     error_type = import_module("schema.errors").RevolveError
     try:
         room = import_module(COMMANDS[words[0]][0])
+        if line := _unknown_action(words, room):
+            print(line, file=sys.stderr)
+            return 2
         return int(room.main(words))
     except error_type as error:
         tell(error)
@@ -125,6 +136,23 @@ def _run(words: list[str], tell: Callable[[Exception], None]) -> int:
     finally:
         if words[1:] in (["-h"], ["--help"]):
             print(_also(words[0]), end="")
+
+
+def _unknown_action(words: list[str], room: ModuleType) -> str:
+    """Return a line about an unknown second word; empty if it is known.
+
+    A parser does not know the commands of two words, which other modules have.
+    """
+    others = [name.split()[1] for name in COMMANDS if name.startswith(f"{words[0]} ")]
+    if not others or words[1:2] == [] or words[1].startswith("-"):
+        return ""
+    actions = import_module("revolve.cli.parsers").actions
+    allowed = [*actions(room.parser(words[0])), *others]
+    if words[1] in allowed:
+        return ""
+    near = import_module("schema.errors").nearest(words[1], allowed)
+    what = f"no action {words[1]!r}{near}; allowed: {', '.join(allowed)}"
+    return f"revolve {words[0]}: {what} (see revolve {words[0]} --help)"
 
 
 def _is_interrupted(error: BaseException | None) -> bool:
@@ -230,7 +258,11 @@ def _lines(names: Iterable[str]) -> str:
 def _overview() -> str:
     return (
         "Evolve the bodies and brains of robots, on one machine or on many.\n\n"
-        "usage: revolve COMMAND ...    (help: revolve COMMAND --help)\n\n"
+        "usage: revolve COMMAND ...    (help: revolve help COMMAND)\n"
+        "       revolve --version\n\n"
         f"{_lines(COMMANDS)}\n\n"
-        "example: revolve run scenario1 --seed 1 --births 600"
+        "examples:\n"
+        "  revolve run scenario1 --seed 1 --births 600\n"
+        "  revolve view runs/scenario1-seed1 --robot best\n"
+        "  revolve analyze runs/scenario1-seed1"
     )

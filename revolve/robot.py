@@ -10,7 +10,7 @@ from coordinator.evolution.breeding import Breeder
 from revolve.children import SIMULATOR, plugins
 from revolve.experiment import Experiment, document_of
 from revolve.messages import Task
-from schema.errors import RevolveError
+from schema.errors import RevolveError, counted
 from schema.experiment.document import body_space
 from schema.experiment.settings import EvaluationSettings
 from schema.formats.files import read_robot, settings_of, write_robot
@@ -125,10 +125,9 @@ class Robot:
             return None
 
     def __repr__(self) -> str:
-        neurons, edges = len(self.brain.neurons), len(self.brain.connections)
-        return (
-            f"<Robot: {len(self.parts)} parts, {neurons} neurons, {edges} connections>"
-        )
+        neurons = counted(len(self.brain.neurons), "neuron")
+        edges = counted(len(self.brain.connections), "connection")
+        return f"<Robot: {counted(len(self.parts), 'part')}, {neurons}, {edges}>"
 
 
 def plain(robot: Robot | PlainRobot) -> PlainRobot:

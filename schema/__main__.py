@@ -1,11 +1,10 @@
 """``revolve robot``: robot files on the command line."""
 
-import argparse
 import sys
 from pathlib import Path
 
 from schema.agent.flags import Flags, add_plugins
-from schema.errors import RevolveError
+from schema.errors import RevolveError, counted
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
@@ -30,7 +29,7 @@ def main(argv: list[str] | None = None) -> int:
         RevolveError: a file does not hold a robot, or cannot be read or written.
     """
     words = ["robot", *sys.argv[1:]] if argv is None else argv
-    options = _parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
+    options = parser().parse_args(words[1:] if words[:1] == ["robot"] else words)
     allow(options.plugins)
     experiment = read_experiment(options.experiment) if options.experiment else None
     space, kinds = BUILT_IN, BUILT_IN_KINDS
@@ -48,40 +47,58 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = Flags(
+def parser(_command: str = "robot") -> Flags:
+    """Return the parser of ``revolve robot``."""
+    flags = Flags(
         prog="revolve robot",
         description="Check, convert or show a robot file. It reads .yaml, .yml, "
         ".pb, .xml (MJCF), and RoboGen's .txt and .json; it writes .yaml, .yml, .pb, "
         ".xml and .urdf.",
-        epilog="example: revolve robot convert spider.yaml spider.pb",
+        examples=(
+            "revolve robot check best.yaml",
+            "revolve robot show runs/scenario1-seed1/best.yaml",
+            "revolve robot convert best.yaml best.xml --experiment scenario1",
+        ),
     )
-    commands = parser.add_subparsers(dest="command", required=True)
+    commands = flags.add_subparsers(dest="command", required=True, metavar="ACTION")
     for name, what in (
         ("check", "check that a file holds a well-formed robot"),
         ("convert", "convert a robot file to another format (.urdf: the body only)"),
         ("show", "show the body and brain of a robot as a tree"),
     ):
-        command = commands.add_parser(name, help=what, description=what)
-        command.add_argument("file", type=Path, metavar="FILE")
+        outputs = (" best.pb", " best.xml") if name == "convert" else ("", "")
+        command = commands.add_parser(
+            name,
+            help=what,
+            description=f"{what.capitalize()}.",
+            examples=(
+                f"revolve robot {name} best.yaml{outputs[0]}",
+                f"revolve robot {name} wheeled.yaml{outputs[1]} --experiment mine.toml",
+            ),
+        )
+        command.add_argument("file", type=Path, metavar="FILE", help="robot file")
         if name == "convert":
-            command.add_argument("output", type=Path, metavar="OUTPUT")
+            command.add_argument(
+                "output", type=Path, metavar="OUTPUT", help="robot file to write"
+            )
         command.add_argument(
             "--experiment",
             metavar="NAME|FILE.toml",
-            help="use the part types and the world of this experiment (default: all "
-            "built-in part types and the default world)",
+            help="experiment whose settings to use (default: all built-in part types "
+            "and the default world)",
         )
         add_plugins(command)
-    return parser
+    return flags
 
 
 def _summary(robot: Robot) -> str:
     brain = robot.brain
     return (
-        f"{len(robot.parts)} parts, {brain.count('input')} inputs, "
-        f"{brain.count('output')} outputs, {brain.count('hidden')} hidden neurons, "
-        f"{len(brain.connections)} connections"
+        f"{counted(len(robot.parts), 'part')}, "
+        f"{counted(brain.count('input'), 'input')}, "
+        f"{counted(brain.count('output'), 'output')}, "
+        f"{counted(brain.count('hidden'), 'hidden neuron')}, "
+        f"{counted(len(brain.connections), 'connection')}"
     )
 
 

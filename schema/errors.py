@@ -110,6 +110,23 @@ def cut(text: str) -> str:
     return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]}..."
 
 
+def unreadable(error: OSError | UnicodeDecodeError) -> str:
+    """Return why a file cannot be read, as the end of a message."""
+    if isinstance(error, UnicodeDecodeError):
+        return f"cannot be read: not UTF-8 at byte {error.start}"
+    return f"cannot be read: {error.strerror or error}"
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number and a noun in the right form, such as "2 workers".
+
+    Args:
+        number: any whole number.
+        noun: singular of a noun whose plural ends in "s".
+    """
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
 def nearest(word: Any, words: Any) -> str:  # noqa: ANN401 - any iterable of str
     """Return ``; did you mean 'x'?`` for the nearest word, or an empty text."""
     # The search takes quadratic time.

@@ -2,6 +2,7 @@
 
 import sys
 
+from schema.agent.flags import Flags
 from schema.agent.supervisor import cores, prepare_process
 
 
@@ -22,6 +23,17 @@ def main(arguments: list[str]) -> int:
     from worker.serve.service import process
 
     return run_pool("worker", process, arguments[1:], processes=cores())
+
+
+def parser(command: str) -> Flags:
+    """Return the parser of ``worker`` or ``bench``."""
+    if command == "bench":
+        from worker.bench.command import parser as bench
+
+        return bench()
+    from schema.agent.command import parser as agent
+
+    return agent("worker", cores())
 
 
 def _bench(arguments: list[str]) -> int:

@@ -1,6 +1,5 @@
 """``revolve robot simulate``: simulate and evaluate the robot of a file."""
 
-import argparse
 import sys
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from schema.formats.mjcf import read_mjcf
 from schema.plugins.permission import allow
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
+from worker.robot.robustness import Judged, rejudge, small_changes, summary
 
 
 def main(arguments: list[str]) -> int:
@@ -32,7 +32,7 @@ def main(arguments: list[str]) -> int:
         ExperimentError: an invalid experiment, or a sensor that has no stimulus in
             its environment.
     """
-    options = _parser().parse_args(arguments[1:])
+    options = parser().parse_args(arguments[1:])
     allow(options.plugins)
     robot, settings = _read(options.file, options.experiment)
     found = evaluate(robot, settings)
@@ -49,7 +49,27 @@ def main(arguments: list[str]) -> int:
     ):
         # All digits, for comparisons of two runs.
         print(f"{name + ':':19}{value!r}{unit}")
+    if options.robustness:
+        _show_robustness(robot, settings, found.fitness)
     return 0
+
+
+def _show_robustness(
+    robot: Robot, settings: EvaluationSettings, fitness: float
+) -> None:
+    """Print the robot's fitness under each small change, then one line of all."""
+    judged: list[Judged] = []
+    for one in rejudge(robot, small_changes(settings)):
+        print(f"{one.change.name + ':':26}{_share(one.fitness, fitness)}", flush=True)
+        judged.append(one)
+    print(summary(fitness, judged))
+
+
+def _share(found: float | None, fitness: float) -> str:
+    if found is None:
+        return "failed"
+    share = f" ({100 * found / fitness:.0f} %)" if fitness > 0 else ""
+    return f"{found:.4f}{share}"
 
 
 def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings]:
@@ -61,21 +81,31 @@ def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings
     return read_robot(path, body_space(settings.space), kinds), settings
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = Flags(
+def parser(_command: str = "robot simulate") -> Flags:
+    """Return the parser of ``revolve robot simulate``."""
+    flags = Flags(
         prog="revolve robot simulate",
         description="Simulate a robot alone and evaluate it as an experiment does.",
-        epilog="example: revolve robot simulate best.yaml --experiment scenario1",
+        examples=(
+            "revolve robot simulate best.yaml --experiment scenario1",
+            "revolve robot simulate best.xml",
+        ),
     )
-    parser.add_argument("file", type=Path, metavar="FILE")
-    parser.add_argument(
+    flags.add_argument("file", type=Path, metavar="FILE", help="robot file")
+    flags.add_argument(
         "--experiment",
         metavar="NAME|FILE.toml",
         help="experiment whose settings to use (default: those in an MJCF file, or "
         "those of the thesis's off-line experiments)",
     )
-    add_plugins(parser)
-    return parser
+    flags.add_argument(
+        "--robustness",
+        action="store_true",
+        help="evaluate it again with finer time steps, 1 %% less friction and starts "
+        "raised by about 0.1 mm, and show how much of its fitness it keeps",
+    )
+    add_plugins(flags)
+    return flags
 
 
 if __name__ == "__main__":

@@ -94,7 +94,6 @@ def robot_picture(
 
     Raises:
         RunFolderError: the robot's birth is not recorded.
-        NoPictures: this machine cannot render.
         SimulationDiverged: the physics diverged.
     """
     row = row_of(best, births)

@@ -16,7 +16,6 @@ from analysis.render.picture import (
     save_animation,
     save_picture,
 )
-from schema.agent.flags import Flags, add_plugins, whole_number
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import Simulation, body_space
 from schema.experiment.file import read_experiment
@@ -29,24 +28,23 @@ FILM_ENDING = ".gif"
 PICTURE_ENDING = ".png"
 
 
-def main(arguments: list[str], simulate: Simulate) -> int:
+def render(options: argparse.Namespace, simulate: Simulate) -> int:
     """Render a robot in neutral pose or in motion; return the exit code.
 
     Args:
-        arguments: the command's name, ``robot render``, first.
+        options: of the command line.
         simulate: the worker's simulation.
 
     Returns:
         0 if the picture was written.
 
     Raises:
-        NoPictures: this machine cannot render, the file name has another ending, or
+        NoPictures: the file name has another ending, the file cannot be written, or
             ``--gait`` exceeds the number of ticks.
         InvalidRobot: the file contains no robot.
         SimulationDiverged: the physics diverged.
         ExperimentError: no such experiment, or it does not support a sensor.
     """
-    options = _parser().parse_args(arguments[1:])
     allow(options.plugins)
     out: Path = options.out
     is_film = out.suffix.lower() == FILM_ENDING
@@ -107,37 +105,3 @@ def _draw_motion(
         save_animation(pictures, out, tick_s)
     else:
         save_picture(gait_strip(pictures), out)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = Flags(
-        prog="revolve robot render",
-        description="Render a robot: in neutral pose, as a strip of consecutive "
-        "pictures (--gait), or as an animation of its evaluation (.gif).",
-        epilog="example: revolve robot render best.yaml best.png --gait 10",
-    )
-    parser.add_argument("file", type=Path, metavar="FILE", help="robot file")
-    parser.add_argument(
-        "out", type=Path, metavar="OUT.png|OUT.gif", help="picture to write"
-    )
-    parser.add_argument(
-        "--gait",
-        type=whole_number(1),
-        metavar="N",
-        help="render N pictures, one per tick of the brain from the middle of the "
-        "evaluation on, in rows of five",
-    )
-    parser.add_argument(
-        "--width",
-        type=whole_number(16),
-        default=640,
-        metavar="PIXELS",
-        help="width of a picture (default: 640)",
-    )
-    parser.add_argument(
-        "--experiment",
-        metavar="NAME|FILE.toml",
-        help="experiment that defines part types, simulation and environment",
-    )
-    add_plugins(parser)
-    return parser

@@ -1,7 +1,6 @@
 """``revolve view``: show a live run, or replay one from its tables."""
 
 import argparse
-import re
 from pathlib import Path
 
 from analysis.measures.load import Run
@@ -9,6 +8,7 @@ from analysis.progress import bars
 from analysis.viewer.blueprint import layout
 from analysis.viewer.body import box_model
 from analysis.viewer.entities import name_of
+from analysis.viewer.flags import LAST_S
 from analysis.viewer.live import LiveSource
 from analysis.viewer.motion import (
     Motion,
@@ -16,7 +16,7 @@ from analysis.viewer.motion import (
     selected_robots,
     show_motion,
 )
-from analysis.viewer.output import HOST, PORT, Output, Window, keep_serving
+from analysis.viewer.output import Output, Window, keep_serving
 from analysis.viewer.recording import Recording, ViewerError
 from analysis.viewer.replay import (
     CHUNK_S,
@@ -29,8 +29,7 @@ from analysis.viewer.resimulate import Simulators, resimulate
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
 from analysis.viewer.watch import watch
-from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
-from schema.agent.flags import Flags, add_plugins, number
+from schema.agent.command import connect_of, tls_of
 from schema.agent.log import tell_user
 from schema.agent.supervisor import stop_on_signals
 from schema.experiment.file import own_experiment
@@ -39,15 +38,12 @@ from schema.robot.ids import BirthId
 from schema.tables.description import allow_plugins_of
 from schema.wire.codec import decode_body
 
-LAST_S = 600.0
-"""Simulated time at the end of a run that is replayed by default [s]."""
 
-
-def main(arguments: list[str], simulators: Simulators) -> int:
+def view(options: argparse.Namespace, simulators: Simulators) -> int:
     """Show a run in the viewer.
 
     Args:
-        arguments: the command's name first.
+        options: of the command line.
         simulators: functions that simulate robots again.
 
     Returns:
@@ -58,18 +54,18 @@ def main(arguments: list[str], simulators: Simulators) -> int:
         NetworkError: no coordinator answers.
         ViewerError: the viewer cannot be opened, or the flags conflict.
     """
-    options = _flags().parse_args(arguments[1:])
     allow(options.plugins)
-    output = Output.of(options.save, options.serve)
     if options.run is not None and options.connect is not None:
         raise ViewerError("give either a run folder or --connect ADDRESS")
     if options.ancestry and not options.robot:
         raise ViewerError("--ancestry: needs --robot best or --robot ISLAND:BIRTH")
     if options.run is not None:
+        output = Output.of(options.save, options.serve)
         _replay(options, output, simulators)
         return 0
     if options.robot or (options.start, options.until) != (None, None):
         raise ViewerError("--robot, --from and --until: for a run folder only")
+    output = Output.of(options.save, options.serve)
     stop = stop_on_signals()
     with LiveSource(connect_of(options), options.fleet, tls_of(options)) as source:
         watch(source, output, options.follow, stop)
@@ -166,70 +162,3 @@ def _span(options: argparse.Namespace, folder: Path) -> tuple[float, float]:
             "for others"
         )
     return start_s, end_s
-
-
-def _robot_name(text: str) -> BirthId:
-    """Return the individual of a flag, such as ``0:17``.
-
-    Raises:
-        argparse.ArgumentTypeError: the text has another form.
-    """
-    match = re.fullmatch(r"(\d+):(\d+)", text)
-    if match is None:
-        raise argparse.ArgumentTypeError(
-            f"must be ISLAND:BIRTH such as 0:17, got {text!r}"
-        )
-    return BirthId(int(match[1]), int(match[2]))
-
-
-def _selected(text: str) -> BirthId | None:
-    """Return the individual of a flag; None is the best ever evaluated."""
-    return None if text == "best" else _robot_name(text)
-
-
-def _flags() -> Flags:
-    flags = Flags(
-        prog="revolve view",
-        description="Show a live run, or replay one from its tables.",
-        epilog="for example: revolve view runs/scenario3-seed1 --save run.rrd",
-        allow_abbrev=False,
-    )
-    flags.add_argument(
-        "run",
-        nargs="?",
-        type=Path,
-        help="run folder to replay (default: the live run at the hub)",
-    )
-    add_connect(flags)
-    flags.add_argument(
-        "--save", type=Path, metavar="FILE",
-        help="write a recording (.rrd) instead of opening a window",
-    )  # fmt: skip
-    flags.add_argument(
-        "--serve", nargs="?", const=f"{HOST}:{PORT}", metavar="HOST:PORT",
-        help=f"serve viewers instead of opening a window (default: {HOST}:{PORT})",
-    )  # fmt: skip
-    flags.add_argument(
-        "--follow", type=_robot_name, metavar="ISLAND:BIRTH",
-        help="follow a robot with the camera, for example 0:17",
-    )  # fmt: skip
-    flags.add_argument(
-        "--robot", action="append", default=[], type=_selected, metavar="ROBOT",
-        help="re-simulate a robot and show its full motion: 'best' (ever evaluated, "
-        "dead or alive) or ISLAND:BIRTH; may be repeated",
-    )  # fmt: skip
-    flags.add_argument(
-        "--ancestry", action="store_true",
-        help="with --robot: also its first parent, and so on back to the founder",
-    )  # fmt: skip
-    flags.add_argument(
-        "--from", dest="start", type=number, metavar="S",
-        help=f"replay poses from this simulated time on [s] (default: the last "
-        f"{LAST_S:g} s)",
-    )  # fmt: skip
-    flags.add_argument(
-        "--until", type=number, metavar="S", help="replay poses up to this time [s]"
-    )
-    add_network_flags(flags)
-    add_plugins(flags)
-    return flags

@@ -1,6 +1,7 @@
 """Destinations of a recording: a file, a server for viewers, or a window."""
 
 import contextlib
+import getpass
 import shlex
 import socket
 import subprocess
@@ -8,11 +9,20 @@ import sys
 import threading
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import quote
 
+from analysis.viewer.flags import HOST
 from analysis.viewer.recording import Recording, ViewerError
 from schema.agent.log import tell_user
+from schema.agent.screen import missing_screen
 
-HOST, PORT = "127.0.0.1", 9876
+WITHOUT_SCREEN = (
+    "use --save FILE.rrd for a recording that 'rerun FILE.rrd' opens elsewhere, or "
+    "--serve, which tells how to view through an SSH tunnel or in a browser"
+)
+"""Advice on a machine without a screen."""
+_LOOPBACK = ("127.0.0.1", "localhost")
+_WEB = 9090
 _ENDING = ".rrd"
 _WINDOW_S = 3.0
 _POLL_S = 0.2
@@ -38,7 +48,7 @@ class Output:
 
         Raises:
             ViewerError: the address is invalid or in use, the folder does not exist,
-                or the file does not end in .rrd.
+                the file does not end in .rrd, or a window needs a screen.
         """
         if save is not None and save.suffix != _ENDING:
             raise ViewerError(f"--save {save}: must end in {_ENDING}")
@@ -47,6 +57,8 @@ class Output:
         if serve is not None or save is not None:
             address = None if serve is None else _address(serve)
             return cls(save, address, has_window=False)
+        if why := missing_screen():
+            raise ViewerError(f"{why}: {WITHOUT_SCREEN}")
         return cls(None, (HOST, _free_port()), has_window=True)
 
     @property
@@ -69,7 +81,8 @@ class Window:
         self._process: subprocess.Popen[bytes] | None = None
         if not output.has_window:
             if output.url:
-                tell_user(f"serving; to view: rerun --connect {output.url}")
+                for line in ways_to_view(output):
+                    tell_user(line)
             return
         # The viewer's own server, which is not used, listens on this machine only.
         command = [sys.executable, "-m", "rerun", "--bind", HOST, "--connect"]
@@ -91,11 +104,33 @@ class Window:
         """
         ended = None if self._process is None else self._process.poll()
         if ended is not None and ended > 0:
-            raise ViewerError(
-                "the viewer cannot open a window; without a screen use --save FILE, or "
-                "--serve and a viewer on another machine"
-            )
+            raise ViewerError(f"the viewer cannot open a window: {WITHOUT_SCREEN}")
         return ended is not None
+
+
+def ways_to_view(output: Output) -> list[str]:
+    """Return lines about the viewers that can show what is served.
+
+    Args:
+        output: with a server.
+    """
+    assert output.serve is not None
+    host, port = output.serve
+    lines = [f"serving; to view: rerun --connect {output.url}"]
+    tunnel = ""
+    if host in _LOOPBACK:
+        to = f"{getpass.getuser()}@{socket.gethostname()}"
+        lines.append(
+            f"from another machine: ssh -N -L {port}:{host}:{port} {to}, and there the "
+            "same"
+        )
+        tunnel = f"; through SSH: -L {port}:{host}:{port} -L {_WEB}:{host}:{_WEB}"
+    page = f"http://{host}:{_WEB}?url={quote(output.url, safe='')}"
+    lines.append(
+        f"in a browser: rerun --serve-web --bind {host} --web-viewer-port {_WEB} "
+        f"{output.url}, then open {page}{tunnel}"
+    )
+    return lines
 
 
 def keep_serving(

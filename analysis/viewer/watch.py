@@ -15,7 +15,7 @@ from analysis.viewer.recording import Recording
 from analysis.viewer.scene import Scene, scene_of
 from analysis.viewer.show import Show
 from schema.agent.log import tell_user
-from schema.errors import MalformedMessage, NetworkError, RevolveError
+from schema.errors import MalformedMessage, NetworkError, RevolveError, counted
 from schema.experiment.file import experiment_from_text
 from schema.limits import printable
 from schema.robot.ids import BirthId
@@ -65,10 +65,14 @@ def watch(
             while not (stop.is_set() or view.has_ended or window.was_closed):
                 now_s = time.monotonic()
                 if not output.has_window:  # the window shows it, next to a run's bars
-                    progress.update(f"recording {name}: {view.births} births", now_s)
+                    progress.update(
+                        f"recording {name}: {counted(view.births, 'birth')}", now_s
+                    )
                 view.tell(source.receive(_POLL_S, now_s))
         if dropped := view.dropped + source.dropped:
-            tell_user(f"dropped {dropped} messages: malformed, or not of this run")
+            tell_user(
+                f"dropped {counted(dropped, 'message')}: malformed, or not of this run"
+            )
         if view.has_ended:
             tell_user("the run has ended")
         keep_serving(output, window, recording, stop)

@@ -41,6 +41,17 @@ PLAIN: dict[str, OperatorAction] = {
     "snapshot": SaveSnapshot(),
 }
 
+_ANY = ("", "--connect runs/scenario3-seed1")
+_EXAMPLES = {
+    "list": _ANY,
+    "pause": _ANY,
+    "resume": _ANY,
+    "insert": ("best.yaml", "best.yaml --place 0.5 -1.2"),
+    "remove": ("17", "17 --island 1 --connect runs/archipelago-arenas-seed1"),
+    "brain": ("17 best.yaml", "17 best.yaml --island 1"),
+    "snapshot": _ANY,
+}
+
 
 def main(arguments: list[str]) -> int:
     """Send one request to a running coordinator and print its reply.
@@ -55,7 +66,7 @@ def main(arguments: list[str]) -> int:
         NetworkError: no coordinator answers, or several have such a run.
         InvalidRobot: the file holds no robot.
     """
-    options = _parser().parse_args(arguments[1:])
+    options = parser().parse_args(arguments[1:])
     action = _action(options)
     coordinator = _coordinator(options)
     request = OperatorRequest(uuid4().hex, options.island, action, options.run)
@@ -104,17 +115,28 @@ def _file(name: str) -> Path:
     return path
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = Flags(
+def parser(_command: str = "arena") -> Flags:
+    """Return the parser of ``revolve arena``."""
+    flags = Flags(
         prog="revolve arena",
         description="Inspect and control a running arena.",
-        epilog="example: revolve arena list --connect runs/scenario3-seed1",
+        examples=(
+            "revolve arena list --connect runs/scenario3-seed1",
+            "revolve arena pause --connect runs/scenario3-seed1",
+            "revolve arena remove 17",
+        ),
         allow_abbrev=False,
     )
-    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    actions = flags.add_subparsers(dest="action", required=True, metavar="ACTION")
     for name, what in ACTIONS.items():
         action = actions.add_parser(
-            name, help=what, description=f"{what.capitalize()}.", allow_abbrev=False
+            name,
+            help=what,
+            description=f"{what.capitalize()}.",
+            allow_abbrev=False,
+            examples=[
+                f"revolve arena {name} {words}".rstrip() for words in _EXAMPLES[name]
+            ],
         )
         if name in ("remove", "brain"):
             action.add_argument(
@@ -122,7 +144,7 @@ def _parser() -> argparse.ArgumentParser:
             )
         if name in ("insert", "brain"):
             action.add_argument(
-                "file", metavar="FILE", help="robot: .yaml, .yml or .pb"
+                "file", metavar="FILE", help="robot file: .yaml, .yml or .pb"
             )
         if name == "insert":
             action.add_argument(
@@ -136,4 +158,4 @@ def _parser() -> argparse.ArgumentParser:
         )  # fmt: skip
         add_count(action, "--island", 0, "island number", least=0)
         add_network_flags(action)
-    return parser
+    return flags

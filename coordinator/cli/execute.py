@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
+from coordinator.cli.campaign_table import outcome_of, show
 from coordinator.cli.deployment import Deployment
 from coordinator.cli.main_loop import execute_runs
 from coordinator.cli.summary import Conclusion, conclude, has_evaluated
@@ -34,7 +35,7 @@ from coordinator.storage.hints import command, stopped
 from coordinator.storage.lock import FolderLock
 from schema.agent.log import tell_error, tell_user, warn_user
 from schema.agent.stopping import STOPPED, advise, tell_stopped
-from schema.errors import NetworkError, RevolveError, RunFolderError
+from schema.errors import NetworkError, RevolveError, RunFolderError, counted
 from schema.experiment.document import Experiment
 from schema.experiment.file import experiment_from_text, experiment_text
 from schema.tables.description import STATE, read_state
@@ -208,7 +209,7 @@ def _execute_campaign(
     advise(stopped(folder))
     finished = sum(one.is_finished for one in planned)
     if finished:
-        tell_user(f"{finished} of {len(planned)} runs are already finished")
+        tell_user(f"{finished} of {counted(len(planned), 'run')} already finished")
 
     def conclude_run(run: RunSession) -> None:
         conclusion = conclude(run)
@@ -221,15 +222,26 @@ def _execute_campaign(
     if not scheduler.is_finished:
         tell_stopped()
         return STOPPED
+    broken = {
+        *(str(path.resolve()) for path in failed),
+        *(status.folder for status, _ in scheduler.failed),
+    }
+    show(
+        outcome_of(
+            Path(one.status.folder),
+            one.status.name,
+            has_failed=one.status.folder in broken,
+        )
+        for one in planned
+    )
     if scheduler.failed:
         tell_user(
-            f"{len(scheduler.failed)} of {len(planned)} runs failed; after fixing the "
-            f"cause, run: {command('resume', folder)}"
+            f"{len(scheduler.failed)} of {counted(len(planned), 'run')} failed; after "
+            f"fixing the cause, run: {command('resume', folder)}"
         )
         return 1
-    print(
-        f"{len(planned)} runs are finished\ntry next:\n  {command('analyze', folder)}"
-    )
+    runs = counted(len(planned), "run")
+    print(f"{runs} finished\ntry next:\n  {command('analyze', folder)}")
     return 1 if failed else 0
 
 

@@ -25,35 +25,53 @@ from schema.experiment.file import shipped_experiments
 _COMMANDS = {
     "run": (
         "Evolve experiments with coordinator, analyzer and workers on this machine.",
-        "revolve run scenario1 --seed 1 --births 600",
+        (
+            "revolve run scenario1 --seed 1 --births 600",
+            "revolve run mine.toml --births 100 --out runs/first --workers 2",
+            "revolve run scenario1 no-selection --repeats 5    # a campaign",
+            "revolve run scenario3 --births 60 --view",
+        ),
     ),
     "coordinator": (
         "Run experiments on workers and analyzers that connect.",
-        "revolve coordinator scenario1 --seed 1",
+        (
+            "revolve coordinator scenario1 --seed 1    # then: revolve worker",
+            "revolve coordinator thesis --repeats 30 --connect hub",
+            "revolve coordinator mine.toml --listen tcp/127.0.0.1:7447",
+        ),
     ),
     "resume": (
         "Resume a run or campaign that was stopped or killed.",
-        "revolve resume runs/scenario1-seed1",
+        (
+            "revolve resume runs/scenario1-seed1",
+            "revolve resume runs/thesis-seed1 --workers 2 --quiet",
+        ),
     ),
     "compare": (
         "Compare two runs row by row, in all columns that are equal for equal seeds.",
-        "revolve compare runs/a runs/b",
+        (
+            "revolve compare runs/a runs/b",
+            "revolve compare runs/before/scenario1-0 runs/after/scenario1-0",
+        ),
     ),
     "bench dispatch": (
         "Measure the coordinator's cost per job and per birth; simulate large fleets.",
-        "revolve bench dispatch",
+        (
+            "revolve bench dispatch",
+            "revolve bench dispatch --seconds 2 --workers 4 --births 300",
+        ),
     ),
 }
-"""Description and example of each command."""
+"""Description and examples of each command."""
 
 
-def parser(command: str) -> argparse.ArgumentParser:
+def parser(command: str) -> Flags:
     """Return the parser of a command's arguments."""
-    description, example = _COMMANDS[command]
+    description, examples = _COMMANDS[command]
     flags = Flags(
         prog=f"revolve {command}",
         description=description,
-        epilog=f"example: {example}",
+        examples=examples,
         allow_abbrev=False,
     )
     if command == "compare":
@@ -78,10 +96,10 @@ def _add_bench(flags: argparse.ArgumentParser) -> None:
         type=positive_number,
         default=5.0,
         metavar="S",
-        help="duration of each measurement over the network (default: 5)",
+        help="duration of each measurement, over the network (default: 5)",
     )
-    add_count(flags, "--workers", 8, "workers that sleep 40 ms per evaluation")
-    add_count(flags, "--births", 1500, "births without physics")
+    add_count(flags, "--workers", 8, "number of workers; each sleeps 40 ms per job")
+    add_count(flags, "--births", 1500, "number of births, without physics")
 
 
 def _add_experiments(flags: argparse.ArgumentParser) -> None:
@@ -101,7 +119,8 @@ def _add_experiments(flags: argparse.ArgumentParser) -> None:
     flags.add_argument(
         "--out",
         metavar="FOLDER",
-        help="run or campaign folder (default: runs/NAME-seedSEED)",
+        help="folder to write to, a run's or a campaign's (default: "
+        "runs/NAME-seedSEED)",
     )
 
 
@@ -114,8 +133,8 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
             flags,
             "--workers",
             None,
-            "worker processes to start here (default: one per core, none with "
-            "--connect)",
+            "number of workers, started on this machine (default: one per core, none "
+            "with --connect)",
             least=0,
         )
         add_oversubscribe(flags)
@@ -123,8 +142,8 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
             flags,
             "--threads",
             None,
-            "threads of each worker that advance one arena together (default: one per "
-            "core for an arena, else 1)",
+            "number of threads that advance one arena together, in each worker "
+            "(default: one per core for an arena, else 1)",
         )
         flags.add_argument(
             "--in-process",
@@ -135,13 +154,13 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
     flags.add_argument(
         "--listen",
         metavar="ADDRESS",
-        help=f"address that agents connect to, {FORMS} (default: {listen})",
+        help=f"address to listen on, {FORMS} (default: {listen})",
     )
     flags.add_argument(
         "--connect",
         metavar="ADDRESS",
-        help="share the workers of an existing hub: its address, or the folder of an "
-        "active run",
+        help=f"address of the hub, {FORMS}, or the folder of an active run; its "
+        "workers are shared (default: start a hub)",
     )
     add_access(flags)
     add_network_flags(flags)
@@ -149,7 +168,8 @@ def _add_deployment(flags: argparse.ArgumentParser, command: str) -> None:
         "--speed",
         type=positive_number,
         metavar="X",
-        help="limit arenas to X simulated seconds per second (default: no limit)",
+        help="limit arenas to X simulated seconds per second; refused if there is no "
+        "arena (default: no limit)",
     )
     flags.add_argument(
         "--view", action="store_true", help="open a viewer, as revolve view does"

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from schema.wire.status import IslandStatus, PeerFault, RunStatus
+from schema.wire.status import IslandStatus, PeerFault, RunStatus, Status
 
 _MOST_PEERS = 5
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
@@ -38,6 +38,26 @@ def best_of(counted: RunStatus | IslandStatus) -> str:
         each = " ".join("-" if best is None else f"{best:.3f}" for best in bests)
         return f"best {each}"
     return f"best {max(judged):.3f}"
+
+
+def missing_agents(status: Status) -> list[str]:
+    """Return the kinds of agents that a coordinator has none of, in the plural."""
+    counts = {"workers": status.workers, "analyzers": status.analyzers}
+    return [kind for kind, count in counts.items() if not count]
+
+
+def state_of(run: RunStatus, status: Status, *, is_live: bool) -> str:
+    """Return the state of a run for a table.
+
+    Args:
+        run: one run of the status.
+        status: of all runs.
+        is_live: a coordinator reported it, so that its agents are known.
+    """
+    missing = missing_agents(status)
+    if is_live and missing and run.state == "running":
+        return f"waiting for {' and '.join(missing)}"
+    return run.state
 
 
 def about_arenas(run: RunStatus) -> str:

@@ -27,7 +27,7 @@ def main(arguments: list[str]) -> int:
     Raises:
         NetworkError: an address that cannot be listened on, or invalid certificates.
     """
-    options = _flags().parse_args(arguments[1:])
+    options = parser().parse_args(arguments[1:])
     start_log("hub", as_json=options.log_json)
     tls, certificates = tls_of(options), access_of(options)
     addresses = tuple(map(listen_address, options.listen or [HUB]))
@@ -42,18 +42,24 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
-def _flags() -> Flags:
+def parser(_command: str = "hub") -> Flags:
+    """Return the parser of ``revolve hub``."""
     flags = Flags(
         prog="revolve hub",
         description="Connect coordinators, agents and viewers until Ctrl-C.",
-        epilog="example: revolve hub",
+        examples=(
+            "revolve hub    # for the processes of this user on this machine",
+            "revolve hub --listen tcp/127.0.0.1:7447",
+            "revolve hub --listen tls/0.0.0.0:7447 --access access.json",
+        ),
         allow_abbrev=False,
     )
     flags.add_argument(
         "--listen",
         action="append",
         metavar="ADDRESS",
-        help=f"address, {FORMS}; may be repeated (default: this user's hub)",
+        help=f"address to listen on, {FORMS}; may be repeated (default: this user's "
+        "hub)",
     )
     add_access(flags)
     add_network_flags(flags)

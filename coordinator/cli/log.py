@@ -40,7 +40,7 @@ def main(arguments: list[str]) -> int:
     Raises:
         RunFolderError: the folder holds no run, or the run no journal.
     """
-    options = _flags().parse_args(arguments[1:])
+    options = parser().parse_args(arguments[1:])
     selection = Selection(options.island, *options.birth)
     path = _journal_of(options.folder, is_followed=options.follow)
     if not options.json:
@@ -155,7 +155,8 @@ def _birth(text: str) -> tuple[int | None, int]:
         ) from None
 
 
-def _flags() -> Flags:
+def parser(_command: str = "log") -> Flags:
+    """Return the parser of ``revolve log``."""
     flags = Flags(
         prog="revolve log",
         description="Print the journal of a run, one line per event: the answers of "
@@ -163,11 +164,14 @@ def _flags() -> Flags:
         "run acted on them. A birth is ISLAND:NUMBER; try counts the attempts of "
         "a birth and the evaluations of a robot. Only reads, also beside a running "
         "coordinator.",
-        epilog="example: revolve log runs/scenario1-seed1 --birth 12 --follow",
+        examples=(
+            "revolve log runs/scenario1-seed1 --follow",
+            "revolve log runs/scenario1-seed1 --birth 12 --json",
+        ),
         allow_abbrev=False,
     )
     flags.add_argument("folder", type=Path, metavar="RUN", help="run folder")
-    islands = "only events that island N handles (default: all)"
+    islands = "island number, of the events to print (default: all)"
     add_count(flags, "--island", None, islands, least=0)
     flags.add_argument(
         "--birth",
@@ -178,7 +182,7 @@ def _flags() -> Flags:
         "of an advance only that robot's state (default: all)",
     )
     flags.add_argument(
-        "--json", action="store_true", help="print one JSON object per line"
+        "--json", action="store_true", help="print JSON, one object per line"
     )
     flags.add_argument(
         "--follow",

@@ -8,37 +8,54 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    ProgressColumn,
     TaskID,
     TextColumn,
 )
+from rich.table import Column
 
-from coordinator.cli.format import about_arenas, best_of, duration, run_details
+from coordinator.cli.format import (
+    about_arenas,
+    best_of,
+    duration,
+    missing_agents,
+    run_details,
+)
 from coordinator.run.scheduler import RunScheduler
 from coordinator.run.session import SPAN_S
 from schema.agent.log import log_form, tell_user, warn_user
+from schema.errors import counted
 from schema.wire.status import IslandStatus, RunStatus, Status
 
 MOST_BARS = 16
 """Bars of single runs or islands that fit on a screen."""
+_LEAST_FOR_BAR = 60
+"""Characters of the narrowest terminal that has room for a bar."""
 
 
 class Display:
     """Progress bars; without a terminal a line at regular intervals."""
 
-    def __init__(self, scheduler: RunScheduler, *, quiet: bool) -> None:
-        """Show all runs of a scheduler; nothing if ``quiet``."""
+    def __init__(
+        self, scheduler: RunScheduler, *, quiet: bool, console: Console | None = None
+    ) -> None:
+        """Show all runs of a scheduler; nothing if ``quiet``.
+
+        Args:
+            scheduler: its runs.
+            quiet: show nothing.
+            console: where to draw; None: on standard error.
+        """
         self._scheduler = scheduler
-        self._console = Console(stderr=True)
+        self._console = console or Console(stderr=True)
         self._quiet = quiet
         # Bars would break lines of JSON.
         self._has_bars = self._console.is_terminal and log_form() != "json"
         self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TextColumn("births {task.fields[about]}"),
+            *_columns(self._console.width),
             console=self._console,
             disable=quiet or not self._has_bars,
+            expand=True,
         )
         self._tasks: dict[str, TaskID] = {}
         self._next_line_s = -math.inf
@@ -82,50 +99,50 @@ class Display:
 
     def _draw(self, status: Status) -> None:
         rows: dict[str, tuple[IslandStatus | RunStatus | Status, str]] = {}
-        about = ", ".join([_rates(status), *self._recoveries()])
+        left = f"{duration(status.left_s)} left"
+        rates = ", ".join([_pace(status), *self._recoveries()])
         if len(status.runs) > 1:
             name = _runs_done(status)
-            rows[""] = (status, about)
+            rows[""] = (status, f"{left}, {rates}")
             active = [run for run in status.runs if run.state == "running"]
             for run in active[:MOST_BARS]:
                 rows[f"{run.name}-{run.run}"] = (run, run_details(run))
         else:
             (run,) = status.runs
             name = run.name
-            rows[""] = (run, f"{about}, {run_details(run)}")
+            rows[""] = (run, f"{left}, {best_of(run)}, {rates}{about_arenas(run)}")
             islands = run.islands if 1 < len(run.islands) <= MOST_BARS else ()
             for number, island in enumerate(islands):
                 rows[f"  island {number}"] = (island, best_of(island))
         for gone in [key for key in self._tasks if key not in rows]:
             self._progress.remove_task(self._tasks.pop(gone))
-        for key, (counted, what) in rows.items():
+        for key, (shown, what) in rows.items():
             if key not in self._tasks:
                 self._tasks[key] = self._progress.add_task(key, about="")
             self._progress.update(
                 self._tasks[key],
                 description=key or name,
-                completed=counted.births,
-                total=counted.wanted,
+                completed=shown.births,
+                total=shown.wanted,
                 about=what,
             )
 
     def _warn_of_missing(self, status: Status, now_s: float) -> None:
         """Warn of missing kinds of agents, and of arenas without a suitable worker."""
-        counts = {"worker": status.workers, "analyzer": status.analyzers}
-        missing = [kind for kind, count in counts.items() if not count]
+        missing = missing_agents(status)
         if not missing:
             self._missing_since_s = None
         elif self._missing_since_s is None:
             self._missing_since_s = now_s
         elif now_s - self._missing_since_s > SPAN_S:
             self._missing_since_s = now_s + 6 * SPAN_S
-            self._warn(f"waiting: no {' and no '.join(missing)} has joined")
+            self._warn(f"waiting for {' and '.join(missing)}: none has joined")
         waiting = {
             f"arena {shard} of {run.held.path.name}": platform
             for run in self._scheduler.active
             for shard, platform in run.waiting.items()
         }
-        if "worker" not in missing and waiting != self._shown_waiting:
+        if "workers" not in missing and waiting != self._shown_waiting:
             self._shown_waiting = waiting
             for arena, platform in waiting.items():
                 self._warn(
@@ -142,7 +159,7 @@ class Display:
 
 def _line(status: Status) -> str:
     """Return the state as one line of a log."""
-    about = f"{status.births} of {status.wanted} births, {_rates(status)}"
+    about = f"{status.births} of {counted(status.wanted, 'birth')}, {_rates(status)}"
     if len(status.runs) == 1:
         return f"{about}{about_arenas(status.runs[0])}"
     return f"{_runs_done(status)}, {about}"
@@ -150,11 +167,32 @@ def _line(status: Status) -> str:
 
 def _runs_done(status: Status) -> str:
     done = sum(run.state == "finished" for run in status.runs)
-    return f"{done} of {len(status.runs)} runs"
+    return f"{done} of {counted(len(status.runs), 'run')}"
 
 
 def _rates(status: Status) -> str:
-    return (
-        f"{status.births_per_s:.1f}/s, {duration(status.left_s)} left, "
-        f"{status.workers} workers"
-    )
+    left = f"{duration(status.left_s)} left"
+    return f"{status.births_per_s:.1f}/s, {left}, {counted(status.workers, 'worker')}"
+
+
+def _pace(status: Status) -> str:
+    return f"{status.births_per_s:.1f} births/s, {counted(status.workers, 'worker')}"
+
+
+def _columns(width: int) -> list[ProgressColumn]:
+    """Return the columns of the bars: the count first, the least important last.
+
+    Only the last one is cut where the terminal is narrow.
+
+    Args:
+        width: of the terminal in characters.
+    """
+    name = Column(no_wrap=True, overflow="ellipsis", max_width=max(12, width // 3))
+    rest = Column(no_wrap=True, overflow="ellipsis", ratio=1)
+    bar = [BarColumn(bar_width=width // 8)] if width >= _LEAST_FOR_BAR else []
+    return [
+        MofNCompleteColumn(table_column=Column(no_wrap=True, justify="right")),
+        TextColumn("{task.description}", table_column=name),
+        *bar,
+        TextColumn("{task.fields[about]}", table_column=rest),
+    ]

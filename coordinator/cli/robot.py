@@ -1,11 +1,11 @@
 """``revolve robot random``: random robots as evolution starts with."""
 
-import argparse
 import sys
 from pathlib import Path
 
 from coordinator.evolution.breeding import Breeder
 from schema.agent.flags import Flags, add_count
+from schema.errors import counted
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.experiment.file import read_experiment
@@ -28,7 +28,7 @@ def main(arguments: list[str]) -> int:
         ExperimentError: no such experiment, or it allows (nearly) no robot.
         InvalidRobot: a file cannot be written.
     """
-    options = _parser().parse_args(arguments[1:])
+    options = parser().parse_args(arguments[1:])
     experiment = read_experiment(options.experiment)
     breeder = Breeder(experiment, options.seed, run=0)
     space = body_space(experiment.space)
@@ -41,28 +41,36 @@ def main(arguments: list[str]) -> int:
         if options.count > 1:
             path = path.with_stem(f"{path.stem}-{number}")
         write_robot(robot, path, space, settings_of(experiment), kinds)
-        print(f"{path}: {len(robot.parts)} parts, {len(robot.brain.neurons)} neurons")
+        parts = counted(len(robot.parts), "part")
+        print(f"{path}: {parts}, {counted(len(robot.brain.neurons), 'neuron')}")
     return 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = Flags(
+def parser(_command: str = "robot random") -> Flags:
+    """Return the parser of ``revolve robot random``."""
+    flags = Flags(
         prog="revolve robot random",
         description="Generate random robots as an experiment generates its founders.",
-        epilog="example: revolve robot random some.yaml --seed 7 --count 3",
+        examples=(
+            "revolve robot random some.yaml --seed 7 --count 3",
+            "revolve robot random light.xml --experiment light",
+        ),
     )
-    parser.add_argument(
-        "file", type=Path, metavar="FILE", help="output: .yaml, .pb, .xml, ..."
+    flags.add_argument(
+        "file",
+        type=Path,
+        metavar="FILE",
+        help="robot file, to be written: .yaml, .pb, .xml, ...",
     )
-    add_count(parser, "--seed", 1, "random seed", least=0)
-    add_count(parser, "--count", 1, "number of robots", least=0)
-    parser.add_argument(
+    add_count(flags, "--seed", 1, "random seed", least=0)
+    add_count(flags, "--count", 1, "number of robots", least=0)
+    flags.add_argument(
         "--experiment",
         default="scenario1",
         metavar="NAME|FILE.toml",
         help="experiment whose settings to use (default: %(default)s)",
     )
-    return parser
+    return flags
 
 
 if __name__ == "__main__":

@@ -7,19 +7,20 @@ from uuid import uuid4
 from rich.console import Console
 from rich.table import Table
 
-from coordinator.cli.format import duration, fault_lines, run_details
+from coordinator.cli.format import duration, fault_lines, run_details, state_of
 from coordinator.cli.status_json import Source, status_json
 from coordinator.network.client_service import ask_coordinators
-from coordinator.storage.campaign import CAMPAIGN, read_campaign
+from coordinator.storage.campaign import CAMPAIGN, is_campaign, read_campaign
 from coordinator.storage.folder import EPOCH, RunDetails, holds_run
 from coordinator.storage.folder_status import folder_status, unbegun_status
+from coordinator.storage.hints import command
 from coordinator.storage.journal import NAME as JOURNAL
 from coordinator.storage.lock import LOCK, read_holder
 from schema.agent.address import read_address
 from schema.agent.command import add_connect, add_network_flags, connect_of, tls_of
 from schema.agent.flags import Flags
 from schema.agent.log import tell_user
-from schema.errors import NetworkError, RevolveError, RunFolderError
+from schema.errors import NetworkError, RevolveError, RunFolderError, counted
 from schema.limits import printable
 from schema.tables.description import DETAILS
 from schema.tables.segments import FINISHED, SEGMENTS
@@ -49,7 +50,7 @@ def main(arguments: list[str]) -> int:
         NetworkError: no coordinator answers at the address.
         RunFolderError: the folder holds no run and no campaign.
     """
-    flags = _flags()
+    flags = parser()
     options = flags.parse_args(arguments[1:])
     if options.folder is not None and options.connect is not None:
         flags.error("give either a folder or --connect")
@@ -66,8 +67,7 @@ def main(arguments: list[str]) -> int:
         print(status_json(sources))
         return code
     for source in sources:
-        title = source.folder or source.coordinator or ""
-        _show(source.status, title, Path(source.folder) if source.folder else None)
+        _show(source)
     return code
 
 
@@ -171,8 +171,10 @@ def _damaged(folder: Path, error: RevolveError) -> RunStatus:
     return RunStatus(str(folder.resolve()), folder.name, 0, "damaged")
 
 
-def _show(status: Status, title: str, root: Path | None = None) -> None:
-    """Print the progress of runs, named by path below ``root`` or folder name."""
+def _show(source: Source) -> None:
+    """Print the progress of runs, named by path below the folder or folder name."""
+    status, is_live = source.status, source.coordinator is not None
+    root = Path(source.folder) if source.folder else None
     table = Table("run", "state", "births", "births/s", "best alive, arenas", box=None)
     above = root and root.resolve()
     for run in status.runs:
@@ -183,21 +185,25 @@ def _show(status: Status, title: str, root: Path | None = None) -> None:
             name = folder.name
         table.add_row(
             name,
-            run.state,
+            state_of(run, status, is_live=is_live),
             f"{run.births} of {run.wanted}" if run.islands else "",
             f"{run.births_per_s:.1f}" if run.births_per_s else "",
             run_details(run) if run.islands else "",
         )
     done = sum(run.state == "finished" for run in status.runs)
-    births = f"{status.births} of {status.wanted} births"
-    lines = [title, f"{done} of {len(status.runs)} runs finished, {births}"]
-    if status.workers or status.analyzers:
+    births = f"{status.births} of {counted(status.wanted, 'birth')}"
+    runs = counted(len(status.runs), "run")
+    lines = [
+        source.folder or source.coordinator or "",
+        f"{done} of {runs} finished, {births}",
+    ]
+    if is_live:
         lines.append(
-            f"{status.births_per_s:.1f} births/s, {status.workers} workers, "
-            f"{status.analyzers} analyzers, {duration(status.left_s)} left"
+            f"{status.births_per_s:.1f} births/s, {counted(status.workers, 'worker')}, "
+            f"{counted(status.analyzers, 'analyzer')}, {duration(status.left_s)} left"
         )
     elif done < len(status.runs):
-        lines.append("no coordinator is running, or it has no workers and analyzers")
+        lines.append(_without_coordinator(status, root))
     lines += [printable(line, _WIDEST) for line in fault_lines(status.faults)]
     # Wide: a narrow terminal wraps lines, but none is cut.
     console = Console(width=_WIDEST, highlight=False, markup=False)
@@ -206,11 +212,25 @@ def _show(status: Status, title: str, root: Path | None = None) -> None:
     console.print(table)
 
 
-def _flags() -> Flags:
+def _without_coordinator(status: Status, root: Path | None) -> str:
+    """Return a line about unfinished runs whose coordinator does not report them."""
+    if any(run.state == "running" for run in status.runs):
+        return "the coordinator does not answer"
+    if root is not None and (is_campaign(root) or holds_run(root)):
+        return f"no coordinator is running; to continue: {command('resume', root)}"
+    return "no coordinator is running"
+
+
+def parser(_command: str = "status") -> Flags:
+    """Return the parser of ``revolve status``."""
     flags = Flags(
         prog="revolve status",
         description="Show the progress of a run, a campaign or all runs of a fleet.",
-        epilog="example: revolve status runs/thesis-seed1",
+        examples=(
+            "revolve status    # all coordinators at this user's hub",
+            "revolve status runs",
+            "revolve status runs/thesis-seed1 --json",
+        ),
         allow_abbrev=False,
     )
     flags.add_argument(
@@ -221,7 +241,7 @@ def _flags() -> Flags:
         "coordinators at the hub)",
     )
     flags.add_argument(
-        "--json", action="store_true", help="print one JSON document for programs"
+        "--json", action="store_true", help="print JSON, one document for programs"
     )
     add_connect(flags)
     add_network_flags(flags)

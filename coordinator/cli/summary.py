@@ -12,6 +12,7 @@ from coordinator.evolution.encodings import encoding_of
 from coordinator.evolution.selection import fittest_first
 from coordinator.run.session import RunSession
 from coordinator.storage.hints import command
+from schema.errors import counted
 from schema.experiment.brains import neuron_kinds
 from schema.experiment.document import body_space
 from schema.formats.files import write_robot
@@ -64,10 +65,14 @@ def _results(run: RunSession) -> list[str]:
         each for each in islands if not (isinstance(each, Arena) and each.is_extinct)
     ]
     if not alive:
-        return [f"extinct after {births} births: too few robots are left to mate"]
+        return [
+            f"extinct after {counted(births, 'birth')}: too few robots are left to mate"
+        ]
     judged = [one for island in alive for one in island.judged]
     if not judged:
-        return [f"{births} births; no robot of the last population has a fitness"]
+        return [
+            f"{counted(births, 'birth')}; no robot of the last population has a fitness"
+        ]
     best = fittest_first(judged)[0]
     mean = sum(one.fitness for one in judged) / len(judged)
     space = body_space(run.experiment.space)
@@ -77,11 +82,11 @@ def _results(run: RunSession) -> list[str]:
     motors = sum(space[part.kind].outputs for part in robot.parts)
     where = f" of island {best.birth.island}" if len(islands) > 1 else ""
     return [
-        f"{births} births; mean fitness of the last population {mean:.4f}",
+        f"{counted(births, 'birth')}; mean fitness of the last population {mean:.4f}",
         (
             f"best robot: birth {best.birth.number}{where}, fitness "
-            f"{best.fitness:.4f}, rank {best.rank}, {len(robot.parts)} parts, "
-            f"{motors} motors"
+            f"{best.fitness:.4f}, rank {best.rank}, "
+            f"{counted(len(robot.parts), 'part')}, {counted(motors, 'motor')}"
         ),
         f"its file: {file}",
     ]
@@ -106,7 +111,8 @@ def _failures(folder: Path) -> str:
     diverged = deaths.filter(pc.field("reason") == "diverged")
     lines = []
     if failed.num_rows:
-        counts = f"{failed.num_rows} of {evaluations.num_rows} evaluations failed"
+        total = counted(evaluations.num_rows, "evaluation")
+        counts = f"{failed.num_rows} of {total} failed"
         lines.append(f"{counts}, {_most_frequent(failed['reason'])}")
     if diverged.num_rows:
         counts = f"{diverged.num_rows} of {deaths.num_rows} deaths were failures"

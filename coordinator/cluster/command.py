@@ -28,7 +28,7 @@ def main(arguments: list[str]) -> int:
     Raises:
         RevolveError: no kit, a name that is used or unknown, or a full disk.
     """
-    options = _flags().parse_args(arguments[1:])
+    options = parser().parse_args(arguments[1:])
     folder = Path(options.folder)
     if options.action == "init":
         _init(folder, options)
@@ -98,21 +98,42 @@ def _list(kit: Kit) -> None:
         )
 
 
-def _flags() -> argparse.ArgumentParser:
+_EXAMPLES: dict[str, tuple[str, ...]] = {
+    "init": (
+        "lab --hub hub.example --workers a,b,c",
+        "lab --hub 192.0.2.7 --port 7448 --days 30",
+    ),
+    "add": ("lab worker-d", "lab visitor --role viewer"),
+    "renew": ("lab", "lab worker-a"),
+    "revoke": ("lab worker-a", "lab visitor"),
+    "list": ("lab", "kits/lab"),
+}
+
+
+def parser(_command: str = "cluster") -> Flags:
+    """Return the parser of ``revolve cluster``."""
     flags = Flags(
         prog="revolve cluster",
         description="Make certificates and samples for the machines of a lab.",
-        epilog="example: revolve cluster init lab --hub hub.example --workers a,b,c",
+        examples=(
+            "revolve cluster init lab --hub hub.example --workers a,b,c",
+            "revolve cluster add lab worker-d",
+            "revolve cluster list lab",
+        ),
         allow_abbrev=False,
     )
     actions = flags.add_subparsers(dest="action", required=True, metavar="ACTION")
 
     def action(name: str, what: str) -> argparse.ArgumentParser:
-        parser = actions.add_parser(
-            name, help=what, description=f"{what.capitalize()}.", allow_abbrev=False
+        made = actions.add_parser(
+            name,
+            help=what,
+            description=f"{what.capitalize()}.",
+            allow_abbrev=False,
+            examples=[f"revolve cluster {name} {words}" for words in _EXAMPLES[name]],
         )
-        parser.add_argument("folder", metavar="DIR", help="folder of the kit")
-        return parser
+        made.add_argument("folder", metavar="DIR", help="folder of the kit")
+        return made
 
     init = action("init", "create a kit: authority, certificates, samples")
     init.add_argument(
@@ -128,7 +149,7 @@ def _flags() -> argparse.ArgumentParser:
     )
     add_count(init, "--days", DAYS, "days until the certificates expire")
     add = action("add", "issue a certificate for another machine")
-    add.add_argument("name", metavar="NAME", help="its name in the fleet")
+    add.add_argument("name", metavar="NAME", help="name of the machine, in the fleet")
     add.add_argument(
         "--role",
         choices=get_args(CertificateRole),
@@ -137,9 +158,9 @@ def _flags() -> argparse.ArgumentParser:
     )
     renew = action("renew", "issue certificates again, before they expire")
     renew.add_argument(
-        "name", nargs="?", metavar="NAME", help="only this one (default: all)"
+        "name", nargs="?", metavar="NAME", help="name of the machine (default: all)"
     )
     revoke = action("revoke", "stop accepting a certificate")
-    revoke.add_argument("name", metavar="NAME", help="its name")
+    revoke.add_argument("name", metavar="NAME", help="name of the machine")
     action("list", "list the certificates, and when they expire")
     return flags

@@ -42,7 +42,7 @@ def main(arguments: list[str]) -> int:
     Returns:
         0 if no check failed, else 1.
     """
-    options = _flags().parse_args(arguments[1:])
+    options = parser().parse_args(arguments[1:])
     began_s = time.monotonic()
     rendering = system.start_rendering()
     has_failed = False
@@ -133,11 +133,15 @@ def _hub(
     yield from hub.check_hub(found, connect)
 
 
-def _flags() -> Flags:
+def parser(_command: str = "doctor") -> Flags:
+    """Return the parser of ``revolve doctor``."""
     flags = Flags(
         prog="revolve doctor",
         description="Check this machine, its certificate and its way to the hub.",
-        epilog="example: revolve doctor --connect tls/hub.example:7447",
+        examples=(
+            "revolve doctor",
+            "revolve doctor --connect tls/hub.example:7447",
+        ),
         allow_abbrev=False,
     )
     add_connect(flags)

@@ -141,7 +141,7 @@ def check_pictures(code: int | None, output: str) -> Finding:
         output: its last line.
     """
     if code == 0:
-        return Finding("ok", "pictures", f"rendered with {output or 'OpenGL'}")
+        return Finding("ok", "pictures", f"drawn with {output or 'OpenGL'}")
     if code is None:
         return Finding(
             "warn", "pictures", "not rendered in time", "repeat when idle, or see below"
@@ -151,8 +151,8 @@ def check_pictures(code: int | None, output: str) -> Finding:
         "warn",
         "pictures",
         why,
-        "runs do not need it; install EGL or OSMesa (Debian: libegl1 "
-        "libgl1-mesa-dri, or libosmesa6) and 'revolve-islands[view]'",
+        "runs do not need them; install 'revolve-islands[pictures]', or set MUJOCO_GL "
+        "to disable if a graphics driver is broken",
     )
 
 

@@ -46,7 +46,7 @@ def check(arguments: list[str], kinds: Sequence[Kind]) -> int:
     Raises:
         ExperimentError: a ``--plugins`` entry that is not there.
     """
-    options = _check_flags(kinds).parse_args(arguments)
+    options = check_flags(kinds).parse_args(arguments)
     allow(options.plugins)
     if options.here:
         words, limit_s = options.plugin, options.here
@@ -69,7 +69,7 @@ def list_plugins(arguments: list[str], kinds: Sequence[Kind]) -> int:
     Raises:
         ExperimentError: a ``--plugins`` entry that is not there.
     """
-    options = _list_flags().parse_args(arguments)
+    options = list_flags().parse_args(arguments)
     allow(options.plugins)
     rows = [*_built_in(kinds), *_found(kinds)]
     if options.json:
@@ -106,12 +106,21 @@ def _found(kinds: Sequence[Kind]) -> Iterator[Listed]:
             yield Listed(kind.name, f"{name}:{attribute}", place, digest_of(name))
 
 
-def _check_flags(kinds: Sequence[Kind]) -> argparse.ArgumentParser:
+def check_flags(kinds: Sequence[Kind]) -> Flags:
+    """Return the parser of ``revolve check``.
+
+    Args:
+        kinds: all kinds.
+    """
     flags = Flags(
         prog="revolve check",
         description="Check plug-ins as a run does before its first birth: one line for "
         "each; exit code 1 if one is refused.",
-        epilog="example: revolve check my_lab.py:wheel",
+        examples=(
+            "revolve check my_lab.py:wheel",
+            "revolve check mine.toml",
+            "revolve check my_lab:walk --kind fitness --plugins my_lab",
+        ),
         allow_abbrev=False,
     )
     flags.add_argument(
@@ -131,14 +140,18 @@ def _check_flags(kinds: Sequence[Kind]) -> argparse.ArgumentParser:
     return flags
 
 
-def _list_flags() -> argparse.ArgumentParser:
+def list_flags() -> Flags:
+    """Return the parser of ``revolve plugins``."""
     flags = Flags(
         prog="revolve plugins",
         description="List the plug-ins of every kind, built-in or found, with file, "
         "line and digest of the source.",
-        epilog="example: revolve plugins --plugins my_lab.py",
+        examples=(
+            "revolve plugins",
+            "revolve plugins --plugins my_lab.py --json",
+        ),
         allow_abbrev=False,
     )
-    flags.add_argument("--json", action="store_true", help="write JSON")
+    flags.add_argument("--json", action="store_true", help="print JSON, one list")
     add_plugins(flags)
     return flags

@@ -83,6 +83,7 @@ def add_network_flags(flags: argparse.ArgumentParser) -> None:
     flags.add_argument(
         "--fleet",
         default=DEFAULT_FLEET,
+        metavar="NAME",
         help=f"name of the fleet (default: {DEFAULT_FLEET})",
     )
     for flag, what in _TLS_FILES.items():
@@ -91,7 +92,7 @@ def add_network_flags(flags: argparse.ArgumentParser) -> None:
             flag,
             metavar="FILE",
             default=os.environ.get(variable),
-            help=f"{what}; default: ${variable}",
+            help=f"{what} (default: ${variable})",
         )
 
 
@@ -223,7 +224,7 @@ def run_pool(
         arguments: of the user, after the command's name.
         processes: default number of processes.
     """
-    flags = _flags(role, processes)
+    flags = parser(role, processes)
     options = flags.parse_args(arguments)
     try:
         start_log(role, as_json=options.log_json)
@@ -241,6 +242,7 @@ def run_pool(
             processes=options.processes,
             plugins=allowed(),
             give_up_after_s=options.give_up_after,
+            tells_hub=True,
         )
         client_config(connect, tls)
     except RevolveError as error:
@@ -294,11 +296,21 @@ def tell_death(death: Death) -> str:
     return f"{task.agent} died of job {task.number} of {task.run}: {death.cause}"
 
 
-def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
+def parser(role: Role, processes: int) -> Flags:
+    """Return the parser of ``revolve worker`` or ``revolve analyzer``.
+
+    Args:
+        role: "worker" or "analyzer".
+        processes: default number of processes.
+    """
     flags = Flags(
         prog=f"revolve {role}",
         description=f"Serve coordinators as {role} until Ctrl-C.",
-        epilog=f"example: revolve {role} --processes 2",
+        examples=(
+            f"revolve {role}    # for this user's hub on this machine",
+            f"revolve {role} --connect tcp/127.0.0.1:7447 --processes 2",
+            f"revolve {role} --connect runs/scenario1-seed1",
+        ),
         allow_abbrev=False,
     )
     add_connect(flags)
@@ -311,6 +323,7 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
     )
     flags.add_argument(
         "--name",
+        metavar="NAME",
         help="name of this machine (default: that of its certificate, else its host "
         "name)",
     )
@@ -330,7 +343,8 @@ def _flags(role: Role, processes: int) -> argparse.ArgumentParser:
             "--threads",
             type=whole_number(),
             metavar="N",
-            help="threads of each process for one arena (default: 1)",
+            help="number of threads that advance one arena together, in each process "
+            "(default: 1)",
         )
     add_network_flags(flags)
     return flags

@@ -6,19 +6,55 @@ parser turns it into one line: the flag, what is allowed, what was given.
 
 import argparse
 import math
-from collections.abc import Callable
-from typing import NoReturn
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
+
+from schema.errors import nearest
 
 # Those of 2^64; the interpreter reads no number of more than 4300.
 _MOST_DIGITS = 20
 
 
 class Flags(argparse.ArgumentParser):
-    """Parser that reports an error in one line (argparse intends this override)."""
+    """Parser that reports an error in one line and ends its help with examples.
+
+    Args:
+        examples: command lines, each complete; text after ``#`` is a comment.
+        settings: those of argparse.
+    """
+
+    def __init__(
+        self,
+        *,
+        examples: Sequence[str] = (),
+        **settings: Any,  # noqa: ANN401 - passed on
+    ) -> None:
+        super().__init__(**settings)
+        self.examples = tuple(examples)
 
     def error(self, message: str) -> NoReturn:
         """Print the error and where to find help; exit with status 2."""
         self.exit(2, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+    def format_help(self) -> str:
+        """Return the help, with the examples at the end."""
+        lines = "".join(f"  {example}\n" for example in self.examples)
+        return super().format_help() + (f"\nexamples:\n{lines}" if lines else "")
+
+    def parse_known_args(  # type: ignore[override]
+        self,
+        args: Sequence[str] | None = None,
+        namespace: Any = None,  # noqa: ANN401
+    ) -> tuple[Any, list[str]]:
+        """Parse arguments; exit with an error that names the first unknown one."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            word = unknown[0].partition("=")[0]
+            if not word.startswith("-"):
+                self.error(f"unexpected argument {word[:80]!r}")
+            known = self._option_string_actions
+            self.error(f"no flag {word[:80]!r}{nearest(word, known)}")
+        return found, []
 
 
 def whole_number(least: int = 1) -> Callable[[str], int]:

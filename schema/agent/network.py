@@ -67,6 +67,7 @@ class Agent:
         shards: arenas whose state the process keeps.
         plugins: modules and files that it may import, for ``permission.allow``.
         give_up_after_s: time without a hub after which the process ends [s].
+        tells_hub: say that the hub is there the first time, too.
     """
 
     role: Role
@@ -84,6 +85,7 @@ class Agent:
     shards: int = 1
     plugins: tuple[str, ...] = ()
     give_up_after_s: float = math.inf
+    tells_hub: bool = False
 
 
 def _is_loopback(host: str) -> bool:

@@ -89,13 +89,16 @@ class HubWatch:
         say: called with a line when the hub is back.
         warn: called with a line when the hub is lost, or a run is refused.
         give_up_after_s: time without a hub after which ``seen`` raises [s].
+        tells_first: say that the hub is there the first time, too.
     """
 
     address: str
     say: Callable[[str], None]
     warn: Callable[[str], None]
     give_up_after_s: float = math.inf
+    tells_first: bool = False
     _lost_s: float | None = None
+    _has_been_there: bool = False
     _refusals: set[str] = field(default_factory=set)
 
     def refused(self, line: str) -> None:
@@ -112,9 +115,12 @@ class HubWatch:
         """
         now_s = time.monotonic()
         if is_there:
-            if self._lost_s is not None:
-                self.say(f"connected to {self.address}")
-            self._lost_s = None
+            if self._lost_s is not None or (
+                self.tells_first and not self._has_been_there
+            ):
+                again = "re" if self._has_been_there else ""
+                self.say(f"{again}connected to {self.address}")
+            self._lost_s, self._has_been_there = None, True
         elif self._lost_s is None:
             self._lost_s = now_s
             self.warn(f"no hub at {self.address}; retrying; press Ctrl-C to stop")
@@ -185,7 +191,7 @@ def serve(
             is bad.
         agent: this agent, and the address of its hub.
         stop: ends the loop; checked between jobs.
-        say: called with a line when the hub is back.
+        say: called with a line when the hub is there, as ``HubWatch`` does.
         warn: called with a line when the hub is gone; None: ``say``.
         outlet: publishes through this agent's session while there is one.
         slot: this process's slot in a pool, if it has one.
@@ -198,7 +204,13 @@ def serve(
     me = Member(agent.fleet, agent.role, agent.name)
     config = session_config(client_config(agent.connect, agent.tls), me)
     server = Server(answer, agent, slot)
-    hub = HubWatch(agent.connect, say, warn or say, agent.give_up_after_s)
+    hub = HubWatch(
+        agent.connect,
+        say,
+        warn or say,
+        agent.give_up_after_s,
+        tells_first=agent.tells_hub,
+    )
     log_engine()
     session = _open(config, hub, stop)
     if session is not None:

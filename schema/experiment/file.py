@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args, get_origin
 import msgspec
 from msgspec import Struct
 
-from schema.errors import ExperimentError, cut, nearest, shown
+from schema.errors import ExperimentError, cut, nearest, shown, unreadable
 from schema.experiment.bounded import read_bytes
 from schema.experiment.check import check_experiment
 from schema.experiment.document import Experiment, references
@@ -64,13 +64,28 @@ def check_source(source: str, shipped: Collection[str]) -> None:
     """Raise unless a source is the path of a TOML file or a shipped name.
 
     Raises:
-        ExperimentError: neither; the message names the nearest.
+        ExperimentError: neither; the message names the nearest, or says what a path
+            of another kind leads to.
     """
-    if not source.endswith(".toml") and source not in shipped:
+    if source.endswith(".toml") or source in shipped:
+        return
+    path = Path(source)
+    if path.is_dir():
         raise ExperimentError(
-            f"{source}: no such experiment{nearest(source, shipped)}; "
-            f"shipped are {', '.join(shipped)}, or give a path to a .toml file"
+            f"{source}: is a folder; an experiment is a .toml file or a shipped name"
         )
+    beside = f"{source}.toml"
+    if path.is_file() or (path.suffix and not Path(beside).is_file()):
+        and_missing = "" if path.is_file() else ", and there is no such file"
+        raise ExperimentError(
+            f"{source}: the file of an experiment must end in .toml, got "
+            f"{path.suffix!r}{and_missing}"
+        )
+    near = nearest(source, [*shipped, *([beside] if Path(beside).is_file() else ())])
+    raise ExperimentError(
+        f"{source}: no such experiment{near}; shipped are {', '.join(shipped)}, or "
+        "give a path to a .toml file"
+    )
 
 
 def shipped_experiments() -> list[str]:
@@ -181,7 +196,7 @@ def _text(source: str) -> str:
     try:
         return read_bytes(Path(source)).decode()
     except (OSError, UnicodeDecodeError) as error:
-        raise ExperimentError(f"{source}: cannot be read: {error}") from None
+        raise ExperimentError(f"{source}: {unreadable(error)}") from None
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:
@@ -236,7 +251,7 @@ def _read_scenery(document: dict[str, Any], where: str) -> None:
             text = read_bytes(path).decode("utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             raise ExperimentError(
-                f"{where}: environment.scenery: {named}: cannot be read: {error}"
+                f"{where}: environment.scenery: {named}: {unreadable(error)}"
             ) from None
         if not text.strip():
             # An empty text means no scenery.

@@ -26,6 +26,7 @@ PERMITTED = {
         "schema/formats/urdf.py",
         "worker/**/*.py",
         "analysis/render/picture.py",
+        "analysis/render/ray_caster.py",
     ),
     "rerun": ("analysis/viewer/*.py",),
     "plotnine": ("analysis/figures/*.py",),

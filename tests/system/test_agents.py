@@ -163,7 +163,7 @@ def test_help_shows_an_example() -> None:
         text=True,
         check=True,
     )
-    assert "example: revolve worker --processes 2" in result.stdout
+    assert "examples:\n  revolve worker" in result.stdout
 
 
 @pytest.mark.skipif(not shutil.which("openssl"), reason="makes certificates")

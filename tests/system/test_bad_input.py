@@ -11,6 +11,8 @@ from typing import Any
 
 import pytest
 
+from revolve.command import main
+
 pytestmark = pytest.mark.system
 
 Workspace = Any
@@ -75,6 +77,56 @@ def test_misspelt_names_are_reported_with_the_nearest_name(
     output = _refused(workspace, "run", "thesys")
     assert "; did you mean 'thesis'?" in output
     assert re.search("scenario3, .*thesis, .*or give a path", output)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("exp.yaml", "exp.yaml: the file of an experiment must end in .toml, got"),
+        ("gone.yaml", "got '.yaml', and there is no such file"),
+        ("gone.toml", "gone.toml: cannot be read: No such file"),
+        ("mine", "mine: no such experiment; did you mean 'mine.toml'?"),
+        ("sub", "sub: is a folder; an experiment is a .toml file or a shipped name"),
+    ],
+)
+def test_what_is_no_experiment_is_told_apart(
+    name: str,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sub").mkdir()
+    for file in ("exp.yaml", "mine.toml"):
+        (tmp_path / file).write_text('name = "a"')
+    assert main(["run", name, "--out", "x"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert message in said
+
+
+def test_a_viewer_needs_a_screen_before_the_run_starts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(variable, raising=False)
+    assert main(["run", "scenario1", "--view", "--out", "x"]) == 2
+    said = capsys.readouterr().err
+    assert "no screen here" in said
+    assert said.endswith("beside it: revolve view --connect x --serve\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_limit_of_speed_needs_an_arena(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "scenario1", "--speed", "2"]) == 2
+    message = "revolve: --speed: limits arenas, and there is none in scenario1\n"
+    assert capsys.readouterr().err.endswith(message)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

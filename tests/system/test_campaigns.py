@@ -97,14 +97,14 @@ def test_killed_campaign_resumes_and_includes_existing_runs(
     first.communicate()
     assert "stopped" in workspace.run("status", "campaign")
     output = workspace.run("resume", "campaign", "--workers", "1", "--quiet")
-    assert "4 runs are finished" in output
+    assert "4 runs finished" in output
     assert (
         "keeps its own number of births" not in output
     )  # it has as many births as the others
     _check_equal(whole, campaign)
     assert existing.stat().st_mtime_ns == before
     again = workspace.run("resume", "campaign", "--workers", "1", "--quiet")
-    assert "4 of 4 runs are already finished" in again
+    assert "4 of 4 runs already finished" in again
 
 
 def test_ctrl_c_stops_all_runs_and_shows_how_to_resume(

@@ -110,9 +110,9 @@ def test_campaign_reports_runs_without_any_fitness(workspace: Workspace) -> None
     output = _run(workspace, *sources, "--out", "both", code=1)
     assert "both/blind-0: 12 of 12 evaluations failed, all: " in output
     assert "seeing-0" not in output
-    assert "2 runs are finished" in output
+    assert "2 runs finished" in output
     again = workspace.run("resume", "both", "--in-process", "--quiet", code=1)
-    assert "2 of 2 runs are already finished" in again
+    assert "2 of 2 runs already finished" in again
     # A campaign of one run reports the reason, too.
     (workspace.folder / "both" / "blind-0" / "state").write_text("tired")
     shutil.rmtree(workspace.folder / "both" / "seeing-0")
@@ -218,7 +218,7 @@ def test_damaged_tables_of_a_campaign_are_written_again(
     data = path.read_bytes()
     path.write_bytes(data[:100] + bytes([data[100] ^ 1]) + data[101:])
     output = workspace.run("resume", "twice", "--in-process", "--quiet")
-    assert "1 of 2 runs are already finished" in output
+    assert "1 of 2 runs already finished" in output
     assert f"{path.name}: damaged (its SHA-256" in output
     for name in ("seeing-0", "seeing-1"):
         assert (
@@ -226,7 +226,7 @@ def test_damaged_tables_of_a_campaign_are_written_again(
             == []
         )
     output = workspace.run("resume", "twice", "--in-process", "--quiet")
-    assert "2 of 2 runs are already finished" in output
+    assert "2 of 2 runs already finished" in output
     assert "damaged" not in output
 
 

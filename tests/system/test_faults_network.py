@@ -133,7 +133,7 @@ def test_disconnecting_a_worker_gives_an_equal_run(
     wait_for_line(fleet.agents["far"], "no hub at")
     assert not fleet.is_over
     remote_fleets.cable.reconnect()
-    wait_for_line(fleet.agents["far"], "connected to")
+    wait_for_line(fleet.agents["far"], "reconnected to")
     fleet.finish()
     assert compare(undisturbed, fleet.folder) == []
 

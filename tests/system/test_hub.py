@@ -55,7 +55,7 @@ def site(workspace: Workspace, small_arena_document: str) -> Site:
 
 def told_of_hub(process: Running) -> tuple[int, int]:
     """Return how many times a process told that the hub was gone, and back."""
-    return process.text.count("; retrying"), process.text.count("connected to")
+    return process.text.count("; retrying"), process.text.count("reconnected to")
 
 
 @pytest.mark.long

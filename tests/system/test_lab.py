@@ -168,7 +168,7 @@ def test_nobody_acts_beyond_its_certificate_on_bad_cables(
     workers["b"].wait_for("retrying")
     wait_for(0.3)
     network["b"].reconnect()
-    workers["b"].wait_for("connected to")
+    workers["b"].wait_for("reconnected to")
     told = workspace.run("cluster", "revoke", str(lab), "c")
     assert "copy members/hub/access.json to the hub, and restart it" in told
     network["hub"].install(lab / "members" / "hub")
@@ -182,7 +182,7 @@ def test_nobody_acts_beyond_its_certificate_on_bad_cables(
         assert line in hub.text
     again = network["hub"].start(*HUB)
     again.wait_for("listening on unixsock-stream/")
-    workers["c"].wait_for("connected to")
+    workers["c"].wait_for("reconnected to")
     wait_until(lambda: len(names(network["hub"], "worker")) == 2, "two workers")
     insiders["c"] = intrude(network["c"], files_of(lab / "members" / "c"), victims[:2])
     insiders["c"].wait_for("connected")

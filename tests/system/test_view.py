@@ -278,8 +278,11 @@ def test_wrong_record_is_reported(workspace: Workspace, undisturbed: Path) -> No
     ("words", "message"),
     [
         (("view", "x", "--connect", "hub"), "give either a run folder or --connect"),
-        (("view", "nowhere"), "no run found"),
-        (("view", "--connect", "tcp/127.0.0.1:1"), "no coordinator at"),
+        (("view", "nowhere", "--save", "a.rrd"), "no run found"),
+        (
+            ("view", "--connect", "tcp/127.0.0.1:1", "--save", "a.rrd"),
+            "no coordinator at",
+        ),
         (("view", "nowhere", "--serve", "9876"), "must be HOST:PORT"),
         (("view", "nowhere", "--follow", "7"), "must be ISLAND:BIRTH"),
         (("view", "nowhere", "--save", "no/such/a.rrd"), "no such folder: no/such"),

@@ -86,7 +86,15 @@ def add_commands(kinds: Any) -> None:  # noqa: ANN401 - argparse hides its type
         ("arena", "random robots in one arena, thesis figure 6.1", 10),
         ("spider", "spiders on a grid, thesis figure 7.1", 5),
     ):
-        parser = kinds.add_parser(name, help=text)
+        parser = kinds.add_parser(
+            name,
+            help=text,
+            description=f"Time {text}.",
+            examples=(
+                f"revolve bench {name} --sizes 5 10 --repetitions 3",
+                f"revolve bench {name} scenario3 --out {name}.parquet",
+            ),
+        )
         add_experiment(parser, "scenario3")
         parser.add_argument(
             "--sizes",
@@ -98,9 +106,15 @@ def add_commands(kinds: Any) -> None:  # noqa: ANN401 - argparse hides its type
         )
         add_count(parser, "--seconds", seconds, "simulated seconds per repetition")
         add_count(parser, "--repetitions", 20, "repetitions per number of robots")
-        add_count(parser, "--threads", 1, "threads that simulate the arena")
-        add_count(parser, "--seed", 1, "seed of the robots and their places", least=0)
-        parser.add_argument("--out", type=Path, help="Parquet file for the results")
+        add_count(
+            parser, "--threads", 1, "number of threads that advance one arena together"
+        )
+        add_count(
+            parser, "--seed", 1, "random seed, of the robots and their places", least=0
+        )
+        parser.add_argument(
+            "--out", type=Path, metavar="FILE", help="Parquet file to write"
+        )
 
 
 def add_experiment(parser: argparse.ArgumentParser, default: str) -> None:
@@ -109,8 +123,8 @@ def add_experiment(parser: argparse.ArgumentParser, default: str) -> None:
         "experiment",
         nargs="?",
         default=default,
-        help="experiment whose settings to use, a .toml file or a shipped one "
-        "(default: %(default)s)",
+        metavar="NAME|FILE.toml",
+        help="experiment whose settings to use (default: %(default)s)",
     )
 
 

@@ -27,6 +27,7 @@ from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.bench import arena_bench, fidelity
 from worker.robot import evaluation
+from worker.robot.robustness import finer
 
 LEAST_RATIO = 0.85
 """Goal for the ratio of bare engine time to evaluation time (design, section 9)."""
@@ -128,7 +129,7 @@ def main(arguments: list[str], robots: arena_bench.RobotSource) -> int:
     Returns:
         0 if the measurement meets its goal, 1 if not.
     """
-    options = _parser().parse_args(arguments[1:])
+    options = parser().parse_args(arguments[1:])
     if options.what == "evaluate":
         return _evaluate(options, robots)
     if options.what in ("arena", "spider"):
@@ -136,21 +137,44 @@ def main(arguments: list[str], robots: arena_bench.RobotSource) -> int:
     return _fidelity(options)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = Flags(prog="revolve bench", description=__doc__)
-    kinds = parser.add_subparsers(dest="what", required=True)
+def parser() -> Flags:
+    """Return the parser of ``revolve bench``."""
+    flags = Flags(
+        prog="revolve bench",
+        description="Benchmark simulation: its speed on this machine, and its "
+        "fidelity.",
+        examples=(
+            "revolve bench evaluate    # compare with bare physics steps",
+            "revolve bench fidelity runs/scenario1-seed1",
+            "revolve bench arena --out arena.parquet    # the thesis's benchmark",
+        ),
+    )
+    kinds = flags.add_subparsers(dest="what", required=True, metavar="ACTION")
     timing = kinds.add_parser(
-        "evaluate", help="time evaluations against the bare engine"
+        "evaluate",
+        help="time evaluations against the bare engine",
+        description="Time evaluations against bare physics steps.",
+        examples=(
+            "revolve bench evaluate",
+            "revolve bench evaluate scenario1 --robots 10 --seed 2",
+        ),
     )
     arena_bench.add_experiment(timing, "scenario1")
     add_count(timing, "--robots", 30, "number of random robots")
-    add_count(timing, "--seed", 1, "seed of the random robots", least=0)
+    add_count(timing, "--seed", 1, "random seed, of the robots", least=0)
     study = kinds.add_parser(
-        "fidelity", help="re-simulate a run's robots with other settings"
+        "fidelity",
+        help="re-simulate a run's robots with other settings",
+        description="Re-simulate a run's robots with a time step five times finer, or "
+        "with other settings.",
+        examples=(
+            "revolve bench fidelity runs/scenario1-seed1",
+            "revolve bench fidelity runs/scenario1-seed1 --against armature=0.02",
+        ),
     )
-    study.add_argument("run", type=Path, help="folder of a run")
+    study.add_argument("run", type=Path, metavar="RUN", help="run folder")
     add_count(study, "--per-third", 20, "robots drawn from each third of the fitness")
-    add_count(study, "--seed", 1, "seed of the choice of robots", least=0)
+    add_count(study, "--seed", 1, "random seed, of the choice of robots", least=0)
     study.add_argument(
         "--against",
         action="append",
@@ -159,7 +183,7 @@ def _parser() -> argparse.ArgumentParser:
         help="compare with this simulation setting instead of a finer time step",
     )
     arena_bench.add_commands(kinds)
-    return parser
+    return flags
 
 
 def _evaluate(options: argparse.Namespace, source: arena_bench.RobotSource) -> int:
@@ -179,7 +203,7 @@ def _evaluate(options: argparse.Namespace, source: arena_bench.RobotSource) -> i
 def _fidelity(options: argparse.Namespace) -> int:
     population = fidelity.read_population(options.run)
     experiment = population.experiment
-    other = fidelity.finer(experiment.simulation)
+    other = finer(experiment.simulation)
     if options.against:
         other = _changed(experiment, options.against)
     chosen = fidelity.sample_thirds(population.fitness, options.per_third, options.seed)

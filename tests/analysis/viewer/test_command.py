@@ -1,6 +1,8 @@
 """Tests of the viewer without network and screen."""
 
 import os
+import re
+import sys
 import threading
 from pathlib import Path
 from typing import Any
@@ -17,7 +19,7 @@ from analysis.viewer.entities import TimePoint
 from analysis.viewer.gallery import Gallery, spot_place
 from analysis.viewer.lineage import Lineage
 from analysis.viewer.live import Sequel
-from analysis.viewer.output import Output, Window, keep_serving
+from analysis.viewer.output import Output, Window, keep_serving, ways_to_view
 from analysis.viewer.recording import ViewerError
 from analysis.viewer.scene import scene_of
 from analysis.viewer.show import Show
@@ -165,11 +167,36 @@ def test_views_of_a_mixed_archipelago_name_arenas_and_populations() -> None:
                      "Arena 4", "Arena 5"]  # fmt: skip
 
 
-def test_an_output_is_a_window_by_default(tmp_path: Path) -> None:
+def test_an_output_is_a_window_by_default(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", ":0")
     file = tmp_path / "a.rrd"
     assert Output.of(None, None).has_window
     assert Output.of(file, None) == Output(file, None, has_window=False)
     assert Output.of(None, "127.0.0.1:0").url == "rerun+http://127.0.0.1:0/proxy"
+
+
+@pytest.mark.skipif(sys.platform == "darwin", reason="there is always a screen")
+def test_a_window_needs_a_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(variable, raising=False)
+    with pytest.raises(ViewerError, match=r"no screen here .*--save .*--serve"):
+        Output.of(None, None)
+    monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
+    assert Output.of(None, None).has_window
+
+
+def test_a_server_tells_how_to_view_it_from_elsewhere() -> None:
+    """The address of the page is what ``rerun --serve-web`` itself writes."""
+    output = Output(None, ("127.0.0.1", 9877), has_window=False)
+    here, far, browser = ways_to_view(output)
+    assert here == "serving; to view: rerun --connect rerun+http://127.0.0.1:9877/proxy"
+    assert re.search(r"ssh -N -L 9877:127\.0\.0\.1:9877 \S+@\S+, and there", far)
+    assert "?url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A9877%2Fproxy" in browser
+    assert "-L 9090:127.0.0.1:9090" in browser
+    open_to_all = ways_to_view(Output(None, ("192.0.2.1", 9877), has_window=False))
+    assert not any("ssh" in line or "SSH" in line for line in open_to_all)
 
 
 def test_a_file_with_another_ending_or_folder_is_refused(tmp_path: Path) -> None:

@@ -1,9 +1,10 @@
-"""Lines about faults of peers."""
+"""Lines about faults of peers, and about runs that wait."""
 
 import pytest
 
-from coordinator.cli.format import fault_lines
+from coordinator.cli.format import fault_lines, state_of
 from coordinator.cli.status import _show
+from coordinator.cli.status_json import Source
 from schema.errors import MalformedMessage
 from schema.limits import MOST_SHOWN
 from schema.wire.operator import (
@@ -11,7 +12,7 @@ from schema.wire.operator import (
     decode_operator_reply,
     encode_operator_reply,
 )
-from schema.wire.status import PeerFault, Status
+from schema.wire.status import PeerFault, RunStatus, Status
 
 FAULTS = (
     PeerFault("late", "a", 1),
@@ -34,7 +35,7 @@ def test_status_shows_the_faults(capsys: pytest.CaptureFixture[str]) -> None:
     data = encode_operator_reply(OperatorReply("", status=status))
     received = decode_operator_reply(data).status
     assert received == status
-    _show(received, "title")
+    _show(Source(received, "title"))
     shown = capsys.readouterr().out
     assert all(line in shown for line in fault_lines(FAULTS))
 
@@ -44,3 +45,18 @@ def test_a_status_with_a_long_name_is_malformed() -> None:
     data = encode_operator_reply(OperatorReply("", status=status))
     with pytest.raises(MalformedMessage):
         decode_operator_reply(data)
+
+
+def test_a_run_without_agents_waits_for_them_if_its_coordinator_says_so() -> None:
+    running = RunStatus("/runs/a", "a", 0, "running")
+    stopped = RunStatus("/runs/b", "b", 0, "stopped")
+    for workers, analyzers, state in (
+        (0, 0, "waiting for workers and analyzers"),
+        (0, 1, "waiting for workers"),
+        (2, 0, "waiting for analyzers"),
+        (2, 1, "running"),
+    ):
+        status = Status((running, stopped), workers, analyzers, 0.0)
+        assert state_of(running, status, is_live=True) == state
+        assert state_of(stopped, status, is_live=True) == "stopped"
+        assert state_of(running, status, is_live=False) == "running"

@@ -1,0 +1,88 @@
+"""Command line flags of ``revolve view``; needs no viewer."""
+
+import argparse
+import re
+from pathlib import Path
+
+from schema.agent.command import add_connect, add_network_flags
+from schema.agent.flags import Flags, add_plugins, number
+from schema.robot.ids import BirthId
+
+HOST, PORT = "127.0.0.1", 9876
+"""Address of the server for viewers."""
+LAST_S = 600.0
+"""Simulated time at the end of a run that is replayed by default [s]."""
+
+
+def parser(_command: str = "view") -> Flags:
+    """Return the parser of ``revolve view``."""
+    flags = Flags(
+        prog="revolve view",
+        description="Show a live run, or replay one from its tables.",
+        examples=(
+            "revolve view runs/scenario3-seed1",
+            "revolve view runs/scenario1-seed1 --robot best --save best.rrd",
+            "revolve view runs/scenario3-seed1 --serve    # for viewers elsewhere",
+            "revolve view --connect runs/scenario3-seed1    # while it runs",
+        ),
+        allow_abbrev=False,
+    )
+    flags.add_argument(
+        "run",
+        nargs="?",
+        type=Path,
+        metavar="RUN",
+        help="run folder, to be replayed (default: the live run at the hub)",
+    )
+    add_connect(flags)
+    flags.add_argument(
+        "--save", type=Path, metavar="FILE",
+        help="write a recording (.rrd) instead of opening a window",
+    )  # fmt: skip
+    flags.add_argument(
+        "--serve", nargs="?", const=f"{HOST}:{PORT}", metavar="HOST:PORT",
+        help=f"serve viewers instead of opening a window (default: {HOST}:{PORT})",
+    )  # fmt: skip
+    flags.add_argument(
+        "--follow", type=_robot_name, metavar="ISLAND:BIRTH",
+        help="follow a robot with the camera, for example 0:17",
+    )  # fmt: skip
+    flags.add_argument(
+        "--robot", action="append", default=[], type=_selected, metavar="ROBOT",
+        help="re-simulate a robot and show its full motion: 'best' (ever evaluated, "
+        "dead or alive) or ISLAND:BIRTH; may be repeated",
+    )  # fmt: skip
+    flags.add_argument(
+        "--ancestry", action="store_true",
+        help="with --robot: also its first parent, and so on back to the founder",
+    )  # fmt: skip
+    flags.add_argument(
+        "--from", dest="start", type=number, metavar="S",
+        help=f"replay poses from this simulated time on [s] (default: the last "
+        f"{LAST_S:g} s)",
+    )  # fmt: skip
+    flags.add_argument(
+        "--until", type=number, metavar="S", help="replay poses up to this time [s]"
+    )
+    add_network_flags(flags)
+    add_plugins(flags)
+    return flags
+
+
+def _robot_name(text: str) -> BirthId:
+    """Return the individual of a flag, such as ``0:17``.
+
+    Raises:
+        argparse.ArgumentTypeError: the text has another form.
+    """
+    match = re.fullmatch(r"(\d+):(\d+)", text)
+    if match is None:
+        raise argparse.ArgumentTypeError(
+            f"must be ISLAND:BIRTH such as 0:17, got {text!r}"
+        )
+    return BirthId(int(match[1]), int(match[2]))
+
+
+def _selected(text: str) -> BirthId | None:
+    """Return the individual of a flag; None is the best ever evaluated."""
+    return None if text == "best" else _robot_name(text)

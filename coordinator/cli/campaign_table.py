@@ -1,0 +1,93 @@
+"""Table at the end of a campaign: the outcome of each experiment."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import fmean, stdev
+
+from rich.console import Console
+from rich.table import Table
+
+from coordinator.cli.format import duration
+from coordinator.storage.folder_status import folder_status
+from schema.errors import RevolveError
+from schema.tables.files import read_table
+
+_WIDEST = 1000
+_HEADS = ("experiment", "runs", "best", "mean", "sd", "time per run", "failed")
+
+
+@dataclass(frozen=True, slots=True)
+class RunOutcome:
+    """Outcome of one run of a campaign.
+
+    Attributes:
+        experiment: its name.
+        best: fitness of the best robot of the last population; None: there is none.
+        took_s: from start to end by the clock, pauses included [s]; None: no end.
+        has_failed: it was not finished, or no evaluation succeeded.
+    """
+
+    experiment: str
+    best: float | None
+    took_s: float | None
+    has_failed: bool
+
+
+def outcome_of(folder: Path, experiment: str, *, has_failed: bool) -> RunOutcome:
+    """Return the outcome of a run from its folder, which may be damaged.
+
+    Args:
+        folder: run folder.
+        experiment: its name.
+        has_failed: as in ``RunOutcome``.
+    """
+    if has_failed:
+        return RunOutcome(experiment, None, None, has_failed=True)
+    try:
+        bests = [island.best for island in folder_status(folder).islands]
+        (row,) = read_table(folder, "runs").to_pylist()
+    except (RevolveError, ValueError):
+        return RunOutcome(experiment, None, None, has_failed=True)
+    judged = [best for best in bests if best is not None]
+    took_s = (row["end"] - row["start"]).total_seconds() if row["end"] else None
+    return RunOutcome(experiment, max(judged, default=None), took_s, has_failed=False)
+
+
+def rows(outcomes: Iterable[RunOutcome]) -> list[tuple[str, ...]]:
+    """Return the cells of the table, one row per experiment in order of appearance.
+
+    Mean and standard deviation are those of the best fitness of the runs; the latter
+    is that of a sample, and missing with fewer than two runs.
+    """
+    groups: dict[str, list[RunOutcome]] = {}
+    for outcome in outcomes:
+        groups.setdefault(outcome.experiment, []).append(outcome)
+    return [_row(name, runs) for name, runs in groups.items()]
+
+
+def _row(name: str, runs: Sequence[RunOutcome]) -> tuple[str, ...]:
+    bests = [run.best for run in runs if run.best is not None]
+    times_s = [run.took_s for run in runs if run.took_s is not None]
+    return (
+        name,
+        str(len(runs)),
+        f"{max(bests):.4f}" if bests else "-",
+        f"{fmean(bests):.4f}" if bests else "-",
+        f"{stdev(bests):.4f}" if len(bests) > 1 else "-",
+        duration(fmean(times_s)) if times_s else "-",
+        str(sum(run.has_failed for run in runs)),
+    )
+
+
+def show(outcomes: Iterable[RunOutcome]) -> None:
+    """Print the table on standard output, with a line that explains it."""
+    table = Table(box=None, pad_edge=False)
+    for number, head in enumerate(_HEADS):
+        table.add_column(head, justify="right" if number else "left", no_wrap=True)
+    for cells in rows(outcomes):
+        table.add_row(*cells)
+    # Wide: a narrow terminal wraps lines, but nothing is cut.
+    console = Console(width=_WIDEST, highlight=False, markup=False)
+    console.print(table)
+    console.print("fitness of each run's best robot in its last population")

@@ -1,0 +1,1 @@
+"""What the command `revolve` has besides commands: versions, parsers, completion."""

@@ -1,0 +1,38 @@
+"""Parsers of all commands, for completion, documentation and tests."""
+
+import argparse
+from importlib import import_module
+
+from revolve.command import COMMANDS
+from schema.agent.flags import Flags
+
+
+def parser_of(command: str) -> Flags:
+    """Return the parser of a command.
+
+    Args:
+        command: a key of ``COMMANDS``.
+    """
+    parser: Flags = import_module(COMMANDS[command][0]).parser(command)
+    return parser
+
+
+def actions(parser: Flags) -> dict[str, Flags]:
+    """Return the parsers of a command's actions, such as ``list`` of ``arena``."""
+    for action in parser._actions:  # noqa: SLF001 - argparse has no public access
+        if isinstance(action, argparse._SubParsersAction):  # noqa: SLF001 - the same
+            return dict(action.choices)
+    return {}
+
+
+def all_parsers() -> dict[str, Flags]:
+    """Return the parsers of all commands and of their actions, by their names.
+
+    The name of an action has two words, as ``arena list``.
+    """
+    found: dict[str, Flags] = {}
+    for command in COMMANDS:
+        found[command] = parser_of(command)
+        for name, parser in actions(found[command]).items():
+            found[f"{command} {name}"] = parser
+    return found

@@ -1,0 +1,49 @@
+"""The table at the end of a campaign, worked out by hand."""
+
+from pathlib import Path
+
+import pytest
+
+from coordinator.cli.campaign_table import RunOutcome, outcome_of, rows, show
+
+
+def outcome(
+    name: str, best: float | None, took_s: float | None, *, has_failed: bool = False
+) -> RunOutcome:
+    return RunOutcome(name, best, took_s, has_failed)
+
+
+OUTCOMES = (
+    outcome("a", 0.1, 60.0),
+    outcome("b", 0.5, 100.0),
+    outcome("a", 0.3, 120.0),
+    outcome("a", 0.2, 90.0),
+    outcome("b", None, None, has_failed=True),
+    outcome("c", None, None, has_failed=True),
+)
+
+
+def test_each_experiment_has_a_row() -> None:
+    """0.1, 0.2, 0.3: mean 0.2, variance (0.01 + 0 + 0.01) / 2."""
+    assert rows(OUTCOMES) == [
+        ("a", "3", "0.3000", "0.2000", "0.1000", "1 min 30 s", "0"),
+        ("b", "2", "0.5000", "0.5000", "-", "1 min 40 s", "1"),
+        ("c", "1", "-", "-", "-", "-", "1"),
+    ]
+
+
+def test_the_table_fits_80_columns_and_explains_itself(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    show(OUTCOMES)
+    head, *lines, note = capsys.readouterr().out.splitlines()
+    assert head.split()[:3] == ["experiment", "runs", "best"]
+    assert len(lines) == 3
+    assert max(map(len, (head, *lines, note))) <= 80
+    assert "best robot in its last population" in note
+
+
+def test_a_folder_without_a_run_counts_as_failed(tmp_path: Path) -> None:
+    expected = outcome("a", None, None, has_failed=True)
+    assert outcome_of(tmp_path, "a", has_failed=False) == expected
+    assert outcome_of(tmp_path, "a", has_failed=True) == expected

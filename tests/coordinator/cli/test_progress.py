@@ -1,0 +1,70 @@
+"""Bars on narrow and wide terminals."""
+
+import io
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from coordinator.cli.progress import Display
+from schema.wire.status import IslandStatus, RunStatus, Status
+
+_ISLAND = IslandStatus(120, 600, 0.51234, 30)
+
+
+def shown(status: Status, width: int) -> list[str]:
+    """Return the lines that are on the screen when the display stops."""
+    file = io.StringIO()
+    console = Console(
+        file=file, width=width, height=25, force_terminal=True, color_system=None
+    )
+    scheduler: Any = SimpleNamespace(active=[], status=lambda _now_s: status)
+    with Display(scheduler, quiet=False, console=console) as display:
+        display.update(1.0)
+    screen = file.getvalue().rpartition("\x1b[2K")[2]
+    return [line.rstrip() for line in screen.splitlines() if "/" in line]
+
+
+def one_run(name: str, *islands: IslandStatus) -> Status:
+    return Status((RunStatus("/r", name, 0, "running", 12.3, islands),), 2, 1, 12.3)
+
+
+@pytest.mark.parametrize(
+    ("width", "line"),
+    [
+        (40, "120/600 scenario1 39 s left, best 0.512…"),
+        (
+            80,
+            (
+                "120/600 scenario1 ━━         39 s left, best 0.512, 12.3 births/s, 2 "
+                "workers"
+            ),
+        ),
+    ],
+)
+def test_a_bar_fits_the_terminal_and_starts_with_the_count(
+    width: int, line: str
+) -> None:
+    assert shown(one_run("scenario1", _ISLAND), width) == [line]
+
+
+@pytest.mark.parametrize("width", [40, 80, 200])
+def test_no_line_is_wider_than_the_terminal(width: int) -> None:
+    runs = tuple(
+        RunStatus("/r", "an-experiment-with-a-very-long-name", run, "running",
+                  1.0, (_ISLAND,) * 5)
+        for run in range(3)
+    )  # fmt: skip
+    lines = shown(Status(runs, 1, 1, 3.0), width)
+    assert [line.split()[0] for line in lines] == [
+        "1800/9000",
+        *["600/3000"] * 3,
+    ]
+    assert all(len(line) <= width for line in lines)
+    assert "40 min" in lines[0]
+    islands = shown(one_run("ring", _ISLAND, _ISLAND), width)
+    assert [line.split()[0] for line in islands] == ["240/1200", "120/600", "120/600"]
+    assert all(len(line) <= width for line in islands)
+    assert "island 1" in islands[-1]
+    assert "best 0.512" in islands[-1]

@@ -1,0 +1,151 @@
+"""Help, examples and versions of all commands."""
+
+import argparse
+import re
+import shlex
+from collections import defaultdict
+
+import pytest
+
+from revolve.cli.parsers import actions, all_parsers, parser_of
+from revolve.command import COMMANDS, main
+from schema.agent.flags import Flags
+
+
+@pytest.fixture(scope="module")
+def parsers() -> dict[str, Flags]:
+    return all_parsers()
+
+
+def test_each_help_has_two_to_four_examples_that_its_parser_accepts(
+    parsers: dict[str, Flags],
+) -> None:
+    for name, parser in parsers.items():
+        assert 2 <= len(parser.examples) <= 4, name
+        for example in parser.examples:
+            assert f"\n  {example}\n" in parser.format_help()
+            words = shlex.split(example, comments=True)
+            assert words[0] == "revolve"
+            assert " ".join(words[1:]).startswith(name), example
+            command = max(
+                (
+                    each
+                    for each in COMMANDS
+                    if words[1:][: len(each.split())] == each.split()
+                ),
+                key=len,
+            )
+            rest = words[1 + len(command.split()) :]
+            parsers[command].parse_args(rest)  # exits if it is refused
+
+
+def test_each_argument_has_a_description_and_a_value_name(
+    parsers: dict[str, Flags],
+) -> None:
+    for name, parser in parsers.items():
+        for action in parser._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                continue
+            if action.help == argparse.SUPPRESS:
+                continue
+            assert action.help, (name, action.dest)
+            if action.nargs != 0 and action.choices is None:
+                assert action.metavar, (name, action.dest)
+
+
+def test_a_flag_has_the_same_description_in_all_commands(
+    parsers: dict[str, Flags],
+) -> None:
+    """Equal up to the first punctuation mark: the rest is what a command adds."""
+    found: defaultdict[tuple[str, str], dict[str, str]] = defaultdict(dict)
+    for name, parser in parsers.items():
+        for action in parser._actions:
+            for flag in action.option_strings or [str(action.metavar)]:
+                if action.help != argparse.SUPPRESS:
+                    start = re.split(r" ?[,:;(]", str(action.help))[0]
+                    found[flag, str(action.metavar)].setdefault(start, name)
+    different = {key: starts for key, starts in found.items() if len(starts) > 1}
+    assert different == {}
+
+
+def test_descriptions_of_flags_that_all_roles_share_are_equal_to_the_letter(
+    parsers: dict[str, Flags],
+) -> None:
+    shared = ("--fleet", "--tls-ca", "--tls-key", "--plugins", "--log-json", "--access")
+    for flag in shared:
+        helps = {
+            action.help
+            for parser in parsers.values()
+            for action in parser._actions
+            if flag in action.option_strings
+        }
+        assert len(helps) == 1, flag
+
+
+def test_help_of_a_command_is_that_of_its_flag(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for words in (["status"], ["robot", "random"], ["arena", "insert"], ["robot"]):
+        shown = []
+        for line in (["help", *words], [*words, "--help"]):
+            with pytest.raises(SystemExit) as end:
+                main(line)
+            assert end.value.code == 0
+            shown.append(capsys.readouterr().out)
+        assert shown[0] == shown[1]
+        assert shown[0].startswith(f"usage: revolve {' '.join(words)}")
+    assert main(["help"]) == main(["--help"]) == 0
+    first, _, second = capsys.readouterr().out.partition("\n\nEvolve")
+    assert "revolve help COMMAND" in first or "revolve help COMMAND" in second
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["help", "statsu"], "no command 'statsu'; did you mean 'status'?"),
+        (["vew"], "no command 'vew'; did you mean 'view'?"),
+        (["robot", "rander"], "no action 'rander'; did you mean 'render'?"),
+        (["bench", "dispath"], "no action 'dispath'; did you mean 'dispatch'?"),
+    ],
+)
+def test_a_misspelt_command_is_named_with_the_nearest(
+    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == 2
+    said = capsys.readouterr()
+    assert message in said.err
+    assert "allowed: " in said.err
+    assert (said.err.count("\n"), said.out) == (1, "")
+
+
+def test_a_misspelt_flag_is_named_with_the_nearest(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for command, words, message in (
+        ("run", ["scenario1", "--birth", "3"], "run: no flag '--birth'; did you mean"),
+        ("run", ["scenario1", "--birth=3"], "'--births'? (see revolve run --help)"),
+        ("arena", ["list", "--conect", "x"], "arena list: no flag '--conect'; did you"),
+        ("status", ["a", "b"], "status: unexpected argument 'b' (see"),
+    ):
+        with pytest.raises(SystemExit) as end:
+            parser_of(command).parse_args(words)
+        assert end.value.code == 2
+        said = capsys.readouterr().err
+        assert message in said
+        assert said.count("\n") == 1
+
+
+def test_actions_are_those_of_the_command() -> None:
+    assert list(actions(parser_of("robot"))) == ["check", "convert", "show"]
+    assert actions(parser_of("status")) == {}
+
+
+def test_the_version_names_what_decides_results(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["--version"]) == 0
+    own, machine, libraries = capsys.readouterr().out.splitlines()
+    assert re.match(r"revolve \d+\.\d+\.\d+|revolve not installed", own)
+    assert re.match(r"Python 3\.\d+\.\d+, \w+ \w+", machine)
+    for name in ("mujoco", "zenoh", "pyarrow", "numpy"):
+        assert re.search(rf"\b{name} \d+\.\d+", libraries)
