@@ -20,13 +20,13 @@ from packaging.metadata import Metadata
 from packaging.requirements import Requirement
 
 from tests.system.documents import OFF_LINE, SMALL_ARENA
-from tests.system.test_strangers import PACKAGE, TOGETHER, document
+from tests.system.test_strangers import PACKAGE, TOGETHER, Until, document
 
 pytestmark = [pytest.mark.system, pytest.mark.long, pytest.mark.timeout(3600)]
 
 ROOT = Path(__file__).parents[2]
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
-EXTRAS = ("analysis", "view", "cluster")
+EXTRAS = ("pictures", "analysis", "view", "cluster")
 EXAMPLE = """
 import revolve as rv
 run = rv.read("one")
@@ -156,7 +156,11 @@ def constraints(folder: Path, libraries: str, wheel: Path) -> list[str]:
 @pytest.mark.parametrize("libraries", ["oldest", "newest"])
 @pytest.mark.parametrize("version", PYTHONS)
 def test_wheel_works_outside_the_tree(
-    made: Callable[[str], Environment], wheel: Path, version: str, libraries: str
+    made: Callable[[str], Environment],
+    wheel: Path,
+    until: Until,
+    version: str,
+    libraries: str,
 ) -> None:
     its = made(version)
     limits = constraints(its.folder, libraries, wheel)
@@ -164,7 +168,7 @@ def test_wheel_works_outside_the_tree(
     assert wheel.name.split("-")[1] in its.run("revolve", "--version")
     words = ("scenario1", "--births", "15", "--seed", "3", "--quiet", "--out")
     its.run("revolve", "run", *words, "one", "--workers", "1")
-    _runs_in_processes(its, words)
+    _runs_in_processes(its, words, until)
     assert "equal" in its.run("revolve", "compare", "one", "two")
     births, again, recorded = its.run("python", "-c", EXAMPLE).split()
     assert (births, again) == ("15", recorded)
@@ -179,16 +183,18 @@ def test_wheel_works_outside_the_tree(
     its.install(*limits, f"{wheel}[all]")
 
 
-def _runs_in_processes(its: Environment, words: tuple[str, ...]) -> None:
+def _runs_in_processes(its: Environment, words: tuple[str, ...], until: Until) -> None:
     """Run a coordinator with a worker and an analyzer in other processes."""
     words = (*words, "two", "--listen", "tcp/127.0.0.1:0")
     run = its.start("revolve", "coordinator", *words)
     place = its.folder / "two" / "address"
     others: list[subprocess.Popen[str]] = []
     try:
-        while not place.exists() and run.poll() is None:
-            with pytest.raises(subprocess.TimeoutExpired):
-                run.wait(0.1)
+        until(
+            lambda: place.exists() or run.poll() is not None,
+            "the coordinator listens",
+        )
+        assert run.poll() is None, run.communicate()
         address = place.read_text().split()[0]
         others += [
             its.start("revolve", role, "--connect", address)
