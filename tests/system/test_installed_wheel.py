@@ -212,7 +212,7 @@ def _follow_advice(
     its: Environment, command: tuple[str, ...], limits: list[str]
 ) -> None:
     """Run a command that lacks a library, then what it advises, then it again."""
-    (line,) = its.run("revolve", *command, code=1).strip().splitlines()
+    (line,) = its.run("revolve", *command, code=2).strip().splitlines()
     found = re.fullmatch(
         r"revolve: .* needs? \w+: (\S+ -m pip install '.*\[\w+\]')", line
     )
