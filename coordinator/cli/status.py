@@ -22,7 +22,7 @@ from schema.agent.flags import Flags
 from schema.agent.log import tell_user
 from schema.errors import NetworkError, RevolveError, RunFolderError, counted
 from schema.limits import printable
-from schema.tables.description import DETAILS
+from schema.tables.description import DETAILS, check_folder
 from schema.tables.segments import FINISHED, SEGMENTS
 from schema.wire.operator import (
     GetStatus,
@@ -127,6 +127,7 @@ def _by_folder(folder: Path) -> Status:
     Raises:
         RunFolderError: there is no run and no campaign.
     """
+    check_folder(folder)
     planned: dict[Path, RunDetails] = {}
     runs: list[RunStatus] = []
     for path in _below(folder, CAMPAIGN):
