@@ -71,7 +71,7 @@ def test_limits_of_the_allowed_values_are_accepted(text: str) -> None:
             "must be >= 15 s",
         ),
         ("[simulation]\nevaluation_s = [30, 20]", r"\[shortest, longest\], got \[30"),
-        ("[simulation]\nevaluation_s = [30]", "length 2, got 1"),
+        ("[simulation]\nevaluation_s = [30]", r"length 2, got \[30\]"),
         ("[simulation]\nevaluation_s = [12, inf]", "must be finite"),
         ("[arena]\n[selection.culling]", "selection.culling: arenas have"),
         ("[arena]\n[selection.reevaluation]", "selection.reevaluation: arenas"),
