@@ -21,6 +21,7 @@ from schema.tables.description import (
     allow_plugins_of,
     read_description,
     read_state,
+    run_columns,
 )
 from schema.tables.files import read_table
 from schema.wire.born import robot_of_birth
@@ -39,6 +40,7 @@ class Run:
         name: of the experiment.
         number: of the repeat, from 0.
         seed: random seed.
+        run_id: identifier, another for each run; a column of all tables, as ``seed``.
         experiment: all settings.
     """
 
@@ -51,6 +53,7 @@ class Run:
         self.folder = Path(folder)
         details = _description(self.folder)
         self.name, self.number, self.seed = details.name, details.run, details.seed
+        self.run_id = run_columns(self.folder)["run_id"]
         self.experiment = Experiment(own_experiment(details.document))
 
     @property

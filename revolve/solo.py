@@ -7,6 +7,7 @@ import msgspec
 
 from revolve.messages import Outcome, Task, problem_of
 from revolve.trace import pack_trace
+from schema.agent.extras import install_advice
 from schema.errors import (
     FitnessUndefined,
     RevolveError,
@@ -34,7 +35,7 @@ def outcome_of(data: bytes) -> bytes:
 def _done(task: Task) -> Outcome:
     allow(task.plugins)
     # Before MuJoCo is imported, in case that any task is a picture.
-    with suppress(RevolveError, ImportError):
+    with suppress(ImportError):
         from analysis.render.picture import choose_engine  # noqa: PLC0415
 
         choose_engine()
@@ -70,7 +71,7 @@ def _picture(
         from analysis.render.picture import RobotRenderer  # noqa: PLC0415
     except ImportError as error:
         raise RevolveError(
-            f"pictures need {error.name}: pip install 'revolve-islands[view]'"
+            f"pictures need {error.name}: {install_advice('pictures')}"
         ) from None
     file = io.BytesIO()
     with RobotRenderer(robot, settings, size=size) as renderer:

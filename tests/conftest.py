@@ -3,21 +3,19 @@
 import logging
 import os
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
-from analysis.render.picture import NoPictures, choose_engine
+from analysis.render.picture import choose_engine
 from schema.plugins import permission
 from tests.own_brains import write_module
 
 # MuJoCo selects its rendering engine when it is first imported, by whichever test comes
 # first. Processes that tests start select their own engine.
 _SETTING = os.environ.get("MUJOCO_GL")
-with suppress(NoPictures):
-    choose_engine()
+choose_engine()
 import mujoco  # noqa: E402, F401
 
 if _SETTING is None:
@@ -36,6 +34,12 @@ def _plain_log(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.setenv("REVOLVE_LOG", "")
     yield
     logging.getLogger("revolve").handlers.clear()
+
+
+@pytest.fixture(autouse=True)
+def _plugins_of_a_test(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forget after each test which modules it has allowed."""
+    monkeypatch.setattr(permission, "_allowed", dict(permission._allowed))
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from schema.formats.mjcf import read_mjcf
 from schema.plugins.permission import allow
 from schema.robot.robot import Robot
 from worker.robot.evaluation import evaluate
+from worker.robot.robustness import Judged, rejudge, small_changes, summary
 
 
 def main(arguments: list[str]) -> int:
@@ -48,7 +49,27 @@ def main(arguments: list[str]) -> int:
     ):
         # All digits, for comparisons of two runs.
         print(f"{name + ':':19}{value!r}{unit}")
+    if options.robustness:
+        _show_robustness(robot, settings, found.fitness)
     return 0
+
+
+def _show_robustness(
+    robot: Robot, settings: EvaluationSettings, fitness: float
+) -> None:
+    """Print the robot's fitness under each small change, then one line of all."""
+    judged: list[Judged] = []
+    for one in rejudge(robot, small_changes(settings)):
+        print(f"{one.change.name + ':':26}{_share(one.fitness, fitness)}", flush=True)
+        judged.append(one)
+    print(summary(fitness, judged))
+
+
+def _share(found: float | None, fitness: float) -> str:
+    if found is None:
+        return "failed"
+    share = f" ({100 * found / fitness:.0f} %)" if fitness > 0 else ""
+    return f"{found:.4f}{share}"
 
 
 def _read(path: Path, experiment: str | None) -> tuple[Robot, EvaluationSettings]:
@@ -76,6 +97,12 @@ def parser(_command: str = "robot simulate") -> Flags:
         metavar="NAME|FILE.toml",
         help="experiment whose settings to use (default: those in an MJCF file, or "
         "those of the thesis's off-line experiments)",
+    )
+    flags.add_argument(
+        "--robustness",
+        action="store_true",
+        help="evaluate it again with finer time steps, 1 %% less friction and starts "
+        "raised by about 0.1 mm, and show how much of its fitness it keeps",
     )
     add_plugins(flags)
     return flags

@@ -39,7 +39,7 @@ def render(options: argparse.Namespace, simulate: Simulate) -> int:
         0 if the picture was written.
 
     Raises:
-        NoPictures: this machine cannot render, the file name has another ending, or
+        NoPictures: the file name has another ending, the file cannot be written, or
             ``--gait`` exceeds the number of ticks.
         InvalidRobot: the file contains no robot.
         SimulationDiverged: the physics diverged.

@@ -1,14 +1,16 @@
 """Off-screen rendering of robots.
 
 MuJoCo renders through EGL or, where that is missing, OSMesa. It chooses between them at
-its first import, so ``choose_engine`` must be called before.
+its first import, so ``choose_engine`` must be called before. Where neither works, the
+ray caster draws.
 """
 
 import ctypes.util
 import os
 import sys
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import lru_cache, partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol, Self
 
@@ -16,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from schema.errors import RevolveError
+from schema.agent.log import tell_user
+from schema.errors import RevolveError, one_line
 from schema.experiment.document import body_space
 from schema.experiment.environment import LIGHT_COLOUR, LIGHT_M
 from schema.experiment.identity import NO_IDENTITY, Identity
@@ -30,11 +33,14 @@ Picture = npt.NDArray[np.uint8]
 
 _LIBRARIES = {"egl": "EGL", "osmesa": "OSMesa"}
 _SETTING = "MUJOCO_GL"
+_OFF = ("disable", "disabled", "off", "false", "0")
+"""Values of the setting for which MuJoCo loads no graphics library."""
 _AZIMUTH, _ELEVATION = 130.0, -28.0
 _FIELD_OF_VIEW = 45.0
+_FLOOR_NAME = "floor"
 _FLOOR = ((0.93, 0.94, 0.95), (0.86, 0.88, 0.90))
 _SKY = (1.0, 1.0, 1.0)
-_TILE_M = 0.1
+_TILE_M = 0.2
 _GROUND = ("ground", "rough")
 
 
@@ -45,19 +51,28 @@ class NoPictures(RevolveError):  # noqa: N818 - names what is missing
 def choose_engine() -> str:
     """Choose the backend of MuJoCo's renderer, and return its name.
 
-    Raises:
-        NoPictures: neither EGL nor OSMesa is installed.
+    Returns:
+        The value of ``MUJOCO_GL``; "disable" if neither EGL nor OSMesa is installed.
     """
-    if "mujoco" in sys.modules or os.environ.get(_SETTING):
-        return os.environ.get(_SETTING, "")
-    for name, library in _LIBRARIES.items():
-        if ctypes.util.find_library(library):
-            os.environ[_SETTING] = name
-            return name
-    raise NoPictures(
-        "pictures need EGL or OSMesa: install one (Debian: libegl1 libgl1-mesa-dri, "
-        "or libosmesa6)"
+    if "mujoco" not in sys.modules and not os.environ.get(_SETTING):
+        os.environ[_SETTING] = _installed() or _OFF[0]
+    return os.environ.get(_SETTING, "")
+
+
+def _installed() -> str | None:
+    """Return the first backend whose library is installed."""
+    if find_spec("OpenGL") is None:
+        return None
+    found = (
+        name for name, file in _LIBRARIES.items() if ctypes.util.find_library(file)
     )
+    return next(found, None)
+
+
+@lru_cache(maxsize=1)
+def _tell_fallback(why: str) -> None:
+    """Say once why robots are drawn without OpenGL."""
+    tell_user(f"robots are drawn without OpenGL: {why}")
 
 
 class RobotRenderer:
@@ -82,9 +97,9 @@ class RobotRenderer:
             size: width and height of pictures [pixels].
 
         Raises:
-            NoPictures: the backend does not work.
+            ExperimentError: invalid scenery.
         """
-        choose_engine()
+        engine = choose_engine()
         import mujoco  # noqa: PLC0415 - after its engine is chosen
 
         from schema.mjcf.model import solo_spec  # noqa: PLC0415 - the same
@@ -98,12 +113,7 @@ class RobotRenderer:
             furnish=partial(_furnish, size, settings.environment.light),
         ).compile()
         self._data = mujoco.MjData(self.model)
-        try:
-            self._renderer = mujoco.Renderer(self.model, size[1], size[0])
-        # The type of the exception depends on the backend.
-        except Exception as error:
-            engine = os.environ.get(_SETTING, "OpenGL")
-            raise NoPictures(f"{engine} cannot render: {error}") from error
+        self._renderer = _renderer(self.model, engine, size)
         mujoco.mj_forward(self.model, self._data)
         own = self.model.body("root").id
         geoms = self.model.body_rootid[self.model.geom_bodyid] == own
@@ -142,6 +152,30 @@ class RobotRenderer:
         camera.azimuth, camera.elevation = _AZIMUTH, _ELEVATION
         self._renderer.update_scene(self._data, camera)
         return np.array(self._renderer.render())
+
+
+def _renderer(
+    model: Any,  # noqa: ANN401 - imported late
+    engine: str,
+    size: tuple[int, int],
+) -> Any:  # noqa: ANN401 - imported late
+    """Return MuJoCo's renderer, or the ray caster where that does not work."""
+    import mujoco  # noqa: PLC0415 - after its engine is chosen
+
+    from analysis.render.ray_caster import RayCaster  # noqa: PLC0415 - the same
+
+    width, height = size
+    if engine.lower() in _OFF:
+        why = f"{_SETTING} is {engine}" if _installed() else "no EGL or OSMesa here"
+    else:
+        try:
+            return mujoco.Renderer(model, height, width)
+        # The type of the exception depends on the backend.
+        except Exception as error:  # noqa: BLE001
+            why = f"{engine or 'its default backend'} does not work: {one_line(error)}"
+    _tell_fallback(why)
+    floor = (_FLOOR_NAME, np.array(_FLOOR, np.float32), _TILE_M)
+    return RayCaster(model, height, width, floor=floor)
 
 
 def _furnish(
@@ -191,13 +225,13 @@ def _furnish(
         width=256,
         height=256,
     )
-    floor = spec.add_material(name="floor")
+    floor = spec.add_material(name=_FLOOR_NAME)
     floor.textures[int(mujoco.mjtTextureRole.mjTEXROLE_RGB)] = "tiles"
     floor.texuniform = True
-    floor.texrepeat = (0.5 / _TILE_M, 0.5 / _TILE_M)
+    floor.texrepeat = (1.0 / _TILE_M, 1.0 / _TILE_M)
     for geom in spec.worldbody.geoms:
         if geom.name in _GROUND:
-            geom.material = "floor"
+            geom.material = _FLOOR_NAME
     spec.worldbody.add_light(
         pos=(-0.5, -0.8, 3.0),
         dir=(0.15, 0.25, -1.0),

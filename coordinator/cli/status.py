@@ -7,7 +7,13 @@ from uuid import uuid4
 from rich.console import Console
 from rich.table import Table
 
-from coordinator.cli.format import duration, fault_lines, run_details, state_of
+from coordinator.cli.format import (
+    duration,
+    fault_lines,
+    missing_agents,
+    run_details,
+    state_of,
+)
 from coordinator.cli.status_json import Source, status_json
 from coordinator.network.client_service import ask_coordinators
 from coordinator.storage.campaign import CAMPAIGN, is_campaign, read_campaign
@@ -198,13 +204,14 @@ def _show(source: Source) -> None:
         source.folder or source.coordinator or "",
         f"{done} of {runs} finished, {births}",
     ]
-    if is_live:
+    if status.workers or status.analyzers:
         lines.append(
             f"{status.births_per_s:.1f} births/s, {counted(status.workers, 'worker')}, "
             f"{counted(status.analyzers, 'analyzer')}, {duration(status.left_s)} left"
         )
     elif done < len(status.runs):
-        lines.append(_without_coordinator(status, root))
+        waiting = f"waiting for {' and '.join(missing_agents(status))}"
+        lines.append(waiting if is_live else _without_coordinator(status, root))
     lines += [printable(line, _WIDEST) for line in fault_lines(status.faults)]
     # Wide: a narrow terminal wraps lines, but none is cut.
     console = Console(width=_WIDEST, highlight=False, markup=False)

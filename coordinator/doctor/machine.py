@@ -5,6 +5,7 @@ from pathlib import Path
 from time import gmtime, strftime
 
 from coordinator.doctor.finding import Finding
+from schema.agent.extras import install_advice
 from schema.agent.platform_tag import cpu_class
 
 GIB = 1 << 30
@@ -124,9 +125,7 @@ def check_viewer(*, has_package: bool, display: str) -> Finding:
         display: name of the screen, empty without one.
     """
     if not has_package:
-        return Finding(
-            "warn", "viewer", "not installed", "pip install 'revolve-islands[view]'"
-        )
+        return Finding("warn", "viewer", "not installed", install_advice("view"))
     if not display:
         advice = "use revolve view --serve here, and rerun --connect where one is"
         return Finding("warn", "viewer", "installed, but there is no display", advice)
@@ -141,7 +140,7 @@ def check_pictures(code: int | None, output: str) -> Finding:
         output: its last line.
     """
     if code == 0:
-        return Finding("ok", "pictures", f"rendered with {output or 'OpenGL'}")
+        return Finding("ok", "pictures", f"drawn with {output or 'OpenGL'}")
     if code is None:
         return Finding(
             "warn", "pictures", "not rendered in time", "repeat when idle, or see below"
@@ -151,8 +150,8 @@ def check_pictures(code: int | None, output: str) -> Finding:
         "warn",
         "pictures",
         why,
-        "runs do not need it; install EGL or OSMesa (Debian: libegl1 "
-        "libgl1-mesa-dri, or libosmesa6) and 'revolve-islands[view]'",
+        "runs do not need them; install 'revolve-islands[pictures]', or set MUJOCO_GL "
+        "to disable if a graphics driver is broken",
     )
 
 

@@ -20,8 +20,12 @@ _LIBRARIES = {
 }
 # In a process of its own: a broken driver may end it.
 _RENDER = """
+import sys
 from analysis.render.picture import choose_engine
 engine = choose_engine()
+if engine == "disable":
+    print("ray casting: neither EGL nor OSMesa is installed")
+    sys.exit()
 import mujoco
 context = mujoco.GLContext(64, 64)
 context.make_current()

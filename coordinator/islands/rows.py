@@ -8,7 +8,7 @@ from coordinator.evolution.encodings import IslandEncoding
 from coordinator.evolution.selection import Individual
 from coordinator.islands.events import Emigrate, Outcome, Record
 from schema.robot.ids import BirthId
-from schema.tables.columns import body_rows, sizes
+from schema.tables.births import body_rows, sizes
 
 
 def named(birth: BirthId, island: int) -> dict[str, int | None]:

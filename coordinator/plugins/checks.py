@@ -63,7 +63,7 @@ def refuse_faulty_of(folder: Path) -> tuple[Experiment, ...]:
         ExperimentError: as of ``refuse_faulty``, or a plug-in that is not that of the
             beginning.
     """
-    experiments = _experiments_of(folder, is_resumed=True)
+    experiments = _experiments_of(folder)
     named = [path for each in experiments for path in references(each)]
     _refuse([str(folder)] if any(map(is_own, named)) else [])
     return experiments
@@ -74,15 +74,19 @@ def _refuse(words: Sequence[str]) -> None:
         raise ExperimentError(problems[0])
 
 
-def _experiments_of(folder: Path, *, is_resumed: bool) -> tuple[Experiment, ...]:
-    """Return the experiments of a run or campaign folder; allow its plug-ins."""
+def _experiments_of(folder: Path) -> tuple[Experiment, ...]:
+    """Return the experiments of a run or campaign folder; allow its plug-ins.
+
+    Raises:
+        ExperimentError: a plug-in that is not that of the beginning.
+    """
     if is_campaign(folder):
-        allow_kept(folder, campaign_plugins(folder), is_resumed=is_resumed)
+        allow_kept(folder, campaign_plugins(folder), is_resumed=True)
         experiments = read_campaign(folder).experiments
         for experiment in experiments:
             allow_references(references(experiment))
         return experiments
-    allow_plugins_of(folder, is_resumed=is_resumed)
+    allow_plugins_of(folder, is_resumed=True)
     return (own_experiment(read_details(folder).document),)
 
 
@@ -208,9 +212,7 @@ def _uses(
         folder = Path(word)
         is_folder = is_campaign(folder) or holds_run(folder)
         experiments = (
-            _experiments_of(folder, is_resumed=False)
-            if is_folder
-            else (draft_experiment(word),)
+            _experiments_of(folder) if is_folder else (draft_experiment(word),)
         )
         for each, experiment in product(kinds, experiments):
             for use in each.used(experiment):

@@ -17,8 +17,10 @@ from coordinator.storage.disk import (
 from coordinator.storage.segment import Segment, cut_segment, remove_segment
 from schema.errors import MalformedMessage, RunFolderError
 from schema.tables.checksums import digest_of
-from schema.tables.columns import TABLES, read_columns
+from schema.tables.columns import ROWS, TABLES
+from schema.tables.description import run_columns
 from schema.tables.files import batches_by_island, damage_of, read_table, stored_rows
+from schema.tables.received import read_columns
 from schema.tables.segments import SEGMENTS, read_segment, segment_path, segments_of
 
 _LOG = logging.getLogger(__name__)
@@ -41,6 +43,7 @@ class TableFile:
         self._parquet = parquet
         self._fsync = fsync
         self._schema = TABLES[name]
+        self._of_run = run_columns(folder)
         self._segment: Segment | None = None
         self._seen = 0
         self._ahead = 0
@@ -179,9 +182,9 @@ class TableFile:
             raise MalformedMessage(
                 f"{self._name}: must be {rows} rows, got {table.num_rows}"
             )
-        numbers = pa.array(range(self._stored, self._stored + rows), pa.int64())
-        arrays = [numbers, *(column.combine_chunks() for column in table.columns)]
-        return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
+        return self._numbered(
+            {name: table[name].combine_chunks() for name in table.column_names}, rows
+        )
 
     def _opened(self) -> Segment:
         """Return a new segment that contains the schema."""
@@ -192,11 +195,27 @@ class TableFile:
     def _batch(self) -> pa.RecordBatch:
         """Return the buffered rows as one batch with record numbers."""
         rows = self.buffered
-        first, *others = self._schema
-        arrays = [
-            pa.array(range(self._stored, self._stored + len(rows)), first.type),
-            *(pa.array([row[each.name] for row in rows], each.type) for each in others),
-        ]
+        columns = {
+            each.name: pa.array([row[each.name] for row in rows], each.type)
+            for each in ROWS[self._name]
+        }
+        return self._numbered(columns, len(rows))
+
+    def _numbered(self, columns: dict[str, pa.Array], rows: int) -> pa.RecordBatch:
+        """Return a batch of the next rows, with record numbers and those of the run.
+
+        Args:
+            columns: of ``ROWS``, by name.
+            rows: their number.
+        """
+        columns["record"] = pa.array(
+            range(self._stored, self._stored + rows), pa.int64()
+        )
+        for each in self._schema:
+            if each.name not in columns:
+                value = pa.scalar(self._of_run[each.name], each.type)
+                columns[each.name] = pa.repeat(value, rows)
+        arrays = [columns[name] for name in self._schema.names]
         return pa.RecordBatch.from_arrays(arrays, schema=self._schema)
 
 

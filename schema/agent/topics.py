@@ -31,7 +31,8 @@ class Member:
         fleet: name of the fleet.
         role: what the process is.
         name: its own, never used again.
-        jobs: key that takes one ``Request`` and gives one ``Answer``.
+        jobs: key that takes one ``Request`` and gives one ``Answer``, or takes one
+            ``AdvanceRequest`` and gives one ``AdvanceAnswer`` (workers).
     """
 
     fleet: str

@@ -39,8 +39,9 @@ class Space(Section, frozen=True):
 
     Attributes:
         part_types: ``module:attribute`` of each; exactly one is a core.
-        min_parts, max_parts: allowed number of parts, core included.
-        max_inputs, max_outputs, max_hidden: allowed number of neurons.
+        min_parts, max_parts: least and greatest number of parts, core included.
+        max_inputs, max_outputs, max_hidden: greatest number of input, output and hidden
+            neurons.
         planar: keep all parts in the plane of the core.
         neuron_types: types of output and hidden neurons: short names of built-in
             types, or ``module:attribute``; each is equally likely.
@@ -72,7 +73,7 @@ class BrainSection(PluginSection, frozen=True):
         type: short name of a built-in type, or ``module:attribute``: ``network`` is
             the thesis's recurrent network of ``space.neuron_types``, ``cpg`` couples
             an oscillator for each motor.
-        parameters: of the type.
+        parameters: parameters of the type.
     """
 
     type: str = "network"
@@ -107,9 +108,9 @@ class Variation(Section, frozen=True):
 
     Attributes:
         p_delete_subtree, p_duplicate_subtree, p_swap_subtree, p_delete_hidden_neuron,
-            p_remove_brain_connection: probability of each step.
-        body_epsilon, brain_epsilon: step size of parameters, as a share of the way
-            to a random value.
+            p_remove_brain_connection: probability of the step of that name.
+        body_epsilon, brain_epsilon: step size of the parameters of bodies and brains,
+            as a share of the way to a random value.
         add_parts: ``loop`` may add several parts, ``once`` at most one; the expected
             number is what deletion removes, less what duplication adds.
         duplicable_size: size of subtrees in that number: their ``mean`` or ``sum``.
@@ -136,7 +137,7 @@ class Encoding(PluginSection, frozen=True):
 
     Attributes:
         type: ``revolve-angle`` (thesis), ``cppn`` or ``module:attribute``.
-        parameters: of the encoding.
+        parameters: parameters of the encoding.
     """
 
     type: str = REVOLVE_ANGLE
@@ -174,7 +175,7 @@ class Reevaluation(Section, frozen=True):
 
     Attributes:
         interval: births between re-evaluations, counted from the last founder.
-        share: of the population to re-evaluate, at least one robot.
+        share: share of the population to re-evaluate, at least one robot.
         fitness: ``replace`` the old fitness, or take the ``mean`` of all evaluations.
     """
 
@@ -197,10 +198,10 @@ class Selection(PluginSection, frozen=True):
         window: births in flight at once; ``children`` if not given.
         parents: selection of parents: ``tournament``, ``random``, ``none``, which makes
             each child a random robot, or ``module:attribute``.
-        parents_parameters: of an own selection of parents.
+        parents_parameters: parameters of an own selection of parents.
         tournament_size: individuals per tournament.
         survivors: the ``best`` or ``random`` ones survive, or ``module:attribute``.
-        survivors_parameters: of an own selection of survivors.
+        survivors_parameters: parameters of an own selection of survivors.
         keep_parents: parents compete with their children for survival.
         max_mating_attempts: attempts per birth before two new parents are chosen.
         culling: makes the population vary in size.
@@ -256,10 +257,10 @@ class Simulation(Section, frozen=True):
         pose_steps: steps between recorded poses.
         window_steps: steps of the fitness window.
         warmup_steps: steps before the window.
-        gravity: [m/s2].
+        gravity: acceleration of gravity [m/s2].
         friction: sliding friction coefficient of all contacts.
         armature: rotor inertia of passive joints [kg m2].
-        damping: of all joints [N m s/rad].
+        damping: viscous damping of all joints [N m s/rad].
         servo_armature: rotor inertia of driven joints [kg m2].
         servo_stiffness: torque per error of angular velocity [N m s/rad]; a servo
             chatters above 2 servo_armature / timestep_s.
@@ -267,8 +268,8 @@ class Simulation(Section, frozen=True):
         drop_m: height above the ground at the start [m].
         evaluation_s: shortest and longest evaluation [s], warm-up included, off-line;
             each evaluation draws its own, and the window is its last part.
-        sensor_noise: standard deviation of each reading, in its unit: m/s2 and rad/s
-            of an imu, 0 to 1 of touch and light.
+        sensor_noise: standard deviation of each reading [unit of the reading]: m/s2 and
+            rad/s of an imu, 0 to 1 of touch and light.
         actuator_noise: standard deviation of each output before it is clipped to
             [0, 1], the range of its joint; the network's state has no noise.
     """
@@ -295,11 +296,11 @@ class Fitness(PluginSection, frozen=True):
     """The function that evolution maximises.
 
     Attributes:
-        function: ``module:attribute``.
+        function: short name of a built-in function, or ``module:attribute``.
         path_weight, straight_weight: weights of the velocities along the path and
-            between its ends.
-        limit: greatest realistic fitness; above it, fitness is 0.
-        parameters: of a function with a Struct of its own.
+            between its ends, of the function ``locomotion``.
+        limit: greatest realistic fitness [m/s]; above it, fitness is 0.
+        parameters: parameters of a function that has a Struct of its own.
     """
 
     later: ClassVar = ("parameters",)
@@ -351,9 +352,10 @@ class Arena(Section, frozen=True):
         birth_distance_m: least distance of a birth place from robots [m].
         birth_place_tries: places to try for that; the last one is used in any case.
         drop_m: height above the ground at birth [m].
-        wall_diameter_m: of the ring wall [m]; 0 is no wall.
-        wall_segments, wall_height_m, wall_thickness_m: of the ring wall [m].
-        light: as ``environment.light``; only one of the two is needed.
+        wall_diameter_m: diameter of the ring wall [m]; 0 is no wall.
+        wall_segments: number of straight segments of the wall.
+        wall_height_m, wall_thickness_m: height and thickness of the wall [m].
+        light: as ``environment.light`` [m]; only one of the two is needed.
         record_touches: write the table ``touches``.
         proximity_steps: physics steps between checks of distances.
         merge_distance_m: robots that may come nearer than this before the next check
@@ -386,13 +388,23 @@ class Arena(Section, frozen=True):
 
 
 class Islands(Section, frozen=True):
-    """Islands with settings of their own; None is as in the rest of the document.
+    """Islands with settings of their own.
 
-    A section given here changes the keys that it names. After reading, it is
-    complete.
+    A section that is not given is as in the rest of the document. A section given here
+    changes the keys that it names. After reading, it is complete.
 
     Attributes:
         count: number of such islands.
+        births: number of births on each of these islands, the initial population
+            included.
+        generation: random robots of these islands.
+        variation: mutation on these islands.
+        selection: parent and survivor selection of these islands.
+        simulation: physics, noise and clocks of these islands.
+        environment: ground and scenery of these islands.
+        fitness: fitness function of these islands.
+        arena: these islands are arenas.
+        migration: exchange of migrants from and to these islands.
     """
 
     count: AtLeastOne = 1
@@ -413,11 +425,22 @@ class Experiment(Section, frozen=True):
     Attributes:
         name: names the run folder.
         births: number of births on each island, the initial population included.
-        islands: numbered from 0, in the order of the document; none is one island.
-        migration: between the islands.
-        measures: of the robots of all islands.
-        encoding: of all islands.
-        brain: of the robots of all islands.
+        space: part types and limits of robots, on all islands.
+        generation: random robots.
+        variation: mutation of offspring.
+        selection: parent and survivor selection.
+        vetting: checks of bodies before they are simulated, on all islands.
+        simulation: physics, noise and clocks.
+        environment: ground and scenery.
+        fitness: the function that evolution maximises.
+        arena: makes the islands arenas, in which robots live together; without it
+            robots are evaluated one by one.
+        islands: islands with settings of their own, numbered from 0 in the order of the
+            document; none is one island.
+        migration: topology, and exchange of migrants between the islands.
+        measures: numbers recorded beside the fitness, on all islands.
+        encoding: how genomes describe robots, on all islands.
+        brain: type of the robots' brains, on all islands.
     """
 
     name: str

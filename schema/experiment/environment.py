@@ -38,7 +38,7 @@ class Environment(Section, frozen=True, dict=True):
         ground_seed: seed of the heights.
         scenery: MJCF of static objects; a document may give the path of a file,
             relative to itself.
-        light: position of the light [m]; None is no light.
+        light: position of the light [m]; no light if not given.
         push_impulse: horizontal impulse on the core at each push [N s], off-line; 0
             is no pushes. Directions are drawn uniformly for each evaluation.
         push_interval_s: time between pushes [s].

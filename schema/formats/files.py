@@ -13,9 +13,10 @@ from schema.experiment.document import Experiment, Fitness, Simulation, Space
 from schema.experiment.settings import EvaluationSettings, evaluation_settings_of
 from schema.formats.robogen_json import robot_from_robogen_json
 from schema.formats.robogen_text import robot_from_robogen_text
-from schema.formats.yaml import Reader, robot_to_yaml
+from schema.formats.yaml import robot_to_yaml
 from schema.formats.yaml_2016 import RevolveReader, is_of_revolve
 from schema.formats.yaml_node import compose
+from schema.formats.yaml_reader import Reader
 from schema.limits import MOST_TEXT_BYTES
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot.brain import NeuronKinds
@@ -50,6 +51,10 @@ _YAML = (".yaml", ".yml")
 _ROBOGEN = {".txt": robot_from_robogen_text, ".json": robot_from_robogen_json}
 _READ = (*_YAML, *_ROBOGEN, ".pb", MJCF_ENDING)
 _WRITTEN = (".yaml", ".yml", ".pb", MJCF_ENDING, ".urdf")
+_BINARY_DUMP = (
+    "a binary RoboGen dump (Protobuf) is not supported: only RoboGen's robot text and "
+    "JSON are"
+)
 _ANY_BUILT_IN = Space(part_types=(*Space().part_types, "schema.parts:LIGHT_SENSOR"))
 
 
@@ -85,7 +90,7 @@ def read_robot(
     if ending in _YAML:
         return robot_from_yaml(read_text(path), str(path), space, kinds)
     if ending in _ROBOGEN:
-        robot = _ROBOGEN[ending](read_text(path), str(path), space)
+        robot = _ROBOGEN[ending](_robogen_text(path), str(path), space)
     elif ending == MJCF_ENDING:
         # MuJoCo is imported only if needed: it is slow to load.
         from schema.formats.mjcf import read_mjcf  # noqa: PLC0415
@@ -118,6 +123,14 @@ def read_text(path: Path, most: int = MOST_TEXT_BYTES) -> str:
         return _read(path, most).decode()
     except UnicodeDecodeError as error:
         raise InvalidRobot(f"{path}: not UTF-8 text (byte {error.start})") from None
+
+
+def _robogen_text(path: Path) -> str:
+    """Return the text of a RoboGen robot; its binary dumps are refused by name."""
+    try:
+        return _read(path).decode()
+    except UnicodeDecodeError:
+        raise InvalidRobot(f"{path}: {_BINARY_DUMP}") from None
 
 
 def _read(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
@@ -171,6 +184,8 @@ def write_robot(
 
 def _ending(path: Path, endings: tuple[str, ...]) -> str:
     ending = path.suffix.lower()
+    if ending == ".dat":
+        raise InvalidRobot(f"{path}: {_BINARY_DUMP}")
     if ending not in endings:
         allowed = ", ".join(endings)
         raise InvalidRobot(f"{path}: must end in one of {allowed}, got {ending!r}")

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from math import pi
 
 from schema.errors import InvalidRobot, shown
+from schema.formats.ids import with_ids
 from schema.formats.robogen_frames import SQUARE, our_orientation, our_slot
 from schema.parts import BUILT_IN, BodySpace
 from schema.robot.brain import INPUT, Brain, Connection, Layer, Neuron
@@ -111,15 +112,18 @@ def checked_part(
         InvalidRobot: an unknown type, turns outside 0..3, or a wrong number of
             parameters.
     """
+    at = f"{where}: part {shown(name)}"
     if kind not in KINDS:
-        allowed = ", ".join(KINDS)
-        raise InvalidRobot(f"{where}: type must be one of {allowed}, got {shown(kind)}")
+        raise InvalidRobot(
+            f"{at}: type {shown(kind)} is not supported: must be one of "
+            f"{', '.join(KINDS)}"
+        )
     if turns not in range(4):
-        raise InvalidRobot(f"{where}: orientation must be 0..3, got {shown(turns)}")
+        raise InvalidRobot(f"{at}: orientation must be 0..3, got {shown(turns)}")
     ours = KINDS[kind]
     wanted = _BAR_NUMBERS if ours == "ParametricBarJoint" else 0
     if len(values) != wanted:
-        raise InvalidRobot(f"{where}: {kind} takes {wanted} numbers, got {len(values)}")
+        raise InvalidRobot(f"{at}: {kind} takes {wanted} numbers, got {len(values)}")
     return RobogenPart(name, ours, turns, values, where)
 
 
@@ -169,7 +173,10 @@ def our_robot(theirs: RobogenRobot, space: BodySpace, where: str) -> Robot:
         check_number(robot)
         check_robot(robot, space)
     except InvalidRobot as error:
-        raise InvalidRobot(f"{where}: {error}") from None
+        names = [f"{part} {number}" for part, number in index]
+        links = [(names[edge.source], names[edge.target]) for edge in connections]
+        message = with_ids(str(error), body.names, names, links)
+        raise InvalidRobot(f"{where}: {message}") from None
     return robot
 
 
@@ -200,7 +207,8 @@ class _Body:
         for slot, child in part.children.items():
             if not 0 <= slot < BUILT_IN[part.kind].arity:
                 raise InvalidRobot(
-                    f"{child.where}: {part.kind} has no slot {shown(slot)}"
+                    f"{child.where}: part {shown(child.name)}: {shown(part.name)} has "
+                    f"no slot {shown(slot)}"
                 )
             by_slot[our_slot(part.kind, slot)] = slot, child
         for parent_slot in sorted(by_slot):

@@ -32,6 +32,18 @@ _LETTERS = {
     "T": "TouchSensor",
     "L": "LightSensor",
 }
+_NOT_SUPPORTED = {
+    "C": "PassiveCardan",
+    "D": "IrSensor",
+    "G": "ActiveWheg",
+    "J": "ActiveWheel",
+    "K": "ActiveCardan",
+    "R": "Rotator",
+    "W": "PassiveWheel",
+}
+"""Further letters, whose types have no counterpart; messages name the types."""
+_DUMPS = {"Fitness:": "report", "Robot-Body": "report", "id:": "Protobuf text"}
+"""Other files that RoboGen wrote, by the first word."""
 _DIGITS = 9
 """Most digits of a neuron's number."""
 _PART = re.compile(r"(\t*)(\d) (\S+) (\S+) (\d)((?: \S+)*)\s*")
@@ -96,6 +108,11 @@ def _body(lines: list[tuple[str, list[str]]], where: str) -> RobogenPart:
     """Return the tree of parts of the first section."""
     if not lines:
         raise InvalidRobot(f"{where}:1: must be the core, got an empty line")
+    if dump := _DUMPS.get(lines[0][1][0].split()[0]):
+        raise InvalidRobot(
+            f"{where}:1: a RoboGen {dump} of an individual is not supported: only "
+            "RoboGen's robot text and JSON are"
+        )
     path: list[RobogenPart] = []
     names: set[str] = set()
     for line, (written,) in lines:
@@ -106,7 +123,7 @@ def _body(lines: list[tuple[str, list[str]]], where: str) -> RobogenPart:
                 f"got {shown(written)}"
             )
         tabs, slot, kind, name, turns, rest = match.groups()
-        kind = _LETTERS.get(kind, kind)
+        kind = _LETTERS.get(kind) or _NOT_SUPPORTED.get(kind, kind)
         values = tuple(_number(word, line) for word in rest.split())
         part = checked_part(name, kind, int(turns), values, line)
         depth = len(tabs)
@@ -128,12 +145,16 @@ def _graft(parent: RobogenPart, slot: int, child: RobogenPart) -> None:
     # Slot 0 of all parts but the core attaches them to their parent: not numbered.
     own = slot + (parent.kind != "Core")
     if own in parent.children:
-        raise InvalidRobot(f"{child.where}: slot {slot} of {parent.name!r} is taken")
+        raise InvalidRobot(
+            f"{child.where}: part {shown(child.name)}: slot {slot} of "
+            f"{shown(parent.name)} is taken"
+        )
     count = BUILT_IN[parent.kind].arity
     if own >= count:
         free = count - (parent.kind != "Core")
         raise InvalidRobot(
-            f"{child.where}: {parent.name!r} has {free} free slots, got slot {slot}"
+            f"{child.where}: part {shown(child.name)}: {shown(parent.name)} has {free} "
+            f"free slots, got slot {slot}"
         )
     parent.children[own] = child
 

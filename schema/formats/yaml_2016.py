@@ -1,115 +1,184 @@
-"""Reader of the YAML form of Revolve (2016).
+"""Reader of the YAML forms of Revolve, from 2015 to 2020.
 
-It differs from the current form in its defaults: a part is attached by its slot 0,
-every output has a neuron, of type Simple unless ``params`` gives another, and hidden
-neurons are a mapping by name. Connections go from ``src`` to ``dst``.
+They differ from the current form in their defaults: a part is attached by its slot 0,
+every output has a neuron, of type Simple unless the brain gives another, neurons are a
+mapping by name, and connections go from ``src`` to ``dst``. A file may hold a body
+only. From 2018, a brain has a type, and its input and output neurons are listed under
+names of their own, in the order of the part's inputs and outputs.
 
-Source: the conversion of the published code (revolve/convert), and its examples.
+Source: the conversion of the published code (revolve/convert in ElteHupkes/revolve,
+pyrevolve/revolve_bot in ci-group/revolve), and its examples.
 """
 
-from schema.formats.yaml import Reader
+from schema.errors import shown
 from schema.formats.yaml_node import Table
-from schema.robot.brain import NEURON_TYPES, Brain, Layer, Neuron
+from schema.formats.yaml_reader import FULL_TURN, Reader
+from schema.robot.brain import INPUT, LAYERS, NEURON_TYPES, Brain, Layer, Neuron
 
 _KINDS = {"CoreComponent": "Core"}
 _OTHER_NAMES = {"phase_offset": ("phaseOffset",), "amplitude": ("gain",)}
 """Older names of the parameters of oscillators in published robots."""
 _ABOUT = ("id", "layer", "type", "part_id")
+_NETWORK = "neural-network"
+_End = tuple[Layer, int]
+"""Layer of a neuron, and index of its part."""
 
 
 def is_of_revolve(document: Table) -> bool:
-    """Return whether a document has keys that only the form of 2016 has."""
+    """Return whether a document has the form of the published Revolve."""
     if document.has("revolve_robot"):
         return False
-    has_brain = not document.is_empty("brain")
-    return document.has("id") or (has_brain and document.table("brain").has("params"))
+    if not document.has("brain") or document.has("id") or document.has("parents"):
+        return True
+    brain = document.table("brain")
+    return brain.has("params") or brain.has("type") or brain.is_mapping("neurons")
 
 
 class RevolveReader(Reader):
-    """Reader of one document in the form of 2016; it ignores labels and numbers."""
+    """Reader of one document of Revolve; it ignores labels, numbers and ancestors."""
 
-    top_keys = ("id", "body", "brain")
+    top_keys = ("id", "parents", "body", "brain")
     edge_keys = ("src", "dst")
-    part_keys = ("id", "type", "orientation", "label", "params", "children")
+    part_keys = ("id", "type", "orientation", "label", "gene", "params", "children")
 
     def kind(self, table: Table) -> str:
-        """Return the type of a part by its name of 2016."""
-        return table.word("type", self.space, _KINDS)
+        """Return the type of a part by its name in Revolve."""
+        kind = _KINDS.get(table.text("type"), table.text("type"))
+        if kind not in self.space:
+            table.refuse_word("type", self.space)
+        return kind
 
     def own_slot(self, table: Table) -> int:
         """Return the slot by which a part is attached to its parent; 0 by default."""
         return table.integer("slot", 0)
 
     def orientation(self, table: Table) -> int:
-        """Return the orientation of a part; the form of 2016 writes 90.0."""
+        """Return the orientation of a part; Revolve also writes 90.0 and -90."""
         degrees = table.number("orientation", 0.0)
         if not degrees.is_integer():
             table.refuse("orientation", f"must be a whole number, got {degrees}")
-        return int(degrees)
+        return int(degrees) % FULL_TURN
 
     def weight(self, table: Table) -> float:
         """Return the weight of a connection; 0 by default."""
         return table.number("weight", 0.0)
 
     def brain(self, table: Table | None) -> Brain:
-        """Return the brain: all outputs, and the hidden neurons of the document."""
-        neurons = self.inputs()
-        outputs = {
-            f"{name}-out-{offset}": index
-            for name, index in self.part_index.items()
-            for offset in range(self.space[self.parts[index].kind].outputs)
-        }
-        if table is None:
-            made = (_neuron("output", part, None) for part in outputs.values())
-            return Brain((*neurons.values(), *made))
-        table.refuse_others("neurons", "params", "connections")
+        """Return the brain: all inputs and outputs, and the hidden neurons."""
+        ends: dict[str, _End] = {}
+        for name, index in self.part_index.items():
+            kind = self.space[self.parts[index].kind]
+            ends |= {f"{name}-in-{k}": ("input", index) for k in range(kind.inputs)}
+            ends |= {f"{name}-out-{k}": ("output", index) for k in range(kind.outputs)}
+        if table is not None:
+            _check_network(table)
         written, params = _tables(table, "neurons"), _tables(table, "params")
-        known = {**neurons, **outputs, **written}
+        own, hidden = self._assigned(written, ends)
+        named = [(own.get(name, name), *end) for name, end in ends.items()]
+        named += [(name, "hidden", part) for name, part in hidden.items()]
+        named.sort(key=lambda each: (LAYERS.index(each[1]), each[2]))
+        neurons = {
+            name: _neuron(layer, part, written.get(name), params.get(name))
+            for name, layer, part in named
+        }
         for name in params:
-            if name not in known:
+            if table is not None and name not in neurons:
                 table.table("params").refuse(name, "unknown neuron")
-        for name, part in outputs.items():
-            entry = params.get(name) or written.get(name)
-            neurons[name] = _neuron("output", part, entry)
-        hidden = [name for name in written if name not in neurons]
-        owner = {name: self._owner(written[name]) for name in hidden}
-        for name in sorted(hidden, key=owner.__getitem__):
-            entry = params.get(name) or written[name]
-            neurons[name] = _neuron("hidden", owner[name], entry)
-        edges = [] if table.is_empty("connections") else table.tables("connections")
-        return Brain(tuple(neurons.values()), self.connections(edges, list(neurons)))
+        edges: list[Table] = []
+        if table is not None and not table.is_empty("connections"):
+            edges = table.tables("connections")
+        return Brain(tuple(neurons.values()), self.connections(edges, neurons))
 
-    def _owner(self, table: Table) -> int:
-        """Return the part of a hidden neuron; the core by default."""
+    def _assigned(
+        self, written: dict[str, Table], ends: dict[str, _End]
+    ) -> tuple[dict[str, str], dict[str, int]]:
+        """Return names by default name of inputs and outputs, and hidden neurons."""
+        free: dict[_End, list[str]] = {}
+        for default, end in ends.items():
+            if default not in written:
+                free.setdefault(end, []).append(default)
+        own: dict[str, str] = {}
+        hidden: dict[str, int] = {}
+        for name, table in written.items():
+            end = self._end(table, ends.get(name, ("hidden", 0)))
+            if end[0] == "hidden" and name not in ends:
+                hidden[name] = end[1]
+            elif ends.get(name) == end:
+                own[name] = name
+            elif name in ends or not free.get(end):
+                part = list(self.part_index)[end[1]]
+                count = list(ends.values()).count(end)
+                table.refuse(
+                    "layer",
+                    f"part {shown(part)} has {count} {end[0]} neurons, "
+                    f"{shown(name)} is none of them",
+                )
+            else:
+                own[free[end].pop(0)] = name
+        return own, hidden
+
+    def _end(self, table: Table, default: _End) -> _End:
+        """Return the layer and part of a written neuron."""
+        layer, part = default
         if table.has("layer"):
-            table.word("layer", ("hidden",))
-        if table.is_empty("part_id"):
-            return 0
-        return self.part_index[table.word("part_id", self.part_index)]
+            word = table.word("layer", LAYERS)
+            layer = next(each for each in LAYERS if each == word)
+        if not table.is_empty("part_id"):
+            part = self.part_index[table.word("part_id", self.part_index)]
+        return layer, part
 
 
-def _tables(table: Table, key: str) -> dict[str, Table]:
+def _check_network(table: Table) -> None:
+    """Raise unless a brain is a neural network."""
+    if table.has("type") and (kind := table.text("type")) != _NETWORK:
+        table.refuse(
+            "type",
+            f"{shown(kind)} is not supported: must be {_NETWORK!r}; "
+            "without the brain, the body can be read",
+        )
+    table.refuse_others("type", "neurons", "params", "connections")
+
+
+def _tables(table: Table | None, key: str) -> dict[str, Table]:
     """Return the mappings in a mapping that may be missing or empty, by key."""
-    if table.is_empty(key):
+    if table is None or table.is_empty(key):
         return {}
     inner = table.table(key)
-    return {name: inner.table(name) for name in inner.keys}
+    tables = {name: inner.table(name) for name in inner.keys}
+    for name, each in tables.items():
+        each.rename(f"neuron {shown(name)}")
+    return tables
 
 
-def _neuron(layer: Layer, part: int, table: Table | None) -> Neuron:
-    """Return the neuron of a mapping; its type is Simple by default."""
-    if table is None:
-        defaults = (parameter.default for parameter in NEURON_TYPES["Simple"])
-        return Neuron(layer, "Simple", part, tuple(defaults))
-    kind = table.word("type", NEURON_TYPES) if table.has("type") else "Simple"
+def _neuron(
+    layer: Layer, part: int, written: Table | None, params: Table | None
+) -> Neuron:
+    """Return a neuron of type Simple unless a mapping gives another.
+
+    Args:
+        layer: of the neuron.
+        part: index of its part.
+        written: its mapping in ``neurons``.
+        params: its mapping in ``params``, which overrides ``written``.
+    """
+    tables = [each for each in (params, written) if each is not None]
+    if params is not None and params.has("type"):
+        tables = [params]
+    typed = next((each for each in tables if each.has("type")), None)
+    kind = INPUT if layer == "input" else "Simple"
+    types = {INPUT: ()} if layer == "input" else NEURON_TYPES
+    if typed is not None and (kind := typed.text("type")) not in types:
+        typed.refuse_word("type", types)
     values = []
     allowed = [*_ABOUT]
-    for parameter in NEURON_TYPES[kind]:
+    for parameter in types[kind]:
         names = [parameter.name]
         if kind == "Oscillator":
             names += _OTHER_NAMES.get(parameter.name, ())
         allowed += names
-        name = next((name for name in names if table.has(name)), parameter.name)
-        values.append(table.number(name, parameter.default))
-    table.refuse_others(*allowed)
+        given = ((each, name) for each in tables for name in names if each.has(name))
+        table, name = next(given, (None, ""))
+        values.append(parameter.default if table is None else table.number(name))
+    for each in tables:
+        each.refuse_others(*allowed)
     return Neuron(layer, kind, part, tuple(values))

@@ -39,6 +39,7 @@ class Table:
             InvalidRobot: not a mapping, a key that is not a scalar, a duplicate key.
         """
         self._path = path
+        self._stem = f"{path}." if path else ""
         self._file = file
         self.line = _line(node)
         self._values: dict[str, yaml.Node] = {}
@@ -52,6 +53,10 @@ class Table:
                 self._fail(self._at(key.value), "is given twice", _line(key))
             self._values[key.value] = value
             self._key_lines[key.value] = _line(key)
+
+    def rename(self, name: str) -> None:
+        """Name the mapping in messages by its id in place of its path."""
+        self._path, self._stem = name, f"{name}: "
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -67,6 +72,10 @@ class Table:
         """Return whether the mapping has a key."""
         return key in self._values
 
+    def is_mapping(self, key: str) -> bool:
+        """Return whether the value of a key is a mapping."""
+        return isinstance(self._values.get(key), yaml.MappingNode)
+
     def is_empty(self, key: str) -> bool:
         """Return whether a key is missing or has no value."""
         node = self._values.get(key)
@@ -75,6 +84,13 @@ class Table:
     def refuse(self, key: str, message: str) -> NoReturn:
         """Raise ``InvalidRobot`` about a key."""
         self._fail(self._at(key), message, self._key_lines.get(key, self.line))
+
+    def refuse_word(self, key: str, allowed: Collection[str]) -> NoReturn:
+        """Raise ``InvalidRobot`` about a word that is none of some words."""
+        word = self.text(key)
+        line = self._key_lines[key]
+        problem = f"{self._at(key)} {shown(word)} is not supported"
+        self._fail("", f"{problem}: {_one_of(allowed)}{nearest(word, allowed)}", line)
 
     def refuse_others(self, *allowed: str) -> None:
         """Raise unless all keys are allowed; the message names the nearest key.
@@ -145,13 +161,7 @@ class Table:
         word = also.get(self.text(key), self.text(key))
         if word not in allowed:
             near = nearest(word, allowed)
-            first = islice(allowed, _MOST_WORDS)
-            more = ", ..." if len(allowed) > _MOST_WORDS else ""
-            self.refuse(
-                key,
-                f"must be one of {', '.join(map(cut, first))}{more}, "
-                f"got {shown(word)}{near}",
-            )
+            self.refuse(key, f"{_one_of(allowed)}, got {shown(word)}{near}")
         return word
 
     def integer(self, key: str, default: int | None = None) -> int:
@@ -196,7 +206,7 @@ class Table:
         return int(key)
 
     def _at(self, key: str) -> str:
-        return f"{self._path}.{cut(key)}" if self._path else cut(key)
+        return f"{self._stem}{cut(key)}"
 
     def _node(self, key: str) -> yaml.Node:
         if key not in self._values:
@@ -232,6 +242,12 @@ def compose(text: str, file: str) -> Table:
         words = " ".join(str(error).split())
         raise InvalidRobot(f"{file}: not valid YAML: {words}") from None
     return Table(node, "", file)
+
+
+def _one_of(allowed: Collection[str]) -> str:
+    first = ", ".join(map(cut, islice(allowed, _MOST_WORDS)))
+    more = ", ..." if len(allowed) > _MOST_WORDS else ""
+    return f"must be one of {first}{more}"
 
 
 def _line(node: yaml.Node | None) -> int:

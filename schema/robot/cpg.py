@@ -27,7 +27,7 @@ class CpgParameters(Struct, frozen=True, forbid_unknown_fields=True):
     """Parameters of the brain type ``cpg``.
 
     Attributes:
-        lowest_hz, highest_hz: range of the frequencies.
+        lowest_hz, highest_hz: range of the frequencies [Hz].
         coupling: [rad/s] per unit of weight; weights are in [0, 1].
     """
 

@@ -8,20 +8,24 @@ partitioning), so that one call reads a campaign, such as DuckDB's
 """
 
 from collections.abc import Iterator
+from functools import reduce
+from operator import and_
 from pathlib import Path
 from typing import NamedTuple
-from urllib.parse import quote
+from urllib.parse import quote, unquote
 
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset
 from pyarrow.dataset import ParquetFileFormat, ParquetFragmentScanOptions
-from pyarrow.parquet import ParquetFile
+from pyarrow.fs import LocalFileSystem
+from pyarrow.parquet import ParquetFile, read_schema
 
 from schema.errors import RunFolderError
 from schema.tables.checksums import digest_of, read_seal
-from schema.tables.columns import TABLES, completed
-from schema.tables.description import read_description
+from schema.tables.columns import TABLES
+from schema.tables.description import read_description, run_columns
+from schema.tables.earlier import absent_value, completed
 from schema.tables.segments import (
     FINISHED,
     Batch,
@@ -223,7 +227,7 @@ def read_table(folder: Path, table: str) -> pa.Table:
             return rows
     try:
         with ParquetFile(path, page_checksum_verification=True) as file:
-            return completed(file.read(), TABLES[table])
+            return completed(file.read(), TABLES[table], run_columns(folder))
     except (ValueError, OSError) as error:
         raise RunFolderError(f"{path}: cannot be read: {error}") from None
 
@@ -247,8 +251,42 @@ def campaign(root: Path, table: str) -> pa.dataset.Dataset:
     for file in files:
         finished_path(file.parents[3], table)
     options = ParquetFragmentScanOptions(page_checksum_verification=True)
-    return pa.dataset.dataset(
-        [str(file) for file in files],
-        format=ParquetFileFormat(default_fragment_scan_options=options),
-        partitioning="hive",
-    )
+    reader = ParquetFileFormat(default_fragment_scan_options=options)
+    disk = LocalFileSystem()
+    # A fragment's expression gives the columns that its file lacks.
+    fragments = [
+        reader.make_fragment(str(file), disk, partition_expression=_lacking(file))
+        for file in files
+    ]
+    return pa.dataset.FileSystemDataset(fragments, _in_campaign(table), reader, disk)
+
+
+def _in_campaign(table: str) -> pa.Schema:
+    """Return the schema of a table with the columns of its folders' names."""
+    schema = TABLES[table]
+    for name, kind in (("experiment", pa.string()), ("run", pa.int32())):
+        if name not in schema.names:
+            schema = schema.append(pa.field(name, kind))
+    return schema
+
+
+def _lacking(file: Path) -> pc.Expression:
+    """Return the values of columns that a finished table lacks.
+
+    They are those of its folders' names, and in earlier runs those of the run.
+    """
+    names = dict(place.partition("=")[::2] for place in file.parts[-3:-1])
+    schema = _in_campaign(file.stem)
+    values = {
+        **{field.name: absent_value(field) for field in TABLES[file.stem]},
+        "experiment": unquote(names["experiment"]),
+        "run": int(names["run"]),
+        **run_columns(file.parents[3]),
+    }
+    stored = read_schema(file).names
+    known = [
+        pc.field(name) == pa.scalar(value, schema.field(name).type)
+        for name, value in values.items()
+        if value is not None and name not in stored
+    ]
+    return reduce(and_, known)

@@ -10,7 +10,7 @@ from struct import Struct
 import pyarrow as pa
 
 from schema.errors import MalformedMessage
-from schema.tables.columns import TABLES
+from schema.tables.columns import ROWS
 
 _U16, _I32, _U32, _I64 = map(Struct, ("<H", "<i", "<I", "<q"))
 _HEADER = 2
@@ -20,6 +20,37 @@ _LENGTH, _COMPRESSION = 0, 3
 _MOST_BATCHES = 16
 
 
+def read_columns(table: str, columns: bytes) -> pa.Table:
+    """Return the rows of an Arrow stream.
+
+    Args:
+        table: name of their table.
+        columns: Arrow IPC stream of the columns in ``ROWS``; empty for no rows.
+
+    Raises:
+        MalformedMessage: not such a stream, or columns of other names or types.
+    """
+    schema = ROWS[table]
+    if not columns:
+        return schema.empty_table()
+    try:
+        with pa.ipc.open_stream(columns) as reader:
+            found = reader.read_all()
+        if not found.schema.equals(schema):
+            raise MalformedMessage(
+                f"{table}: columns must be {_described(schema)}, got "
+                f"{_described(found.schema)}"
+            )
+        found.validate(full=True)
+    except (pa.ArrowException, OSError) as error:
+        raise MalformedMessage(f"{table}: not an Arrow stream: {error}") from None
+    return found
+
+
+def _described(schema: pa.Schema) -> str:
+    return ", ".join(f"{field.name}: {field.type}" for field in schema)
+
+
 def received_columns(
     table: str, columns: bytes, *, most_bytes: int, most_rows: int
 ) -> pa.Table:
@@ -27,8 +58,8 @@ def received_columns(
 
     Args:
         table: name of their table.
-        columns: Arrow IPC stream of all columns but ``record``, not compressed; empty
-            for no rows.
+        columns: Arrow IPC stream of the columns in ``ROWS``, not compressed; empty for
+            no rows.
         most_bytes: length that it may have.
         most_rows: number of rows that it may have.
 
@@ -36,7 +67,7 @@ def received_columns(
         MalformedMessage: not such a stream; columns of other names or types; nulls in
             a column that has none; too many bytes or rows.
     """
-    schema = TABLES[table].remove(0)
+    schema = ROWS[table]
     if not columns:
         return schema.empty_table()
     if len(columns) > most_bytes:
@@ -55,7 +86,7 @@ def received_columns(
 
 
 def _batches(table: str, columns: bytes, most_rows: int) -> Iterator[pa.RecordBatch]:
-    schema = TABLES[table].remove(0)
+    schema = ROWS[table]
     messages = iter(pa.ipc.MessageReader.open_stream(columns))
     first = next(messages, None)
     if first is None or first.type != "schema":

@@ -7,8 +7,8 @@ per process; the rows before it are read. Resuming the run computes the others a
 import contextlib
 import logging
 import re
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Iterator, Mapping
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,7 +16,9 @@ import pyarrow as pa
 
 from schema.errors import RunFolderError
 from schema.tables.checksums import Damaged, read_seal, sound_messages, sums_path
-from schema.tables.columns import TABLES, completed, is_earlier
+from schema.tables.columns import TABLES
+from schema.tables.description import run_columns
+from schema.tables.earlier import completed, is_earlier
 
 SEGMENTS = "segments"
 FINISHED = "tables"
@@ -83,7 +85,9 @@ def read_segment(folder: Path, table: str, path: Path) -> Iterator[Batch]:
     try:
         sums = _sums(folder, path)
         batches = _unchecked if sums is None else _checked
-        yield from batches(path, TABLES[table], sums or b"")
+        whole = partial(_whole, schema=TABLES[table], of_run=run_columns(folder))
+        for batch in batches(path, TABLES[table], sums or b""):
+            yield batch._replace(rows=whole(batch.rows))
     except Damaged as damage:
         # At the end of a run, segments are removed as soon as there is Parquet.
         if not parquet_files(folder, table):
@@ -142,7 +146,7 @@ def _checked(path: Path, schema: pa.Schema, sums: bytes) -> Iterator[Batch]:
             _check_version(path, stored, schema)
         else:
             batch = pa.ipc.read_record_batch(message, stored)
-            yield Batch(end, number, _whole(batch, schema))
+            yield Batch(end, number, batch)
 
 
 def _unchecked(path: Path, schema: pa.Schema, _sums: bytes) -> Iterator[Batch]:
@@ -160,7 +164,7 @@ def _unchecked(path: Path, schema: pa.Schema, _sums: bytes) -> Iterator[Batch]:
         _check_version(path, reader.schema, schema)
         for number, batch in enumerate(reader, start=2):
             batch.validate(full=True)
-            yield Batch(source.tell(), number, _whole(batch, schema))
+            yield Batch(source.tell(), number, batch)
 
 
 def _check_version(path: Path, found: pa.Schema, schema: pa.Schema) -> None:
@@ -171,10 +175,12 @@ def _check_version(path: Path, found: pa.Schema, schema: pa.Schema) -> None:
         )
 
 
-def _whole(batch: pa.RecordBatch, schema: pa.Schema) -> pa.RecordBatch:
+def _whole(
+    batch: pa.RecordBatch, schema: pa.Schema, of_run: Mapping[str, object]
+) -> pa.RecordBatch:
     """Return a batch with all columns of its table."""
     if batch.schema.names == schema.names:
         return batch
-    columns = completed(pa.Table.from_batches([batch]), schema).columns
+    columns = completed(pa.Table.from_batches([batch]), schema, of_run).columns
     arrays = [column.combine_chunks() for column in columns]
     return pa.RecordBatch.from_arrays(arrays, schema=schema)

@@ -51,7 +51,11 @@ class InsertRobot(Message, frozen=True, tag="insert"):
 
 
 class RemoveRobot(Message, frozen=True, tag="remove"):
-    """Remove a robot from the arena."""
+    """Remove a robot from the arena.
+
+    Attributes:
+        birth: id of the robot.
+    """
 
     birth: BirthId
 

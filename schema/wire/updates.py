@@ -100,7 +100,13 @@ class Migrant(Message, frozen=True):
 
 
 class WorkerInfo(Message, frozen=True):
-    """A connected worker, its platform and the arena shards that it holds."""
+    """A connected worker.
+
+    Attributes:
+        name: of its process.
+        platform: processor class, system and libraries, which decide rounding.
+        shards: numbers of the arenas that it holds.
+    """
 
     name: str
     platform: str

@@ -27,7 +27,7 @@ from schema.experiment.document import Experiment
 from schema.experiment.file import read_experiment
 from schema.robot.ids import BirthId
 from schema.robot.results import Provenance, Report
-from schema.tables.columns import POSES
+from schema.tables.columns import ROWS
 from schema.wire.arena import Advance, Casualty, Judgement, Touch
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -134,7 +134,7 @@ def poses(
     births: list[BirthId], *times_s: float, joints: Mapping[BirthId, int] | None = None
 ) -> bytes:
     """Return a pose for each time and robot as columns; one joint by default."""
-    schema = POSES.remove(0)
+    schema = ROWS["poses"]
     rows = [
         {"island": one.island, "birth": one.number, "sim_time_s": time_s}
         | dict.fromkeys(("x", "y", "z", "qx", "qy", "qz"), 0.0)

@@ -37,6 +37,8 @@ def test_run_has_every_table(done: rv.Run) -> None:
         table = getattr(done, name)
         assert table.schema.names[0] == "record"
         assert table.equals(done.table(name))
+        assert set(table["run_id"].to_pylist()) <= {done.run_id}
+        assert set(table["seed"].to_pylist()) <= {7}
     assert (done.births.num_rows, done.state, done.seed) == (BIRTHS, "finished", 7)
 
 

@@ -34,7 +34,9 @@ def test_check(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_check_of_a_wrong_file(path: Path) -> None:
     path.write_text(TEXT.replace("leg,", "leg, leg: 1,"))
-    with pytest.raises(InvalidRobot, match=r"robot\.yaml:4: body\.children\.1\.leg"):
+    with pytest.raises(
+        InvalidRobot, match=r"robot\.yaml:4: part 'leg': leg: no such key"
+    ):
         main(["robot", "check", str(path)])
 
 

@@ -11,8 +11,8 @@ from coordinator.islands.events import Advanced, Commanded
 from coordinator.storage.compare import compare
 from coordinator.storage.journal import Journal
 from schema.agent.network import client_config
-from schema.tables.columns import read_columns
 from schema.tables.files import read_table
+from schema.tables.received import read_columns
 from schema.wire.arena_codec import Live, decode_live
 
 pytestmark = [pytest.mark.system, pytest.mark.timeout(300)]

@@ -11,7 +11,7 @@ import pytest
 from coordinator.storage.compare import compare
 from schema.parts import BUILT_IN
 from schema.robot.robot import check_robot
-from schema.tables.columns import body_rows
+from schema.tables.births import body_rows
 from schema.tables.files import read_table
 from schema.wire.codec import decode_robot
 from tests.system.documents import OFF_LINE, SMALL_ARENA

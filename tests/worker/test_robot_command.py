@@ -22,3 +22,22 @@ def test_file_has_the_evaluation_of_its_robot(
         assert lines[0] == f"fitness:           {expected.fitness!r}"
         assert lines[1] == f"path velocity:     {expected.path_velocity!r} m/s"
         assert lines[3] == "simulated:         12.0 s"
+
+
+def test_robustness_is_shown_by_change_and_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_robot(spider(), tmp_path / "spider.yaml", BUILT_IN)
+    short = tmp_path / "short.toml"
+    short.write_text('name = "short"\n[simulation]\nwindow_steps = 400\n')
+    words = [str(tmp_path / "spider.yaml"), "--experiment", str(short)]
+    assert main(["robot simulate", *words]) == 0
+    plain = capsys.readouterr().out.splitlines()
+    assert main(["robot simulate", *words, "--robustness"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:4] == plain
+    assert len(lines) == 4 + 11 + 1
+    assert lines[4].startswith("time step 0.0025 s:")
+    shares = [int(line.split("(")[1].split()[0]) for line in lines[4:-1]]
+    text = f"keeps {min(shares)} to {max(shares)} % of its fitness"
+    assert lines[-1].startswith(text)

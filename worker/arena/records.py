@@ -10,12 +10,12 @@ import pyarrow as pa
 from schema.experiment.settings import ArenaSettings
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
-from schema.tables.columns import POSES
+from schema.tables.columns import ROWS
 from schema.wire.arena import Touch
 from worker.clusters.cluster import Cluster
 from worker.clusters.columns import Layout
 
-_SCHEMA = POSES.remove(0)
+_SCHEMA = ROWS["poses"]
 
 
 class Poses:
@@ -77,7 +77,7 @@ def pose_batch(
     joint_counts: npt.NDArray[np.int32],
     angles: Floats,
 ) -> pa.RecordBatch:
-    """Return N rows of the poses table, without ``record``.
+    """Return N rows of the poses table, with the columns in ``ROWS``.
 
     Args:
         islands: (N,) of the robots' births.

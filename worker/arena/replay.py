@@ -18,7 +18,8 @@ from schema.experiment.settings import EvaluationSettings, read_arena_settings
 from schema.robot.ids import BirthId
 from schema.robot.results import Evaluation, Floats
 from schema.robot.robot import Robot
-from schema.tables.columns import POSES, read_columns
+from schema.tables.columns import ROWS
+from schema.tables.received import read_columns
 from schema.wire.arena_codec import Rebuild
 from worker.arena.births import possible
 from worker.arena.records import pose_batch
@@ -120,7 +121,7 @@ def together(
                 world.step,
                 world.digest() == advance.digest,
                 pa.concat_tables(samples),
-                pa.concat_tables(motion) if motion else POSES.remove(0).empty_table(),
+                pa.concat_tables(motion) if motion else ROWS["poses"].empty_table(),
             )
     finally:
         world.close()

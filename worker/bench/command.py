@@ -27,6 +27,7 @@ from schema.robot.results import Floats
 from schema.robot.robot import Robot
 from worker.bench import arena_bench, fidelity
 from worker.robot import evaluation
+from worker.robot.robustness import finer
 
 LEAST_RATIO = 0.85
 """Goal for the ratio of bare engine time to evaluation time (design, section 9)."""
@@ -202,7 +203,7 @@ def _evaluate(options: argparse.Namespace, source: arena_bench.RobotSource) -> i
 def _fidelity(options: argparse.Namespace) -> int:
     population = fidelity.read_population(options.run)
     experiment = population.experiment
-    other = fidelity.finer(experiment.simulation)
+    other = finer(experiment.simulation)
     if options.against:
         other = _changed(experiment, options.against)
     chosen = fidelity.sample_thirds(population.fitness, options.per_third, options.seed)

@@ -97,18 +97,6 @@ def winners(fitness: Floats) -> list[int]:
     return [int(index) for index in np.argsort(-fitness, kind="stable")[:WINNERS]]
 
 
-def finer(simulation: Simulation, factor: int = 5) -> Simulation:
-    """Return the simulation with a time step that many times finer."""
-    return replace(
-        simulation,
-        timestep_s=simulation.timestep_s / factor,
-        brain_steps=simulation.brain_steps * factor,
-        pose_steps=simulation.pose_steps * factor,
-        window_steps=simulation.window_steps * factor,
-        warmup_steps=simulation.warmup_steps * factor,
-    )
-
-
 def compare(
     robots: Iterable[Robot], experiment: Experiment, other: Simulation
 ) -> Floats:

@@ -1,5 +1,7 @@
 """Tests of rendered pictures and their files."""
 
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NoReturn
@@ -14,11 +16,11 @@ from analysis.render.flags import parser
 from analysis.render.picture import (
     NoPictures,
     RobotRenderer,
-    choose_engine,
     gait_strip,
     save_animation,
     save_picture,
 )
+from analysis.render.ray_caster import RayCaster, _checker
 from schema.experiment.environment import Environment
 from schema.formats.files import settings_of, write_robot
 from schema.parts import BUILT_IN
@@ -36,14 +38,23 @@ ROBOT = Robot(
 )
 
 
-@pytest.fixture(scope="module")
-def renderer() -> Iterator[RobotRenderer]:
-    try:
-        choose_engine()
-        made = RobotRenderer(ROBOT, settings_of(None), size=(160, 120))
-    except NoPictures as error:
-        pytest.skip(str(error))
-    with made:
+@pytest.fixture(params=["gl", "rays"])
+def engine(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Choose what renders; tests/conftest.py has loaded the graphics library."""
+    name = str(request.param)
+    if name == "rays":
+        monkeypatch.setenv("MUJOCO_GL", "disable")
+        return name
+    with RobotRenderer(ROBOT, settings_of(None), size=(16, 16)) as made:
+        if isinstance(made._renderer, RayCaster):
+            pytest.skip("no EGL or OSMesa that works")
+    return name
+
+
+@pytest.fixture
+def renderer(engine: str) -> Iterator[RobotRenderer]:
+    with RobotRenderer(ROBOT, settings_of(None), size=(160, 120)) as made:
+        assert isinstance(made._renderer, RayCaster) == (engine == "rays")
         yield made
 
 
@@ -168,7 +179,6 @@ def robot_file(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.usefixtures("renderer")  # skips where nothing can render
 def test_a_strip_longer_than_the_evaluation_is_refused(robot_file: Path) -> None:
     words = ["robot render", str(robot_file), str(robot_file.with_suffix(".png"))]
     message = r"--gait 49: must be <= 48, the number of ticks in the second half"
@@ -179,7 +189,6 @@ def test_a_strip_longer_than_the_evaluation_is_refused(robot_file: Path) -> None
         main([*words, "--gait", "48"])
 
 
-@pytest.mark.usefixtures("renderer")
 def test_a_log_names_the_picture_that_is_rendered(
     robot_file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -192,3 +201,69 @@ def test_a_log_names_the_picture_that_is_rendered(
 def test_a_strip_as_gif_is_refused() -> None:
     with pytest.raises(NoPictures, match=r"--gait needs a \.png"):
         main(["robot render", "a.yaml", "a.gif", "--gait", "5"])
+
+
+def test_a_machine_without_graphics_library_gets_pictures_and_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """In a new process, which would load MuJoCo with EGL if it could."""
+    script = """
+import ctypes.util
+ctypes.util.find_library = lambda name: None
+from analysis.render.picture import RobotRenderer, choose_engine
+choose_engine()
+from tests.analysis.render.test_picture import ROBOT, settings_of
+for _ in range(2):
+    with RobotRenderer(ROBOT, settings_of(None), size=(40, 30)) as renderer:
+        print(renderer.picture().shape)
+"""
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "(30, 40, 3)\n" * 2
+    line = "robots are drawn without OpenGL: no EGL or OSMesa here\n"
+    assert done.stderr == line
+
+
+@pytest.mark.parametrize("engine", ["gl"], indirect=True)
+def test_both_engines_draw_the_same_robot(
+    renderer: RobotRenderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Parts cover the same pixels, but for their edges."""
+    monkeypatch.setenv("MUJOCO_GL", "disable")
+    with RobotRenderer(ROBOT, settings_of(None), size=(160, 120)) as other:
+        pictures = [renderer.picture(), other.picture()]
+    for channel in (0, 2):
+        first, second = ({*map(tuple, mostly(one, channel))} for one in pictures)
+        assert len(first ^ second) < 0.15 * len(first)
+
+
+def test_a_shadow_falls_away_from_the_light(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The light at (-0.5, -0.8, 3) shines through (0, 0, 1) at (0.25, 0.4, 0)."""
+    monkeypatch.setenv("MUJOCO_GL", "disable")
+    core = Robot(ROBOT.parts[:1], ROBOT.brain)
+    low, high = (np.array([0, 0, z, 1, 0, 0, 0]) for z in (0.0225, 1.0))
+    with RobotRenderer(core, settings_of(None), size=(160, 120)) as made:
+        spot = np.array([0.25, 0.4, 0.0])
+        bright, dark = (
+            made.picture(pose, look_at=spot)[60, 80] for pose in (low, high)
+        )
+    assert (dark < 0.8 * bright).all()
+
+
+@pytest.mark.parametrize(
+    ("place", "width", "share"),
+    [
+        ((0.5, 0.5), 0.1, 1.0),  # within a tile of the first colour
+        ((1.5, 0.5), 0.1, 0.0),  # within one of the second
+        ((1.0, 0.5), 0.5, 0.5),  # on the edge between both
+        ((1.1, 0.5), 0.4, 0.25),  # a quarter of the pixel is in the first tile
+        ((0.3, -7.7), 2.0, 0.5),  # two tiles wide: as much of each
+    ],
+)
+def test_a_checker_is_averaged_over_a_pixel(
+    place: tuple[float, float], width: float, share: float
+) -> None:
+    found = _checker(np.array([place]), np.array([width]))
+    assert found == pytest.approx([share], abs=1e-5)

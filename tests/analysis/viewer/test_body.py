@@ -25,7 +25,7 @@ from schema.robot.brain import Brain
 from schema.robot.ids import BirthId
 from schema.robot.results import Floats
 from schema.robot.robot import Part, Robot
-from schema.tables.columns import read_columns
+from schema.tables.received import read_columns
 from tests.coordinator.arena_world import poses
 
 GREY = (0.2, 0.4, 0.6)

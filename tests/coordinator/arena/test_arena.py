@@ -21,7 +21,7 @@ from schema.errors import ExperimentError, UnexpectedEvent
 from schema.experiment.document import Experiment
 from schema.experiment.file import read_experiment
 from schema.robot.ids import BirthId
-from schema.tables.columns import TABLES
+from schema.tables.columns import ROWS
 from schema.wire.arena import Advance
 from tests.coordinator.arena_world import (
     CROWDED,
@@ -239,7 +239,7 @@ def test_rows_have_the_columns_of_their_tables() -> None:
         rows = lived.rows(name)
         assert rows
         for row in rows:
-            assert [*sorted(["record", *row])] == sorted(TABLES[name].names)
+            assert sorted(row) == sorted(ROWS[name].names)
 
 
 def advanced(step: int, number: int) -> Advanced:

@@ -28,7 +28,8 @@ from coordinator.run.shard_requests import Reached, ShardRequests
 from schema.errors import MalformedMessage
 from schema.experiment.identity import Origin
 from schema.robot.ids import BirthId
-from schema.tables.columns import POSES, read_columns
+from schema.tables.columns import POSES
+from schema.tables.received import read_columns
 from schema.wire import revolve_pb2 as pb
 from schema.wire.arena import Advance, Casualty, Changes, Insertion, Judgement, Touch
 from schema.wire.arena_codec import (

@@ -11,6 +11,7 @@ from coordinator.storage.compare import compare
 from coordinator.storage.folder import RunDetails, RunFolder
 from coordinator.storage.recorder import Recorder
 from schema.errors import RunFolderError
+from schema.tables.files import read_table
 
 DETAILS = RunDetails("test", 0, 1, "{}")
 Make = Callable[..., list[Record]]
@@ -43,6 +44,9 @@ def test_equal_runs_have_no_difference(
 ) -> None:
     first = written(tmp_path / "a", make_records(12))
     second = written(tmp_path / "b", make_records(12), is_finished=is_finished)
+    ids = [read_table(run, "births")["run_id"].unique() for run in (first, second)]
+    assert [len(each) for each in ids] == [1, 1]
+    assert ids[0] != ids[1]
     assert compare(first, second) == []
     assert compare(second, first) == []
 

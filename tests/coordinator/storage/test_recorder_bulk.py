@@ -10,8 +10,9 @@ from coordinator.storage.folder import RunDetails
 from coordinator.storage.recorder import Recorder
 from schema.errors import MalformedMessage, RunFolderError
 from schema.robot.ids import BirthId
-from schema.tables.columns import POSES, TABLES, read_columns
+from schema.tables.columns import POSES, ROWS
 from schema.tables.files import read_table
+from schema.tables.received import read_columns
 from schema.tables.segments import segment_path, segments_of
 from tests.coordinator.arena_world import poses
 
@@ -144,11 +145,11 @@ def test_wrong_columns_are_refused_and_nothing_is_written(
 def test_empty_bytes_are_no_rows() -> None:
     table = read_columns("poses", b"")
     assert table.num_rows == 0
-    assert table.schema == POSES.remove(0)
+    assert table.schema == ROWS["poses"]
 
 
 def test_columns_of_several_batches_become_one() -> None:
-    schema = TABLES["poses"].remove(0)
+    schema = ROWS["poses"]
     sink = pa.BufferOutputStream()
     batches = read_columns("poses", bulk(1).columns).to_batches()
     with pa.ipc.new_stream(sink, schema) as writer:

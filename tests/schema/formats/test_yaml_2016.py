@@ -92,10 +92,10 @@ def test_default_outputs_and_hidden_neurons_by_name() -> None:
     ("old", "new", "message"),
     [
         ("early: {type", "earlier: {type", r"its\.yaml:9: brain.params.earlier: unkn"),
-        ("gain: 0.25", "phase: 0.25", r"its\.yaml:4: .*late\.phase: no such key"),
+        ("gain: 0.25", "phase: 0.25", r"its\.yaml:4: neuron 'late': phase: no"),
         ("src: late", "src: later", r"its\.yaml:12: .*'late'"),
-        ("layer: hidden", "layer: input", r"its\.yaml:4: .*layer: must be one of hid"),
-        ("type: Core", "type: Cor", r"its\.yaml:1: body.type: must be one of"),
+        ("layer: hidden", "layer: input", r":4: neuron 'late': layer: part 'h' has"),
+        ("type: Core", "type: Cor", r"its\.yaml:1: part 'c': type 'Cor' is"),
         ("id: h,", "id: h, orientation: 0.5,", r"its\.yaml:1: .*orientation: must"),
         ("part_id: h, gain", "part_id: x, gain", r"its\.yaml:4: .*part_id"),
     ],

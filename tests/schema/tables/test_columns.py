@@ -12,13 +12,12 @@ from hypothesis.strategies import DataObject, SearchStrategy
 
 from schema.parts import BUILT_IN
 from schema.robot.genome import ConnectionGene, Genome, NeuronGene, Node, develop
+from schema.tables.births import body_rows, sizes
 from schema.tables.columns import (
     BIRTHS,
     EVALUATIONS,
     TABLES,
-    body_rows,
     repeatable,
-    sizes,
 )
 from schema.wire.codec import decode_genome, encode_genome, encode_robot
 
@@ -43,34 +42,48 @@ def birth(genome: Genome, record: int) -> dict[str, object]:
         "x": None if record else -1.5,
         "y": None if record else 0.0,
         "robot": encode_robot(robot) if record else None,
+        "seed": 7,
+        "run_id": "0123456789ab",
     }
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_every_column_has_unit_and_repeatable_metadata(name: str) -> None:
+def test_every_column_has_a_description_and_a_unit(name: str) -> None:
     schema = TABLES[name]
+    assert schema.metadata[b"description"]
     assert schema.names[0] == "record"
     assert schema.metadata[b"revolve.schema"] == name.encode()
     assert int(schema.metadata[b"revolve.schema_version"]) >= 1
     for field in schema:
-        assert set(field.metadata) - {b"absent"} == {b"unit", b"repeatable"}
+        assert set(field.metadata) - {b"absent"} == {
+            b"unit",
+            b"description",
+            b"repeatable",
+        }
+        text = field.metadata[b"description"].decode()
+        assert len(text) > 10
+        assert not text.endswith(".")
         if field.name.endswith("_s"):
             assert field.metadata[b"unit"] == b"s"
         if field.name.endswith("velocity"):
             assert field.metadata[b"unit"] == b"m/s"
+        if field.name in "xyz":
+            assert field.metadata[b"unit"] == b"m"
+        is_float = pa.types.is_floating(getattr(field.type, "value_type", field.type))
+        assert bool(field.metadata[b"unit"]) >= is_float
 
 
 @pytest.mark.parametrize(
     ("name", "others"),
     [
-        ("births", {"robot"}),
-        ("evaluations", {"wall_s", "worker", "platform"}),
-        ("population", set()),
-        ("fitness", set()),
-        ("poses", set()),
-        ("deaths", set()),
-        ("touches", set()),
-        ("runs", {"versions", "platform", "cpu_flags", "start", "end"}),
+        ("births", {"robot", "run_id"}),
+        ("evaluations", {"wall_s", "worker", "platform", "run_id"}),
+        ("population", {"run_id"}),
+        ("fitness", {"run_id"}),
+        ("poses", {"run_id"}),
+        ("deaths", {"run_id"}),
+        ("touches", {"run_id"}),
+        ("runs", {"versions", "platform", "cpu_flags", "start", "end", "run_id"}),
     ],
 )
 def test_columns_of_machines_and_clocks_are_not_repeatable(
@@ -78,6 +91,14 @@ def test_columns_of_machines_and_clocks_are_not_repeatable(
 ) -> None:
     schema = TABLES[name]
     assert set(schema.names) - set(repeatable(schema)) == others
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_every_table_names_its_run(name: str) -> None:
+    schema = TABLES[name]
+    assert schema.field("seed").type == pa.uint64()
+    assert schema.field("run_id").type == pa.string()
+    assert schema.names[-1] == "run_id"
 
 
 def test_no_column_has_the_name_of_a_partition() -> None:

@@ -8,9 +8,11 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from msgspec.structs import replace
 
 from schema.errors import RunFolderError
 from schema.tables.columns import EVALUATIONS, TABLES
+from schema.tables.description import Description, description_text, run_columns
 from schema.tables.files import campaign, parquet_path, read_table
 from schema.tables.segments import segment_path
 
@@ -30,7 +32,10 @@ ROW = {
     "worker": "w",
     "platform": "p",
     "measures": [("height", 0.1), ("turning", 2.0)],
+    "seed": 7,
+    "run_id": "0123456789ab",
 }
+DESCRIPTION = Description("old", 0, 2**64 - 1, "{}", nonce="a5d3c0ab")
 
 
 def without(*names: str) -> pa.Table:
@@ -68,6 +73,85 @@ def test_present_rows_are_read_unchanged(
 ) -> None:
     write(tmp_path, without())
     assert read_table(tmp_path, "evaluations").to_pylist() == [ROW]
+
+
+@pytest.mark.parametrize("write", [write_segment, write_parquet])
+def test_rows_of_older_runs_get_seed_and_id_of_their_run(
+    tmp_path: Path, write: Callable[[Path, pa.Table], None]
+) -> None:
+    write(tmp_path, without("seed", "run_id"))
+    (tmp_path / "run.json").write_text(description_text(DESCRIPTION))
+    (row,) = read_table(tmp_path, "evaluations").to_pylist()
+    assert row == {**ROW, "seed": 2**64 - 1, "run_id": run_columns(tmp_path)["run_id"]}
+
+
+def test_run_columns_are_null_without_a_description(tmp_path: Path) -> None:
+    write_segment(tmp_path, without("seed", "run_id"))
+    (row,) = read_table(tmp_path, "evaluations").to_pylist()
+    assert row == {**ROW, "seed": None, "run_id": None}
+
+
+@pytest.mark.parametrize("older", ["a", "b"])
+def test_a_campaign_of_older_and_newer_runs_has_all_columns(
+    tmp_path: Path, older: str
+) -> None:
+    new = ["trial", "seed", "run_id"]
+    for name in "ab":
+        folder = tmp_path / name
+        write_parquet(folder, without(*new) if name == older else without())
+        (folder / "run.json").write_text(description_text(DESCRIPTION))
+    rows = campaign(tmp_path, "evaluations").to_table().sort_by("trial")
+    assert [row["experiment"] for row in rows.to_pylist()] == ["old", "old"]
+    assert rows.select(new).to_pylist() == [
+        {"trial": 0, **run_columns(tmp_path / older)},
+        {name: ROW[name] for name in new},
+    ]
+
+
+def test_run_id_is_that_of_one_run(tmp_path: Path) -> None:
+    def columns(description: Description) -> dict[str, int | str | None]:
+        (tmp_path / "run.json").write_text(description_text(description))
+        return run_columns(tmp_path)
+
+    own = columns(DESCRIPTION)
+    # Worked out by hand: the SHA-256 of ["old",0,18446744073709551615,"{}","a5d3c0ab"].
+    assert own == {"seed": 2**64 - 1, "run_id": "2d5796dcc131"}
+    assert columns(replace(DESCRIPTION, checksums=True, digests={"births": "1"})) == own
+    others = [
+        replace(DESCRIPTION, run=1),
+        replace(DESCRIPTION, seed=1),
+        replace(DESCRIPTION, document="{ }"),
+        replace(DESCRIPTION, nonce="b"),
+    ]
+    ids = {columns(each)["run_id"] for each in others}
+    assert len(ids | {own["run_id"]}) == 1 + len(others)
+
+
+def relabelled(**changes: str | None) -> pa.Table:
+    """Return one row whose columns have other metadata; None removes a key."""
+    rows = without()
+    fields = []
+    for field in rows.schema:
+        known = {key.decode(): text.decode() for key, text in field.metadata.items()}
+        found = {**known, **changes}
+        kept = {key: text for key, text in found.items() if text is not None}
+        fields.append(field.with_metadata(kept))
+    metadata = dict(EVALUATIONS.metadata)
+    del metadata[b"description"]
+    return rows.cast(pa.schema(fields, metadata))
+
+
+def test_descriptions_and_units_of_earlier_runs_are_replaced(tmp_path: Path) -> None:
+    write_segment(tmp_path, relabelled(description=None, unit="furlong"))
+    found = read_table(tmp_path, "evaluations")
+    assert found.to_pylist() == [ROW]
+    assert found.schema.equals(EVALUATIONS, check_metadata=True)
+
+
+def test_columns_of_another_repeatability_are_refused(tmp_path: Path) -> None:
+    write_segment(tmp_path, relabelled(repeatable="maybe"))
+    with pytest.raises(RunFolderError, match="another version of Revolve"):
+        read_table(tmp_path, "evaluations")
 
 
 def test_a_nullable_column_is_null_in_older_rows(tmp_path: Path) -> None:

@@ -10,11 +10,11 @@ import pytest
 
 from schema.errors import MalformedMessage
 from schema.robot.ids import BirthId
-from schema.tables.columns import POSES
+from schema.tables.columns import ROWS
 from schema.tables.received import received_columns
 from tests.coordinator.arena_world import poses
 
-SCHEMA = POSES.remove(0)
+SCHEMA = ROWS["poses"]
 COLUMNS = poses([BirthId(0, number) for number in range(5)], 1.0)
 
 

@@ -14,7 +14,7 @@ from schema.parts import LIGHT_SENSOR
 from schema.robot.brain import Brain, Neuron
 from schema.robot.ids import BirthId
 from schema.robot.robot import Part, Robot
-from schema.tables.columns import read_columns
+from schema.tables.received import read_columns
 from schema.wire.arena import BrainChange, Changes, Insertion
 from tests.worker.arena_cases import (
     EXPERIMENT,

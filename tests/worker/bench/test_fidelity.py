@@ -13,12 +13,12 @@ from schema.experiment.document import Experiment, Simulation
 from schema.robot.robot import Robot
 from worker.bench.fidelity import (
     compare,
-    finer,
     read_population,
     sample_thirds,
     spearman,
     winners,
 )
+from worker.robot.robustness import finer
 
 
 def test_spearman_equals_that_of_scipy_with_ties() -> None:

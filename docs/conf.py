@@ -1,0 +1,31 @@
+"""Settings of the documentation site, which `make docs` builds with Sphinx.
+
+The pages stay plain Markdown that reads well on a code host, too. docs/index.md has the
+navigation. Notebooks show the output that is stored in them; tests run them.
+"""
+
+from pathlib import Path
+
+import msgspec
+
+_PROJECT = msgspec.toml.decode(
+    (Path(__file__).parents[1] / "pyproject.toml").read_bytes()
+)["project"]
+
+project = "Revolve Islands"
+version = release = _PROJECT["version"]
+html_title = f"{project} {version}"
+
+extensions = ["myst_nb"]
+exclude_patterns = ["_build", "data"]
+myst_heading_anchors = 4
+nb_execution_mode = "off"
+# Code without a language is a command, its output or a message.
+highlight_language = "text"
+
+html_theme = "furo"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_copyright = False
+html_show_sphinx = False

@@ -1,0 +1,55 @@
+"""A run whose plug-in was changed after its start."""
+
+import pytest
+
+from tests.system.workspace import Workspace
+
+pytestmark = pytest.mark.system
+
+DOCUMENT = """
+name = "mine"
+births = 8
+[selection]
+population = 6
+[simulation]
+warmup_steps = 5
+window_steps = 40
+[fitness]
+function = "lab:far"
+"""
+MODULE = """
+def far(track, fitness):
+    return float(track.core_position[-1, 0])
+"""
+FAULTY = "\ndef far(track):\n    return 0.0\n"
+HOW = ("--in-process", "--quiet")
+
+
+def test_resume_and_check_name_the_changed_module(
+    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is simulated by a plug-in that is not the one of the run."""
+    # As an installed command: the folder is not searched for modules.
+    monkeypatch.setenv("PYTHONSAFEPATH", "1")
+    run, module = workspace.folder / "a", workspace.folder / "lab.py"
+    (workspace.folder / "mine.toml").write_text(DOCUMENT)
+    module.write_text(MODULE)
+    workspace.run("run", "mine.toml", "--out", "a", *HOW)
+    assert "lab.py:2: in order" in workspace.run("check", "a")
+    (run / "state").write_text("stopped")
+    before = (run / "journal.bin").read_bytes()
+
+    module.write_text(FAULTY)
+    for words, code in ((("resume", "a", *HOW), 2), (("check", "a"), 1)):
+        (line,) = workspace.run(*words, code=code).splitlines()[-1:]
+        assert "plug-in lab: " in line
+        assert "has changed since the run began" in line
+        assert line.endswith(": --plugins a/plugins/lab.py")
+    told = workspace.run("check", "mine.toml", code=1)
+    assert "lab.py:2: 'lab:far' must take 2 arguments" in told
+    assert (run / "journal.bin").read_bytes() == before
+
+    kept = ("--plugins", "a/plugins/lab.py")
+    assert "in order" in workspace.run("check", "a", *kept)
+    workspace.run("resume", "a", *HOW, *kept)
+    assert (run / "state").read_text().strip() == "finished"

@@ -1,0 +1,93 @@
+"""Fitness under small changes of the simulation."""
+
+from types import SimpleNamespace
+
+import pytest
+from msgspec.structs import asdict, replace
+
+from schema.errors import SimulationDiverged
+from schema.experiment.document import Fitness, Simulation, Space
+from schema.experiment.settings import EvaluationSettings
+from schema.robot.robot import Robot
+from worker.robot import robustness
+from worker.robot.evaluation import evaluate
+from worker.robot.robustness import Change, Judged, rejudge, small_changes, summary
+
+SETTINGS = EvaluationSettings(
+    space=Space(),
+    simulation=Simulation(window_steps=400, drop_m=0.01),
+    fitness=Fitness(),
+)
+CHANGE = Change("none", SETTINGS)
+
+
+def judged(*fitness: float | None) -> list[Judged]:
+    return [Judged(CHANGE, one) for one in fitness]
+
+
+def test_each_change_changes_one_thing_and_no_duration() -> None:
+    changes = small_changes(SETTINGS)
+    before = asdict(SETTINGS.simulation)
+    differing = []
+    for change in changes:
+        assert replace(change.settings, simulation=SETTINGS.simulation) == SETTINGS
+        after = asdict(change.settings.simulation)
+        differing.append({name for name in after if after[name] != before[name]})
+        world = change.settings.simulation
+        assert world.window_steps * world.timestep_s == pytest.approx(2.0)
+        assert world.brain_steps * world.timestep_s == pytest.approx(0.125)
+    clocks = {"timestep_s", "brain_steps", "pose_steps", "window_steps"}
+    assert differing == [clocks, clocks, {"friction"}, *[{"drop_m"}] * 8]
+    steps = [change.settings.simulation.timestep_s for change in changes[:2]]
+    assert steps == pytest.approx([0.0025, 0.001])
+    assert changes[2].settings.simulation.friction == pytest.approx(0.99)
+    lifts = [1000 * (one.settings.simulation.drop_m - 0.01) for one in changes[3:]]
+    assert len({*lifts}) == 8
+    assert all(0 < lift < 0.2 for lift in lifts)
+    assert sum(lifts) / 8 == pytest.approx(0.1, abs=0.05)
+
+
+def test_starts_are_drawn_from_the_seed() -> None:
+    assert small_changes(SETTINGS, 1) == small_changes(SETTINGS, 1)
+    assert small_changes(SETTINGS, 1)[3:] != small_changes(SETTINGS, 2)[3:]
+
+
+def test_fitness_is_that_of_an_evaluation_with_the_changed_settings(
+    turtle: Robot,
+) -> None:
+    slow = replace(SETTINGS, fitness=Fitness(path_weight=0.5))
+    found = list(rejudge(turtle, [CHANGE, Change("half the weight", slow)]))
+    assert [one.fitness for one in found] == [
+        evaluate(turtle, SETTINGS).fitness,
+        evaluate(turtle, slow).fitness,
+    ]
+
+
+def test_failed_evaluations_have_no_fitness(
+    turtle: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fake(_: Robot, settings: EvaluationSettings, __: object) -> SimpleNamespace:
+        if settings.simulation.friction < 1.0:
+            raise SimulationDiverged("slipped away")
+        return SimpleNamespace(fitness=0.5)
+
+    monkeypatch.setattr(robustness, "evaluate", fake)
+    found = [one.fitness for one in rejudge(turtle, small_changes(SETTINGS))]
+    assert found == [0.5, 0.5, None, *[0.5] * 8]
+
+
+@pytest.mark.parametrize(
+    ("fitness", "found", "line"),
+    [
+        (
+            0.125,
+            (0.07625, 0.1, 0.1325),
+            "keeps 61 to 106 % of its fitness (0.125) under",
+        ),
+        (0.1, (0.1, None), "start; 1 of them failed"),
+        (-0.2, (-0.25, -0.1), "has a fitness of -0.25 to -0.1 under 2 small changes"),
+        (0.3, (None,), "has no fitness under 1 small changes"),
+    ],
+)
+def test_summary(fitness: float, found: tuple[float | None, ...], line: str) -> None:
+    assert line in summary(fitness, judged(*found))
