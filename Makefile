@@ -61,7 +61,7 @@ test: compiled
 # Tests that are too long for CI: run them before a release and report the results.
 test-long: test-many bench test-fresh
 
-test-many: compiled
+test-many: compiled $(DOCS_STAMP)
 	$(BIN)/python -m pytest -q -n 2 --dist worksteal -m long
 
 # To test one release of Debian only: make SUITES=sid test-fresh.
