@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -17,7 +18,6 @@ from analysis.comparison.comparison import Outcomes, comparison, findings
 from analysis.comparison.progression import progression
 from analysis.figures.catalogue import DrawnFigure
 from analysis.figures.figure_writer import draw_figures
-from analysis.figures.report import report
 from analysis.measures.benchmarks import read_benchmarks
 from analysis.measures.distinct_names import with_distinct_names
 from analysis.measures.load import LeftOut, Run, read_runs
@@ -26,6 +26,7 @@ from analysis.measures.study import concatenated, measure_runs
 from analysis.measures.trees import SlotRule
 from analysis.progress import bars
 from analysis.render.picture import Simulate
+from analysis.report.page import report
 from analysis.summary import show
 from schema.errors import RunFolderError
 
@@ -66,29 +67,24 @@ def analyze(
         raise RunFolderError(f"{options.out}: {why}") from None
     with bars(f"measuring runs: {len(runs)}", *columns, TimeRemainingColumn()) as bar:
         tables, left_out = _measured(runs, options, bar)
-        drawn, undrawn = draw_figures(
+        left_out = [*unread, *not_benchmarks, *left_out]
+        # Before the figures: one that fails must not cost the measures.
+        _write_measures(tables, left_out, options.out / MEASURES)
+        drawings = draw_figures(
             {**tables, "benchmark": benchmark},
             {run.folder: run for run in runs},
             options.out / FIGURES,
             simulate,
             bar,
         )
-    tables["left_out"] = pa.Table.from_pylist(
-        [asdict(one) for one in (*unread, *not_benchmarks, *left_out, *undrawn)],
-        schema("left_out"),
-    )
-    (options.out / MEASURES).mkdir(parents=True, exist_ok=True)
-    for name in OUTPUTS:
-        if name not in tables:  # written by an earlier analysis
-            (options.out / MEASURES / f"{name}.parquet").unlink(missing_ok=True)
-    for name, table in tables.items():
-        pq.write_table(table, options.out / MEASURES / f"{name}.parquet")
+        left_out += drawings.left_out
+        _write_measures(tables, left_out, options.out / MEASURES, only="left_out")
     command = shlex.join(["revolve", *words])
-    page = report(tables, drawn, command, datetime.now(UTC), _versions())
+    page = report(tables, drawings, command, datetime.now(UTC), _versions())
     (options.out / REPORT).write_text(page, encoding="utf-8")
     show(tables, Console())
     print(f"{options.out / MEASURES}: {len(tables)} tables, {', '.join(tables)}")
-    print(f"{options.out / FIGURES}: {_listed(drawn)}")
+    print(f"{options.out / FIGURES}: {_listed(drawings.figures)}")
     print(f"{options.out / REPORT}: report with all figures in one file")
     return 0
 
@@ -110,6 +106,30 @@ def _measured(
     tables["findings"] = findings(outcomes)
     bar.remove_task(comparing)
     return tables, [one for run in measured for one in run.left_out]
+
+
+def _write_measures(
+    tables: dict[str, pa.Table],
+    left_out: Sequence[LeftOut],
+    folder: Path,
+    only: str = "",
+) -> None:
+    """Write measures, and remove those that an earlier analysis wrote.
+
+    Args:
+        tables: by name; the table ``left_out`` is added to them.
+        left_out: its rows.
+        folder: folder of the measures.
+        only: the table to write; all if empty.
+    """
+    rows = [asdict(one) for one in left_out]
+    tables["left_out"] = pa.Table.from_pylist(rows, schema("left_out"))
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in [only] if only else OUTPUTS:
+        if name in tables:
+            pq.write_table(tables[name], folder / f"{name}.parquet")
+        else:
+            (folder / f"{name}.parquet").unlink(missing_ok=True)
 
 
 def _listed(figures: Sequence[DrawnFigure]) -> str:

@@ -28,14 +28,9 @@ def progression(populations: pa.Table) -> pa.Table:
     keys = ["experiment", "births"]
     pieces = []
     for measure in POPULATION:
-        known = populations.filter(populations[measure].is_valid())
-        runs = known.group_by([*keys, "folder"])
-        means = runs.aggregate([(measure, "mean"), (measure, "count")])
-        by_run = _whole_runs(means, f"{measure}_count")
+        by_run = run_means(populations, measure)
         kinds = ("mean", "stddev", "min", "max", "count")
-        totals = by_run.group_by(keys).aggregate(
-            [(f"{measure}_mean", k) for k in kinds]
-        )
+        totals = by_run.group_by(keys).aggregate([("mean", kind) for kind in kinds])
         names = [*keys, "mean", "sd", "least", "greatest", "runs"]
         named = totals.rename_columns(names).sort_by(
             [(key, "ascending") for key in keys]
@@ -49,6 +44,46 @@ def progression(populations: pa.Table) -> pa.Table:
     for name, ends in (("low", mean - half), ("high", mean + half)):
         table = table.append_column(name, pa.array(ends, from_pandas=True))
     return table.select(schema("progression").names).cast(schema("progression"))
+
+
+def run_means(populations: pa.Table, measure: str) -> pa.Table:
+    """Return a measure of each run by number of births, the mean over its islands.
+
+    Args:
+        populations: populations of several runs, with the columns of ``outputs``.
+        measure: column of ``populations``.
+
+    Returns:
+        ``experiment``, ``folder``, ``births``, ``mean``, in ascending order, at the
+        births at which all islands of the run have a value.
+    """
+    keys = ["experiment", "folder", "births"]
+    known = populations.filter(populations[measure].is_valid())
+    means = known.group_by(keys).aggregate([(measure, "mean"), (measure, "count")])
+    whole = _whole_runs(means, f"{measure}_count").drop_columns(f"{measure}_count")
+    named = whole.rename_columns([*keys, "mean"])
+    return named.sort_by([(key, "ascending") for key in keys])
+
+
+def mean_of_all_runs(progression: pa.Table, by_run: pa.Table) -> pa.Table:
+    """Return the rows of a progression at which every run has a value.
+
+    A mean over other runs at other births would change without a change in any run.
+
+    Args:
+        progression: rows of one measure, as ``progression`` returns them.
+        by_run: the same measure, as ``run_means`` returns it.
+    """
+    runs = by_run.group_by("experiment").aggregate([("folder", "count_distinct")])
+    names, counts = runs["experiment"], runs["folder_count_distinct"]
+    wanted = dict(zip(names.to_pylist(), counts.to_pylist(), strict=True))
+    rows = zip(
+        progression["experiment"].to_pylist(),
+        progression["runs"].to_pylist(),
+        strict=True,
+    )
+    chosen = [count == wanted.get(name) for name, count in rows]
+    return progression.filter(pa.array(chosen, pa.bool_()))
 
 
 def _whole_runs(by_run: pa.Table, count: str) -> pa.Table:

@@ -1,13 +1,15 @@
 """Catalogue of the figures: number, title, caption and drawing function."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from analysis.figures.bench import arena_speed, spider_speed
-from analysis.figures.forms import Panels, Tables, over_births, over_runs
+from analysis.figures.courses import course_caption, over_births
+from analysis.figures.forms import Panels, Tables, over_runs, spread_caption
 from analysis.figures.islands import between, fitness_by_island, migration_graph
 from analysis.figures.named_measures import measures_over_births
 from analysis.figures.robots import (
@@ -17,17 +19,14 @@ from analysis.figures.robots import (
     variability,
 )
 
-_SPREAD = (
-    "Each point is a finished run. Boxes summarise five or more runs, bars show the "
-    "median of fewer. Violins show the robots of all last populations."
-)
 BIRTHS = "the births tables of the runs"
 """A source that is not a table of measures."""
 _BENCHMARK = "the benchmark file"
-_COURSE = (
-    "Lines are means over runs. Bands are 95 % intervals of the mean, shown for three "
-    "or more runs and clipped at the axis limits."
-)
+
+Section = Literal[
+    "fitness", "robots", "bodies", "diversity", "islands", "measures", "speed", "thesis"
+]
+"""Section of the report that shows a figure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,34 +36,61 @@ class Figure:
     Attributes:
         number: number in the thesis; a letter for a figure that is not in it.
         title: subject of the figure.
-        caption: description of what the figure shows.
+        caption: description of what the figure shows, or a function that returns it
+            for the tables that the figure was drawn from.
         source: tables whose rows it shows.
         draw: returns the drawing, or raises ``NothingToDraw`` with the reason.
+        section: section of the report.
+        subject: words of the file name; those of the title if empty.
     """
 
     number: str
     title: str
-    caption: str
+    caption: str | Callable[[Tables], str]
     source: tuple[str, ...]
     draw: Callable[[Tables], Any]
+    section: Section
+    subject: str = ""
+
+    @property
+    def stem(self) -> str:
+        """Name of the figure's files without ending, for example ``A-connections``."""
+        number = self.number.partition("-")[0]
+        words = re.findall(r"[\w.~+]+", self.subject or self.title.lower())
+        return "-".join([number, *words])
 
 
 @dataclass(frozen=True, slots=True)
 class DrawnFigure:
-    """A figure that was drawn, and its PNG file."""
+    """A figure that was drawn, its caption, and its PNG file."""
 
     figure: Figure
+    caption: str
     picture: Path
 
 
-def _spread(number: str, title: str, panels: Panels) -> Figure:
-    draw = partial(over_runs, panels=panels)
-    return Figure(number, title, _SPREAD, ("outcomes", "robots"), draw)
+def _spread(section: Section, number: str, title: str, panels: Panels) -> Figure:
+    return Figure(
+        number,
+        title,
+        partial(spread_caption, panels=panels),
+        ("outcomes", "robots"),
+        partial(over_runs, panels=panels),
+        section,
+    )
 
 
-def _course(number: str, title: str, measure: str, text: str) -> Figure:
-    draw = partial(over_births, measure=measure, text=text)
-    return Figure(number, title, _COURSE, ("progression",), draw)
+def _course(
+    section: Section, number: str, title: str, measure: str, text: str
+) -> Figure:
+    return Figure(
+        number,
+        title,
+        partial(course_caption, measure=measure),
+        ("populations", "progression"),
+        partial(over_births, measure=measure, text=text),
+        section,
+    )
 
 
 FIGURES: tuple[Figure, ...] = (
@@ -73,81 +99,81 @@ FIGURES: tuple[Figure, ...] = (
            "one arena. Points are repetitions, the solid line joins their means, the "
            "dashed line is the thesis's fit for its own machine. Values above the thin "
            "line are faster than real time.",
-           (_BENCHMARK,), arena_speed),
-    _spread("6.2", "Fitness at the end", {"fitness": "fitness [m/s]"}),
-    _course("6.3", "Fitness over births", "fitness", "mean fitness [m/s]"),
-    _spread("6.4", "Unique ancestors per robot of the last population",
+           (_BENCHMARK,), arena_speed, "speed"),
+    _spread("fitness", "6.2", "Fitness at the end", {"fitness": "mean fitness"}),
+    _course("fitness", "6.3", "Fitness over births", "fitness", "mean fitness"),
+    _spread("diversity", "6.4", "Unique ancestors per robot of the last population",
             {"ancestors_per_robot": "unique ancestors per robot"}),
-    _course("6.5a", "Diversity over births", "diversity", "mean tree edit distance"),
-    _spread("6.5b", "Diversity at the end",
+    _course("diversity", "6.5a", "Diversity over births", "diversity",
+            "mean tree edit distance"),
+    _spread("diversity", "6.5b", "Diversity at the end",
             {"diversity": "mean tree edit distance"}),
-    _spread("6.6", "Rank at the end", {"rank": "rank"}),
-    _course("6.7", "Retention over births", "retention",
+    _spread("diversity", "6.6", "Rank at the end", {"rank": "rank"}),
+    _course("diversity", "6.7", "Retention over births", "retention",
             "share alive 120 births later"),
     Figure("6.8", "Variability of fitness on-line",
            "Density over robots of the range of a robot's fitness divided by the range "
            "of fitness in the population during its life. Thin lines are single runs.",
-           ("variability",), variability),
-    _spread("6.9", "Parts at the end", {"parts": "parts"}),
-    _spread("6.11", "Joints at the end",
+           ("variability",), variability, "islands"),
+    _spread("bodies", "6.9", "Parts at the end", {"parts": "parts"}),
+    _spread("bodies", "6.11", "Joints at the end",
             {"active_joints": "active joints",
              "passive_joints": "passive joints", "joints": "all joints"}),
-    _spread("6.12", "Joints per part at the end",
+    _spread("bodies", "6.12", "Joints per part at the end",
             {"active_joints_per_part": "active joints per part",
              "passive_joints_per_part": "passive joints per part",
              "joints_per_part": "all joints per part"}),
-    _spread("6.13", "Extremities at the end",
+    _spread("bodies", "6.13", "Extremities at the end",
             {"extremities": "extremities",
              "extremities_per_part": "extremities per part"}),
     Figure("6.14a", "Fitness by the number of extremities",
            "Points are means over the runs that have such robots. Bars are 95 % "
-           "intervals of the mean, shown for three or more runs and clipped at the "
-           "axis limits. Left: the last populations. Right: all robots ever evaluated.",
-           ("extremities",), partial(extremities_and_fitness, by="count")),
+           "intervals of the mean, shown for three or more runs. Left: the last "
+           "populations. Right: all robots ever evaluated.",
+           ("extremities",), partial(extremities_and_fitness, by="count"), "bodies"),
     Figure("6.14b", "Fitness by extremities per part",
            "As figure 6.14a, in bins of 0.1; each point is at the middle of its bin.",
-           ("extremities",), partial(extremities_and_fitness, by="per_part")),
-    _spread("6.15", "Touch sensors at the end",
+           ("extremities",), partial(extremities_and_fitness, by="per_part"), "bodies"),
+    _spread("bodies", "6.15", "Touch sensors at the end",
             {"touch_sensors": "touch sensors",
              "without_touch": "share of robots without any"}),
-    _spread("6.16", "Hidden neurons at the end",
+    _spread("bodies", "6.16", "Hidden neurons at the end",
             {"hidden": "hidden neurons",
              "hidden_per_part": "hidden neurons per part"}),
     Figure("6.17", "All ancestors of the best robots",
            "Each point is an ancestor of the fittest robot of an experiment's last "
            "populations; the horizontal axis is its number of birth on its island. "
            "Each line leads to a parent.",
-           (BIRTHS,), lineages),
+           (BIRTHS,), lineages, "diversity"),
     Figure("7.1", "Speed of an arena of spiders by its population",
            "Real-time factor (simulated time by wall-clock time) of identical spiders "
            "on a grid. Points are repetitions, the line joins their means.",
-           (_BENCHMARK,), spider_speed),
-    _spread("A", "Connections at the end",
+           (_BENCHMARK,), spider_speed, "speed"),
+    _spread("bodies", "A", "Connections at the end",
             {"connections": "connections",
              "connections_per_part": "connections per part"}),
     Figure("B", "Fitness of islands",
            "Each line is the mean fitness of one island, for all runs with several "
            "islands.",
-           ("populations",), fitness_by_island),
+           ("populations",), fitness_by_island, "islands"),
     Figure("C", "Migration between islands",
            "The width of an arrow is the number of migrants. Its colour is the share "
            "of migrants that are alive, or have a living descendant, at the end.",
-           ("migrants",), migration_graph),
+           ("migrants",), migration_graph, "islands"),
     Figure("D", "Diversity within and between islands",
            "Mean tree edit distance of pairs of robots on the same island, and of "
            "pairs on different islands.",
-           ("between",), between),
-    Figure("E", "Robots that touched another robot",
-           _SPREAD, ("outcomes",),
-           partial(over_runs, panels={"touched": "share of robots"})),
+           ("between",), between, "islands"),
+    _spread("islands", "E", "Robots that touched another robot",
+            {"touched": "share of robots"}),
     Figure("F", "The thesis's findings as effects",
            "Cliff's delta of a over b with its 95 % interval, or the rank-biserial "
            "correlation where an experiment is compared with a number. In brackets: "
            "the thesis's finding (> greater, < smaller, = no large difference).",
-           ("findings",), effects),
+           ("findings",), effects, "thesis"),
     Figure("H", "Measures over births",
            "Mean over the population of each measure that the experiment names. Each "
            "line is an island of a run; units are those of the measure.",
-           ("named_measures",), measures_over_births),
+           ("named_measures",), measures_over_births, "measures"),
 )  # fmt: skip
 """Figures of the thesis in its order, then further figures."""

@@ -1,7 +1,9 @@
 """Draws all figures that the data allows; records why the others are left out."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
+from glob import escape
 from pathlib import Path
 
 import pyarrow as pa
@@ -9,7 +11,8 @@ import pyarrow.compute as pc
 from rich.progress import Progress
 
 from analysis.figures.catalogue import BIRTHS, FIGURES, DrawnFigure, Figure
-from analysis.figures.family_tree import LINEAGE, best_robots
+from analysis.figures.family_tree import LINEAGE, Best, best_robots
+from analysis.figures.films import film
 from analysis.figures.forms import NothingToDraw, Tables
 from analysis.figures.pictures import family_tree, gaits
 from analysis.figures.robot_pictures import RobotPicture, robot_picture
@@ -26,7 +29,37 @@ from schema.tables.files import read_table
 _TREES = {"scenario1": "6.18", "scenario2": "6.19", "scenario3": "6.20"}
 _BASELINES = ("no-reproduction", "no-selection")
 """Experiments without an ancestry that selection made."""
+GAITS = "6.10"
+"""Number of the figure of gaits."""
 _SOURCE = ("robots", BIRTHS)
+_FILM = "best-robot-of-"
+_EARLIER = "figure-*.p??"
+"""Names of the files of all figures in earlier versions."""
+
+
+@dataclass(frozen=True, slots=True)
+class Film:
+    """A moving picture of an experiment's best robot."""
+
+    best: Best
+    path: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Drawings:
+    """Files that an analysis drew.
+
+    Attributes:
+        figures: figures, those of the thesis first.
+        films: moving pictures, in the order of experiments.
+        no_films: reasons why experiments have none, by experiment.
+        left_out: figures that cannot be drawn, with the reason.
+    """
+
+    figures: list[DrawnFigure]
+    films: list[Film]
+    no_films: dict[str, str]
+    left_out: list[LeftOut]
 
 
 class FigureWriter:
@@ -38,13 +71,14 @@ class FigureWriter:
     """
 
     def __init__(self, folder: Path) -> None:
-        """Remove the family trees that an earlier analysis left in the folder.
+        """Remove files of earlier analyses whose names the experiments determine.
 
         Args:
             folder: an existing folder.
         """
         self._folder = folder
-        self._remove(_tree_number("*"))
+        for pattern in ("G-*.p??", f"{_FILM}*.gif", _EARLIER):
+            self._remove(pattern)
         self.drawn: list[DrawnFigure] = []
         self.left_out: list[LeftOut] = []
 
@@ -55,18 +89,26 @@ class FigureWriter:
         except NothingToDraw as error:
             self.leave_out(figure.number, str(error))
             return
-        stem = self._folder / f"figure-{figure.number}"
+        stem = self._folder / figure.stem
         save(drawn, stem)
         picture = stem.with_name(stem.name + PICTURE_ENDING)
-        self.drawn.append(DrawnFigure(figure, picture))
+        caption = figure.caption
+        text = caption if isinstance(caption, str) else caption(tables)
+        self.drawn.append(DrawnFigure(figure, text, picture))
 
     def leave_out(self, number: str, why: str) -> None:
         """Record why there is no such figure, and remove one of an earlier analysis."""
-        self._remove(number)
+        self._remove(f"{escape(number)}-*.p??")
         self.left_out.append(LeftOut("", f"figure {number}", why))
 
-    def _remove(self, number: str) -> None:
-        for path in self._folder.glob(f"figure-{number}.p??"):
+    def add_film(self, one: RobotPicture) -> Film:
+        """Write the moving picture of a robot."""
+        path = self._folder / f"{_FILM}{one.best.experiment}.gif"
+        path.write_bytes(film(one.film, one.film_interval_s))
+        return Film(one.best, path)
+
+    def _remove(self, pattern: str) -> None:
+        for path in self._folder.glob(pattern):
             path.unlink()
 
 
@@ -88,8 +130,8 @@ def draw_figures(
     folder: Path,
     simulate: Callable[[], Simulate],
     bar: Progress,
-) -> tuple[list[DrawnFigure], list[LeftOut]]:
-    """Draw all figures into a folder, as PDF and PNG.
+) -> Drawings:
+    """Draw all figures into a folder, as PDF and PNG, and the best robots as GIF.
 
     Args:
         tables: by the names of ``outputs``, and ``benchmark``.
@@ -98,9 +140,6 @@ def draw_figures(
         simulate: returns the worker's simulation, or raises the reason why robots
             cannot be rendered.
         bar: shows progress.
-
-    Returns:
-        The figures that were drawn, in order, and those that were left out.
     """
     writer = FigureWriter(folder)
     pictures, problems = _robot_pictures(tables["robots"], runs, simulate, bar)
@@ -120,7 +159,9 @@ def draw_figures(
             why = problems.get(name, f"no robot of {name} was evaluated")
             writer.leave_out(_tree_number(name), why)
         bar.advance(task)
-    return sorted(writer.drawn, key=_place), writer.left_out
+    films = [writer.add_film(one) for one in pictures.values()]
+    figures = sorted(writer.drawn, key=_place)
+    return Drawings(figures, films, problems, writer.left_out)
 
 
 def _robot_pictures(
@@ -159,7 +200,7 @@ def _add_gaits(
     pictures: Sequence[RobotPicture],
     problems: Mapping[str, str],
 ) -> None:
-    number = "6.10"
+    number = GAITS
     for name, why in problems.items():
         writer.leave_out(number, f"{name}: {why}")
     if not pictures and not problems:
@@ -173,7 +214,8 @@ def _add_gaits(
         "encodings that give them no identity keep their own colour."
     )
     title = "Gaits of the best robots"
-    writer.add(Figure(number, title, caption, _SOURCE, lambda _: gaits(pictures)), {})
+    draw = partial(gaits, pictures)
+    writer.add(Figure(number, title, caption, _SOURCE, lambda _: draw(), "robots"), {})
 
 
 def _add_tree(writer: FigureWriter, one: RobotPicture, robots: pa.Table) -> None:
@@ -209,4 +251,7 @@ def _add_tree(writer: FigureWriter, one: RobotPicture, robots: pa.Table) -> None
     )
     title = f"Ancestry of the best robot of {label(best.experiment)}"
     draw = partial(family_tree, one, family, fitness)
-    writer.add(Figure(number, title, caption, _SOURCE, lambda _: draw()), {})
+    subject = f"ancestry-of-{best.experiment}"
+    writer.add(
+        Figure(number, title, caption, _SOURCE, lambda _: draw(), "robots", subject), {}
+    )

@@ -1,4 +1,4 @@
-"""Plots of the thesis: distributions over runs, and progress over births."""
+"""Distributions of measures over runs: points, boxes and violins."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -80,6 +80,39 @@ def over_runs(tables: Tables, panels: Panels) -> p9.ggplot:
     figure += p9.scale_x_discrete(limits=experiments, labels=labels)
     look = theme_of_size(3.6) + p9.theme(legend_position="none")
     return figure + p9.labs(x="", y=next(iter(panels.values()))) + look
+
+
+def spread_caption(tables: Tables, panels: Panels) -> str:
+    """Return what points, boxes, bars and violins of ``over_runs`` show."""
+    runs = stacked(tables["outcomes"], panels)
+    known = runs[runs["panel"] == next(iter(panels.values()))]
+    sizes = known.groupby("experiment", observed=True).size().to_dict()
+    births = set(tables["outcomes"]["births"].to_pylist())
+    at = f", at {births.pop()} births" if len(births) == 1 else ""
+    texts = [f"Each point is a finished run ({counted_runs(sizes)}){at}."]
+    if max(sizes.values(), default=0) >= BOX_RUNS:
+        texts.append(
+            "Boxes show median and quartiles, whiskers the values within 1.5 times "
+            "the height of the box."
+        )
+    if min(sizes.values(), default=BOX_RUNS) < BOX_RUNS:
+        texts.append(f"Bars show the median of fewer than {BOX_RUNS} runs.")
+    if _violins(tables, panels, in_order(sizes)):
+        texts.append(
+            "Pale shapes show the robots of all last populations, from the least to "
+            "the greatest value."
+        )
+    return " ".join(texts)
+
+
+def counted_runs(sizes: Mapping[str, int]) -> str:
+    """Return the number of runs of each experiment as text."""
+    names = in_order(sizes)
+    if len(set(sizes.values())) == 1 and len(names) > _NARROW:
+        count = sizes[names[0]]
+        return f"{count} run{'s' * (count > 1)} of each experiment"
+    counts = [f"{sizes[name]} of {label(name)}" for name in names]
+    return ", ".join(counts)
 
 
 def _births(outcomes: pa.Table, experiments: list[str]) -> dict[str, str]:
@@ -193,34 +226,3 @@ def _summaries(runs: Any) -> list[Any]:  # noqa: ANN401 - pandas
             )
         )
     return layers
-
-
-def over_births(tables: Tables, measure: str, text: str) -> p9.ggplot:
-    """Return the mean of a measure over runs, by number of births.
-
-    Args:
-        tables: ``progression``.
-        measure: column of ``populations``.
-        text: label of the axis.
-
-    Raises:
-        NothingToDraw: no run has two populations with a value.
-    """
-    table = tables["progression"].filter(pc.field("measure") == measure)
-    if len(set(table["births"].to_pylist())) <= 1:
-        raise NothingToDraw(f"no run has {measure} at two numbers of births")
-    figure = p9.ggplot(table.to_pandas(), p9.aes("births", "mean"))
-    sure = table.filter(pc.field("runs") >= BAND_RUNS)
-    if sure.num_rows:
-        ends = p9.aes(ymin="low", ymax="high", fill="experiment")
-        band = sure.to_pandas()
-        band["low"] = band["low"].clip(lower=0.0)
-        figure += p9.geom_ribbon(ends, data=band, alpha=0.18)
-    figure += p9.geom_line(p9.aes(colour="experiment"), size=0.9)
-    names = table["experiment"].to_pylist()
-    figure = figure + scales(names, is_filled=sure.num_rows > 0) + theme_of_size(3.8)
-    # The interval of few runs may extend far beyond the possible values.
-    top = float(pc.max(table["greatest"]).as_py())
-    limits = p9.coord_cartesian(ylim=(0, 1.02 * top or 1.0))
-    margins = p9.scale_y_continuous(expand=(0.03, 0, 0, 0))
-    return figure + limits + margins + p9.labs(x="births", y=text)

@@ -48,7 +48,7 @@ def fitness_by_island(tables: Tables) -> p9.ggplot:
         + p9.scale_colour_manual(hues[: len(names)], limits=names)
         + p9.guides(colour=p9.guide_legend(nrow=-(-len(names) // _IN_A_ROW)))
         + p9.expand_limits(y=0)
-        + p9.labs(x="births on the island", y="mean fitness [m/s]", colour="island ")
+        + p9.labs(x="births on the island", y="mean fitness", colour="island ")
         + theme_of_size(3.8)
         + p9.theme(legend_title=p9.element_text())
     )

@@ -39,7 +39,7 @@ def gaits(robot_pictures: Sequence[RobotPicture]) -> Figure:
         for axis, picture, time_s in zip(row, one.gait, one.times_s, strict=False):
             axis.imshow(picture)
             axis.set_title(f"{time_s:.1f} s", fontsize=7, color=_FAINT, pad=2)
-        text = f"{label(one.best.experiment)}, {one.best.fitness:.3f} m/s"
+        text = f"{label(one.best.experiment)}, fitness {one.best.fitness:.3g}"
         row[0].set_title("")
         row[0].set_title(text, loc="left", fontsize=8, color=_INK, pad=6)
     return figure
@@ -53,7 +53,7 @@ def family_tree(
     Args:
         one: pictures of the robot and its family.
         relatives: its family.
-        fitness: fitness of its relatives [m/s].
+        fitness: fitness of its relatives.
 
     Source: Hupkes 2016, figures 6.18 to 6.20.
     """
@@ -72,7 +72,7 @@ def family_tree(
         _line(axes, spots[child], spots[parent])
     for row, spot in spots.items():
         known = fitness.get(one.births[row])
-        text = "" if known is None else f"{known:.3f} m/s"
+        text = "" if known is None else f"{known:.3g}"
         _add_picture(axes, one, row, spot, text=f"{_name(one, row)}  {text}")
     line = top + 0.35
     axes.plot([0, width], [line, line], "--", color=_FAINT, linewidth=0.8)

@@ -24,8 +24,11 @@ from schema.wire.born import robot_of_birth
 FRAMES = 6
 EVERY_S = 0.5
 """Pictures of a gait, and the time between two of them [s]."""
+FILM_EVERY_S = 0.1
+"""Time between two pictures of a film [s]; it lasts as long as the gait."""
 _LARGE, _SMALL = (400, 300), (300, 225)
 _WIDE, _CLOSE = (0.15, 0.15, 0.0), (0.26, 0.14, 0.1)
+_FILM = (0.12, 0.03, 0.0)
 """Shares of a picture that are cut off: of the height above and below, of the width at
 each side. Robots are flat, and the near side is below the middle."""
 MUTATED = (0.93, 0.93, 0.93)
@@ -51,6 +54,8 @@ class RobotPicture:
         best: the robot.
         gait: consecutive pictures of the robot moving alone.
         times_s: time of each of these pictures [s].
+        film: pictures of the same time, more of them.
+        film_interval_s: time between two of these pictures [s].
         family: its nearest ancestors; None if they are not shown.
         pictures: pictures of the family, by births row.
         births: birth ids of the family, by births row.
@@ -60,6 +65,8 @@ class RobotPicture:
     best: Best
     gait: tuple[Picture, ...]
     times_s: tuple[float, ...]
+    film: tuple[Picture, ...]
+    film_interval_s: float
     family: Family | None
     pictures: Mapping[int, Picture]
     births: Mapping[int, BirthId]
@@ -120,11 +127,9 @@ def robot_picture(
         names[member] = BirthId(*(column[member].as_py() for column in columns))
     island = best.birth_island
     own = Identity(replace(origin, island=island), BirthId(island, best.birth), 0)
-    gait, times = _gait(painted(row), settings, partial(simulate, identity=own))
     return RobotPicture(
         best,
-        gait,
-        times,
+        *_motion(painted(row), settings, partial(simulate, identity=own)),
         relatives if has_family else None,
         pictures,
         names,
@@ -139,20 +144,34 @@ def _cut(picture: Picture, share: tuple[float, float, float]) -> Picture:
     return picture[top : high - below, left : wide - left]
 
 
-def _gait(
+def _motion(
     robot: Robot, settings: EvaluationSettings, simulate: Simulate
-) -> tuple[tuple[Picture, ...], tuple[float, ...]]:
-    """Return pictures from the middle of a robot's life on, by a fixed camera."""
+) -> tuple[tuple[Picture, ...], tuple[float, ...], tuple[Picture, ...], float]:
+    """Return pictures from the middle of a robot's life on, by a fixed camera.
+
+    Returns:
+        Pictures of the gait and their times [s]; pictures of the film and the time
+        between two of them [s].
+    """
     poses: list[Floats] = []
     watch: Callable[[Any], None] = lambda data: poses.append(data.qpos.copy())  # noqa: E731
     simulate(robot, settings, watch=watch)
     tick_s = settings.simulation.brain_steps * settings.simulation.timestep_s
-    step = max(1, round(EVERY_S / tick_s))
+    step, film_step = (
+        max(1, round(every_s / tick_s)) for every_s in (EVERY_S, FILM_EVERY_S)
+    )
     first = len(poses) // 2
     chosen = range(first, len(poses), step)[:FRAMES]
+    filmed = range(first, min(len(poses), first + FRAMES * step), film_step)
     middle = np.mean([poses[at][:3] for at in chosen], axis=0)
     with RobotRenderer(robot, settings, size=_LARGE) as renderer:
-        pictures = tuple(
-            _cut(renderer.picture(poses[at], look_at=middle), _WIDE) for at in chosen
-        )
-    return pictures, tuple((at - first) * tick_s for at in chosen)
+        pictures = {
+            at: renderer.picture(poses[at], look_at=middle)
+            for at in sorted({*chosen, *filmed})
+        }
+    return (
+        tuple(_cut(pictures[at], _WIDE) for at in chosen),
+        tuple((at - first) * tick_s for at in chosen),
+        tuple(_cut(pictures[at], _FILM) for at in filmed),
+        film_step * tick_s,
+    )

@@ -89,7 +89,7 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
     mean = shown["fitness"]
     half = half_interval(shown["sd"].to_numpy(), shown["runs"].to_numpy())
     half[shown["runs"] < BAND_RUNS] = np.nan
-    shown["low"], shown["high"] = (mean - half).clip(lower=0.0), mean + half
+    shown["low"], shown["high"] = mean - half, mean + half
     width, start, axis = _BINS[by]
     experiments = shown["experiment"]
     names = in_order(experiments)
@@ -111,8 +111,8 @@ def extremities_and_fitness(tables: Tables, by: str) -> p9.ggplot:
         + p9.geom_point(p9.aes(colour="experiment"), size=1.3)
         + p9.facet_wrap("panel", ncol=2)
         + scales(experiments, is_filled=False)
-        + p9.coord_cartesian(ylim=(0, 1.3 * float(mean.max()) or 1.0))
-        + p9.labs(x=axis, y="mean fitness [m/s]")
+        + p9.expand_limits(y=0)
+        + p9.labs(x=axis, y="mean fitness")
         + theme_of_size(3.6)
     )
 

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from analysis.measures.distinct_names import MARK
 
 WIDTH_IN = 7.0
-DPI = 160
+DPI = 300
 
 _THESIS = {
     "scenario1": "#0072B2",
@@ -126,5 +126,5 @@ def save(figure: p9.ggplot | Figure, stem: Path) -> None:
             # Without a date, the same tables give the same bytes.
             dated = {"CreationDate": None} if ending == ".pdf" else {}
             path = stem.with_name(stem.name + ending)
-            drawn.savefig(path, dpi=DPI, metadata=dated, bbox_inches="tight")
+            drawn.savefig(path, dpi=DPI, metadata=dated)
     plt.close(drawn)

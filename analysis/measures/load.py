@@ -62,6 +62,7 @@ class Run:
         islands: settings of each island.
         differs: settings that differ from other runs of the same experiment name.
         has_measures: the experiment names measures of robots.
+        function: fitness function; empty if the document does not name one.
     """
 
     folder: Path
@@ -73,6 +74,7 @@ class Run:
     islands: tuple[IslandSettings, ...]
     differs: str = ""
     has_measures: bool = False
+    function: str = ""
 
     @property
     def is_finished(self) -> bool:
@@ -156,6 +158,7 @@ def read_run(folder: Path) -> Run:
         islands = tuple(_settings(document))
         name, number, seed = details["name"], details["run"], details["seed"]
         has_measures = bool(document.get("measures", {}).get("names"))
+        function = str(document.get("fitness", {}).get("function", ""))
     except (
         ValueError, KeyError, TypeError, AttributeError, RecursionError
     ) as error:  # fmt: skip
@@ -170,6 +173,7 @@ def read_run(folder: Path) -> Run:
         document=str(details["document"]),
         islands=islands,
         has_measures=has_measures,
+        function=function,
     )
     if run.is_finished and not any(has_rows(folder, each) for each in TABLES):
         raise RunFolderError("the run is finished, but its tables are missing")
@@ -247,6 +251,16 @@ def read_tables(run: Run) -> tuple[dict[str, pa.Table], list[LeftOut]]:
     here = online[np.minimum(islands, len(online) - 1)]
     tables["population"] = tables["population"].append_column("is_online", [here])
     return tables, left_out
+
+
+def read_duration_s(folder: Path) -> float | None:
+    """Return the time from a run's start to its end [s]; None if not recorded."""
+    try:
+        rows = read_table(folder, "runs").select(["start", "end"]).to_pylist()
+    except (RunFolderError, pa.ArrowException, OSError):
+        return None
+    start, end = (rows[0]["start"], rows[0]["end"]) if rows else (None, None)
+    return None if start is None or end is None else (end - start).total_seconds()
 
 
 def _named(table: pa.Table) -> pa.Table:

@@ -101,6 +101,9 @@ OUTPUTS: dict[str, dict[str, str]] = {
         "planned": "births of all islands in a finished run",
         "islands": "number of islands",
         "differs": "settings that differ from most runs of the same experiment name",
+        "function": "fitness function",
+        "failures": "failed evaluations, and robots of arenas whose physics diverged",
+        "duration_s": "time from the start to the end of the run, pauses included [s]",
     },
     "populations": {**_ISLAND, **POPULATION},
     "robots": {
@@ -205,10 +208,10 @@ OUTPUTS: dict[str, dict[str, str]] = {
 
 _INTEGERS = {"size", "judged", "ancestors", "planned", "islands", "robots", "samples",
              "pairs", "epoch", "to", "descendants", "living", "reached", "runs",
-             "runs_a", "runs_b", "finding", "births", "birth"}  # fmt: skip
+             "runs_a", "runs_b", "failures", "finding", "births", "birth"}  # fmt: skip
 _TEXTS = {"folder", "experiment", "state", "population", "by", "measure", "a", "b",
           "figure", "claim", "expected", "verdict", "why", "what",
-          "differs"}  # fmt: skip
+          "differs", "function"}  # fmt: skip
 _COUNTS = {"robots": {*BODY, "rank", "ancestors"}}
 
 

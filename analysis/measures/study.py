@@ -1,6 +1,6 @@
 """Measures of many runs, computed in parallel processes."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from itertools import repeat
@@ -9,7 +9,7 @@ from multiprocessing import active_children, get_context
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from analysis.measures.load import TABLE, LeftOut, Run, read_tables
+from analysis.measures.load import TABLE, LeftOut, Run, read_duration_s, read_tables
 from analysis.measures.measures import measure
 from analysis.measures.outputs import run_schema, schema
 from analysis.measures.run_tables import RunTables
@@ -82,7 +82,7 @@ def measure_run(run: Run, slots: SlotRule) -> MeasuredRun:
         why = f"the run is not finished: {born} of {planned} births are recorded"
         left_out.append(LeftOut(folder, "comparison", why))
     named = {name: _named(found[name], name, run) for name in found}
-    named["runs"] = _named(_summary(run, tables["births"]), "runs", run)
+    named["runs"] = _named(_summary(run, tables, unread), "runs", run)
     return MeasuredRun(run, named, tuple(left_out))
 
 
@@ -104,17 +104,29 @@ def _wanted(run: Run) -> frozenset[str]:
     return frozenset(wanted)
 
 
-def _summary(run: Run, births: pa.Table) -> pa.Table:
+def _summary(
+    run: Run, tables: Mapping[str, pa.Table], unread: frozenset[str]
+) -> pa.Table:
     row = {
         "run": run.number,
         "seed": run.seed,
         "state": run.state,
-        "births": births.num_rows,
+        "births": tables["births"].num_rows,
         "planned": planned_births(run),
         "islands": len(run.islands),
         "differs": run.differs,
+        "function": run.function,
+        "failures": None if unread & {"evaluations", "deaths"} else _failures(tables),
+        "duration_s": read_duration_s(run.folder),
     }
     return pa.Table.from_pylist([row], run_schema("runs"))
+
+
+def _failures(tables: Mapping[str, pa.Table]) -> int:
+    """Return the number of failed evaluations and of diverged robots of arenas."""
+    failed = pc.equal(tables["evaluations"]["status"], "failed")
+    diverged = pc.equal(tables["deaths"]["reason"], "diverged")
+    return sum(pc.sum(column).as_py() or 0 for column in (failed, diverged))
 
 
 def _named(table: pa.Table, name: str, run: Run) -> pa.Table:

@@ -23,6 +23,7 @@ PERMITTED = {
         "schema/mjcf/*.py",
         "schema/experiment/scenery.py",
         "schema/formats/mjcf.py",
+        "schema/formats/mjcf_export.py",
         "schema/formats/urdf.py",
         "worker/**/*.py",
         "analysis/render/picture.py",

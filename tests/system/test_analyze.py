@@ -10,6 +10,7 @@ import polars as pl
 import pyarrow.parquet as pq
 import pytest
 from msgspec.structs import replace
+from PIL import Image
 
 from analysis.figures.catalogue import FIGURES
 from analysis.measures.outputs import OUTPUTS, schema
@@ -64,6 +65,10 @@ def test_runs_are_measured_and_left_out_runs_are_reported(
     names = ["scenario1", "crowd", "scenario1~2"]
     assert measures["runs"]["experiment"].to_pylist() == names
     assert measures["runs"]["births"].to_pylist() == [60, 25, 60]
+    for run in measures["runs"].to_pylist():
+        assert run["function"] == "worker.fitness:thesis"
+        assert run["failures"] >= 0
+        assert 0 < run["duration_s"] < 300
     (arena,) = measures["interactions"].to_pylist()
     assert arena["robots"] == 25
     assert 0 < arena["touched"] <= 1
@@ -95,17 +100,26 @@ def test_figures_are_written_or_left_out_with_a_reason(
     page = (report / "report.html").read_text("utf-8")
     drawn = {path.stem for path in (report / "figures").glob("*.png")}
     assert drawn == {path.stem for path in (report / "figures").glob("*.pdf")}
-    assert {f"figure-6.{n}" for n in ("2", "3", "5a", "8", "9", "16")} <= drawn
-    assert {f'<figure id="{name}">' in page for name in drawn} == {True}
+    stems = {one.number: one.stem for one in FIGURES}
+    assert {stems[f"6.{n}"] for n in ("2", "3", "5a", "8", "9", "16")} <= drawn
+    assert {f"figures/{name}.pdf" in page for name in drawn} == {True}
+    with Image.open(report / "figures" / f"{stems['6.3']}.png") as picture:
+        assert picture.info["dpi"] == pytest.approx((300, 300), abs=1)
     table = pq.read_table(report / "measures" / "left_out.parquet").to_pylist()
     why = {row["what"]: row["why"] for row in table if not row["folder"]}
     assert "revolve bench arena" in why["figure 6.1"]
     assert why["figure 6.19"] == "no robot of scenario2 was evaluated"
     assert "left out: figure B: no run has several islands" in output
-    everything = {f"figure-{one.number}" for one in FIGURES}
-    assert everything == (everything & drawn) | {
-        name.replace(" ", "-") for name in why if name.replace(" ", "-") in everything
-    }
+    missing = {n for n, stem in stems.items() if stem not in drawn}
+    assert {f"figure {n}" for n in missing} <= set(why)
+    assert not {f"figure {n}" for n in set(stems) - missing} & set(why)
+
+
+def test_fonts_are_embedded_in_pdfs(report_and_output: tuple[Path, str]) -> None:
+    report, _ = report_and_output
+    pdfs = [path.read_bytes() for path in (report / "figures").glob("6.*.pdf")]
+    # Type 42 is TrueType: its outlines are in FontFile2, and text stays text.
+    assert {b"/FontFile2" in pdf and b"/Type3" not in pdf for pdf in pdfs} == {True}
 
 
 def test_three_libraries_read_the_same_tables(

@@ -1,9 +1,18 @@
 """Tests of the catalogue: data of the layers that each figure draws."""
 
+import pyarrow as pa
 import pytest
 
-from analysis.figures.catalogue import FIGURES
-from analysis.figures.forms import NothingToDraw, over_births, over_runs, stacked
+from analysis.comparison.progression import progression
+from analysis.figures.catalogue import FIGURES, Figure
+from analysis.figures.courses import course as figure_course
+from analysis.figures.courses import course_caption, over_births
+from analysis.figures.forms import (
+    NothingToDraw,
+    over_runs,
+    spread_caption,
+    stacked,
+)
 from analysis.figures.style import colours, in_order, label
 from tests.analysis.drawn import Row, layers, table
 
@@ -27,16 +36,25 @@ def robots(experiment: str, *fitness: float) -> list[Row]:
     ]
 
 
-def course(experiment: str, runs: int, *mean: float) -> list[Row]:
-    return [
-        {"experiment": experiment, "measure": "fitness", "births": 15 * n, "runs": runs,
-         "mean": value, "low": value - 0.1, "high": value + 0.1, "least": value,
-         "greatest": value + 0.05}
-        for n, value in enumerate(mean, 1)
+def courses(*runs: tuple[str, str, tuple[float, ...]]) -> dict[str, pa.Table]:
+    """Return the tables of runs: experiment, folder, fitness every 15 births."""
+    rows = [
+        {"experiment": experiment, "folder": folder, "island": 0, "births": 15 * n,
+         "fitness": value}
+        for experiment, folder, fitness in runs
+        for n, value in enumerate(fitness, 1)
     ]  # fmt: skip
+    populations = table("populations", rows)
+    return {"populations": populations, "progression": progression(populations)}
 
 
-FITNESS = {"fitness": "fitness [m/s]"}
+THREE = [("b", f"b-{n}", (0.2 + n, 0.5 + n)) for n in range(3)]
+"""Three runs with means 1.2 and 1.5, and standard deviation 1."""
+HALF = 4.302653 / 3**0.5
+"""Half the interval of their mean: Student's t with two degrees of freedom."""
+
+
+FITNESS = {"fitness": "mean fitness"}
 
 
 def test_spread_shows_runs_as_points_and_robots_as_violins() -> None:
@@ -60,7 +78,7 @@ def test_spread_shows_runs_as_points_and_robots_as_violins() -> None:
     # Five runs have a box, three a bar at the median.
     assert set(shown["geom_boxplot"]["experiment"]) == {"b"}
     assert shown["geom_errorbar"]["value"] == [0.3]
-    assert figure.labels.y == "fitness [m/s]"
+    assert figure.labels.y == "mean fitness"
     figure.draw()
 
 
@@ -92,12 +110,6 @@ def test_different_births_of_experiments_are_labelled() -> None:
     assert alone.labels.x == ""
 
 
-def test_an_interval_is_clipped_at_zero() -> None:
-    rows = table("progression", course("b", 3, 0.05, 0.4))
-    shown = layers(over_births({"progression": rows}, "fitness", "f"))
-    assert shown["geom_ribbon"]["low"] == pytest.approx([0.0, 0.3])
-
-
 def test_panels_of_zeros_begin_at_zero() -> None:
     rows = [{"experiment": "x", "births": 60, "parts": 7.0, "hidden": 0.0}]
     panels = {"parts": "z", "hidden": "a"}
@@ -108,25 +120,70 @@ def test_panels_of_zeros_begin_at_zero() -> None:
     assert lows[1] > -0.1
 
 
-def test_bands_are_drawn_for_three_or_more_runs() -> None:
-    rows = [*course("a", 2, 0.1, 0.2), *course("b", 3, 0.3, 0.4)]
-    shown = layers(
-        over_births({"progression": table("progression", rows)}, "fitness", "f")
-    )
-    assert shown["geom_line"]["mean"] == [0.1, 0.2, 0.3, 0.4]
-    assert shown["geom_ribbon"]["low"] == pytest.approx([0.2, 0.3])
-    assert set(shown["geom_ribbon"]["experiment"]) == {"b"}
+def test_bands_of_three_or_more_runs_are_not_cut_at_the_axes() -> None:
+    two = [("a", f"a-{n}", (0.1, 0.2)) for n in range(2)]
+    figure = over_births(courses(*two, *THREE), "fitness", "f")
+    band = layers(figure)["geom_ribbon"]
+    assert band["low"] == pytest.approx([1.2 - HALF, 1.5 - HALF])
+    assert band["high"] == pytest.approx([1.2 + HALF, 1.5 + HALF])
+    assert set(band["experiment"]) == {"b"}
+    (axes,) = figure.draw().axes
+    low, high = axes.get_ylim()
+    assert low < 1.2 - HALF
+    assert high > 1.5 + HALF
 
 
-def test_progress_of_few_runs_is_drawn_without_bands() -> None:
-    rows = table("progression", course("a", 1, 0.1, 0.2))
-    figure = over_births({"progression": rows}, "fitness", "f")
-    assert set(layers(figure)) == {"geom_line"}
-    figure.draw()
+def test_single_runs_are_drawn_without_bands() -> None:
+    figure = over_births(courses(("a", "a-0", (0.1, 0.2))), "fitness", "f")
+    assert set(layers(figure)) == {"geom_line", "geom_blank"}
+    assert figure.data["mean"].tolist() == [0.1, 0.2]
+
+
+def test_a_mean_ends_where_the_first_run_ends_and_the_caption_says_so() -> None:
+    longer = [("b", "b-3", (0.2, 0.5, 9.0, 9.5))]
+    tables = courses(*THREE, *longer)
+    figure = over_births(tables, "fitness", "f")
+    # Of four runs at 15 and 30 births; the run alone has a thin line up to 60.
+    assert figure.data["births"].tolist() == [15, 30]
+    assert figure.data["mean"].tolist() == pytest.approx([(3.6 + 0.2) / 4, 5 / 4])
+    thin = figure.layers[1]._data
+    assert thin["births"].max() == 60
+    ends = "A mean ends where the first of its runs ends: 30 births (b)."
+    assert course_caption(tables, "fitness").endswith(ends)
+    assert "first of its runs" not in course_caption(courses(*THREE), "fitness")
+
+
+def test_long_runs_are_thinned_and_keep_both_ends() -> None:
+    run = ("a", "a-0", tuple(float(n) for n in range(1000)))
+    shown = figure_course(courses(run), "fitness").by_run["births"].to_pylist()
+    assert len(shown) <= 301
+    assert (shown[0], shown[-1]) == (15, 15000)
+
+
+def test_captions_name_what_is_drawn_and_of_how_many_runs() -> None:
+    text = course_caption(courses(("a", "a-0", (0.1, 0.2))), "fitness")
+    assert text == "Each line is one run (1 of a)."
+    text = course_caption(courses(*THREE, ("a", "a-0", (0.1, 0.2))), "fitness")
+    assert text.startswith("Thick lines are means over runs (1 of a, 3 of b).")
+    assert "95 % intervals of the mean of 3 or more runs" in text
+    tables = {"outcomes": table("outcomes", outcomes("b", 1, 2, 3, 4, 9))}
+    text = spread_caption(tables, FITNESS)
+    assert text.startswith("Each point is a finished run (5 of b), at 60 births. Boxes")
+    assert "Bars" not in text
+    assert "Pale shapes" not in text
+
+
+def test_file_names_say_what_is_shown() -> None:
+    stems = [one.stem for one in FIGURES]
+    assert len(set(stems)) == len(stems)
+    assert {"6.2-fitness-at-the-end", "A-connections-at-the-end"} <= set(stems)
+    tree = Figure("G-a b", "Ancestry", "", (), list, "robots", "ancestry-of-a b")
+    assert tree.stem == "G-ancestry-of-a-b"
 
 
 def test_missing_data_is_named() -> None:
-    empty = {name: table(name, []) for name in ("outcomes", "progression")}
+    names = ("outcomes", "progression", "populations")
+    empty = {name: table(name, []) for name in names}
     with pytest.raises(NothingToDraw, match="no finished run could be measured"):
         over_runs(empty, FITNESS)
     with pytest.raises(NothingToDraw, match="fitness at two numbers of births"):

@@ -140,6 +140,8 @@ def robot_picture(members: pa.Table) -> RobotPicture:
         Best("scenario1", Path("f"), 0, 5, 0.25),
         (pictures[0], pictures[1]),
         (0.0, 0.5),
+        (pictures[0], pictures[1]),
+        0.5,
         relatives,
         pictures,
         {row: BirthId(0 if row else 1, row) for row in pictures},
@@ -165,7 +167,7 @@ def test_a_tree_shows_each_ancestor_once_and_founders_on_top(
         text.get_text().split("  ")[0]: text.get_text().split("  ")[-1]
         for text in axes.texts
     }
-    assert texts["5"] == "0.250 m/s"
+    assert texts["5"] == "0.25"
     # 0 was born on another island.
     assert set(texts) == {"5", "4", "3", "1", "1:0", "founder 1", "founder 1:0"}
     by_row: dict[int, list[float]] = {}
@@ -183,6 +185,6 @@ def test_a_tree_shows_each_ancestor_once_and_founders_on_top(
 def test_gaits_are_shown_in_rows_with_times(robot_picture: RobotPicture) -> None:
     figure = gaits([robot_picture, robot_picture])
     assert len(figure.axes) == 4
-    assert figure.axes[0].get_title(loc="left") == "scenario 1, 0.250 m/s"
+    assert figure.axes[0].get_title(loc="left") == "scenario 1, fitness 0.25"
     assert figure.axes[3].get_title() == "0.5 s"
     assert shade(figure.axes[3].images[0]) == 1

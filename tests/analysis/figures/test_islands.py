@@ -77,7 +77,7 @@ def test_fitness_by_extremities_has_bars_where_three_runs_are() -> None:
         for at, low, high in zip(bars["at"], bars["low"], bars["high"], strict=True)
         if low == low and high == high  # noqa: PLR0124 - NaN is not itself
     ]
-    assert known == [pytest.approx((3.935, max(0.2 - error, 0.0), 0.2 + error))]
+    assert known == [pytest.approx((3.935, 0.2 - error, 0.2 + error))]
     points = dict(
         zip(shown["geom_point"]["at"], shown["geom_point"]["fitness"], strict=True)
     )

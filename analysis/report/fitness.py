@@ -1,0 +1,209 @@
+"""Interactive plots of fitness: over births, and of the last populations."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from analysis.figures.courses import Course, course
+from analysis.figures.forms import BAND_RUNS, NothingToDraw
+from analysis.figures.style import colours, in_order, label
+from analysis.report.html import legend
+from analysis.report.plots import Axes, band, dot, line, painted, plot, with_margin
+
+Tables = Mapping[str, pa.Table]
+Row = Mapping[str, Any]
+
+_MANY_RUNS = 40
+"""Runs from which on only the best robot of each is marked."""
+_MOST_DOTS = 3000
+_NAME = 14
+"""Characters of an experiment's name along an axis."""
+
+
+class RunName(NamedTuple):
+    """What identifies a run to a reader."""
+
+    experiment: str
+    number: int
+    seed: int
+
+    def __str__(self) -> str:
+        return f"{label(self.experiment)}, run {self.number}, seed {self.seed}"
+
+
+def run_names(runs: pa.Table) -> dict[str, RunName]:
+    """Return the names of runs by folder."""
+    rows = runs.select(["folder", "experiment", "run", "seed"]).to_pylist()
+    return {
+        row["folder"]: RunName(row["experiment"], row["run"], row["seed"])
+        for row in rows
+    }
+
+
+def fitness_over_births(tables: Tables) -> str:
+    """Return the plot of runs, their means, and robots fitter than all before.
+
+    Args:
+        tables: ``runs``, ``robots``, ``populations``, ``progression``.
+
+    Returns:
+        HTML; empty if no run has two populations.
+    """
+    try:
+        shown = course(tables, "fitness")
+    except NothingToDraw:
+        return ""
+    names = run_names(tables["runs"])
+    of_all = [name.experiment for name in names.values()]
+    paint = colours(of_all)
+    robots = _records(tables["robots"], few=len(names) >= _MANY_RUNS)
+    means = shown.mean.to_pylist()
+    sure = [row for row in means if row["runs"] >= BAND_RUNS]
+    heights = [row[end] for row in sure for end in ("low", "high")]
+    heights += shown.by_run["mean"].to_pylist() + robots["fitness"].to_pylist()
+    last = max(shown.by_run["births"].to_pylist())
+    axes = Axes((0.0, float(last)), with_margin(heights))
+    marks = [_band(axes, sure, name, paint[name]) for name in in_order(shown.sizes)]
+    marks += _runs(axes, shown, names, paint)
+    for name in in_order(shown.sizes):
+        points = [(r["births"], r["mean"]) for r in means if r["experiment"] == name]
+        text = f"{label(name)}: mean of {shown.sizes[name]} runs"
+        if len(points) > 1 and shown.sizes[name] > 1:
+            mean = line(axes, points, "mean")
+            marks.append(painted(paint[name], mean, kind="curve", text=text))
+    marks += _dots(axes, robots, names, paint)
+    drawn = plot(
+        axes,
+        marks,
+        description="Fitness over births",
+        x_text="births on each island",
+        y_text="fitness",
+    )
+    return legend(in_order(shown.sizes), of_all) + drawn
+
+
+def _records(robots: pa.Table, *, few: bool) -> pa.Table:
+    """Return the robots that are fitter than all that were born before in their run."""
+    keys = ["folder", "birth", "birth_island"]
+    born = robots.sort_by([(key, "ascending") for key in keys])
+    fitness = np.asarray(born["fitness"], np.float64)
+    folders = np.asarray(born["folder"].combine_chunks().dictionary_encode().indices)
+    starts = np.flatnonzero(np.diff(folders, prepend=-1))
+    kept = []
+    for start, end in zip(starts, [*starts[1:], len(fitness)], strict=True):
+        best = np.maximum.accumulate(fitness[start:end])
+        is_record = np.diff(best, prepend=-np.inf) > 0
+        places = start + np.flatnonzero(is_record)
+        kept += places[-1:].tolist() if few else places.tolist()
+    return born.take(pa.array(kept, pa.int64()))
+
+
+def _band(axes: Axes, rows: Sequence[Row], name: str, colour: str) -> str:
+    mine = [
+        (row["births"], row["low"], row["high"])
+        for row in rows
+        if row["experiment"] == name
+    ]
+    return painted(colour, band(axes, mine)) if len(mine) > 1 else ""
+
+
+def _runs(
+    axes: Axes, shown: Course, names: Mapping[str, RunName], paint: Mapping[str, str]
+) -> list[str]:
+    points: dict[str, list[tuple[float, float]]] = {}
+    for row in shown.by_run.to_pylist():
+        points.setdefault(row["folder"], []).append((row["births"], row["mean"]))
+    marks = []
+    for folder, mine in points.items():
+        name = names[folder]
+        births, fitness = mine[-1]
+        text = f"{name}\nmean fitness {fitness:.3g} at {births} births"
+        kind = "run" if shown.sizes[name.experiment] > 1 else "mean"
+        drawn = line(axes, mine, kind)
+        marks.append(painted(paint[name.experiment], drawn, kind="curve", text=text))
+    return marks
+
+
+def _dots(
+    axes: Axes,
+    robots: pa.Table,
+    names: Mapping[str, RunName],
+    paint: Mapping[str, str],
+) -> list[str]:
+    marks: dict[str, list[str]] = {}
+    for row in robots.to_pylist():
+        name = names[row["folder"]]
+        births = row["birth"] + 1
+        text = f"robot {row['birth_island']}:{row['birth']}, {name}\n{_described(row)}"
+        if births <= axes.x_range[1]:
+            place = axes.x(births), axes.y(row["fitness"])
+            marks.setdefault(name.experiment, []).append(dot(*place, text, 2.6))
+    return [painted(paint[name], *marks[name], kind="dots") for name in in_order(marks)]
+
+
+def _described(row: Row) -> str:
+    return (
+        f"fitness {row['fitness']:.3g}; {row['parts']} parts, "
+        f"{row['active_joints']} motors, {row['hidden']} hidden neurons"
+    )
+
+
+def last_populations(tables: Tables) -> str:
+    """Return the plot of all robots of the last populations, a column per run.
+
+    Args:
+        tables: ``runs`` and ``robots``.
+
+    Returns:
+        HTML; empty if no run has a population, or if there are too many robots.
+    """
+    living = tables["robots"].filter(pc.field("is_last"))
+    if not 0 < living.num_rows <= _MOST_DOTS:
+        return ""
+    names = run_names(tables["runs"])
+    paint = colours(name.experiment for name in names.values())
+    shown = in_order(living["experiment"].to_pylist())
+    axes = Axes((0.0, float(len(shown))), with_margin(living["fitness"].to_pylist()))
+    marks = []
+    for place, experiment in enumerate(shown):
+        mine = living.filter(pc.field("experiment") == experiment)
+        marks.append(painted(paint[experiment], *_columns(axes, mine, names, place)))
+    ticks = [
+        (place + 0.5, text if len(text) <= _NAME else f"{text[: _NAME - 1]}…")
+        for place, text in enumerate(map(label, shown))
+    ]
+    return plot(
+        axes,
+        marks,
+        description="Fitness of the last populations",
+        x_text="",
+        y_text="fitness",
+        x_names=ticks,
+    )
+
+
+def _columns(
+    axes: Axes, living: pa.Table, names: Mapping[str, RunName], place: int
+) -> list[str]:
+    """Return a column of robots for each run of an experiment, and the run's mean."""
+    by_run: dict[str, list[Row]] = {}
+    for row in living.to_pylist():
+        by_run.setdefault(row["folder"], []).append(row)
+    marks = []
+    width = 0.8 / len(by_run)
+    for at, (folder, rows) in enumerate(by_run.items()):
+        name = names[folder]
+        middle = place + 0.1 + width * (at + 0.5)
+        for count, row in enumerate(rows):
+            aside = width * 0.6 * ((count * 0.618) % 1 - 0.5)
+            text = f"robot {row['birth_island']}:{row['birth']}, {name}"
+            spot = axes.x(middle + aside), axes.y(row["fitness"])
+            marks.append(dot(*spot, f"{text}\n{_described(row)}", 2.6))
+        mean = float(np.mean([row["fitness"] for row in rows]))
+        ends = [(middle - 0.4 * width, mean), (middle + 0.4 * width, mean)]
+        text = f"{name}\nmean {mean:.3g} of {len(rows)} robots"
+        marks.append(painted("#333", line(axes, ends, "level"), text=text))
+    return marks

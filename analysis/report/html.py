@@ -1,0 +1,83 @@
+"""Pieces of HTML: tables, cells, numbers and durations."""
+
+from collections.abc import Sequence
+from html import escape
+
+from analysis.figures.style import colours, label
+
+_NUMERIC = ' class="n"'
+
+
+def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return an HTML table of cells that are HTML already; empty without rows."""
+    if not rows:
+        return ""
+    head = "".join(
+        f"<th{_NUMERIC * text.startswith(f'<td{_NUMERIC}')}>{escape(name)}</th>"
+        for name, text in zip(heads, rows[0], strict=True)
+    )
+    body = "\n".join(f"<tr>{''.join(row)}</tr>" for row in rows)
+    return (
+        f'<div class="scroll"><table><thead><tr>{head}</tr></thead>\n'
+        f"<tbody>\n{body}\n</tbody></table></div>"
+    )
+
+
+def cell(value: object) -> str:
+    """Return a table cell; numbers are right-aligned, with 3 significant digits."""
+    if isinstance(value, bool | str):
+        return f"<td>{escape(str(value))}</td>"
+    return f"<td{_NUMERIC}>{number(value)}</td>"
+
+
+def number(value: object) -> str:
+    """Return a number as HTML, floats with 3 significant digits; a dash for None."""
+    if value is None:
+        return "–"
+    text = f"{value:.3g}" if isinstance(value, float) else str(value)
+    return text.replace("-", "&minus;")
+
+
+def duration(seconds: float | None) -> str:
+    """Return a duration as text, for example ``4 min 10 s``."""
+    if seconds is None:
+        return "–"
+    if seconds < 60:  # noqa: PLR2004 - seconds of a minute
+        return f"{seconds:.0f} s" if seconds >= 1 else f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s"
+
+
+def folded(title: str, content: str, *, is_open: bool = False) -> str:
+    """Return content that a click on its title shows; empty without content.
+
+    Args:
+        title: text.
+        content: HTML.
+        is_open: whether it is shown from the start.
+    """
+    start = "<details open>" if is_open else "<details>"
+    return f"{start}<summary>{escape(title)}</summary>{content}</details>" * bool(
+        content
+    )
+
+
+def plural(count: int, noun: str) -> str:
+    """Return a number and a noun, for example ``3 runs``."""
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def legend(experiments: Sequence[str], of_all: Sequence[str]) -> str:
+    """Return the names of experiments beside their colours.
+
+    Args:
+        experiments: those to show.
+        of_all: all experiments of the report, which determine the colours.
+    """
+    paint = colours(of_all)
+    marks = "".join(
+        f'<span><i style="background:{paint[name]}"></i>{escape(label(name))}</span>'
+        for name in experiments
+    )
+    return f'<p class="legend">{marks}</p>'

@@ -1,0 +1,251 @@
+"""The report: one self-contained HTML file, without links to the network."""
+
+import base64
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import datetime
+from html import escape
+from importlib.resources import files
+
+import pyarrow as pa
+from PIL import Image
+
+from analysis.figures.catalogue import DrawnFigure, Section
+from analysis.figures.figure_writer import GAITS, Drawings, Film
+from analysis.figures.style import in_order, label
+from analysis.measures.outputs import OUTPUTS
+from analysis.report.fitness import fitness_over_births, last_populations, run_names
+from analysis.report.html import cell, folded, number, plural, table
+from analysis.report.overview import (
+    all_differences,
+    all_runs,
+    differences,
+    speed,
+    summary,
+)
+from analysis.report.thesis import findings
+
+_SHOWN_PIXELS = 1400
+"""Width of figures in the report; their files are wider."""
+
+Tables = Mapping[str, pa.Table]
+
+
+def report(
+    tables: Tables,
+    drawings: Drawings,
+    command: str,
+    when: datetime,
+    versions: Mapping[str, str],
+) -> str:
+    """Return the report as HTML.
+
+    Args:
+        tables: by the names of ``outputs``; ``left_out`` contains figures, too.
+        drawings: figures and films.
+        command: the command that made the report.
+        when: its time, UTC.
+        versions: versions of the software.
+    """
+    runs = tables["runs"].to_pylist()
+    names = [label(name) for name in in_order(row["experiment"] for row in runs)]
+    title = f"Revolve Islands: {', '.join(names)}" if names else "Revolve Islands"
+    births = sum(row["births"] for row in runs)
+    lead = (
+        f"{plural(len(runs), 'run')}, {plural(births, 'birth')}; "
+        f"written {when:%Y-%m-%d %H:%M} UTC"
+    )
+    sections = {
+        key: (head, content)
+        for key, (head, content) in _sections(
+            tables, drawings, command, versions
+        ).items()
+        if content
+    }
+    links = "".join(
+        f'<li><a href="#{key}">{head}</a></li>' for key, (head, _) in sections.items()
+    )
+    body = "\n".join(
+        f'<section><h2 id="{key}">{head}</h2>\n{content}</section>'
+        for key, (head, content) in sections.items()
+    )
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>{_file('page.css')}</style>\n"
+        f'</head>\n<body>\n<div id="page">\n<header><h1>{escape(title)}</h1>'
+        f'<p class="lead">{escape(lead)}</p></header>\n<nav aria-label="Contents">'
+        f"<ul>{links}</ul></nav>\n<main>\n{body}\n</main>\n</div>\n"
+        f"<script>{_file('page.js')}</script>\n</body>\n</html>\n"
+    )
+
+
+def _file(name: str) -> str:
+    return files("analysis.report").joinpath(name).read_text("utf-8")
+
+
+def _sections(
+    tables: Tables, drawings: Drawings, command: str, versions: Mapping[str, str]
+) -> dict[str, tuple[str, str]]:
+    """Return heading and content of all sections by anchor, empty ones included."""
+    courses, last = fitness_over_births(tables), last_populations(tables)
+    plots = {"6.3": courses, "6.2": last}
+    by_number = {one.figure.number: one for one in drawings.figures}
+
+    def shown(section: Section) -> str:
+        return _figures(
+            one
+            for one in drawings.figures
+            if one.figure.section == section and not plots.get(one.figure.number)
+        )
+
+    return {
+        "overview": ("Overview", _overview(tables, courses, by_number.get("6.3"))),
+        "robots": ("Best robots", _films(tables, drawings) + shown("robots")),
+        "fitness": ("Fitness", _last(last, by_number.get("6.2")) + shown("fitness")),
+        "comparison": ("Comparison", all_differences(tables)),
+        "bodies": ("Bodies", shown("bodies")),
+        "diversity": ("Diversity and ancestry", shown("diversity")),
+        "islands": ("Islands and arenas", shown("islands")),
+        "measures": ("Measures of the experiments", shown("measures")),
+        "speed": ("Speed", speed(tables) + shown("speed")),
+        "thesis": ("Findings of the thesis", _thesis(tables) + shown("thesis")),
+        "runs": ("Runs", folded("All runs", all_runs(tables))),
+        "left-out": ("Left out", _left_out(tables["left_out"].to_pylist())),
+        "tables": ("Tables", folded("Files and columns", _contents(tables))),
+        "made": ("How this was made", _provenance(command, versions)),
+    }
+
+
+def _overview(tables: Tables, courses: str, drawn: DrawnFigure | None) -> str:
+    if courses:
+        text = (
+            "Thick lines are means over the runs of an experiment, as far as all its "
+            "runs reach; bands are 95 % intervals of the mean of three or more runs. "
+            "Thin lines are the mean fitness of single runs. Dots are robots that were "
+            "fitter than all robots born before them in their run."
+        )
+        courses = _plotted("6.3", "Fitness over births", courses, text, drawn)
+    compared = f"<div>{text}</div>" if (text := differences(tables)) else ""
+    both = f'<div class="duo">{courses}{compared}</div>' if courses or compared else ""
+    return summary(tables) + both
+
+
+def _last(plot: str, drawn: DrawnFigure | None) -> str:
+    if not plot:
+        return ""
+    text = (
+        "Each dot is a robot of a last population, each column of dots a run; short "
+        "bars are the means of runs."
+    )
+    return _plotted("6.2", "Fitness of the last populations", plot, text, drawn)
+
+
+def _plotted(
+    number: str, title: str, plot: str, text: str, drawn: DrawnFigure | None
+) -> str:
+    """Return an interactive plot in place of a figure, with the figure's file."""
+    files_of = f" {_file_of(drawn)}" if drawn else ""
+    return (
+        f'<figure id="figure-{number}">{plot}<figcaption><b>{title}.</b> '
+        f"{text} A pointer on a mark shows run, seed and robot.{files_of}"
+        "</figcaption></figure>"
+    )
+
+
+def _films(tables: Tables, drawings: Drawings) -> str:
+    names = run_names(tables["runs"])
+    shown = "".join(
+        _film(one, str(names[str(one.best.folder)])) for one in drawings.films
+    )
+    reasons = "".join(
+        f"<p>{escape(label(name))}: no moving picture: {escape(why)}</p>"
+        for name, why in drawings.no_films.items()
+    )
+    return (f'<div class="films">{shown}</div>' if shown else "") + reasons
+
+
+def _film(one: Film, run: str) -> str:
+    best = one.best
+    data = base64.b64encode(one.path.read_bytes()).decode()
+    name = f"Robot {best.birth_island}:{best.birth} of {run}"
+    return (
+        f'<figure><img alt="{escape(name)}" src="data:image/gif;base64,{data}">'
+        f"<figcaption><b>{escape(label(best.experiment))}: fitness "
+        f"{number(best.fitness)}.</b> {escape(name)}, three seconds from the middle of "
+        f"its evaluation. File: <code>figures/{escape(one.path.name)}</code>."
+        "</figcaption></figure>"
+    )
+
+
+def _thesis(tables: Tables) -> str:
+    return findings(tables["findings"].to_pylist())
+
+
+def _figures(figures: Iterable[DrawnFigure]) -> str:
+    content = "".join(map(_figure, figures))
+    return f'<div class="figures">{content}</div>' if content else ""
+
+
+def _figure(drawn: DrawnFigure) -> str:
+    one = drawn.figure
+    name = f"{one.title}."
+    wide = ' class="wide"' * (one.number == GAITS)
+    return (
+        f'<figure id="figure-{escape(one.number)}"{wide}>'
+        f'<img loading="lazy" alt="{escape(name)}" src="{_embedded(drawn)}">'
+        f"<figcaption><b>{escape(name)}</b> {escape(drawn.caption)} {_file_of(drawn)}"
+        "</figcaption></figure>"
+    )
+
+
+def _file_of(drawn: DrawnFigure) -> str:
+    one = drawn.figure
+    thesis = f"figure {one.number} of the thesis; " * one.number[0].isdigit()
+    text = f"{thesis}file <code>figures/{escape(drawn.picture.stem)}.pdf</code>, .png"
+    sources = ", ".join(map(_source, one.source))
+    return f"{text[0].upper()}{text[1:]}; source: {sources}."
+
+
+def _embedded(drawn: DrawnFigure) -> str:
+    """Return a figure as a data URL: narrower than its file, as WebP."""
+    with Image.open(drawn.picture) as picture:
+        high = round(picture.height * min(1.0, _SHOWN_PIXELS / picture.width))
+        size = (min(_SHOWN_PIXELS, picture.width), high)
+        small = picture.convert("RGB").resize(size, Image.Resampling.LANCZOS)
+    stored = io.BytesIO()
+    is_photo = drawn.figure.section == "robots"
+    small.save(stored, "WEBP", lossless=not is_photo, quality=80, method=2)
+    return f"data:image/webp;base64,{base64.b64encode(stored.getvalue()).decode()}"
+
+
+def _source(name: str) -> str:
+    """Return a source; the name of a table of measures is set as code."""
+    text = escape(name)
+    return f"<code>{text}</code>" if name in OUTPUTS else text
+
+
+def _left_out(rows: Sequence[Mapping[str, object]]) -> str:
+    lines = [[cell(row[name]) for name in ("what", "folder", "why")] for row in rows]
+    content = table(("what", "run or file", "why"), lines)
+    is_data = any(row["folder"] for row in rows)
+    title = f"{plural(len(rows), 'item')} and why"
+    return folded(title, content, is_open=is_data)
+
+
+def _contents(tables: Tables) -> str:
+    rows = [
+        [
+            f"<td><code>measures/{name}.parquet</code></td>",
+            cell(tables[name].num_rows),
+            cell(", ".join(OUTPUTS[name])),
+        ]
+        for name in OUTPUTS
+        if name in tables
+    ]
+    return table(("file", "rows", "columns"), rows)
+
+
+def _provenance(command: str, versions: Mapping[str, str]) -> str:
+    rows = [[cell(name), cell(text)] for name, text in versions.items()]
+    return f"<pre>{escape(command)}</pre>" + table(("software", "version"), rows)

@@ -1,0 +1,53 @@
+"""Section of the thesis's findings."""
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+from analysis.report.html import cell, folded, table
+
+_HEADS = ("figure", "finding", "expected", "runs", "mean a", "mean b", "effect",
+          "low", "high", "q", "verdict", "why")  # fmt: skip
+_NOTE = (
+    "The unit is the run. The effect is Cliff's delta of a over b with its 95 % "
+    "interval, or the rank-biserial correlation where one experiment is compared "
+    "with a number. q is the p value, corrected for all tests of the table."
+)
+
+
+def findings(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return the tests of the findings; folded if none could be tested.
+
+    Args:
+        rows: of the table ``findings``.
+    """
+    if not rows:
+        return ""
+    verdicts = [str(row["verdict"]) for row in rows]
+    counts = ", ".join(
+        f"{verdicts.count(verdict)} {verdict}"
+        for verdict in ("reproduced", "not reproduced", "undecided")
+    )
+    is_tested = any(row["runs_a"] is not None for row in rows)
+    about = (
+        f"{counts}."
+        if is_tested
+        else f"None of the {len(rows)} findings can be tested: they are about "
+        "experiments of the thesis (scenario1 and others), two finished runs of each."
+    )
+    note = f'<p class="note">{escape(_NOTE)}</p>'
+    content = note + table(_HEADS, [_line(row) for row in rows])
+    title = f"All {len(rows)} findings"
+    return f"<p><b>{escape(about)}</b></p>" + folded(title, content, is_open=is_tested)
+
+
+def _line(row: Mapping[str, Any]) -> list[str]:
+    verdict = str(row["verdict"])
+    kind = verdict.split(maxsplit=1)[0]
+    badge = f'<span class="v {kind}">{escape(verdict)}</span>'
+    counts = (row["runs_a"], row["runs_b"])
+    counted = " / ".join(str(count) for count in counts if count is not None)
+    cells = [row[name] for name in ("figure", "claim", "expected")]
+    numbers = ("mean_a", "mean_b", "effect", "effect_low", "effect_high", "q")
+    cells += [counted or "–", *(row[name] for name in numbers)]
+    return [*map(cell, cells), f"<td>{badge}</td>", cell(row["why"])]
