@@ -38,6 +38,7 @@ def _run(page: Path, folder: Path, *numbers: str) -> None:
     assert int(done.stdout.split()[-2]) >= 2
 
 
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize(
     ("name", "births"), [("04-part", "150=20"), ("07-tables", "60=20")]
 )
